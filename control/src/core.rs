@@ -1,0 +1,80 @@
+//! What every core is: a function of (time, inputs, its state).
+
+use backdrive_msgs::{Gains, Sample};
+
+/// The step that is being done.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Tick {
+    /// Number of the step, from 0.
+    pub step: u64,
+    /// Time since the start of the graph, s: `step * period_s`.
+    pub time_s: f64,
+    /// 1 / rate, s.
+    pub period_s: f64,
+}
+
+/// What an input port holds at a step.
+#[derive(Debug, Clone, Copy)]
+pub struct Port {
+    /// The newest sample that the port's delay lets through; `None` before the first.
+    pub sample: Option<Sample>,
+    /// Steps since the sample that should be here: 0 when it is, and counting up from the start of
+    /// the graph while there is none.
+    pub age_steps: u64,
+}
+
+impl Port {
+    /// A port on which nothing has arrived yet.
+    pub const EMPTY: Port = Port { sample: None, age_steps: 0 };
+}
+
+/// Collects what happened in a step. It never allocates; what does not fit is counted.
+#[derive(Debug)]
+pub struct Events {
+    list: [(&'static str, f64, u32); 8],
+    len: usize,
+    /// Events that did not fit.
+    pub dropped: u64,
+}
+
+impl Default for Events {
+    fn default() -> Events {
+        Events { list: [("", 0.0, 0); 8], len: 0, dropped: 0 }
+    }
+}
+
+impl Events {
+    /// Notes an event: its machine-readable name, a number that belongs to it (or
+    /// [`backdrive_msgs::NOT_MEASURED`]), and its severity, 0 info, 1 warning, 2 error.
+    pub fn push(&mut self, kind: &'static str, value: f64, severity: u32) {
+        match self.list.get_mut(self.len) {
+            Some(slot) => {
+                *slot = (kind, value, severity);
+                self.len += 1;
+            }
+            None => self.dropped += 1,
+        }
+    }
+
+    /// Takes all of them out.
+    pub fn drain(&mut self) -> impl Iterator<Item = (&'static str, f64, u32)> + '_ {
+        let len = std::mem::take(&mut self.len);
+        self.list[..len].iter().copied()
+    }
+}
+
+/// A core: stepped once per tick, in order of step.
+pub trait Core: Send {
+    /// Does one step. `inputs` and `outputs` are in the order in which the node kind lists its ports;
+    /// each output comes in as [`Sample::new`] of its axes and is sent as it is left (the runner fills
+    /// step, sequence, stamp and source).
+    fn step(&mut self, tick: &Tick, inputs: &[Port], outputs: &mut [Sample], events: &mut Events);
+
+    /// New gains are wanted from now on. Most cores have none.
+    fn set_gains(&mut self, _gains: &Gains) {}
+
+    /// The gains now in force, if the core has any: (mu, lambda).
+    fn gains(&self) -> Option<(f64, f64)> {
+        None
+    }
+}
