@@ -1,1 +1,38 @@
-//! placeholder
+//! Bags: MCAP files in which every message of a run is, and that any ROS 2 tool opens.
+//!
+//! [`Recorder`] writes one while a graph runs, on a thread of its own; [`Reader`] reads one, whoever
+//! wrote it and however it ended. Around them: [`info()`] sums a bag up, [`recover()`] saves what a killed
+//! recorder left behind, [`diff()`] compares two bags, [`signals()`] picks the columns of a recording,
+//! [`export_csv`] and [`import_csv`] cross over to tables, and [`play()`] sends a bag's messages again.
+//!
+//! Payloads are CDR with ros2msg schemas whatever the live transport was; the graph, the models and a
+//! verdict on completeness are in the file.
+
+mod cdr;
+mod completeness;
+mod diff;
+mod error;
+mod framing;
+mod header;
+mod info;
+mod order;
+mod play;
+mod reader;
+mod recorder;
+mod recover;
+mod signals;
+mod table;
+mod writer;
+
+pub use cdr::{FieldPath, Schema};
+pub use completeness::{Completeness, TopicCompleteness};
+pub use diff::{DiffOptions, DiffReport, Divergence, TopicDiff, diff};
+pub use error::BagError;
+pub use header::{BagHeader, Clock, TopicInfo};
+pub use info::{BagInfo, TopicSummary, info};
+pub use play::{PlayOptions, PlayReport, Sink, play};
+pub use reader::{Entry, Messages, Reader, TopicRef};
+pub use recorder::{Health, Recorder, RecorderOptions, WhenFull};
+pub use recover::{RecoverReport, recover};
+pub use signals::{Alignment, Signal, Signals, recording, signals};
+pub use table::{ColumnMap, ImportOptions, ImportReport, Quantity, export_csv, import_csv};

@@ -1,3 +1,12 @@
 //! Pure cores: what the nodes of a graph compute, without clock, I/O or allocation while stepping.
 
+pub mod canceller;
 pub mod core;
+pub mod device;
+pub mod exciter;
+pub mod freshness;
+pub mod guard;
+pub mod master;
+pub mod operator;
+pub mod scaling;
+pub mod slave;

@@ -1,1 +1,37 @@
-//! placeholder
+//! Runs a graph: starts one process per node, watches them, shows how they do, restarts or stops them,
+//! and leaves nothing behind.
+//!
+//! - [`plan`]: what the supervisor needs to know of a graph
+//! - [`rundir`]: the directory of a run; [`sweep`]: removing what dead runs have left
+//! - `child`: one process, heard and ended; `slot`: the place of a node in a run, over all its lives
+//! - [`supervise`]: starting and ending a run; `watch`: what happens between
+//! - [`status`], `screen`: what a person sees meanwhile
+//! - [`report`]: what is known afterwards
+//!
+//! A run is three things on the machine: its directory, the files `/dev/shm/bd<id>_*`, and its processes.
+//! The supervisor holds a lock in the directory for as long as it lives. A run whose lock is free is dead,
+//! and whoever starts next removes it.
+
+mod child;
+mod error;
+pub mod join;
+mod pace;
+pub mod plan;
+pub mod report;
+pub mod rundir;
+mod screen;
+mod signals;
+mod slot;
+pub mod status;
+pub mod supervise;
+pub mod sweep;
+mod tell;
+mod watch;
+
+pub use error::LaunchError;
+pub use plan::{NodePlan, Plan};
+pub use report::{Cause, Death, NodeReport, RunEvent, RunReport};
+pub use rundir::{RunDir, RunHome, RunPaths};
+pub use screen::Display;
+pub use supervise::{Command, OnDeath, SuperviseOptions, run, supervise, supervise_plan};
+pub use sweep::{Swept, SweptRun};

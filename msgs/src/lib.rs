@@ -206,3 +206,66 @@ pub enum Message {
     /// A node's health.
     Status(Status),
 }
+
+/// A message of a layout that this program does not speak.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("message layout {found} is not {LAYOUT}: every program of a graph must be built from the same version")]
+pub struct WrongLayout {
+    /// Layout version of the sender.
+    pub found: u32,
+}
+
+/// Refuses what was sent with another layout version than [`LAYOUT`].
+pub fn check_layout(layout: u32) -> Result<(), WrongLayout> {
+    if layout == LAYOUT { Ok(()) } else { Err(WrongLayout { found: layout }) }
+}
+
+impl Message {
+    /// What kind of topic carries it.
+    pub fn kind(&self) -> topic::Kind {
+        match self {
+            Message::Sample(_) => topic::Kind::Sample,
+            Message::Gains(_) => topic::Kind::Gains,
+            Message::Event(_) => topic::Kind::Event,
+            Message::Status(_) => topic::Kind::Status,
+        }
+    }
+
+    /// Layout version of the sender.
+    pub fn layout(&self) -> u32 {
+        each!(self, message => message.layout)
+    }
+
+    /// [`source_id`] of the sender.
+    pub fn source(&self) -> u32 {
+        each!(self, message => message.source)
+    }
+
+    /// Step of the loop that it belongs to.
+    pub fn step(&self) -> u64 {
+        each!(self, message => message.step)
+    }
+
+    /// Its count on its topic, from 0.
+    pub fn sequence(&self) -> u64 {
+        each!(self, message => message.sequence)
+    }
+
+    /// As [`Sample::stamp_ns`].
+    pub fn stamp_ns(&self) -> i64 {
+        each!(self, message => message.stamp_ns)
+    }
+}
+
+/// The same expression for whichever message it is.
+macro_rules! each {
+    ($any:expr, $message:ident => $value:expr) => {
+        match $any {
+            Message::Sample($message) => $value,
+            Message::Gains($message) => $value,
+            Message::Event($message) => $value,
+            Message::Status($message) => $value,
+        }
+    };
+}
+use each;

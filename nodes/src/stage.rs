@@ -4,6 +4,10 @@ use backdrive_control::core::Core;
 use backdrive_msgs::topic::Topic;
 use serde::{Deserialize, Serialize};
 
+/// Name of an input port that only holds its stage back, such as a source's in lockstep: its delay is how
+/// far the stage may be ahead. The core does not see it, and where all stages run in one thread it is not needed.
+pub const PACE_PORT: &str = "pace";
+
 /// How time runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, Default)]
 #[serde(rename_all = "lowercase")]

@@ -3,5 +3,16 @@
 //! A [`model::Model`] is what a model file says. It compiles to a stepper, is linearised, is driven
 //! by a recording or an excitation, and takes fragments (a grip, an environment) at a port.
 
+pub mod describe;
 pub mod elements;
+pub mod excitation;
+pub mod fragment;
+pub mod isolate;
+pub mod linear;
 pub mod model;
+pub mod parse;
+pub mod recording;
+pub mod set;
+pub mod stepper;
+pub mod tomlfile;
+pub mod write;

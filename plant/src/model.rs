@@ -144,6 +144,8 @@ pub struct Axis {
     pub name: String,
     /// The body that a grip or an environment attaches to.
     pub user: usize,
+    /// Whether the model already holds the user's hand (a master fitted as held), so that no grip is attached.
+    pub holds_user: bool,
     /// Index of the input that carries the reflected force (of a slave: the command).
     pub feedback: usize,
     /// Index of the output that is the measured position.

@@ -1,6 +1,6 @@
 //! Linear spring.
 
-use super::{Kind, Law, Parameter, Range};
+use super::{Kind, Law, Linear, Mechanics, Parameter, Range, Role};
 
 /// `f = stiffness (x - rest)`.
 #[derive(Debug, Clone, PartialEq)]
@@ -18,20 +18,19 @@ impl Spring {
         source: "Hooke",
         energy: "stores, creates none",
         parameters: &[
-            Parameter {
-                key: "stiffness",
-                unit: "N/m",
-                range: Range::Any,
-                default: None,
-                list: false,
-                doc: "k; negative for an over-centre mechanism",
-            },
-            Parameter { key: "rest", unit: "m", range: Range::Any, default: Some(0.0), list: false, doc: "displacement without force" },
+            Parameter::number("stiffness", "N/m", Range::Any, "k; negative for an over-centre mechanism"),
+            Parameter::number("rest", "m", Range::Any, "displacement without force").or(0.0),
         ],
         build: |v| Ok(Law::Spring(Spring { stiffness: v[0][0], rest: v[1][0] })),
     };
 
     pub(super) fn values(&self) -> Vec<Vec<f64>> {
         vec![vec![self.stiffness], vec![self.rest]]
+    }
+}
+
+impl Mechanics for Spring {
+    fn role(&self) -> Role {
+        Role::Linear(Linear { stiffness: self.stiffness, force: -self.stiffness * self.rest, ..Linear::default() })
     }
 }

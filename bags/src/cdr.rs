@@ -1,0 +1,432 @@
+//! Reads a number out of any ROS 2 message by the path of its field, guided by the schema in the bag.
+
+use std::collections::HashMap;
+
+/// A ROS 2 message definition with everything that it refers to.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Schema {
+    types: Vec<Vec<Field>>,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+struct Field {
+    name: String,
+    of: Type,
+    count: Count,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Type {
+    Bool,
+    Unsigned(u8),
+    Signed(u8),
+    Float(u8),
+    Text,
+    WideText,
+    /// Index into [`Schema::types`].
+    Message(usize),
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Count {
+    One,
+    Array(usize),
+    Sequence,
+}
+
+/// Where a number stands in a message: `effort[0]`, `wrench.force.x`, `header.stamp` (a time, in s).
+#[derive(Debug, Clone, PartialEq)]
+pub struct FieldPath {
+    text: String,
+    /// Place of the field in its type, and index into it if it is a list.
+    steps: Vec<(usize, Option<usize>)>,
+    is_time: bool,
+}
+
+/// Nesting beyond this is a definition that contains itself.
+const MOST_NESTED: usize = 16;
+
+/// Most numbers that [`Schema::numbers`] lists.
+const MOST_NUMBERS: usize = 256;
+
+impl Schema {
+    /// Reads a ros2msg schema: the definition of `type_name`, then its dependencies behind lines of `=`.
+    ///
+    /// Errors: a sentence that names the line.
+    pub fn parse(type_name: &str, text: &str) -> Result<Schema, String> {
+        let mut sections: Vec<(String, Vec<&str>)> = vec![(short(type_name), Vec::new())];
+        for line in text.lines() {
+            let line = line.trim();
+            if line.len() >= 3 && line.bytes().all(|byte| byte == b'=') {
+                sections.push((String::new(), Vec::new()));
+            } else if let Some((name, lines)) = sections.last_mut() {
+                match line.strip_prefix("MSG:") {
+                    Some(found) if name.is_empty() => *name = short(found.trim()),
+                    _ => lines.push(line),
+                }
+            }
+        }
+        let places: HashMap<&str, usize> = sections.iter().enumerate().rev().map(|(index, (name, _))| (name.as_str(), index)).collect();
+        let types = sections.iter().map(|(name, lines)| fields(name, lines, &places)).collect::<Result<_, _>>()?;
+        Ok(Schema { types })
+    }
+
+    /// Finds a field by its path.
+    ///
+    /// Errors: a sentence that says what there is instead.
+    pub fn find(&self, path: &str) -> Result<FieldPath, String> {
+        let (mut at, mut steps) = (0, Vec::new());
+        let mut parts = path.split('.').peekable();
+        while let Some(part) = parts.next() {
+            let (name, index) = match part.strip_suffix(']').and_then(|part| part.split_once('[')) {
+                Some((name, index)) => (name, Some(index.parse().map_err(|_| format!("{index:?} is not an index"))?)),
+                None => (part, None),
+            };
+            let fields = &self.types[at];
+            let place = fields.iter().position(|field| field.name == name).ok_or_else(|| {
+                let names: Vec<&str> = fields.iter().map(|field| field.name.as_str()).collect();
+                format!("there is no {name:?}; there is {}", names.join(", "))
+            })?;
+            let field = &fields[place];
+            match (field.count, index) {
+                (Count::One, Some(_)) => return Err(format!("{name:?} is not a list")),
+                (Count::Array(_) | Count::Sequence, None) => return Err(format!("{name:?} is a list: say which, as in {name}[0]")),
+                (Count::Array(len), Some(index)) if index >= len => return Err(format!("{name:?} has {len} entries")),
+                _ => steps.push((place, index)),
+            }
+            match (field.of, parts.peek().is_some()) {
+                (Type::Message(inner), true) => at = inner,
+                (Type::Message(inner), false) if self.is_time(inner) => {
+                    return Ok(FieldPath { text: path.to_owned(), steps, is_time: true });
+                }
+                (Type::Message(inner), false) => {
+                    let names: Vec<&str> = self.types[inner].iter().map(|field| field.name.as_str()).collect();
+                    return Err(format!("{name:?} is not a number; it has {}", names.join(", ")));
+                }
+                (Type::Text | Type::WideText, _) => return Err(format!("{name:?} is text")),
+                (_, true) => return Err(format!("{name:?} is a number and has no fields")),
+                (_, false) => return Ok(FieldPath { text: path.to_owned(), steps, is_time: false }),
+            }
+        }
+        Err("the path is empty".to_owned())
+    }
+
+    /// Paths of all numbers in a message like this one, at most 256: lists have the length that they have in it.
+    pub fn numbers(&self, payload: &[u8]) -> Result<Vec<String>, String> {
+        let mut found = Vec::new();
+        let mut cdr = Cdr::new(payload)?;
+        self.list(&mut cdr, 0, "", &mut found, 0)?;
+        Ok(found)
+    }
+
+    /// Reads a number; `None` when the list it stands in is shorter in this message.
+    ///
+    /// Integers beyond 2⁵³ are rounded. A time is in s. Errors: a sentence, the message ends early.
+    pub fn read(&self, path: &FieldPath, payload: &[u8]) -> Result<Option<f64>, String> {
+        let mut cdr = Cdr::new(payload)?;
+        let mut at = 0;
+        for (depth, (place, index)) in path.steps.iter().enumerate() {
+            let fields = self.types.get(at).ok_or("the path is of another schema")?;
+            for field in fields.get(..*place).ok_or("the path is of another schema")? {
+                self.skip_field(&mut cdr, field, 0)?;
+            }
+            let field = fields.get(*place).ok_or("the path is of another schema")?;
+            let len = cdr.count(field.count)?;
+            if let Some(index) = index {
+                if *index >= len {
+                    return Ok(None);
+                }
+                self.skip(&mut cdr, field.of, *index, 0)?;
+            }
+            match field.of {
+                Type::Message(inner) if depth + 1 < path.steps.len() => at = inner,
+                Type::Message(_) if path.is_time => {
+                    let (sec, nanosec) = (cdr.signed(4)?, cdr.unsigned(4)?);
+                    return Ok(Some(sec as f64 + nanosec as f64 * 1e-9));
+                }
+                of => return cdr.number(of).map(Some),
+            }
+        }
+        Err("the path is empty".to_owned())
+    }
+
+    fn is_time(&self, index: usize) -> bool {
+        let names: Vec<(&str, Type)> = self.types[index].iter().map(|field| (field.name.as_str(), field.of)).collect();
+        names == [("sec", Type::Signed(4)), ("nanosec", Type::Unsigned(4))]
+    }
+
+    fn list(&self, cdr: &mut Cdr, of: usize, prefix: &str, found: &mut Vec<String>, nested: usize) -> Result<(), String> {
+        if nested > MOST_NESTED {
+            return Err("the definition contains itself".to_owned());
+        }
+        for field in &self.types[of] {
+            let len = cdr.count(field.count)?;
+            for index in 0..len {
+                if found.len() >= MOST_NUMBERS {
+                    return Ok(());
+                }
+                let name =
+                    if field.count == Count::One { format!("{prefix}{}", field.name) } else { format!("{prefix}{}[{index}]", field.name) };
+                match field.of {
+                    Type::Message(inner) => self.list(cdr, inner, &format!("{name}."), found, nested + 1)?,
+                    Type::Text | Type::WideText => self.skip(cdr, field.of, 1, nested)?,
+                    of => {
+                        cdr.number(of)?;
+                        found.push(name);
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn skip_field(&self, cdr: &mut Cdr, field: &Field, nested: usize) -> Result<(), String> {
+        let len = cdr.count(field.count)?;
+        self.skip(cdr, field.of, len, nested)
+    }
+
+    fn skip(&self, cdr: &mut Cdr, of: Type, times: usize, nested: usize) -> Result<(), String> {
+        if nested > MOST_NESTED {
+            return Err("the definition contains itself".to_owned());
+        }
+        match of {
+            Type::Message(inner) => {
+                // A type of no size must not be skipped four thousand million times because a damaged length says so.
+                let fields = &self.types[inner];
+                let times = if fields.is_empty() { 0 } else { times };
+                for _ in 0..times {
+                    let before = cdr.at;
+                    for field in fields {
+                        self.skip_field(cdr, field, nested + 1)?;
+                    }
+                    if cdr.at == before {
+                        break;
+                    }
+                }
+                Ok(())
+            }
+            Type::Text => (0..times).try_for_each(|_| {
+                let len = cdr.unsigned(4)? as usize;
+                cdr.take(len).map(|_| ())
+            }),
+            Type::WideText => (0..times).try_for_each(|_| {
+                let len = cdr.unsigned(4)? as usize;
+                cdr.take(len.saturating_mul(2)).map(|_| ())
+            }),
+            Type::Bool => cdr.take(times).map(|_| ()),
+            Type::Unsigned(size) | Type::Signed(size) | Type::Float(size) => {
+                if times > 0 {
+                    cdr.align(size.into());
+                    cdr.take(times.saturating_mul(size.into()))?;
+                }
+                Ok(())
+            }
+        }
+    }
+}
+
+impl std::fmt::Display for FieldPath {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(&self.text)
+    }
+}
+
+/// `std_msgs/msg/Header` and `std_msgs/Header` are the same.
+fn short(name: &str) -> String {
+    name.replace("/msg/", "/")
+}
+
+fn fields(of: &str, lines: &[&str], places: &HashMap<&str, usize>) -> Result<Vec<Field>, String> {
+    let mut fields = Vec::new();
+    for line in lines {
+        let line = line.split('#').next().unwrap_or("").trim();
+        let Some((type_text, rest)) = line.split_once(char::is_whitespace) else {
+            if line.is_empty() {
+                continue;
+            }
+            return Err(format!("schema of {of}: {line:?} is not a field"));
+        };
+        let rest = rest.trim_start();
+        let name_end = rest.find(|c: char| !c.is_ascii_alphanumeric() && c != '_').unwrap_or(rest.len());
+        let (name, behind) = rest.split_at(name_end);
+        if behind.trim_start().starts_with('=') {
+            continue; // a constant is not on the wire
+        }
+        let (element, count) = match type_text.strip_suffix(']').and_then(|text| text.rsplit_once('[')) {
+            None => (type_text, Count::One),
+            Some((element, "")) => (element, Count::Sequence),
+            Some((element, bound)) if bound.starts_with("<=") => (element, Count::Sequence),
+            Some((element, len)) => {
+                (element, Count::Array(len.parse().map_err(|_| format!("schema of {of}: {type_text:?} is not an array"))?))
+            }
+        };
+        let element = element.split("<=").next().unwrap_or(element); // a bounded string
+        fields.push(Field { name: name.to_owned(), of: type_named(of, element, places)?, count });
+    }
+    Ok(fields)
+}
+
+fn type_named(of: &str, name: &str, places: &HashMap<&str, usize>) -> Result<Type, String> {
+    Ok(match name {
+        "bool" => Type::Bool,
+        "byte" | "char" | "uint8" => Type::Unsigned(1),
+        "uint16" => Type::Unsigned(2),
+        "uint32" => Type::Unsigned(4),
+        "uint64" => Type::Unsigned(8),
+        "int8" => Type::Signed(1),
+        "int16" => Type::Signed(2),
+        "int32" => Type::Signed(4),
+        "int64" => Type::Signed(8),
+        "float32" => Type::Float(4),
+        "float64" => Type::Float(8),
+        "string" => Type::Text,
+        "wstring" => Type::WideText,
+        name => {
+            let package = of.split('/').next().unwrap_or("");
+            let candidates = [short(name), format!("{package}/{name}"), format!("std_msgs/{name}"), format!("builtin_interfaces/{name}")];
+            let place = candidates.iter().find_map(|name| places.get(name.as_str()));
+            Type::Message(*place.ok_or_else(|| format!("schema of {of}: type {name:?} is not defined in it"))?)
+        }
+    })
+}
+
+/// A place in a CDR payload.
+struct Cdr<'a> {
+    bytes: &'a [u8],
+    at: usize,
+    big_endian: bool,
+}
+
+impl<'a> Cdr<'a> {
+    fn new(payload: &'a [u8]) -> Result<Cdr<'a>, String> {
+        match payload {
+            [0, order @ (0 | 1), _, _, bytes @ ..] => Ok(Cdr { bytes, at: 0, big_endian: *order == 0 }),
+            _ => Err(format!("payload starts with {:02x?}, not with a plain CDR header", &payload[..payload.len().min(4)])),
+        }
+    }
+
+    fn align(&mut self, to: usize) {
+        self.at = self.at.next_multiple_of(to);
+    }
+
+    fn take(&mut self, len: usize) -> Result<&'a [u8], String> {
+        let end = self.at.checked_add(len).filter(|end| *end <= self.bytes.len());
+        let end = end.ok_or_else(|| format!("payload ends at byte {} of its CDR, {len} more are due at {}", self.bytes.len(), self.at))?;
+        let taken = &self.bytes[self.at..end];
+        self.at = end;
+        Ok(taken)
+    }
+
+    fn unsigned(&mut self, size: u8) -> Result<u64, String> {
+        self.align(size.into());
+        let bytes = self.take(size.into())?;
+        let join = |value: u64, byte: &u8| value << 8 | u64::from(*byte);
+        Ok(if self.big_endian { bytes.iter().fold(0, join) } else { bytes.iter().rev().fold(0, join) })
+    }
+
+    fn signed(&mut self, size: u8) -> Result<i64, String> {
+        let unused = 64 - 8 * u32::from(size);
+        Ok((self.unsigned(size)? << unused) as i64 >> unused)
+    }
+
+    fn number(&mut self, of: Type) -> Result<f64, String> {
+        Ok(match of {
+            Type::Bool => self.unsigned(1)? as f64,
+            Type::Unsigned(size) => self.unsigned(size)? as f64,
+            Type::Signed(size) => self.signed(size)? as f64,
+            Type::Float(4) => f32::from_bits(self.unsigned(4)? as u32).into(),
+            Type::Float(_) => f64::from_bits(self.unsigned(8)?),
+            Type::Text | Type::WideText | Type::Message(_) => return Err("not a number".to_owned()),
+        })
+    }
+
+    fn count(&mut self, count: Count) -> Result<usize, String> {
+        Ok(match count {
+            Count::One => 1,
+            Count::Array(len) => len,
+            Count::Sequence => self.unsigned(4)? as usize,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use backdrive_msgs::topic::Kind;
+    use backdrive_msgs::{Message, Sample, ros};
+
+    #[test]
+    fn a_joint_state_is_read_by_name() {
+        let (name, text) = ros::schema(Kind::Sample);
+        let schema = Schema::parse(name, text).expect("it parses");
+        let mut sample = Sample::new(2);
+        (sample.stamp_ns, sample.effort[1], sample.position[0]) = (2_500_000_000, -3.25, 0.5);
+        let mut payload = Vec::new();
+        ros::encode(&Message::Sample(sample), &["a".to_owned(), "bcd".to_owned()], &mut payload).expect("it encodes");
+        let read = |path: &str| schema.read(&schema.find(path).expect(path), &payload).expect(path);
+        assert_eq!(read("effort[1]"), Some(-3.25));
+        assert_eq!(read("position[0]"), Some(0.5));
+        assert_eq!(read("velocity[0]"), None, "the list is empty");
+        assert_eq!(read("header.stamp"), Some(2.5));
+        assert_eq!(read("header.stamp.nanosec"), Some(5e8));
+        let numbers = schema.numbers(&payload).expect("they can be listed");
+        assert_eq!(numbers, ["header.stamp.sec", "header.stamp.nanosec", "position[0]", "position[1]", "effort[0]", "effort[1]"]);
+    }
+
+    #[test]
+    fn a_wrong_path_says_what_there_is() {
+        let (name, text) = ros::schema(Kind::Sample);
+        let schema = Schema::parse(name, text).expect("it parses");
+        for (path, says) in [
+            ("torque[0]", "there is header, name, position, velocity, effort"),
+            ("effort", "effort[0]"),
+            ("header", "it has stamp, frame_id"),
+            ("header.frame_id", "is text"),
+            ("effort[x]", "not an index"),
+            ("header[0].stamp", "not a list"),
+            ("effort[0].x", "has no fields"),
+        ] {
+            let error = schema.find(path).expect_err(path);
+            assert!(error.contains(says), "{path}: {error}");
+        }
+    }
+
+    #[test]
+    fn other_peoples_types_are_read() {
+        let wrench = "# This represents a wrench with reference coordinate frame and timestamp\nstd_msgs/Header header\nWrench wrench\n\
+            ================================================================================\nMSG: geometry_msgs/Wrench\n\
+            Vector3  force\nVector3  torque\n\
+            ================================================================================\nMSG: geometry_msgs/Vector3\n\
+            float64 x 0.0 # default\nfloat64 y\nfloat64 z\n\
+            ================================================================================\nMSG: std_msgs/Header\n\
+            builtin_interfaces/Time stamp\nstring frame_id\n\
+            ================================================================================\nMSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec\n";
+        let schema = Schema::parse("geometry_msgs/msg/WrenchStamped", wrench).expect("it parses");
+        // Time, text of one letter, two bytes up to a multiple of eight.
+        let mut payload = vec![0, 1, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 2, 0, 0, 0, b'b', 0, 0, 0];
+        for value in [1.0_f64, 2.0, 3.0, 4.0, 5.0, 6.0] {
+            payload.extend(value.to_le_bytes());
+        }
+        let read = |path: &str| schema.read(&schema.find(path).expect(path), &payload).expect(path);
+        assert_eq!((read("wrench.force.x"), read("wrench.torque.z")), (Some(1.0), Some(6.0)));
+        let odd = "uint8 KIND=3\nstring<=5 label \"x\"\nbool[2] flags\nint16[<=4] counts\nfloat32 last\nfloat64[] none\n";
+        let schema = Schema::parse("a/msg/Odd", odd).expect("it parses");
+        let payload = [0, 1, 0, 0, 2, 0, 0, 0, b'q', 0, 1, 0, 2, 0, 0, 0, 255, 255, 7, 0, 0, 0, 0xc0, 0x3f, 0, 0, 0, 0];
+        let read = |path: &str| schema.read(&schema.find(path).expect(path), &payload).expect(path);
+        assert_eq!(
+            (read("flags[0]"), read("flags[1]"), read("counts[0]"), read("counts[1]")),
+            (Some(1.0), Some(0.0), Some(-1.0), Some(7.0))
+        );
+        assert_eq!((read("counts[3]"), read("last"), read("none[9]")), (None, Some(1.5), None));
+        assert!(Schema::parse("a/msg/B", "Missing x\n").is_err());
+    }
+
+    #[test]
+    fn damaged_messages_are_errors() {
+        let schema = Schema::parse("a/msg/L", "string[] names\nb/Empty[] nothing\nfloat64 x\n===\nMSG: b/Empty\n").expect("it parses");
+        let path = schema.find("x").expect("it is there");
+        assert!(schema.read(&path, &[0, 1, 0, 0, 255, 255, 255, 255]).is_err());
+        assert!(schema.read(&path, &[0, 1, 0, 0, 0, 0, 0, 0, 255, 255, 255, 255]).is_err());
+        assert!(schema.read(&path, &[]).is_err());
+    }
+}

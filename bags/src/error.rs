@@ -1,0 +1,124 @@
+//! What can go wrong with a bag.
+
+use backdrive_msgs::ros::RosError;
+use std::path::{Path, PathBuf};
+
+/// What can go wrong with a bag or a table.
+#[derive(Debug, thiserror::Error)]
+pub enum BagError {
+    /// The operating system refused.
+    #[error("{}: {source}", path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// What it said.
+        source: std::io::Error,
+    },
+    /// It is something else.
+    #[error("{} is not an MCAP file: it does not start with the MCAP magic bytes", path.display())]
+    NotMcap {
+        /// The file.
+        path: PathBuf,
+    },
+    /// Bytes inside it are wrong.
+    #[error("{}, byte {offset}: {what}; `backdrive bag recover` saves what is whole", path.display())]
+    Damaged {
+        /// The file.
+        path: PathBuf,
+        /// Where the damaged record starts.
+        offset: u64,
+        /// What is wrong with it.
+        what: String,
+    },
+    /// A message does not hold what its topic says.
+    #[error("{}, byte {offset}, {topic}: {source}", path.display())]
+    Message {
+        /// The file.
+        path: PathBuf,
+        /// Where the record, or the chunk around it, starts.
+        offset: u64,
+        /// Its topic.
+        topic: String,
+        /// What is wrong with it.
+        source: RosError,
+    },
+    /// A message cannot be put into its ROS form.
+    #[error("{topic}: {source}")]
+    Encode {
+        /// Its topic.
+        topic: String,
+        /// Why.
+        source: RosError,
+    },
+    /// The bag can no longer be written, and everything pushed from now on is lost.
+    #[error("{name}: writing stopped: {what}; what was written before is kept (`backdrive bag recover`)")]
+    Write {
+        /// The file.
+        name: String,
+        /// What the writer met.
+        what: String,
+    },
+    /// What backdrive wrote about the run cannot be read.
+    #[error("{}: metadata record {record:?}, key {key:?}: {what}", path.display())]
+    Metadata {
+        /// The file.
+        path: PathBuf,
+        /// `backdrive.run` or `backdrive.completeness`.
+        record: &'static str,
+        /// The key.
+        key: &'static str,
+        /// What is wrong with it.
+        what: String,
+    },
+    /// A topic index beyond the header's list of topics.
+    #[error("topic {index} does not exist: the header lists {count}")]
+    NoSuchIndex {
+        /// What was asked for.
+        index: usize,
+        /// How many there are.
+        count: usize,
+    },
+    /// A topic that the bag does not have.
+    #[error("{} has no topic {topic}; it has {}", path.display(), available.join(", "))]
+    NoTopic {
+        /// The file.
+        path: PathBuf,
+        /// What was asked for.
+        topic: String,
+        /// What there is.
+        available: Vec<String>,
+    },
+    /// A field that a topic does not have, or that is no number.
+    #[error("{topic}: field {field:?}: {what}")]
+    Field {
+        /// The topic.
+        topic: String,
+        /// What was asked for.
+        field: String,
+        /// What is wrong, and what there is.
+        what: String,
+    },
+    /// A table cannot be read.
+    #[error("{}, line {line}: {what}", path.display())]
+    Table {
+        /// The file.
+        path: PathBuf,
+        /// Line, from 1.
+        line: u64,
+        /// What is wrong.
+        what: String,
+    },
+    /// The signals make no recording.
+    #[error(transparent)]
+    Recording(#[from] backdrive_plant::recording::RecordingError),
+    /// What was asked for makes no sense.
+    #[error("{0}")]
+    Usage(String),
+}
+
+impl BagError {
+    pub(crate) fn io(path: &Path) -> impl FnOnce(std::io::Error) -> BagError + use<> {
+        let path = path.to_owned();
+        move |source| BagError::Io { path, source }
+    }
+}

@@ -1,0 +1,211 @@
+//! A bag in one look.
+
+use crate::completeness::Tracker;
+use crate::{BagError, Reader};
+use serde::Serialize;
+use std::collections::BTreeMap;
+use std::fmt;
+use std::path::Path;
+
+/// What a bag holds. Fields that only backdrive writes are empty for other people's bags.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct BagInfo {
+    /// The file.
+    pub path: String,
+    /// Its size.
+    pub bytes: u64,
+    /// Its profile, such as `ros2`.
+    pub profile: String,
+    /// Who wrote it.
+    pub library: String,
+    /// Title of the graph.
+    pub title: Option<String>,
+    /// How time ran: `lockstep`, `realtime` or `imported`.
+    pub clock: Option<&'static str>,
+    /// Steps per second.
+    pub rate_hz: Option<f64>,
+    /// Machine.
+    pub host: Option<String>,
+    /// Program and version.
+    pub versions: BTreeMap<String, String>,
+    /// What each seed was for, and the seed.
+    pub seeds: BTreeMap<String, u64>,
+    /// Names of the models and other files in it.
+    pub files: Vec<String>,
+    /// Log time of the first message, s.
+    pub start_s: Option<f64>,
+    /// From the first to the last log time, s.
+    pub duration_s: f64,
+    /// Messages.
+    pub messages: u64,
+    /// Topic by topic.
+    pub topics: Vec<TopicSummary>,
+    /// Whether nothing is missing; unknown for other people's bags.
+    pub complete: Option<bool>,
+    /// Messages known to be missing.
+    pub lost: Option<u64>,
+    /// Whether its writer closed it. If not, `recover` makes a clean copy.
+    pub ended_cleanly: bool,
+    /// The first damage, if there is any; what stands behind it is not counted.
+    pub damage: Option<String>,
+}
+
+/// A topic of a bag.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct TopicSummary {
+    /// Name.
+    pub name: String,
+    /// ROS type.
+    pub type_name: String,
+    /// Node that speaks on it.
+    pub publisher: String,
+    /// Names of its axes.
+    pub axes: Vec<String>,
+    /// Messages.
+    pub messages: u64,
+    /// Mean rate between its first and its last message, 1/s; unknown with fewer than two.
+    pub rate_hz: Option<f64>,
+    /// Messages known to be missing; unknown for other people's messages.
+    pub lost: Option<u64>,
+}
+
+/// Reads a whole bag, checksums included, and sums it up.
+///
+/// Errors: it cannot be read or is no MCAP file. Damage inside is reported in the result.
+pub fn info(path: &Path) -> Result<BagInfo, BagError> {
+    let reader = Reader::open(path)?;
+    let count = reader.topics().len();
+    let (mut spans, mut counts) = (vec![None::<(u64, u64)>; count], vec![0_u64; count]);
+    let mut trackers: Vec<Tracker> = reader.topics().iter().map(|topic| Tracker::new(&topic.name)).collect();
+    let mut ours = vec![false; count];
+    let mut damage = reader.damage().first().cloned();
+    for entry in reader.messages()? {
+        let entry = match entry {
+            Ok(entry) => entry,
+            Err(error) => {
+                damage = damage.or(Some(error.to_string()));
+                break;
+            }
+        };
+        let (index, time) = (entry.topic.index, entry.log_time_ns);
+        counts[index] += 1;
+        spans[index] = Some(spans[index].map_or((time, time), |(first, last)| (first.min(time), last.max(time))));
+        // Without the recorder's verdict, what the sequence numbers say.
+        if reader.completeness().is_none() {
+            match entry.message(path) {
+                Ok(Some(message)) => {
+                    ours[index] = true;
+                    trackers[index].see(&message);
+                }
+                Ok(None) => {}
+                Err(error) => damage = damage.or(Some(error.to_string())),
+            }
+        }
+    }
+    let lost = |index: usize, name: &str| match reader.completeness() {
+        Some(verdict) => verdict.topics.iter().find(|topic| topic.topic == name).map(|topic| topic.lost),
+        None => ours[index].then_some(trackers[index].found.lost),
+    };
+    let topics: Vec<TopicSummary> = reader
+        .topics()
+        .iter()
+        .enumerate()
+        .map(|(index, topic)| TopicSummary {
+            name: topic.name.clone(),
+            type_name: topic.type_name.clone(),
+            publisher: reader
+                .header()
+                .and_then(|header| header.topics.iter().find(|info| info.topic.name == topic.name))
+                .map(|info| info.publisher.clone())
+                .unwrap_or_default(),
+            axes: topic.axes.clone(),
+            messages: counts[index],
+            rate_hz: spans[index]
+                .filter(|(first, last)| last > first)
+                .map(|(first, last)| (counts[index] - 1) as f64 / ((last - first) as f64 * 1e-9)),
+            lost: lost(index, &topic.name),
+        })
+        .collect();
+    let first = spans.iter().flatten().map(|span| span.0).min();
+    let last = spans.iter().flatten().map(|span| span.1).max();
+    let known: Vec<u64> = topics.iter().filter_map(|topic| topic.lost).collect();
+    let lost = (!known.is_empty()).then(|| known.iter().sum());
+    let complete = match reader.completeness() {
+        Some(verdict) => Some(verdict.is_complete() && damage.is_none()),
+        None if reader.header().is_some() => Some(false), // the recorder did not come to its end
+        None => None,
+    };
+    let header = reader.header().cloned();
+    let told = header.as_ref();
+    Ok(BagInfo {
+        path: path.display().to_string(),
+        bytes: reader.bytes(),
+        profile: reader.profile().to_owned(),
+        library: reader.library().to_owned(),
+        title: told.map(|header| header.title.clone()),
+        clock: told.map(|header| header.clock.as_str()),
+        rate_hz: told.map(|header| header.rate_hz),
+        host: told.map(|header| header.host.clone()),
+        files: told.map(|header| header.files.iter().map(|file| file.0.clone()).collect()).unwrap_or_default(),
+        start_s: first.map(|time| time as f64 * 1e-9),
+        duration_s: first.zip(last).map_or(0.0, |(first, last)| (last - first) as f64 * 1e-9),
+        messages: counts.iter().sum(),
+        topics,
+        complete,
+        lost,
+        ended_cleanly: reader.ended_cleanly(),
+        damage,
+        versions: header.as_ref().map(|header| header.versions.clone()).unwrap_or_default(),
+        seeds: header.map(|header| header.seeds).unwrap_or_default(),
+    })
+}
+
+impl fmt::Display for BagInfo {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(f, "{}  {}", self.path, size(self.bytes))?;
+        if let Some(title) = self.title.as_deref().filter(|title| !title.is_empty()) {
+            writeln!(f, "  {title}")?;
+        }
+        let clock = self.clock.map_or(String::new(), |clock| format!("{clock}, "));
+        let rate = self.rate_hz.map_or(String::new(), |rate| format!(" at {rate} Hz"));
+        writeln!(f, "  {clock}{:.3} s{rate}, {} messages", self.duration_s, self.messages)?;
+        if !self.files.is_empty() {
+            writeln!(f, "  with {}", self.files.join(", "))?;
+        }
+        let by = if self.library.is_empty() { "an unknown program" } else { &self.library };
+        writeln!(f, "  written by {by}{}", self.host.as_deref().map_or(String::new(), |host| format!(" on {host}")))?;
+        let width = self.topics.iter().map(|topic| topic.name.len()).max().unwrap_or(0);
+        let types = self.topics.iter().map(|topic| topic.type_name.len()).max().unwrap_or(0);
+        for topic in &self.topics {
+            let rate = topic.rate_hz.map_or_else(|| "-".to_owned(), |rate| format!("{rate:.1}"));
+            let lost = match topic.lost {
+                Some(0) | None => String::new(),
+                Some(lost) => format!("  {lost} LOST"),
+            };
+            writeln!(f, "  {:width$}  {:types$}  {:>9}  {rate:>9} Hz{lost}", topic.name, topic.type_name, topic.messages)?;
+        }
+        let verdict = match (self.complete, self.lost) {
+            (Some(true), _) => "complete".to_owned(),
+            (_, Some(lost)) if lost > 0 => format!("INCOMPLETE: {lost} messages lost"),
+            (Some(false), _) => "no gaps, but the recorder did not finish: what is missing at the end is not known".to_owned(),
+            (None, _) => "whether it is complete is not known".to_owned(),
+        };
+        writeln!(f, "  {verdict}")?;
+        if !self.ended_cleanly {
+            writeln!(f, "  the file was not closed; `backdrive bag recover` makes a clean copy")?;
+        }
+        if let Some(damage) = &self.damage {
+            writeln!(f, "  DAMAGED: {damage}")?;
+        }
+        Ok(())
+    }
+}
+
+fn size(bytes: u64) -> String {
+    match bytes {
+        0..1_000 => format!("{bytes} B"),
+        1_000..1_000_000 => format!("{:.1} kB", bytes as f64 * 1e-3),
+        1_000_000..1_000_000_000 => format!("{:.1} MB", bytes as f64 * 1e-6),
+        _ => format!("{:.2} GB", bytes as f64 * 1e-9),
+    }
+}

@@ -1,0 +1,94 @@
+//! The induced-motion canceller: it predicts what the reflected force alone does to the master, and subtracts it.
+
+use crate::core::{Core, Events, Port, Tick};
+use crate::device::Device;
+use crate::freshness::Freshness;
+use backdrive_msgs::{MAX_AXES, Sample};
+
+/// Input `measured` (position; effort = applied force); outputs `motion` (position without the predicted induced motion,
+/// x_m - x^_mf), `induced` (position x^_mf).
+///
+/// Kuchenbecker & Niemeyer 2005, Fig. 3: the model is driven by the applied force alone, with the hand at rest.
+pub struct Canceller {
+    model: Option<Device>,
+    high_pass: Option<HighPass>,
+    measured: Freshness,
+    force: [f64; MAX_AXES],
+    started: bool,
+    trusted: bool,
+}
+
+impl Canceller {
+    /// Without a model nothing is subtracted. `high_pass_hz` above 0 passes the estimate through a first-order
+    /// high-pass of that corner: it lifts the limit that over-cancelling at DC sets, at the price of phase near the corner.
+    pub fn new(model: Option<Device>, high_pass_hz: f64, period_s: f64) -> Canceller {
+        let high_pass = (high_pass_hz > 0.0).then(|| HighPass::new(high_pass_hz, period_s));
+        Canceller { model, high_pass, measured: Freshness::default(), force: [0.0; MAX_AXES], started: false, trusted: true }
+    }
+}
+
+impl Core for Canceller {
+    fn step(&mut self, tick: &Tick, inputs: &[Port], outputs: &mut [Sample], events: &mut Events) {
+        let fresh = self.measured.new_sample(&inputs[0], |s| s.position[0]).copied();
+        let mut induced = [0.0; MAX_AXES];
+        if let Some(model) = &mut self.model {
+            let axes = model.axes();
+            // The model runs on through a gap under the last force it knows of.
+            if self.started {
+                model.step(&self.force[..axes], &[]);
+            } else {
+                model.start(&self.force[..axes], &[]);
+                self.started = true;
+            }
+            if self.trusted && !model.is_finite() {
+                self.trusted = false;
+                events.push("canceller_off", tick.time_s, 2);
+            }
+            if self.trusted {
+                for axis in 0..axes {
+                    induced[axis] = model.measured(axis);
+                }
+            }
+        }
+        if let Some(high_pass) = &mut self.high_pass {
+            high_pass.apply(&mut induced);
+        }
+        // Without a measurement there is nothing to say: the outputs stay not measured.
+        if let Some(measured) = fresh {
+            let (motion, estimate) = outputs.split_at_mut(1);
+            for axis in 0..measured.len() {
+                motion[0].position[axis] = measured.position[axis] - induced[axis];
+                estimate[0].position[axis] = induced[axis];
+                self.force[axis] = if measured.effort[axis].is_nan() { 0.0 } else { measured.effort[axis] };
+            }
+        }
+    }
+}
+
+/// First-order high-pass, the bilinear image of s / (s + 2 pi corner).
+struct HighPass {
+    feed: f64,
+    keep: f64,
+    input: [f64; MAX_AXES],
+    output: [f64; MAX_AXES],
+}
+
+impl HighPass {
+    fn new(corner_hz: f64, period_s: f64) -> HighPass {
+        let warped = (std::f64::consts::PI * corner_hz * period_s).min(1.5).tan();
+        HighPass {
+            feed: 1.0 / (1.0 + warped),
+            keep: (1.0 - warped) / (1.0 + warped),
+            input: [0.0; MAX_AXES],
+            output: [0.0; MAX_AXES],
+        }
+    }
+
+    fn apply(&mut self, values: &mut [f64; MAX_AXES]) {
+        for axis in 0..MAX_AXES {
+            self.output[axis] = self.keep * self.output[axis] + self.feed * (values[axis] - self.input[axis]);
+            self.input[axis] = values[axis];
+            values[axis] = self.output[axis];
+        }
+    }
+}

@@ -1,0 +1,225 @@
+//! Position and force scaling: x_c = mu x_u and F_f = lambda F_s, in one process whose two paths step separately.
+
+use crate::core::{Core, Events, Port, Tick};
+use crate::freshness::Freshness;
+use crate::guard::Guard;
+use backdrive_msgs::{Gains, MAX_AXES, NOT_MEASURED, Sample, flag};
+
+/// A gain that ramps to what is wanted in a straight line.
+#[derive(Debug, Clone)]
+struct Ramp {
+    now: f64,
+    target: f64,
+    change_per_step: f64,
+}
+
+impl Ramp {
+    fn new(value: f64) -> Ramp {
+        Ramp { now: value, target: value, change_per_step: 0.0 }
+    }
+
+    fn aim(&mut self, target: f64, ramp_s: f64, period_s: f64) {
+        self.target = target;
+        let steps = (ramp_s / period_s).round().max(1.0);
+        self.change_per_step = (target - self.now).abs() / steps;
+    }
+
+    fn step(&mut self) -> f64 {
+        let left = self.target - self.now;
+        self.now = if left.abs() <= self.change_per_step { self.target } else { self.now + self.change_per_step.copysign(left) };
+        self.now
+    }
+}
+
+/// A change of gains that the graph file asks for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct GainChange {
+    /// When it starts, s.
+    pub at_s: f64,
+    /// New position scale.
+    pub mu: f64,
+    /// New force scale.
+    pub lambda: f64,
+}
+
+/// Gains at the start and later.
+#[derive(Debug, Clone, PartialEq)]
+pub struct GainPlan {
+    /// Position scale.
+    pub mu: f64,
+    /// Force scale.
+    pub lambda: f64,
+    /// Time over which a change ramps, s.
+    pub ramp_s: f64,
+    /// In order of time.
+    pub changes: Vec<GainChange>,
+}
+
+impl GainPlan {
+    fn due(&self, done: &mut usize, tick: &Tick) -> Option<GainChange> {
+        let change = self.changes.get(*done).filter(|c| tick.time_s >= c.at_s).copied();
+        *done += usize::from(change.is_some());
+        change
+    }
+}
+
+/// Input `motion` (position); output `command` (position x_c = mu x).
+///
+/// Without a new input the output is not measured: the slave then holds.
+pub struct Forward {
+    plan: GainPlan,
+    changes_done: usize,
+    mu: Ramp,
+    lambda: f64,
+    period_s: f64,
+    motion: Freshness,
+}
+
+impl Forward {
+    /// Starts at the plan's first gains.
+    pub fn new(plan: GainPlan, period_s: f64) -> Forward {
+        let (mu, lambda) = (Ramp::new(plan.mu), plan.lambda);
+        Forward { plan, changes_done: 0, mu, lambda, period_s, motion: Freshness::default() }
+    }
+}
+
+impl Core for Forward {
+    fn step(&mut self, tick: &Tick, inputs: &[Port], outputs: &mut [Sample], _events: &mut Events) {
+        if let Some(change) = self.plan.due(&mut self.changes_done, tick) {
+            self.mu.aim(change.mu, self.plan.ramp_s, self.period_s);
+        }
+        let mu = self.mu.step();
+        if let Some(motion) = self.motion.new_sample(&inputs[0], |s| s.position[0]) {
+            for axis in 0..motion.len().min(outputs[0].len()) {
+                outputs[0].position[axis] = mu * motion.position[axis];
+            }
+        }
+    }
+
+    fn set_gains(&mut self, gains: &Gains) {
+        self.mu.aim(gains.mu, gains.ramp_s, self.period_s);
+        self.lambda = gains.lambda;
+    }
+
+    // The backward path tells the gains of both, for the guard acts there.
+}
+
+/// Inputs `contact` (effort F_s), `measured` (the master's, one step late: what the guard watches); outputs
+/// `force` (effort F_f = lambda F_s + dither), `dither` (effort: the added excitation alone).
+///
+/// Without a new contact force the output is not measured: the master then lets go.
+pub struct Backward {
+    plan: GainPlan,
+    changes_done: usize,
+    mu: Ramp,
+    lambda: Ramp,
+    period_s: f64,
+    contact: Freshness,
+    dither: Vec<Vec<f64>>,
+    guard: Option<Guard>,
+    force: [f64; MAX_AXES],
+}
+
+impl Backward {
+    /// Starts at the plan's first gains. `dither` has one list of forces per axis, N or N m, one value per step, repeated from the start when they end; it may be empty.
+    pub fn new(plan: GainPlan, dither: Vec<Vec<f64>>, guard: Option<Guard>, period_s: f64) -> Backward {
+        let (mu, lambda) = (Ramp::new(plan.mu), Ramp::new(plan.lambda));
+        Backward { plan, changes_done: 0, mu, lambda, period_s, contact: Freshness::default(), dither, guard, force: [0.0; MAX_AXES] }
+    }
+}
+
+impl Core for Backward {
+    fn step(&mut self, tick: &Tick, inputs: &[Port], outputs: &mut [Sample], events: &mut Events) {
+        if let Some(change) = self.plan.due(&mut self.changes_done, tick) {
+            self.mu.aim(change.mu, self.plan.ramp_s, self.period_s);
+            self.lambda.aim(change.lambda, self.plan.ramp_s, self.period_s);
+        }
+        self.mu.step();
+        let lambda = self.lambda.step();
+        let guarded = self.guard.as_mut().map_or(1.0, |guard| {
+            let verdict = guard.step(&self.force, inputs.get(1).and_then(|p| p.sample.as_ref()));
+            if let Some(reason) = verdict {
+                events.push(reason.event(), lambda * guard.share(), 1);
+            }
+            guard.share()
+        });
+        let (force, dither) = outputs.split_at_mut(1);
+        for axis in 0..force[0].len() {
+            // A dither is periodic: it lasts as long as the run.
+            if let Some(samples) = self.dither.get(axis).filter(|d| !d.is_empty()) {
+                dither[0].effort[axis] = samples[tick.step as usize % samples.len()];
+            }
+        }
+        if guarded < 1.0 {
+            force[0].flags |= flag::GUARDED;
+        }
+        // Before the first contact force has come there is none: the dither alone is played.
+        let contact = self.contact.new_sample(&inputs[0], |s| s.effort[0]).copied();
+        if contact.is_none() && self.contact.begun() {
+            return;
+        }
+        for axis in 0..force[0].len() {
+            let felt = contact.map_or(0.0, |c| if c.effort[axis].is_nan() { 0.0 } else { c.effort[axis] });
+            let added = if dither[0].effort[axis].is_nan() { 0.0 } else { dither[0].effort[axis] };
+            let reflected = guarded * lambda * felt;
+            self.force[axis] = reflected + added;
+            force[0].effort[axis] = if contact.is_none() && self.dither.is_empty() { NOT_MEASURED } else { reflected + added };
+        }
+    }
+
+    fn set_gains(&mut self, gains: &Gains) {
+        self.mu.aim(gains.mu, gains.ramp_s, self.period_s);
+        self.lambda.aim(gains.lambda, gains.ramp_s, self.period_s);
+        if let Some(guard) = &mut self.guard {
+            guard.restore();
+        }
+    }
+
+    fn gains(&self) -> Option<(f64, f64)> {
+        Some((self.mu.now, self.lambda.now * self.guard.as_ref().map_or(1.0, Guard::share)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn tick(step: u64) -> Tick {
+        Tick { step, time_s: step as f64 * 1e-3, period_s: 1e-3 }
+    }
+
+    fn contact(step: u64, force: f64) -> [Port; 2] {
+        let mut sample = Sample::new(1);
+        (sample.step, sample.effort[0]) = (step, force);
+        [Port { sample: Some(sample), age_steps: 0 }, Port::EMPTY]
+    }
+
+    #[test]
+    fn a_gain_change_ramps() {
+        let changes = vec![GainChange { at_s: 0.010, mu: 1.0, lambda: 1.0 }];
+        let plan = GainPlan { mu: 1.0, lambda: 0.5, ramp_s: 0.010, changes };
+        let mut core = Backward::new(plan, Vec::new(), None, 1e-3);
+        let mut forces = Vec::new();
+        for step in 0..30 {
+            let mut outputs = [Sample::new(1), Sample::new(1)];
+            core.step(&tick(step), &contact(step, -2.0), &mut outputs, &mut Events::default());
+            forces.push(outputs[0].effort[0]);
+        }
+        assert_eq!(forces[9], -1.0);
+        assert!((forces[14] + 1.5).abs() < 1e-12, "half way after half the ramp: {}", forces[14]);
+        assert_eq!(forces[25], -2.0);
+        assert!(forces.windows(2).all(|w| (w[1] - w[0]).abs() <= 0.1 + 1e-12));
+    }
+
+    #[test]
+    fn silence_of_the_slave_is_passed_on() {
+        let plan = GainPlan { mu: 1.0, lambda: 0.5, ramp_s: 0.010, changes: Vec::new() };
+        let mut core = Backward::new(plan, Vec::new(), None, 1e-3);
+        let mut outputs = [Sample::new(1), Sample::new(1)];
+        core.step(&tick(0), &contact(0, -2.0), &mut outputs, &mut Events::default());
+        assert_eq!(outputs[0].effort[0], -1.0);
+        let mut outputs = [Sample::new(1), Sample::new(1)];
+        core.step(&tick(1), &contact(0, -2.0), &mut outputs, &mut Events::default());
+        assert!(outputs[0].effort[0].is_nan());
+    }
+}

@@ -1,0 +1,123 @@
+//! How a process becomes a node of a running graph: ours and a user's own alike.
+
+use crate::rundir::RunPaths;
+use backdrive_bags::{BagHeader, Recorder, RecorderOptions, TopicInfo};
+use backdrive_control::core::Core;
+use backdrive_nodes::build::{self, credit_listeners, topics};
+use backdrive_nodes::graph::{Files, Graph, Node, NodeKind, Overrides};
+use backdrive_nodes::process::{ProcessOptions, run_process};
+use backdrive_nodes::protocol::FromNode;
+use backdrive_nodes::recorder::{RecorderPlan, run_recorder};
+use backdrive_nodes::stage::Clock;
+use backdrive_nodes::transport::iceoryx2::Iceoryx2;
+use backdrive_msgs::topic::{Kind, Topic};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+/// Joins a run as a node of the user's own, with the arguments that the supervisor gives (`--run DIR --name NAME`),
+/// and runs it to its end. `cores` gets the graph and the node and brings one core per stage of the node's kind.
+pub fn join<F>(cores: F) -> ExitCode
+where
+    F: FnOnce(&Graph, &Node) -> Result<Vec<Box<dyn Core>>, String>,
+{
+    let arguments: Vec<String> = std::env::args().collect();
+    let after = |flag: &str| arguments.iter().position(|a| a == flag).and_then(|i| arguments.get(i + 1)).cloned();
+    match (after("--run"), after("--name")) {
+        (Some(run), Some(name)) => {
+            run_node(Path::new(&run), &name, |graph, node| build::plan_with(graph, &node.name, cores(graph, node)?).map_err(|e| e.to_string()))
+        }
+        _ => fail("this program is a node of a graph: name it as `command` of a node, and `backdrive run` starts it".to_string(), 2),
+    }
+}
+
+/// Joins a run as one of our own nodes.
+pub fn join_as(run: &Path, name: &str) -> ExitCode {
+    run_node(run, name, |graph, node| build::plan(graph, &node.name).map_err(|e| e.to_string()))
+}
+
+fn run_node<P>(run: &Path, name: &str, plan: P) -> ExitCode
+where
+    P: FnOnce(&Graph, &Node) -> Result<backdrive_nodes::stage::NodePlan, String>,
+{
+    let paths = match RunPaths::open(run) {
+        Ok(paths) => paths,
+        Err(e) => return fail(e.to_string(), 5),
+    };
+    let graph = match read_graph(&paths) {
+        Ok(graph) => graph,
+        Err(e) => return fail(e, 3),
+    };
+    let Some(node) = graph.node(name) else { return fail(format!("the graph has no node \"{name}\""), 3) };
+    let transport = match Iceoryx2::open(&paths.location(), name) {
+        Ok(transport) => Box::new(transport),
+        Err(e) => return fail(e.to_string(), 5),
+    };
+    if node.kind == NodeKind::Recorder {
+        let (plan, header) = recording(&graph, name);
+        let path = graph.bag.clone().unwrap_or_else(|| PathBuf::from("run.mcap"));
+        return match Recorder::create(&path, &header, &recorder_options(&graph)) {
+            Ok(recorder) => run_recorder(&plan, &graph.timing, transport, Box::new(recorder)),
+            Err(e) => fail(e.to_string(), 5),
+        };
+    }
+    let plan = match plan(&graph, node) {
+        Ok(plan) => plan,
+        Err(e) => return fail(e, 3),
+    };
+    let mut options = ProcessOptions::default();
+    options.run.listeners = topics(&graph).into_iter().map(|t| (t.topic.name, t.listeners)).collect();
+    run_process(plan, &graph.timing, transport, options)
+}
+
+/// The graph of a run as its processes read it: the resolved text, and the files as they were when the run began.
+fn read_graph(paths: &RunPaths) -> Result<Graph, String> {
+    let path = paths.graph();
+    let text = std::fs::read_to_string(&path).map_err(|e| format!("{}: cannot be read: {e}", path.display()))?;
+    Graph::from_text(&text, &path, &Overrides::default(), &Files::Disk).map_err(|e| e.to_string())
+}
+
+/// What a recorder of this graph hears, and what its bag says of the run.
+pub fn recording(graph: &Graph, name: &str) -> (RecorderPlan, BagHeader) {
+    let topics = topics(graph);
+    let credit = (graph.timing.clock == Clock::Lockstep)
+        .then(|| (Topic { name: build::CREDIT_TOPIC.to_string(), kind: Kind::Sample }, credit_listeners(graph)));
+    let plan = RecorderPlan { name: name.to_string(), topics: topics.iter().map(|t| t.topic.clone()).collect(), credit };
+    let header = BagHeader {
+        title: graph.title.clone(),
+        graph_toml: graph.text.clone(),
+        files: graph.files.clone(),
+        versions: BTreeMap::from([("backdrive".to_string(), env!("CARGO_PKG_VERSION").to_string())]),
+        seeds: BTreeMap::from([("graph".to_string(), graph.seed)]),
+        clock: match graph.timing.clock {
+            Clock::Lockstep => backdrive_bags::Clock::Lockstep,
+            Clock::Realtime => backdrive_bags::Clock::Realtime,
+        },
+        rate_hz: graph.timing.rate_hz,
+        host: host(),
+        topics: topics.into_iter().map(|t| TopicInfo { topic: t.topic, axes: t.axes, publisher: t.publisher }).collect(),
+    };
+    (plan, header)
+}
+
+/// How a graph's bag is written. A bag that exists is replaced: a run is asked for by name, and asked for again.
+pub fn recorder_options(graph: &Graph) -> RecorderOptions {
+    let options = match graph.timing.clock {
+        Clock::Lockstep => RecorderOptions::lockstep(),
+        Clock::Realtime => RecorderOptions::default(),
+    };
+    RecorderOptions { overwrite: true, ..options }
+}
+
+/// Name of this machine. A lockstep bag is the same wherever it was made, so it is left out there by the caller's choice of clock.
+fn host() -> String {
+    std::fs::read_to_string("/proc/sys/kernel/hostname").map(|s| s.trim().to_string()).unwrap_or_default()
+}
+
+/// Says why the node cannot begin, to the supervisor and to whoever started it by hand.
+fn fail(error: String, code: u8) -> ExitCode {
+    let line = serde_json::to_string(&FromNode::Failed { error: error.clone(), code });
+    println!("{}", line.unwrap_or_default());
+    eprintln!("{error}");
+    ExitCode::from(code)
+}

@@ -1,0 +1,351 @@
+//! The directory of a run, and the lock that says whether the run is alive.
+//!
+//! ```text
+//! <tmp>/backdrive-<uid>/<id>/
+//!     graph.toml         the graph as every process of the run reads it
+//!     supervisor.lock    locked for as long as the supervisor lives
+//!     pids               who was started, for the case that the supervisor is killed
+//!     middleware/        the transport's files
+//! /dev/shm/bd<id>_*      shared memory
+//! ```
+//!
+//! A process id can be reused and a process can be in another container; a lock belongs to whoever holds
+//! it and is free the moment that process is gone. So the lock alone says whether a run is alive.
+
+use crate::error::LaunchError;
+use backdrive_nodes::transport::Location;
+use nix::errno::Errno;
+use nix::fcntl::{Flock, FlockArg};
+use std::fs::{DirBuilder, File, OpenOptions};
+use std::hash::{BuildHasher, Hasher};
+use std::io::Write;
+use std::os::unix::fs::{DirBuilderExt, MetadataExt, OpenOptionsExt, PermissionsExt};
+use std::path::{Path, PathBuf};
+use std::time::{SystemTime, UNIX_EPOCH};
+
+pub(crate) const LOCK: &str = "supervisor.lock";
+pub(crate) const PIDS: &str = "pids";
+const GRAPH: &str = "graph.toml";
+const MIDDLEWARE: &str = "middleware";
+
+/// A run gets its directory under this name and takes its lock before it gets the name that others look at.
+pub(crate) const UNBORN: &str = ".new-";
+
+/// Shared memory that is there in every case, per node, bytes: its topics' segments as far as they are touched at the start.
+const SHM_PER_NODE: u64 = 2 << 20;
+
+/// Longest root, bytes: the middleware's paths begin with it and may have 255.
+const LONGEST_ROOT: usize = 120;
+
+/// Where the runs of this user have their directories.
+#[derive(Debug, Clone)]
+pub struct RunHome {
+    pub(crate) dir: PathBuf,
+    pub(crate) shm: PathBuf,
+}
+
+impl RunHome {
+    /// `backdrive-<uid>` in the system's directory for temporary files.
+    pub fn system() -> RunHome {
+        RunHome::at(std::env::temp_dir().join(format!("backdrive-{}", uid())))
+    }
+
+    /// Another directory, which then is for runs only.
+    pub fn at(dir: impl Into<PathBuf>) -> RunHome {
+        RunHome { dir: dir.into(), shm: PathBuf::from("/dev/shm") }
+    }
+
+    /// The directory.
+    pub fn dir(&self) -> &Path {
+        &self.dir
+    }
+
+    /// Makes the directory of a new run of this many nodes, and locks it.
+    ///
+    /// # Errors
+    /// The directory cannot be made, is not this user's, or shared memory cannot be used or is nearly full.
+    pub fn create(&self, graph: &str, nodes: usize) -> Result<RunDir, LaunchError> {
+        self.make_home()?;
+        let id = new_id();
+        let paths = RunPaths { root: self.dir.join(&id), id: id.clone() };
+        if paths.root.as_os_str().len() > LONGEST_ROOT {
+            let reason = format!("the path has more than {LONGEST_ROOT} bytes");
+            return Err(failed(&paths.root, "make it", reason, "set TMPDIR to a shorter path"));
+        }
+        self.check_shm(&paths.prefix(), nodes as u64 * SHM_PER_NODE)?;
+
+        const ROOM: &str = "check that there is room and that you may write there, or set TMPDIR";
+        let unborn = self.dir.join(format!("{UNBORN}{id}"));
+        let make = |dir: &Path| DirBuilder::new().mode(0o700).create(dir).map_err(|e| failed(dir, "make it", e, ROOM));
+        make(&unborn)?;
+        let lock_path = unborn.join(LOCK);
+        let mut file = OpenOptions::new()
+            .write(true)
+            .create_new(true)
+            .mode(0o600)
+            .open(&lock_path)
+            .map_err(|e| failed(&lock_path, "make it", e, ROOM))?;
+        let _ = writeln!(file, "{}", std::process::id());
+        let lock = Flock::lock(file, FlockArg::LockExclusiveNonblock)
+            .map_err(|(_, e)| failed(&lock_path, "lock it", e, "set TMPDIR to a directory on a local file system"))?;
+        let graph_path = unborn.join(GRAPH);
+        std::fs::write(&graph_path, graph).map_err(|e| failed(&graph_path, "write it", e, ROOM))?;
+        make(&unborn.join(MIDDLEWARE))?;
+        let pids_path = unborn.join(PIDS);
+        let mut pids = OpenOptions::new()
+            .append(true)
+            .create_new(true)
+            .mode(0o600)
+            .open(&pids_path)
+            .map_err(|e| failed(&pids_path, "make it", e, ROOM))?;
+        let _ = writeln!(pids, "{}", boot_id());
+        std::fs::rename(&unborn, &paths.root).map_err(|e| failed(&paths.root, "make it", e, ROOM))?;
+        Ok(RunDir { paths, shm: self.shm.clone(), pids, _lock: lock })
+    }
+
+    /// Makes the directory of all runs. Another user's is refused: what is in it decides what is removed.
+    fn make_home(&self) -> Result<(), LaunchError> {
+        let advice = "remove it, or set TMPDIR to a directory of yours";
+        DirBuilder::new().recursive(true).mode(0o700).create(&self.dir).map_err(|e| failed(&self.dir, "make it", e, advice))?;
+        let meta = std::fs::symlink_metadata(&self.dir).map_err(|e| failed(&self.dir, "read it", e, advice))?;
+        if !meta.is_dir() || meta.uid() != uid() {
+            return Err(failed(&self.dir, "use it", "it is not a directory of this user", advice));
+        }
+        if meta.mode() & 0o077 != 0 {
+            let private = std::fs::Permissions::from_mode(0o700);
+            std::fs::set_permissions(&self.dir, private).map_err(|e| failed(&self.dir, "make it private", e, advice))?;
+        }
+        Ok(())
+    }
+
+    fn check_shm(&self, prefix: &str, need: u64) -> Result<(), LaunchError> {
+        let error = |reason: String, advice: String| LaunchError::SharedMemory { path: self.shm.clone(), reason, advice };
+        let full = |free: u64| {
+            error(
+                format!("is nearly full: {free} bytes free, {need} needed"),
+                "run `backdrive clean`, remove what else fills it, or in a container give it more with `--shm-size=256m`".to_string(),
+            )
+        };
+        // One page is written: a file system may let a file be made and still have no room, or be over its quota.
+        let probe = self.shm.join(format!("{prefix}probe"));
+        let written = OpenOptions::new().write(true).create_new(true).mode(0o600).open(&probe).and_then(|mut f| f.write_all(&[1; 4096]));
+        let _ = std::fs::remove_file(&probe);
+        match written {
+            Ok(()) => {}
+            Err(e) if e.kind() == std::io::ErrorKind::StorageFull => return Err(full(0)),
+            Err(e) if e.kind() == std::io::ErrorKind::NotFound => {
+                return Err(error("is not there".to_string(), format!("mount a tmpfs at {}", self.shm.display())));
+            }
+            Err(e) => {
+                let advice = format!("its mode should be 1777: `ls -ld {}`, or in a container mount it writable", self.shm.display());
+                return Err(error(format!("cannot be written: {e}"), advice));
+            }
+        }
+        if let Ok(stat) = nix::sys::statvfs::statvfs(&self.shm) {
+            let free = (stat.blocks_available() as u64).saturating_mul(stat.fragment_size() as u64);
+            // A file system without a size limit tells 0 blocks.
+            if stat.blocks() > 0 && free < need {
+                return Err(full(free));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Where the things of a run are: what a process needs that belongs to it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct RunPaths {
+    pub(crate) root: PathBuf,
+    pub(crate) id: String,
+}
+
+impl RunPaths {
+    /// The run whose directory this is, such as a node gets it with `--run`.
+    ///
+    /// # Errors
+    /// It is not the directory of a run.
+    pub fn open(root: &Path) -> Result<RunPaths, LaunchError> {
+        let advice = "give the directory that the supervisor made";
+        let root = std::path::absolute(root).map_err(|e| failed(root, "find it", e, advice))?;
+        let id = root.file_name().and_then(|n| n.to_str()).filter(|n| is_id(n)).map(str::to_string);
+        match id {
+            Some(id) if root.join(GRAPH).is_file() => Ok(RunPaths { root, id }),
+            _ => Err(failed(&root, "join it", "it is not the directory of a run", advice)),
+        }
+    }
+
+    /// Name of the run: 20 hexadecimal digits.
+    pub fn id(&self) -> &str {
+        &self.id
+    }
+
+    /// The directory.
+    pub fn root(&self) -> &Path {
+        &self.root
+    }
+
+    /// The graph.
+    pub fn graph(&self) -> PathBuf {
+        self.root.join(GRAPH)
+    }
+
+    /// What the names of the run's files in shared memory begin with.
+    pub fn prefix(&self) -> String {
+        prefix_of(&self.id)
+    }
+
+    /// Where the transport meets.
+    pub fn location(&self) -> Location {
+        Location { prefix: self.prefix(), root: self.root.join(MIDDLEWARE) }
+    }
+}
+
+/// The directory of a run that is alive because this exists. Dropped without [`RunDir::remove`], it is left to the next sweep.
+#[derive(Debug)]
+pub struct RunDir {
+    paths: RunPaths,
+    shm: PathBuf,
+    pids: File,
+    _lock: Flock<File>,
+}
+
+impl RunDir {
+    /// Where its things are.
+    pub fn paths(&self) -> &RunPaths {
+        &self.paths
+    }
+
+    /// Notes a process of the run, so that it can be ended should it outlive the supervisor.
+    pub(crate) fn note(&mut self, pid: i32, name: &str) {
+        if let Some(started) = crate::sweep::start_time(pid) {
+            let _ = writeln!(self.pids, "{pid} {started} {name}");
+        }
+    }
+
+    /// Removes everything of the run. None of its processes may live.
+    ///
+    /// # Errors
+    /// Something cannot be removed; the rest is.
+    pub fn remove(self) -> Result<(), LaunchError> {
+        let advice = "run `backdrive clean`";
+        let mut first = None;
+        match crate::sweep::shm_files(&self.shm, &[&self.paths.prefix()]) {
+            Ok(files) => {
+                for file in files {
+                    if let Err(e) = crate::sweep::remove_file(&file) {
+                        first.get_or_insert(failed(&file, "remove it", e, advice));
+                    }
+                }
+            }
+            Err(e) => first = Some(failed(&self.shm, "read it", e, advice)),
+        }
+        // Last, and with the lock still held: what remains of a removal that is cut short is swept.
+        if let Err(e) = crate::sweep::remove_dir(&self.paths.root) {
+            first.get_or_insert(failed(&self.paths.root, "remove it", e, advice));
+        }
+        first.map_or(Ok(()), Err)
+    }
+}
+
+/// Takes the lock of a run if it is free. `Ok(None)`: the run is alive.
+pub(crate) fn try_lock(path: &Path) -> std::io::Result<Option<Flock<File>>> {
+    let file = OpenOptions::new().read(true).write(true).custom_flags(nix::libc::O_NOFOLLOW).open(path)?;
+    match Flock::lock(file, FlockArg::LockExclusiveNonblock) {
+        Ok(lock) => Ok(Some(lock)),
+        Err((_, Errno::EWOULDBLOCK)) => Ok(None),
+        Err((_, e)) => Err(e.into()),
+    }
+}
+
+pub(crate) fn prefix_of(id: &str) -> String {
+    format!("bd{id}_")
+}
+
+/// Whether a file name is the name of a run.
+pub(crate) fn is_id(name: &str) -> bool {
+    name.len() == 20 && name.bytes().all(|b| b.is_ascii_digit() || (b'a'..=b'f').contains(&b))
+}
+
+/// Time, process and chance, in fixed widths: sorts by time, and none begins another.
+fn new_id() -> String {
+    let seconds = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |d| d.as_secs()) as u32;
+    let chance = std::hash::RandomState::new().build_hasher().finish() & 0xff_ffff;
+    format!("{seconds:08x}{:06x}{chance:06x}", std::process::id() & 0xff_ffff)
+}
+
+/// Differs from one start of the machine to the next; process ids mean nothing beyond it.
+pub(crate) fn boot_id() -> String {
+    std::fs::read_to_string("/proc/sys/kernel/random/boot_id").map_or_else(|_| "unknown".to_string(), |s| s.trim().to_string())
+}
+
+pub(crate) fn uid() -> u32 {
+    // SAFETY: has no preconditions and cannot fail.
+    unsafe { nix::libc::geteuid() }
+}
+
+fn failed(path: &Path, action: &'static str, reason: impl ToString, advice: &'static str) -> LaunchError {
+    LaunchError::RunDir { path: path.to_path_buf(), action, reason: reason.to_string(), advice }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    type Outcome = Result<(), Box<dyn std::error::Error>>;
+
+    #[test]
+    fn a_run_has_its_files_and_leaves_none() -> Outcome {
+        let temp = tempfile::tempdir()?;
+        let home = RunHome::at(temp.path().join("runs"));
+        let run = home.create("title = \"x\"\n", 3)?;
+        let paths = RunPaths::open(run.paths().root())?;
+        assert_eq!(&paths, run.paths());
+        assert_eq!(std::fs::read_to_string(paths.graph())?, "title = \"x\"\n");
+        assert!(paths.location().root.is_dir());
+        assert_eq!(std::fs::metadata(home.dir())?.mode() & 0o777, 0o700);
+        let shm = Path::new("/dev/shm").join(format!("{}segment", paths.prefix()));
+        std::fs::write(&shm, "x")?;
+        run.remove()?;
+        assert!(!shm.exists());
+        assert_eq!(std::fs::read_dir(home.dir())?.count(), 0);
+        Ok(())
+    }
+
+    #[test]
+    fn ids_differ_and_have_one_form() {
+        let ids: std::collections::HashSet<String> = (0..100).map(|_| new_id()).collect();
+        assert!(ids.len() > 98);
+        assert!(ids.iter().all(|id| is_id(id)));
+        assert!(!is_id("..") && !is_id("0123456789abcdef012G") && !is_id(""));
+    }
+
+    #[test]
+    fn another_directory_is_no_run() -> Outcome {
+        let temp = tempfile::tempdir()?;
+        let told = RunPaths::open(temp.path()).err().map(|e| e.to_string()).unwrap_or_default();
+        assert!(told.contains("not the directory of a run"), "{told}");
+        Ok(())
+    }
+
+    #[test]
+    fn trouble_with_shared_memory_is_told_with_what_to_do() -> Outcome {
+        let temp = tempfile::tempdir()?;
+        let mut home = RunHome::at(temp.path().join("runs"));
+        home.shm = temp.path().join("absent");
+        let told = home.create("", 1).err().map(|e| e.to_string()).unwrap_or_default();
+        assert!(told.contains("is not there") && told.contains("tmpfs"), "{told}");
+        home.shm = PathBuf::from("/dev/shm");
+        let told = home.create("", 1 << 40).err().map(|e| e.to_string()).unwrap_or_default();
+        assert!(told.contains("nearly full") && told.contains("--shm-size"), "{told}");
+        Ok(())
+    }
+
+    #[test]
+    fn a_home_that_is_a_link_is_refused() -> Outcome {
+        let temp = tempfile::tempdir()?;
+        std::fs::create_dir(temp.path().join("theirs"))?;
+        std::os::unix::fs::symlink(temp.path().join("theirs"), temp.path().join("runs"))?;
+        assert!(RunHome::at(temp.path().join("runs")).create("", 1).is_err());
+        Ok(())
+    }
+}

@@ -1,0 +1,226 @@
+//! The place of a node in a run, over all lives of its process.
+
+use crate::child::Child;
+use crate::pace::Pace;
+use crate::plan::NodePlan;
+use backdrive_nodes::protocol::{NodeStatus, ToNode};
+use nix::sys::signal::Signal;
+use std::collections::VecDeque;
+use std::time::{Duration, Instant};
+
+/// Lines of standard error that are kept for the report.
+const LAST_LINES: usize = 20;
+
+/// Peaks of the last second, as many as there can be status messages.
+const PEAKS: usize = 32;
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Phase {
+    /// Started, not yet connected.
+    Joining,
+    /// Connected, not yet told to start.
+    Ready,
+    /// In the loop.
+    Running,
+    /// Dead, and to be started again.
+    Backoff { until: Instant },
+    /// Ended for good.
+    Ended,
+}
+
+/// How far the supervisor has gone to end a process.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum Asked {
+    No,
+    Stop,
+    Term,
+    Kill,
+}
+
+pub(crate) struct Slot {
+    pub plan: NodePlan,
+    pub child: Option<Child>,
+    pub phase: Phase,
+    /// Since when it has been in this phase.
+    pub since: Instant,
+    pub life: u32,
+    pub restarts: u32,
+    /// Whether this life has created its topics.
+    pub created: bool,
+    pub missing: Vec<String>,
+    pub done: bool,
+    /// What it said when it failed, and the exit code it asks for.
+    pub failed: Option<(String, u8)>,
+    pub asked: Asked,
+    pub asked_at: Instant,
+    pub status: Option<NodeStatus>,
+    /// Missed deadlines and losses of former lives.
+    before: (u64, u64),
+    pub peak: f64,
+    peaks: VecDeque<(Instant, f64)>,
+    /// When its steps last advanced.
+    pub progress: Instant,
+    /// When it was last heard.
+    pub heard: Instant,
+    pub silent: bool,
+    pub stray: bool,
+    pub stderr: VecDeque<String>,
+    pub lines: Pace,
+    pub events: Pace,
+    pub end: String,
+}
+
+impl Slot {
+    pub fn new(plan: NodePlan, now: Instant) -> Slot {
+        Slot {
+            plan,
+            child: None,
+            phase: Phase::Joining,
+            since: now,
+            life: 0,
+            restarts: 0,
+            created: false,
+            missing: Vec::new(),
+            done: false,
+            failed: None,
+            asked: Asked::No,
+            asked_at: now,
+            status: None,
+            before: (0, 0),
+            peak: 0.0,
+            peaks: VecDeque::new(),
+            progress: now,
+            heard: now,
+            silent: false,
+            stray: false,
+            stderr: VecDeque::new(),
+            lines: Pace::new(20.0, 60.0, now),
+            events: Pace::new(2.0, 10.0, now),
+            end: String::new(),
+        }
+    }
+
+    pub fn enter(&mut self, phase: Phase, now: Instant) {
+        self.phase = phase;
+        self.since = now;
+    }
+
+    /// A new process takes the place.
+    pub fn begin(&mut self, child: Child, now: Instant) {
+        if let Some(status) = &self.status {
+            self.before = (status.missed_deadlines, status.lost);
+        }
+        self.child = Some(child);
+        self.created = false;
+        self.missing.clear();
+        self.done = false;
+        self.failed = None;
+        self.asked = Asked::No;
+        self.heard = now;
+        self.progress = now;
+        self.silent = false;
+        self.enter(Phase::Joining, now);
+    }
+
+    pub fn ended(&self) -> bool {
+        self.phase == Phase::Ended
+    }
+
+    pub fn tell(&self, words: &ToNode) {
+        if let Some(child) = &self.child {
+            child.tell(words);
+        }
+    }
+
+    /// Goes one step further to end it; never back.
+    pub fn ask(&mut self, asked: Asked, now: Instant) {
+        if asked <= self.asked {
+            return;
+        }
+        self.asked = asked;
+        self.asked_at = now;
+        let Some(child) = &self.child else { return };
+        match asked {
+            Asked::No => {}
+            Asked::Stop => child.tell(&ToNode::Stop),
+            Asked::Term => child.signal(Signal::SIGTERM),
+            Asked::Kill => child.signal(Signal::SIGKILL),
+        }
+    }
+
+    pub fn take_status(&mut self, mut status: NodeStatus, now: Instant) {
+        status.missed_deadlines += self.before.0;
+        status.lost += self.before.1;
+        let steps = self.status.as_ref().map_or(0, |s| s.steps);
+        let recorded = self.status.as_ref().and_then(|s| s.recorded);
+        if status.steps > steps || (status.recorded.is_some() && status.recorded != recorded) {
+            self.progress = now;
+        }
+        // A node that was started again may count from 0.
+        status.steps = status.steps.max(steps);
+        if status.peak_effort.is_finite() {
+            self.peak = self.peak.max(status.peak_effort);
+            self.peaks.push_back((now, status.peak_effort));
+            while self.peaks.len() > PEAKS {
+                self.peaks.pop_front();
+            }
+        }
+        status.peak_effort = self.peak;
+        self.status = Some(status);
+    }
+
+    /// Largest effort of the last second, N.
+    pub fn recent_peak(&self, now: Instant) -> Option<f64> {
+        let recent = self.peaks.iter().filter(|(at, _)| now.saturating_duration_since(*at) < Duration::from_secs(1));
+        recent.map(|(_, peak)| *peak).reduce(f64::max)
+    }
+
+    pub fn steps(&self) -> u64 {
+        self.status.as_ref().map_or(0, |s| s.steps)
+    }
+
+    pub fn wrote(&mut self, line: String) {
+        self.stderr.push_back(line);
+        if self.stderr.len() > LAST_LINES {
+            self.stderr.pop_front();
+        }
+    }
+
+    /// Why it is not ready, for a person.
+    pub fn lack(&self) -> String {
+        let name = &self.plan.name;
+        match (&self.missing[..], self.created) {
+            ([], false) => format!("{name}: has not said a word; does the program speak the node protocol?"),
+            ([], true) => format!("{name}: is still connecting"),
+            (missing, _) => format!("{name}: {}", missing.join("; ")),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn losses_add_up_over_lives_and_steps_do_not_go_back() {
+        let now = Instant::now();
+        let mut slot = Slot::new(NodePlan::default(), now);
+        slot.take_status(NodeStatus { steps: 90, lost: 2, missed_deadlines: 1, peak_effort: 5.0, ..NodeStatus::default() }, now);
+        slot.before = (1, 2);
+        slot.take_status(NodeStatus { steps: 10, lost: 4, peak_effort: 3.0, ..NodeStatus::default() }, now);
+        let status = slot.status.clone().unwrap_or_default();
+        assert_eq!((status.steps, status.lost, status.missed_deadlines, status.peak_effort), (90, 6, 1, 5.0));
+        assert_eq!(slot.recent_peak(now), Some(5.0));
+        assert_eq!(slot.recent_peak(now + Duration::from_secs(2)), None);
+    }
+
+    #[test]
+    fn says_what_it_lacks() {
+        let mut slot = Slot::new(NodePlan { name: "slave".to_string(), ..NodePlan::default() }, Instant::now());
+        assert!(slot.lack().contains("not said a word"));
+        slot.created = true;
+        assert!(slot.lack().contains("still connecting"));
+        slot.missing = vec!["/a: no publisher".to_string(), "/b: no publisher".to_string()];
+        assert_eq!(slot.lack(), "slave: /a: no publisher; /b: no publisher");
+    }
+}

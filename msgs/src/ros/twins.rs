@@ -1,0 +1,400 @@
+//! What the CDR encoder and decoder see: the fields of each message in the order of its schema.
+
+use super::RosError;
+use crate::text::Text;
+use crate::{Event, Gains, MAX_AXES, NOT_MEASURED, Sample, Status};
+use serde::de::{SeqAccess, Visitor};
+use serde::ser::{SerializeSeq, SerializeStruct};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use std::borrow::Cow;
+use std::fmt;
+use std::io::Write;
+
+const NS_PER_S: i64 = 1_000_000_000;
+
+/// `builtin_interfaces/Time`.
+#[derive(Serialize, Deserialize, Clone, Copy)]
+struct Time {
+    sec: i32,
+    nanosec: u32,
+}
+
+impl Time {
+    /// The nearest time that fits: whole seconds are 32 bits wide.
+    fn from_ns(ns: i64) -> Time {
+        let sec = ns.div_euclid(NS_PER_S);
+        match i32::try_from(sec) {
+            Ok(sec) => Time { sec, nanosec: ns.rem_euclid(NS_PER_S) as u32 },
+            Err(_) if sec < 0 => Time { sec: i32::MIN, nanosec: 0 },
+            Err(_) => Time { sec: i32::MAX, nanosec: NS_PER_S as u32 - 1 },
+        }
+    }
+
+    fn to_ns(self) -> i64 {
+        i64::from(self.sec) * NS_PER_S + i64::from(self.nanosec)
+    }
+}
+
+/// A NaN has many bit patterns; a bag holds one of them.
+fn canonical(value: f64) -> f64 {
+    if value.is_nan() { NOT_MEASURED } else { value }
+}
+
+/// Text on the stack: a frame id is written 60 000 times a second.
+struct FrameId {
+    bytes: [u8; 192],
+    len: usize,
+}
+
+impl FrameId {
+    fn of(sample: &Sample) -> FrameId {
+        let mut bytes = [0; 192];
+        let mut rest = &mut bytes[..];
+        // The longest text is 20 + 20 + 8 + 1 + 10 + 10 digits, 20 more for the stamp, and 47 for the keys: it fits.
+        let _ = write!(
+            rest,
+            "step={} seq={} src={:08x} axes={} flags={} layout={}",
+            sample.step,
+            sample.sequence,
+            sample.source,
+            sample.len(),
+            sample.flags,
+            sample.layout
+        );
+        // A stamp that the header cannot hold.
+        if Time::from_ns(sample.stamp_ns).to_ns() != sample.stamp_ns {
+            let _ = write!(rest, " stamp={}", sample.stamp_ns);
+        }
+        let len = 192 - rest.len();
+        FrameId { bytes, len }
+    }
+
+    fn as_str(&self) -> &str {
+        std::str::from_utf8(&self.bytes[..self.len]).unwrap_or("")
+    }
+}
+
+/// `sensor_msgs/JointState` as it is written.
+pub(super) struct JointState<'a> {
+    pub(super) sample: &'a Sample,
+    pub(super) axis_names: &'a [String],
+}
+
+impl Serialize for JointState<'_> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let axes = self.sample.len();
+        let frame_id = FrameId::of(self.sample);
+        let mut out = serializer.serialize_struct("JointState", 7)?;
+        out.serialize_field("stamp", &Time::from_ns(self.sample.stamp_ns))?;
+        out.serialize_field("frame_id", frame_id.as_str())?;
+        out.serialize_field("name", &AxisNames { given: self.axis_names, axes })?;
+        out.serialize_field("position", &Quantity(&self.sample.position[..axes]))?;
+        out.serialize_field("velocity", &Quantity(&self.sample.velocity[..axes]))?;
+        out.serialize_field("effort", &Quantity(&self.sample.effort[..axes]))?;
+        out.end()
+    }
+}
+
+/// Exactly as many names as there are axes: readers pair them with the values.
+struct AxisNames<'a> {
+    given: &'a [String],
+    axes: usize,
+}
+
+impl Serialize for AxisNames<'_> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        const SPARE: [&str; MAX_AXES] = ["axis0", "axis1", "axis2", "axis3", "axis4", "axis5", "axis6", "axis7"];
+        let mut out = serializer.serialize_seq(Some(self.axes))?;
+        for axis in 0..self.axes {
+            out.serialize_element(self.given.get(axis).map_or(SPARE[axis], String::as_str))?;
+        }
+        out.end()
+    }
+}
+
+/// Position, velocity or effort of all axes, or an empty array when no axis has it.
+struct Quantity<'a>(&'a [f64]);
+
+impl Serialize for Quantity<'_> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let values = if self.0.iter().all(|value| value.is_nan()) { &[] } else { self.0 };
+        let mut out = serializer.serialize_seq(Some(values.len()))?;
+        for value in values {
+            out.serialize_element(&canonical(*value))?;
+        }
+        out.end()
+    }
+}
+
+/// `sensor_msgs/JointState` as it is read, without allocating.
+#[derive(Deserialize)]
+pub(super) struct JointStateIn {
+    stamp: Time,
+    frame: FrameIn,
+    _names: SkippedStrings,
+    position: Values,
+    velocity: Values,
+    effort: Values,
+}
+
+impl TryFrom<JointStateIn> for Sample {
+    type Error = RosError;
+
+    fn try_from(read: JointStateIn) -> Result<Sample, RosError> {
+        let frame = match read.frame {
+            FrameIn::Ours(frame) => frame,
+            FrameIn::Foreign(frame_id) => return Err(RosError::Foreign { frame_id }),
+        };
+        for (name, values) in [("position", &read.position), ("velocity", &read.velocity), ("effort", &read.effort)] {
+            if values.len != 0 && values.len != frame.axes as usize {
+                return Err(RosError::Inconsistent { what: format!("{} axes, but {name} has {} entries", frame.axes, values.len) });
+            }
+        }
+        Ok(Sample {
+            layout: frame.layout,
+            source: frame.source,
+            step: frame.step,
+            sequence: frame.sequence,
+            stamp_ns: frame.stamp_ns.unwrap_or_else(|| read.stamp.to_ns()),
+            axes: frame.axes,
+            flags: frame.flags,
+            position: read.position.values,
+            velocity: read.velocity.values,
+            effort: read.effort.values,
+        })
+    }
+}
+
+/// What a frame id of ours says.
+struct Frame {
+    step: u64,
+    sequence: u64,
+    source: u32,
+    axes: u32,
+    flags: u32,
+    layout: u32,
+    stamp_ns: Option<i64>,
+}
+
+impl Frame {
+    /// Keys may come in any order and unknown ones are skipped, so that a later version may add some.
+    fn parse(text: &str) -> Option<Frame> {
+        let (mut step, mut sequence, mut source, mut axes, mut flags, mut layout, mut stamp_ns) =
+            (None, None, None, None, None, None, None);
+        for word in text.split_ascii_whitespace() {
+            let (key, value) = word.split_once('=')?;
+            match key {
+                "step" => step = Some(value.parse().ok()?),
+                "seq" => sequence = Some(value.parse().ok()?),
+                "src" => source = Some(u32::from_str_radix(value, 16).ok()?),
+                "axes" => axes = Some(value.parse().ok().filter(|axes| *axes as usize <= MAX_AXES)?),
+                "flags" => flags = Some(value.parse().ok()?),
+                "layout" => layout = Some(value.parse().ok()?),
+                "stamp" => stamp_ns = Some(value.parse().ok()?),
+                _ => {}
+            }
+        }
+        Some(Frame { step: step?, sequence: sequence?, source: source?, axes: axes?, flags: flags?, layout: layout?, stamp_ns })
+    }
+}
+
+enum FrameIn {
+    Ours(Frame),
+    Foreign(String),
+}
+
+impl<'de> Deserialize<'de> for FrameIn {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<FrameIn, D::Error> {
+        struct FrameVisitor;
+        impl Visitor<'_> for FrameVisitor {
+            type Value = FrameIn;
+
+            fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
+                f.write_str("a frame id")
+            }
+
+            fn visit_str<E>(self, text: &str) -> Result<FrameIn, E> {
+                Ok(Frame::parse(text).map_or_else(|| FrameIn::Foreign(Text::<64>::new(text).as_str().to_owned()), FrameIn::Ours))
+            }
+        }
+        deserializer.deserialize_str(FrameVisitor)
+    }
+}
+
+/// Axis names are for other people's tools.
+struct SkippedStrings;
+
+impl<'de> Deserialize<'de> for SkippedStrings {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<SkippedStrings, D::Error> {
+        struct Skip;
+        impl Visitor<'_> for Skip {
+            type Value = Skip;
+
+            fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
+                f.write_str("a name")
+            }
+
+            fn visit_str<E>(self, _: &str) -> Result<Skip, E> {
+                Ok(Skip)
+            }
+        }
+        impl<'de> Deserialize<'de> for Skip {
+            fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Skip, D::Error> {
+                deserializer.deserialize_str(Skip)
+            }
+        }
+        struct Strings;
+        impl<'de> Visitor<'de> for Strings {
+            type Value = SkippedStrings;
+
+            fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
+                f.write_str("names")
+            }
+
+            fn visit_seq<A: SeqAccess<'de>>(self, mut seq: A) -> Result<SkippedStrings, A::Error> {
+                while seq.next_element::<Skip>()?.is_some() {}
+                Ok(SkippedStrings)
+            }
+        }
+        deserializer.deserialize_seq(Strings)
+    }
+}
+
+/// An array of at most [`MAX_AXES`] numbers; the places beyond it are not measured.
+struct Values {
+    values: [f64; MAX_AXES],
+    len: usize,
+}
+
+impl<'de> Deserialize<'de> for Values {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Values, D::Error> {
+        struct ValuesVisitor;
+        impl<'de> Visitor<'de> for ValuesVisitor {
+            type Value = Values;
+
+            fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
+                f.write_str("numbers")
+            }
+
+            fn visit_seq<A: SeqAccess<'de>>(self, mut seq: A) -> Result<Values, A::Error> {
+                let mut read = Values { values: [NOT_MEASURED; MAX_AXES], len: 0 };
+                while let Some(value) = seq.next_element::<f64>()? {
+                    // A longer array is somebody else's: its length tells on it, its values are not needed.
+                    if let Some(place) = read.values.get_mut(read.len) {
+                        *place = canonical(value);
+                    }
+                    read.len += 1;
+                }
+                Ok(read)
+            }
+        }
+        deserializer.deserialize_seq(ValuesVisitor)
+    }
+}
+
+/// The fields that all twins share. The stamp stands twice: in the header for tools, in full for us.
+#[derive(Serialize, Deserialize)]
+struct Common {
+    stamp: Time,
+    frame_id: Cow<'static, str>,
+    layout: u32,
+    source: u32,
+    step: u64,
+    sequence: u64,
+    stamp_ns: i64,
+}
+
+impl Common {
+    fn new(layout: u32, source: u32, step: u64, sequence: u64, stamp_ns: i64) -> Common {
+        Common { stamp: Time::from_ns(stamp_ns), frame_id: Cow::Borrowed(""), layout, source, step, sequence, stamp_ns }
+    }
+}
+
+/// `backdrive_msgs/Gains`.
+#[derive(Serialize, Deserialize)]
+pub(super) struct GainsTwin {
+    common: Common,
+    mu: f64,
+    lambda: f64,
+    ramp_s: f64,
+}
+
+impl From<&Gains> for GainsTwin {
+    fn from(gains: &Gains) -> Self {
+        GainsTwin {
+            common: Common::new(gains.layout, gains.source, gains.step, gains.sequence, gains.stamp_ns),
+            mu: canonical(gains.mu),
+            lambda: canonical(gains.lambda),
+            ramp_s: canonical(gains.ramp_s),
+        }
+    }
+}
+
+impl From<GainsTwin> for Gains {
+    fn from(GainsTwin { common, mu, lambda, ramp_s }: GainsTwin) -> Gains {
+        let Common { layout, source, step, sequence, stamp_ns, .. } = common;
+        Gains { layout, source, step, sequence, stamp_ns, mu: canonical(mu), lambda: canonical(lambda), ramp_s: canonical(ramp_s) }
+    }
+}
+
+/// `backdrive_msgs/Event`.
+#[derive(Serialize, Deserialize)]
+pub(super) struct EventTwin<'a> {
+    common: Common,
+    severity: u32,
+    value: f64,
+    kind: Cow<'a, str>,
+    text: Cow<'a, str>,
+}
+
+impl<'a> From<&'a Event> for EventTwin<'a> {
+    fn from(event: &'a Event) -> Self {
+        EventTwin {
+            common: Common::new(event.layout, event.source, event.step, event.sequence, event.stamp_ns),
+            severity: event.severity,
+            value: canonical(event.value),
+            kind: Cow::Borrowed(event.kind.as_str()),
+            text: Cow::Borrowed(event.text.as_str()),
+        }
+    }
+}
+
+impl From<EventTwin<'_>> for Event {
+    fn from(EventTwin { common, severity, value, kind, text }: EventTwin) -> Event {
+        let Common { layout, source, step, sequence, stamp_ns, .. } = common;
+        let (kind, text) = (Text::new(&kind), Text::new(&text));
+        Event { layout, source, step, sequence, stamp_ns, severity, reserved: 0, value: canonical(value), kind, text }
+    }
+}
+
+/// `backdrive_msgs/Status`.
+#[derive(Serialize, Deserialize)]
+pub(super) struct StatusTwin {
+    common: Common,
+    steps: u64,
+    missed_deadlines: u64,
+    lost: u64,
+    loop_p50_s: f64,
+    loop_p99_s: f64,
+}
+
+impl From<&Status> for StatusTwin {
+    fn from(status: &Status) -> Self {
+        StatusTwin {
+            common: Common::new(status.layout, status.source, status.step, status.sequence, status.stamp_ns),
+            steps: status.steps,
+            missed_deadlines: status.missed_deadlines,
+            lost: status.lost,
+            loop_p50_s: canonical(status.loop_p50_s),
+            loop_p99_s: canonical(status.loop_p99_s),
+        }
+    }
+}
+
+impl From<StatusTwin> for Status {
+    fn from(StatusTwin { common, steps, missed_deadlines, lost, loop_p50_s, loop_p99_s }: StatusTwin) -> Status {
+        let Common { layout, source, step, sequence, stamp_ns, .. } = common;
+        let (loop_p50_s, loop_p99_s) = (canonical(loop_p50_s), canonical(loop_p99_s));
+        Status { layout, source, step, sequence, stamp_ns, steps, missed_deadlines, lost, loop_p50_s, loop_p99_s }
+    }
+}

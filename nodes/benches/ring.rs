@@ -1,0 +1,240 @@
+//! How much our transport costs: a lockstep loop through five processes with a recorder listening to all
+//! of it, against bytes going round a ring of five processes through pipes.
+//!
+//! `cargo bench -p backdrive-nodes --bench ring [-- LOOPS RUNS]`. The runs are interleaved and medians
+//! compared, for on a shared machine only ratios of neighbouring runs mean anything. One loop crosses
+//! five process boundaries in both: master, canceller, scaling, slave, scaling, and back to the master.
+
+#[path = "../tests/common/mod.rs"]
+mod common;
+
+use backdrive_bags::Completeness;
+use backdrive_msgs::{Message, Sample};
+use backdrive_nodes::clock::{Start, now_ns};
+use backdrive_nodes::histogram::Histogram;
+use backdrive_nodes::process::{ProcessOptions, run_process};
+use backdrive_nodes::protocol::{FromNode, NodeStatus, ToNode};
+use backdrive_nodes::recorder::{Sink, run_recorder};
+use backdrive_nodes::runner::{Options, RunError};
+use backdrive_nodes::stage::{Clock, Timing};
+use backdrive_nodes::transport::Location;
+use backdrive_nodes::transport::iceoryx2::Iceoryx2;
+use common::{NODES, listeners, plans, recorder_plan, timing};
+use std::error::Error;
+use std::io::{BufRead, BufReader, Read, Write};
+use std::process::{Child, ChildStdin, ChildStdout, Command, ExitCode, Stdio};
+
+type Result<T> = std::result::Result<T, Box<dyn Error>>;
+
+const SIZE: usize = std::mem::size_of::<Sample>();
+
+fn main() -> Result<ExitCode> {
+    let args: Vec<String> = std::env::args().skip(1).filter(|a| a != "--bench").collect();
+    match args.iter().map(String::as_str).collect::<Vec<_>>().as_slice() {
+        ["pipe"] => relay(),
+        ["node", name, location, steps] => node(name, &serde_json::from_str(location)?, steps.parse()?),
+        numbers => compare(number(numbers.first(), 30_000)?, number(numbers.get(1), 10)?),
+    }
+}
+
+fn number(text: Option<&&str>, default: u64) -> Result<u64> {
+    Ok(text.map_or(Ok(default), |t| t.parse())?)
+}
+
+fn compare(loops: u64, runs: u64) -> Result<ExitCode> {
+    println!("{loops} loops per run, medians of {runs} interleaved runs, messages of {SIZE} bytes");
+    let (mut pipes, mut ours) = (Vec::new(), Vec::new());
+    for _ in 0..runs {
+        pipes.push(pipe_ring(loops)?);
+        ours.push(lockstep_ring(loops)?);
+    }
+    let pipe = show("pipe ring of 5", &pipes);
+    let own = show("lockstep of 5 + recorder", &ours);
+    println!("ratio of p50: {:.2} (target at most 4, aim 2); of loops/s: {:.2}", own[1] / pipe[1], pipe[0] / own[0]);
+    Ok(ExitCode::SUCCESS)
+}
+
+/// loops/s, p50 µs, p99 µs.
+type Figures = [f64; 3];
+
+fn show(name: &str, runs: &[Figures]) -> Figures {
+    let median = |i: usize| {
+        let mut values: Vec<f64> = runs.iter().map(|r| r[i]).collect();
+        values.sort_by(f64::total_cmp);
+        values[values.len() / 2]
+    };
+    let figures = [median(0), median(1), median(2)];
+    println!("{name:26} {:8.0} loops/s  p50 {:6.1} us  p99 {:6.1} us", figures[0], figures[1], figures[2]);
+    figures
+}
+
+fn this_program(args: &[&str]) -> Result<Command> {
+    let mut command = Command::new(std::env::current_exe()?);
+    command.args(args);
+    Ok(command)
+}
+
+/// Passes on what it is given.
+fn relay() -> Result<ExitCode> {
+    let (mut input, mut output, mut bytes) = (std::io::stdin().lock(), std::fs::File::from(dup_stdout()?), [0; SIZE]);
+    while input.read_exact(&mut bytes).is_ok() {
+        output.write_all(&bytes)?;
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Standard output without the buffer of the standard library.
+fn dup_stdout() -> Result<std::os::fd::OwnedFd> {
+    use std::os::fd::AsFd;
+    Ok(std::io::stdout().as_fd().try_clone_to_owned()?)
+}
+
+/// This process and four relays.
+fn pipe_ring(loops: u64) -> Result<Figures> {
+    let mut children: Vec<Child> = Vec::new();
+    let mut first = None;
+    let mut last: Option<ChildStdout> = None;
+    for _ in 0..4 {
+        let stdin = last.take().map_or_else(Stdio::piped, Stdio::from);
+        let mut child = this_program(&["pipe"])?.stdin(stdin).stdout(Stdio::piped()).spawn()?;
+        first = first.or(child.stdin.take());
+        last = child.stdout.take();
+        children.push(child);
+    }
+    let (Some(mut first), Some(mut last)) = (first, last) else { return Err("no pipe".into()) };
+    let (mut histogram, mut bytes) = (Histogram::default(), [0; SIZE]);
+    for _ in 0..loops / 10 {
+        first.write_all(&bytes)?;
+        last.read_exact(&mut bytes)?;
+    }
+    let begun = now_ns();
+    let mut before = begun;
+    for _ in 0..loops {
+        first.write_all(&bytes)?;
+        last.read_exact(&mut bytes)?;
+        let now = now_ns();
+        histogram.record((now - before) as u64);
+        before = now;
+    }
+    let seconds = (before - begun) as f64 * 1e-9;
+    drop(first);
+    for mut child in children {
+        child.wait()?;
+    }
+    Ok([loops as f64 / seconds, histogram.quantile(0.5) * 1e-3, histogram.quantile(0.99) * 1e-3])
+}
+
+fn ring_timing(steps: u64) -> Timing {
+    timing(Clock::Lockstep, 1000.0, Some(steps))
+}
+
+fn node(name: &str, location: &Location, steps: u64) -> Result<ExitCode> {
+    let transport = Box::new(Iceoryx2::open(location, name)?);
+    let timing = ring_timing(steps);
+    if name == "recorder" {
+        return Ok(run_recorder(&recorder_plan(), &timing, transport, Box::new(Counting::default())));
+    }
+    let plan = plans(None, true).into_iter().find(|p| p.name == name).ok_or("no such node")?;
+    let options = ProcessOptions { run: Options { listeners: listeners(true), ..Options::default() }, ..ProcessOptions::default() };
+    Ok(run_process(plan, &timing, transport, options))
+}
+
+/// Checks sequence numbers and throws away.
+#[derive(Default)]
+struct Counting {
+    next: Vec<u64>,
+    lost: u64,
+    written: u64,
+}
+
+impl Sink for Counting {
+    fn push(&mut self, topic: usize, message: Message, _: i64) -> std::result::Result<(), RunError> {
+        if self.next.len() <= topic {
+            self.next.resize(topic + 1, 0);
+        }
+        self.lost += message.sequence().saturating_sub(self.next[topic]);
+        self.next[topic] = message.sequence() + 1;
+        self.written += 1;
+        Ok(())
+    }
+
+    fn health(&self) -> (u64, u64, u64) {
+        (self.written, 0, self.lost)
+    }
+
+    fn finish(self: Box<Self>) -> std::result::Result<Completeness, RunError> {
+        match self.lost {
+            0 => Ok(Completeness::default()),
+            lost => Err(RunError::Incomplete { lost }),
+        }
+    }
+}
+
+struct Node {
+    child: Child,
+    stdin: ChildStdin,
+    lines: BufReader<ChildStdout>,
+}
+
+impl Node {
+    fn start(name: &str, location: &Location, steps: u64) -> Result<Node> {
+        let (place, steps) = (serde_json::to_string(location)?, steps.to_string());
+        let mut child = this_program(&["node", name, &place, &steps])?.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn()?;
+        let (stdin, stdout) = (child.stdin.take().ok_or("no stdin")?, child.stdout.take().ok_or("no stdout")?);
+        Ok(Node { child, stdin, lines: BufReader::new(stdout) })
+    }
+
+    fn next(&mut self) -> Result<FromNode> {
+        let mut line = String::new();
+        self.lines.read_line(&mut line)?;
+        Ok(serde_json::from_str(&line)?)
+    }
+
+    fn until_ready(&mut self) -> Result<()> {
+        loop {
+            match self.next()? {
+                FromNode::Ready => return Ok(()),
+                FromNode::Failed { error, .. } => return Err(error.into()),
+                _ => {}
+            }
+        }
+    }
+
+    fn until_done(&mut self) -> Result<NodeStatus> {
+        loop {
+            match self.next()? {
+                FromNode::Done(status) => return Ok(status),
+                FromNode::Failed { error, .. } => return Err(error.into()),
+                _ => {}
+            }
+        }
+    }
+}
+
+fn lockstep_ring(steps: u64) -> Result<Figures> {
+    let root = tempfile::tempdir()?;
+    let location = Location { prefix: format!("ring{}_", std::process::id()), root: root.path().join("run") };
+    let mut nodes = Vec::new();
+    for name in NODES.into_iter().chain(["recorder"]) {
+        nodes.push(Node::start(name, &location, steps)?);
+    }
+    nodes.iter_mut().try_for_each(Node::until_ready)?;
+    let Start { t0_ns, unix_ns } = Start::after(0);
+    let begun = now_ns();
+    // The source last: the others are then all waiting when it begins.
+    for node in nodes.iter_mut().rev() {
+        let mut line = serde_json::to_vec(&ToNode::Start { t0_ns, unix_ns })?;
+        line.push(b'\n');
+        node.stdin.write_all(&line)?;
+    }
+    let master = nodes[1].until_done()?;
+    let seconds = (now_ns() - begun) as f64 * 1e-9;
+    for (i, node) in nodes.iter_mut().enumerate() {
+        if i != 1 {
+            node.until_done()?;
+        }
+        node.child.wait()?;
+    }
+    location.remove()?;
+    Ok([steps as f64 / seconds, master.loop_p50_us, master.loop_p99_us])
+}

@@ -1,0 +1,242 @@
+//! From a graph to what each process does.
+
+use crate::graph::{DeviceFiles, Direction, Graph, Node, NodeKind, Settings};
+use crate::stage::{Clock, InputPort, NodePlan, OutputPort, Stage};
+use backdrive_control::canceller::Canceller;
+use backdrive_control::core::{Core, Events, Port, Tick};
+use backdrive_control::device::{Device, DeviceError, DeviceOptions, Role};
+use backdrive_control::exciter::Exciter;
+use backdrive_control::guard::Guard;
+use backdrive_control::master::Master;
+use backdrive_control::operator::Operator;
+use backdrive_control::scaling::{Backward, Forward};
+use backdrive_control::slave::Slave;
+use backdrive_msgs::topic::{Kind, Topic};
+use backdrive_msgs::{Gains, Sample, source_id};
+
+/// Oscillation of the reflected force that the guard leaves alone, N or N m: about what a finger does not feel.
+const GUARD_LEAST_FORCE: f64 = 0.02;
+
+/// Steps by which a source may run ahead of the recorder in lockstep; well within the recorder's buffers.
+const AHEAD_OF_RECORDER: u64 = 1024;
+
+/// Steps by which a source may run ahead of its listeners in lockstep where nothing records.
+const AHEAD_OF_LISTENERS: u64 = 256;
+
+/// Topic on which a recorder says how far it has come.
+pub const CREDIT_TOPIC: &str = "/recorder/credit";
+
+/// Why a graph cannot be built.
+#[derive(Debug, thiserror::Error)]
+pub enum BuildError {
+    /// There is no such node.
+    #[error("the graph has no node \"{0}\"")]
+    NoSuchNode(String),
+    /// A node's device does not work.
+    #[error("node \"{node}\": {error}")]
+    Device {
+        /// The node.
+        node: String,
+        /// What is wrong.
+        error: DeviceError,
+    },
+    /// A program brings the wrong number of cores.
+    #[error("node \"{node}\": kind {kind} has {expected} stages, the program brings {given} cores")]
+    Cores {
+        /// The node.
+        node: String,
+        /// Its kind.
+        kind: &'static str,
+        /// Stages of the kind.
+        expected: usize,
+        /// Cores given.
+        given: usize,
+    },
+}
+
+/// A topic of a graph and who is on it.
+#[derive(Debug, Clone)]
+pub struct GraphTopic {
+    /// Name and kind.
+    pub topic: Topic,
+    /// Name of the node that speaks on it.
+    pub publisher: String,
+    /// Names of the axes, for samples.
+    pub axes: Vec<String>,
+    /// Number of stages that wait for it, and of all subscribers, the recorder included.
+    pub woken: usize,
+    /// See `woken`.
+    pub listeners: usize,
+}
+
+/// Every topic of a graph, in the order in which a lockstep bag holds the messages of one step.
+pub fn topics(graph: &Graph) -> Vec<GraphTopic> {
+    let recorded = usize::from(graph.node_of(NodeKind::Recorder).is_some());
+    let mut topics = Vec::new();
+    for (index, node) in graph.nodes.iter().enumerate().filter(|(_, n)| n.kind != NodeKind::Recorder) {
+        for port in node.kind.ports(Direction::Output) {
+            let topic = graph.topic_of(index, port);
+            let woken = graph.connections.iter().filter(|c| c.from.0 == index && c.from.1 == port).count() + pacing(graph, &topic);
+            let (publisher, axes) = (node.name.clone(), node.axis_names.clone());
+            topics.push(GraphTopic { topic, publisher, axes, woken, listeners: woken + recorded });
+        }
+    }
+    for node in graph.nodes.iter().filter(|n| n.kind != NodeKind::Recorder) {
+        let mut side = |part: &str, kind: Kind| {
+            let topic = Topic { name: format!("/{}/{part}", node.name), kind };
+            topics.push(GraphTopic { topic, publisher: node.name.clone(), axes: Vec::new(), woken: 0, listeners: recorded });
+        };
+        if node.kind == NodeKind::Scaling {
+            side("gains", Kind::Gains);
+        }
+        side("events", Kind::Event);
+        side("status", Kind::Status);
+    }
+    topics
+}
+
+fn is_source(kind: NodeKind) -> bool {
+    matches!(kind, NodeKind::Operator | NodeKind::Exciter)
+}
+
+/// What holds the graph's sources back in lockstep: (topic, steps they may be ahead).
+fn pace(graph: &Graph) -> Vec<(Topic, u64)> {
+    if graph.timing.clock == Clock::Realtime {
+        return Vec::new();
+    }
+    if graph.node_of(NodeKind::Recorder).is_some() {
+        return vec![(Topic { name: CREDIT_TOPIC.to_string(), kind: Kind::Sample }, AHEAD_OF_RECORDER)];
+    }
+    let nodes = graph.nodes.iter().enumerate().filter(|(_, n)| !is_source(n.kind));
+    nodes.filter_map(|(i, n)| n.kind.ports(Direction::Output).first().map(|port| (graph.topic_of(i, port), AHEAD_OF_LISTENERS))).collect()
+}
+
+fn pacing(graph: &Graph, topic: &Topic) -> usize {
+    let sources = graph.nodes.iter().filter(|n| is_source(n.kind)).count();
+    if pace(graph).iter().any(|(t, _)| t == topic) { sources } else { 0 }
+}
+
+/// Sources that wait for the recorder's credit.
+pub fn credit_listeners(graph: &Graph) -> usize {
+    pacing(graph, &Topic { name: CREDIT_TOPIC.to_string(), kind: Kind::Sample })
+}
+
+/// The plan of one of our own nodes (not of a recorder).
+pub fn plan(graph: &Graph, name: &str) -> Result<NodePlan, BuildError> {
+    let node = graph.node(name).ok_or_else(|| BuildError::NoSuchNode(name.to_string()))?;
+    let cores = cores(graph, node).map_err(|error| BuildError::Device { node: node.name.clone(), error })?;
+    plan_with(graph, name, cores)
+}
+
+/// The plan of a node whose cores the caller brings, one per stage of the node's kind: how a program of
+/// the user's own takes the place of one of ours.
+pub fn plan_with(graph: &Graph, name: &str, cores: Vec<Box<dyn Core>>) -> Result<NodePlan, BuildError> {
+    let index = graph.nodes.iter().position(|n| n.name == name).ok_or_else(|| BuildError::NoSuchNode(name.to_string()))?;
+    let node = &graph.nodes[index];
+    let kinds = node.kind.stages();
+    if kinds.len() != cores.len() {
+        let (kind, expected, given) = (node.kind.name(), kinds.len(), cores.len());
+        return Err(BuildError::Cores { node: name.to_string(), kind, expected, given });
+    }
+    let mut stages = Vec::new();
+    for (kind, core) in kinds.iter().zip(cores) {
+        let mut inputs = Vec::new();
+        let mut wiring = Vec::new();
+        for port in kind.inputs {
+            let connection = graph.connections.iter().find(|c| c.to.0 == index && c.to.1 == port.name);
+            wiring.push(connection.map(|_| inputs.len()));
+            inputs.extend(connection.map(|c| InputPort {
+                name: port.name.to_string(),
+                topic: c.topic.clone(),
+                delay: c.delay,
+                impairment: c.impairment,
+            }));
+        }
+        let core = if wiring.iter().all(Option::is_some) { core } else { Box::new(Wired::new(core, wiring)) };
+        if kind.inputs.is_empty() {
+            inputs.extend(pace(graph).into_iter().map(|(topic, delay)| InputPort {
+                name: "pace".to_string(),
+                topic,
+                delay,
+                impairment: None,
+            }));
+        }
+        let output = |port: &str| OutputPort { name: port.to_string(), topic: graph.topic_of(index, port), axes: node.axes };
+        let outputs = kind.outputs.iter().map(|port| output(port.name)).collect();
+        stages.push(Stage { name: kind.name.to_string(), inputs, outputs, core });
+    }
+    let side = |part: &str, kind: Kind| Topic { name: format!("/{name}/{part}"), kind };
+    Ok(NodePlan {
+        name: name.to_string(),
+        stages,
+        events: side("events", Kind::Event),
+        status: side("status", Kind::Status),
+        gains_in: None,
+        gains_out: (node.kind == NodeKind::Scaling).then(|| side("gains", Kind::Gains)),
+    })
+}
+
+fn cores(graph: &Graph, node: &Node) -> Result<Vec<Box<dyn Core>>, DeviceError> {
+    let period_s = graph.period_s();
+    let stale = graph.stale_after_s;
+    let simulated = |files: &DeviceFiles, role: Role| -> Result<Option<Device>, DeviceError> {
+        let Some(model) = &files.model else { return Ok(None) };
+        let noise_seed = files.real_sensors.then(|| graph.seed.wrapping_mul(0x9e37_79b9).wrapping_add(source_id(&node.name) as u64));
+        let options = DeviceOptions { substeps: files.substeps, noise_seed, quantise: files.real_sensors };
+        Device::new(model, files.fragment.as_ref(), role, period_s, &options).map(Some)
+    };
+    let needed = |device: Option<Device>| device.ok_or_else(|| DeviceError::NoAxes("none".to_string()));
+    Ok(match &node.settings {
+        Settings::Operator(intents) => vec![Box::new(Operator::new(intents.clone()))],
+        Settings::Master(files) => {
+            vec![Box::new(Master::new(needed(simulated(files, Role::Master)?)?, stale, period_s))]
+        }
+        Settings::Canceller(files, high_pass_hz) => {
+            vec![Box::new(Canceller::new(simulated(files, Role::Master)?, *high_pass_hz, period_s))]
+        }
+        Settings::Scaling { dither, guard } => {
+            let guard = guard.then(|| Guard::new(node.axes, GUARD_LEAST_FORCE, period_s));
+            vec![
+                Box::new(Forward::new(graph.gains.clone(), period_s)),
+                Box::new(Backward::new(graph.gains.clone(), dither.clone(), guard, period_s)),
+            ]
+        }
+        Settings::Slave(files) => vec![Box::new(Slave::new(needed(simulated(files, Role::Slave)?)?, stale, period_s))],
+        Settings::Exciter(forces) => vec![Box::new(Exciter::new(forces.clone()))],
+        Settings::Recorder => Vec::new(),
+    })
+}
+
+/// Gives a core the ports it expects where the graph leaves some unconnected.
+struct Wired {
+    core: Box<dyn Core>,
+    wiring: Vec<Option<usize>>,
+    ports: Vec<Port>,
+}
+
+impl Wired {
+    fn new(core: Box<dyn Core>, wiring: Vec<Option<usize>>) -> Wired {
+        let ports = vec![Port::EMPTY; wiring.len()];
+        Wired { core, wiring, ports }
+    }
+}
+
+impl Core for Wired {
+    fn step(&mut self, tick: &Tick, inputs: &[Port], outputs: &mut [Sample], events: &mut Events) {
+        for (port, wire) in self.ports.iter_mut().zip(&self.wiring) {
+            if let Some(wire) = wire {
+                *port = inputs[*wire];
+            }
+        }
+        self.core.step(tick, &self.ports, outputs, events);
+    }
+
+    fn set_gains(&mut self, gains: &Gains) {
+        self.core.set_gains(gains);
+    }
+
+    fn gains(&self) -> Option<(f64, f64)> {
+        self.core.gains()
+    }
+}
+

@@ -1,0 +1,148 @@
+//! What a graph must be to run: every needed input fed once, one publisher per topic, no loop without delay, axes that agree.
+
+use super::{Connection, Direction, Graph, Node, NodeKind, Settings};
+use backdrive_plant::tomlfile::{FileError, Table};
+
+pub(super) fn check(graph: &Graph, top: &Table) -> Result<(), FileError> {
+    if graph.nodes.is_empty() {
+        return Err(top.error("has no [[nodes]]"));
+    }
+    let at = |line: usize, key: String, message: String| FileError::at(top.file_name(), line, key, message);
+    let of_node = |node: &Node, message: String| at(node.line, format!("node \"{}\"", node.name), message);
+    let of_connection = |c: &Connection, message: String| {
+        let (from, to) = (&graph.nodes[c.from.0].name, &graph.nodes[c.to.0].name);
+        at(c.line, format!("connection {from}.{} -> {to}.{}", c.from.1, c.to.1), message)
+    };
+
+    if graph.nodes.iter().filter(|n| n.kind == NodeKind::Recorder).count() > 1 {
+        return Err(top.error("has two recorders; one records every topic"));
+    }
+    inputs_are_fed(graph, &of_node, &of_connection)?;
+    one_publisher(graph, &of_node)?;
+    axes_agree(graph, &of_node, &of_connection)?;
+    no_loop_without_delay(graph, &of_connection)?;
+    for node in &graph.nodes {
+        if node.restart && graph.timing.clock == crate::stage::Clock::Lockstep {
+            return Err(of_node(node, "restart needs clock = \"realtime\": in lockstep the others cannot go on without it".into()));
+        }
+        if let Settings::Scaling { guard: true, .. } = node.settings
+            && !graph.connections.iter().any(|c| graph.nodes[c.to.0].name == node.name && c.to.1 == "measured")
+        {
+            let message = "the guard needs the master: connect master.measured to its input \"measured\" with delay = 1";
+            return Err(of_node(node, message.into()));
+        }
+    }
+    Ok(())
+}
+
+type OfNode<'a> = dyn Fn(&Node, String) -> FileError + 'a;
+type OfConnection<'a> = dyn Fn(&Connection, String) -> FileError + 'a;
+
+fn inputs_are_fed(graph: &Graph, of_node: &OfNode, of_connection: &OfConnection) -> Result<(), FileError> {
+    for (index, node) in graph.nodes.iter().enumerate() {
+        for port in node.kind.ports(Direction::Input) {
+            let mut feeding = graph.connections.iter().filter(|c| c.to.0 == index && c.to.1 == port);
+            let required = node.kind.port(port, Direction::Input).is_some_and(|(_, p)| p.required);
+            if feeding.next().is_none() && required {
+                return Err(of_node(node, format!("nothing is connected to its input \"{port}\"")));
+            }
+            if let Some(second) = feeding.next() {
+                return Err(of_connection(second, format!("the input \"{port}\" has another connection already: one publisher per input")));
+            }
+        }
+    }
+    Ok(())
+}
+
+/// (topic, node index, port) of every output.
+fn outputs(graph: &Graph) -> Vec<(String, usize, &'static str)> {
+    let ports = |(index, node): (usize, &Node)| {
+        node.kind.ports(Direction::Output).into_iter().map(move |port| (index, port)).collect::<Vec<_>>()
+    };
+    graph.nodes.iter().enumerate().flat_map(ports).map(|(index, port)| (graph.topic_of(index, port).name, index, port)).collect()
+}
+
+fn one_publisher(graph: &Graph, of_node: &OfNode) -> Result<(), FileError> {
+    let outputs = outputs(graph);
+    for (i, (topic, node, port)) in outputs.iter().enumerate() {
+        if let Some((_, other, other_port)) = outputs[..i].iter().find(|(earlier, ..)| earlier == topic) {
+            let (this, other) = (&graph.nodes[*node], &graph.nodes[*other]);
+            return Err(of_node(
+                this,
+                format!("\"{port}\" publishes {topic}, and so does {}.{other_port}; give one of them another topic", other.name),
+            ));
+        }
+    }
+    Ok(())
+}
+
+fn axes_agree(graph: &Graph, of_node: &OfNode, of_connection: &OfConnection) -> Result<(), FileError> {
+    for node in &graph.nodes {
+        if let Settings::Operator(intents) = &node.settings
+            && intents.len() > node.axes
+        {
+            return Err(of_node(node, format!("moves {} axes, but the device has {}", intents.len(), node.axes)));
+        }
+    }
+    for connection in &graph.connections {
+        let (from, to) = (&graph.nodes[connection.from.0], &graph.nodes[connection.to.0]);
+        if from.axes != to.axes && to.kind != NodeKind::Recorder {
+            return Err(of_connection(connection, format!("{} has {} axes and {} has {}", from.name, from.axes, to.name, to.axes)));
+        }
+    }
+    Ok(())
+}
+
+fn no_loop_without_delay(graph: &Graph, of_connection: &OfConnection) -> Result<(), FileError> {
+    match order(graph) {
+        Ok(_) => Ok(()),
+        Err(stuck) => {
+            let loop_names: Vec<String> =
+                stuck.iter().map(|(node, stage)| format!("{}.{}", graph.nodes[*node].name, graph.nodes[*node].kind.stages()[*stage].name)).collect();
+            let inside = |c: &&Connection| c.delay == 0 && stuck.contains(&stage_of(graph, &c.to, Direction::Input));
+            let message = format!("a loop without delay runs through {}; give one of its connections delay = 1", loop_names.join(", "));
+            let line = graph.connections.iter().rev().find(inside);
+            Err(line.map_or_else(|| FileError::whole(graph.path.display().to_string(), message.clone()), |c| of_connection(c, message.clone())))
+        }
+    }
+}
+
+fn stage_of(graph: &Graph, end: &(usize, String), direction: Direction) -> (usize, usize) {
+    (end.0, graph.nodes[end.0].kind.port(&end.1, direction).map_or(0, |(stage, _)| stage))
+}
+
+/// All stages as (node, stage), each after those whose outputs of the same step it needs; or those that wait for each other.
+pub(crate) fn order(graph: &Graph) -> Result<Vec<(usize, usize)>, Vec<(usize, usize)>> {
+    let mut waiting: Vec<(usize, usize)> =
+        graph.nodes.iter().enumerate().flat_map(|(n, node)| (0..node.kind.stages().len()).map(move |s| (n, s))).collect();
+    let mut done = Vec::with_capacity(waiting.len());
+    while !waiting.is_empty() {
+        let ready = |stage: &(usize, usize)| {
+            graph.connections.iter().filter(|c| c.delay == 0 && stage_of(graph, &c.to, Direction::Input) == *stage).all(|c| {
+                let before = stage_of(graph, &c.from, Direction::Output);
+                !waiting.contains(&before)
+            })
+        };
+        let Some(next) = waiting.iter().position(ready) else { break };
+        done.push(waiting.remove(next));
+    }
+    if waiting.is_empty() { Ok(done) } else { Err(only_loops(graph, waiting)) }
+}
+
+/// Of stages that cannot be ordered, those that feed each other, without those that only wait behind them.
+fn only_loops(graph: &Graph, mut stuck: Vec<(usize, usize)>) -> Vec<(usize, usize)> {
+    loop {
+        let feeds = |stage: &(usize, usize)| {
+            graph.connections.iter().any(|c| {
+                c.delay == 0
+                    && stage_of(graph, &c.from, Direction::Output) == *stage
+                    && stuck.contains(&stage_of(graph, &c.to, Direction::Input))
+            })
+        };
+        let kept: Vec<(usize, usize)> = stuck.iter().copied().filter(feeds).collect();
+        if kept.len() == stuck.len() {
+            return kept;
+        }
+        stuck = kept;
+    }
+}

@@ -1,0 +1,175 @@
+//! Node kinds: their stages and ports. A new kind is one entry here, its settings, and its core in `build`.
+
+/// What a node is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum NodeKind {
+    /// The user's hand: what it wants.
+    Operator,
+    /// The device in the user's hand.
+    Master,
+    /// Predicts the induced motion and subtracts it.
+    Canceller,
+    /// Position and force scaling.
+    Scaling,
+    /// The remote device with its environment.
+    Slave,
+    /// Plays an excitation on a force channel.
+    Exciter,
+    /// Records every topic.
+    Recorder,
+}
+
+/// Whether a port takes or gives.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Direction {
+    /// Takes.
+    Input,
+    /// Gives.
+    Output,
+}
+
+/// A port of a stage.
+#[derive(Debug, Clone, Copy)]
+pub struct PortKind {
+    /// Name in a graph file.
+    pub name: &'static str,
+    /// One line.
+    pub doc: &'static str,
+    /// Inputs: whether the graph must connect it.
+    pub required: bool,
+    /// Outputs: last part of the usual topic, in CRTK's words; a command is told under the receiver's name.
+    pub topic: &'static str,
+    /// Outputs: whether it commands the receiver.
+    pub commands: bool,
+}
+
+/// A stage of a node kind.
+#[derive(Debug, Clone, Copy)]
+pub struct StageKind {
+    /// Name within the node.
+    pub name: &'static str,
+    /// In the order in which the core expects them.
+    pub inputs: &'static [PortKind],
+    /// In the order in which the core fills them.
+    pub outputs: &'static [PortKind],
+}
+
+const fn input(name: &'static str, required: bool, doc: &'static str) -> PortKind {
+    PortKind { name, doc, required, topic: "", commands: false }
+}
+
+const fn state(name: &'static str, topic: &'static str, doc: &'static str) -> PortKind {
+    PortKind { name, doc, required: false, topic, commands: false }
+}
+
+const fn command(name: &'static str, topic: &'static str, doc: &'static str) -> PortKind {
+    PortKind { name, doc, required: false, topic, commands: true }
+}
+
+const OPERATOR: &[StageKind] =
+    &[StageKind { name: "hand", inputs: &[], outputs: &[state("intent", "setpoint_js", "position and velocity that the hand wants")] }];
+
+const MASTER: &[StageKind] = &[StageKind {
+    name: "plant",
+    inputs: &[
+        input("intent", false, "motion of the hand; without it the hand rests"),
+        input("force", false, "force on the motor, along +x; without it there is none"),
+    ],
+    outputs: &[
+        state("measured", "measured_js", "measured position; effort is the force applied from this step to the next"),
+        state("user", "user_js", "position, velocity and force of the hand on the handle; known in simulation only"),
+    ],
+}];
+
+const CANCELLER: &[StageKind] = &[StageKind {
+    name: "predict",
+    inputs: &[input("measured", true, "the master's measured position and applied force")],
+    outputs: &[
+        state("motion", "measured_js", "position without the predicted induced motion"),
+        state("induced", "induced_js", "predicted induced motion"),
+    ],
+}];
+
+const SCALING: &[StageKind] = &[
+    StageKind {
+        name: "forward",
+        inputs: &[input("motion", true, "motion of the user")],
+        outputs: &[command("command", "servo_jp", "mu times the motion: where the slave shall be")],
+    },
+    StageKind {
+        name: "backward",
+        inputs: &[
+            input("contact", true, "force of the environment on the slave"),
+            input("measured", false, "the master's measured position and applied force; the guard watches it"),
+        ],
+        outputs: &[
+            command("force", "servo_jf", "lambda times the contact force, and the dither"),
+            state("dither", "dither_jf", "the added excitation alone"),
+        ],
+    },
+];
+
+const SLAVE: &[StageKind] = &[StageKind {
+    name: "plant",
+    inputs: &[input("command", true, "where the tip shall be")],
+    outputs: &[state("measured", "measured_js", "position and velocity of the tip; effort is the environment's force on it")],
+}];
+
+const EXCITER: &[StageKind] =
+    &[StageKind { name: "play", inputs: &[], outputs: &[command("force", "servo_jf", "the excitation: a force on the master's motor")] }];
+
+const RECORDER: &[StageKind] = &[];
+
+impl NodeKind {
+    /// Names in graph files.
+    pub const ALL: &'static [(&'static str, NodeKind)] = &[
+        ("operator", NodeKind::Operator),
+        ("master", NodeKind::Master),
+        ("canceller", NodeKind::Canceller),
+        ("scaling", NodeKind::Scaling),
+        ("slave", NodeKind::Slave),
+        ("exciter", NodeKind::Exciter),
+        ("recorder", NodeKind::Recorder),
+    ];
+
+    /// Name in graph files.
+    pub fn name(self) -> &'static str {
+        NodeKind::ALL.iter().find(|(_, kind)| *kind == self).map_or("", |(name, _)| name)
+    }
+
+    /// The stages that step separately.
+    pub fn stages(self) -> &'static [StageKind] {
+        match self {
+            NodeKind::Operator => OPERATOR,
+            NodeKind::Master => MASTER,
+            NodeKind::Canceller => CANCELLER,
+            NodeKind::Scaling => SCALING,
+            NodeKind::Slave => SLAVE,
+            NodeKind::Exciter => EXCITER,
+            NodeKind::Recorder => RECORDER,
+        }
+    }
+
+    /// A port by its name and direction, with the index of its stage.
+    pub fn port(self, name: &str, direction: Direction) -> Option<(usize, &'static PortKind)> {
+        self.stages().iter().enumerate().find_map(|(index, stage)| {
+            let ports = if direction == Direction::Input { stage.inputs } else { stage.outputs };
+            ports.iter().find(|p| p.name == name).map(|port| (index, port))
+        })
+    }
+
+    /// Names of all ports of a direction.
+    pub fn ports(self, direction: Direction) -> Vec<&'static str> {
+        let of = |stage: &'static StageKind| if direction == Direction::Input { stage.inputs } else { stage.outputs };
+        self.stages().iter().flat_map(|stage| of(stage).iter().map(|p| p.name)).collect()
+    }
+
+    /// The usual topic of an output port. A command goes by the name of the node that obeys it.
+    pub fn usual_topic(self, port: &str, node: &str, receiver: Option<&str>) -> String {
+        match self.port(port, Direction::Output) {
+            Some((_, p)) if p.commands => format!("/{}/{}", receiver.unwrap_or(node), p.topic),
+            Some((_, p)) => format!("/{node}/{}", p.topic),
+            None => format!("/{node}/{port}"),
+        }
+    }
+}

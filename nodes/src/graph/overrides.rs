@@ -1,0 +1,190 @@
+//! What the command line changes in a graph file, without touching the file.
+
+use super::NodeKind;
+use backdrive_plant::tomlfile::FileError;
+use std::path::{Path, PathBuf};
+use toml_edit::{DocumentMut, Item, Value, value};
+
+/// Changes to a graph; `None` leaves what the file says. Files are relative to the working directory.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Overrides {
+    /// Model of the master.
+    pub master: Option<PathBuf>,
+    /// Grip on the master; `none` for no hand.
+    pub grip: Option<PathBuf>,
+    /// Model of the slave.
+    pub slave: Option<PathBuf>,
+    /// What the slave touches; `none` for nothing.
+    pub environment: Option<PathBuf>,
+    /// The canceller's model, or `none`.
+    pub canceller: Option<PathBuf>,
+    /// The grip that the canceller assumes, or `none`.
+    pub canceller_grip: Option<PathBuf>,
+    /// Corner of the canceller's high-pass, Hz.
+    pub high_pass_hz: Option<f64>,
+    /// Position scale.
+    pub mu: Option<f64>,
+    /// Force scale.
+    pub lambda: Option<f64>,
+    /// Dither on the force channel, such as `multisine:peak=0.1,from=1,to=500,period=2`.
+    pub dither: Option<String>,
+    /// Whether the guard watches.
+    pub guard: Option<bool>,
+    /// The bag.
+    pub bag: Option<PathBuf>,
+    /// `lockstep` or `realtime`.
+    pub clock: Option<String>,
+    /// Steps per second.
+    pub rate_hz: Option<f64>,
+    /// Length of the run, s.
+    pub duration_s: Option<f64>,
+    /// Seed of everything random.
+    pub seed: Option<u64>,
+    /// Whether sensors round and are noisy as the model files say (`as_modelled`) or not (`ideal`).
+    pub sensors: Option<String>,
+    /// Whether the devices' limits act (`enforced`) or not (`ignored`).
+    pub limits: Option<String>,
+}
+
+/// Keys of node tables that name files.
+const FILE_KEYS: &[&str] = &["model", "grip", "environment", "recording"];
+
+impl Overrides {
+    /// Text of the graph file with the changes, and with every file it names as an absolute path.
+    pub(super) fn apply(&self, text: &str, path: &Path) -> Result<String, FileError> {
+        let name = path.display().to_string();
+        let mut doc: DocumentMut = match text.parse() {
+            Ok(doc) => doc,
+            // The parser that follows says where and why.
+            Err(_) => return Ok(text.to_string()),
+        };
+        let here = std::env::current_dir().unwrap_or_default();
+        let beside = absolute(&here, path).parent().map(Path::to_path_buf).unwrap_or_default();
+        make_absolute(&mut doc, &beside);
+        self.write_top(&mut doc);
+        self.write_nodes(&mut doc, &here, &name)?;
+        Ok(doc.to_string())
+    }
+
+    fn write_top(&self, doc: &mut DocumentMut) {
+        let mut gains = |key: &str, number: Option<f64>| {
+            if let Some(number) = number {
+                set(doc.as_table_mut().entry("gains").or_insert(toml_edit::table()), key, value(number));
+            }
+        };
+        gains("mu", self.mu);
+        gains("lambda", self.lambda);
+        if let Some(rate) = self.rate_hz {
+            doc["rate_hz"] = value(rate);
+        }
+        if let Some(duration) = self.duration_s {
+            doc["duration_s"] = value(duration);
+        }
+        if let Some(clock) = &self.clock {
+            doc["clock"] = value(clock.as_str());
+        }
+        if let Some(seed) = self.seed {
+            doc["seed"] = value(seed.min(i64::MAX as u64) as i64);
+        }
+    }
+
+    fn write_nodes(&self, doc: &mut DocumentMut, here: &Path, name: &str) -> Result<(), FileError> {
+        let file = |path: &PathBuf| {
+            let keep = path.as_os_str() == "none";
+            value(if keep { "none".to_string() } else { absolute(here, path).display().to_string() })
+        };
+        let wanted: [(&str, NodeKind, &str, Option<Item>); 14] = [
+            ("--master", NodeKind::Master, "model", self.master.as_ref().map(file)),
+            ("--grip", NodeKind::Master, "grip", self.grip.as_ref().map(file)),
+            ("--slave", NodeKind::Slave, "model", self.slave.as_ref().map(file)),
+            ("--environment", NodeKind::Slave, "environment", self.environment.as_ref().map(file)),
+            ("--canceller", NodeKind::Canceller, "model", self.canceller.as_ref().map(file)),
+            ("--canceller-grip", NodeKind::Canceller, "grip", self.canceller_grip.as_ref().map(file)),
+            ("--high-pass", NodeKind::Canceller, "high_pass_hz", self.high_pass_hz.map(value)),
+            ("--dither", NodeKind::Scaling, "dither", self.dither.as_deref().map(value)),
+            ("--guard", NodeKind::Scaling, "guard", self.guard.map(value)),
+            ("--bag", NodeKind::Recorder, "bag", self.bag.as_ref().map(file)),
+            ("--sensors", NodeKind::Master, "sensors", self.sensors.as_deref().map(value)),
+            ("--sensors", NodeKind::Slave, "sensors", self.sensors.as_deref().map(value)),
+            ("--limits", NodeKind::Master, "limits", self.limits.as_deref().map(value)),
+            ("--limits", NodeKind::Slave, "limits", self.limits.as_deref().map(value)),
+        ];
+        for (option, kind, key, item) in wanted {
+            let Some(item) = item else { continue };
+            let mut found = false;
+            for node in node_tables(doc) {
+                if node.get("kind").and_then(Item::as_str) == Some(kind.name()) {
+                    node[key] = item.clone();
+                    found = true;
+                }
+            }
+            if !found && !matches!(option, "--sensors" | "--limits") {
+                return Err(FileError::whole(name, format!("has no {} node, so {option} means nothing here", kind.name())));
+            }
+        }
+        Ok(())
+    }
+}
+
+fn node_tables(doc: &mut DocumentMut) -> impl Iterator<Item = &mut toml_edit::Table> {
+    doc.get_mut("nodes").and_then(Item::as_array_of_tables_mut).into_iter().flat_map(|tables| tables.iter_mut())
+}
+
+fn set(table: &mut Item, key: &str, item: Item) {
+    if let Some(table) = table.as_table_like_mut() {
+        table.insert(key, item);
+    }
+}
+
+fn make_absolute(doc: &mut DocumentMut, beside: &Path) {
+    for node in node_tables(doc) {
+        for key in FILE_KEYS {
+            if let Some(Item::Value(Value::String(text))) = node.get_mut(key)
+                && text.value() != "none"
+            {
+                let full = absolute(beside, Path::new(text.value())).display().to_string();
+                let decor = text.decor().clone();
+                *text = toml_edit::Formatted::new(full);
+                *text.decor_mut() = decor;
+            }
+        }
+    }
+}
+
+/// The text with one experiment written into it and the list of experiments gone; unchanged where there is no such experiment.
+pub(super) fn experiment_text(text: &str, name: &str) -> String {
+    let Ok(mut doc) = text.parse::<DocumentMut>() else { return text.to_string() };
+    let Some(Item::ArrayOfTables(experiments)) = doc.remove("experiments") else { return text.to_string() };
+    let Some(experiment) = experiments.iter().find(|e| e.get("name").and_then(Item::as_str) == Some(name)) else {
+        return text.to_string();
+    };
+    for (key, item) in experiment.iter() {
+        match (key, item.as_table_like()) {
+            ("duration_s", _) => doc["duration_s"] = item.clone(),
+            (node_name, Some(changes)) => {
+                for node in node_tables(&mut doc).filter(|n| n.get("name").and_then(Item::as_str) == Some(node_name)) {
+                    for (key, item) in changes.iter() {
+                        node[key] = item.clone();
+                    }
+                }
+            }
+            _ => {}
+        }
+    }
+    doc.to_string()
+}
+
+/// `path` seen from `base`, without `.` and `..` where they can be resolved.
+pub(super) fn absolute(base: &Path, path: &Path) -> PathBuf {
+    let mut full = PathBuf::new();
+    for part in base.join(path).components() {
+        match part {
+            std::path::Component::CurDir => {}
+            std::path::Component::ParentDir => {
+                full.pop();
+            }
+            part => full.push(part),
+        }
+    }
+    full
+}

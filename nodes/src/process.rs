@@ -1,0 +1,220 @@
+//! A node as a process of its own, in conversation with the supervisor (see [`crate::protocol`]).
+//!
+//! Two threads beside the loop do the talking, so that a full pipe or a slow reader never stalls it:
+//! one reads standard input, one writes standard output.
+
+use crate::clock::Start;
+use crate::protocol::{FromNode, NodeStatus, ToNode};
+use crate::realtime;
+use crate::runner::{Control, Options, RunError, Runner, Told};
+use crate::stage::{Clock, NodePlan, Timing};
+use crate::transport::Transport;
+use backdrive_msgs::measured;
+use nix::sys::signal::{SigHandler, Signal, signal};
+use std::io::{BufRead, Write};
+use std::process::ExitCode;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TrySendError, sync_channel};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+/// How a process runs, beyond what the graph says.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct ProcessOptions {
+    /// Of the loop.
+    pub run: Options,
+    /// Of the operating system; used in real time only.
+    pub realtime: realtime::Options,
+}
+
+/// Time from the supervisor's death, or a stop, to the end of a process whose loop does not end by itself.
+const GRACE: Duration = Duration::from_secs(3);
+
+/// Runs a node as this process until its steps are done, the supervisor stops it or is gone, or it fails.
+/// The last line that it says is `done` or `failed`; the exit code is 0 or that of the failure.
+///
+/// `listeners` names how many listeners each topic has in the graph: the node is ready when they are all there.
+pub fn run_process(plan: NodePlan, timing: &Timing, transport: Box<dyn Transport>, options: ProcessOptions) -> ExitCode {
+    let line = Line::open();
+    let timing = timing.clone();
+    line.supervised(|line| {
+        let mut runner = Runner::new(plan, &timing, transport, options.run)?;
+        let Some(start) = line.meet(|| runner.missing()) else {
+            return Ok(NodeStatus::default());
+        };
+        let mut tell = |told| line.tell(told);
+        if timing.clock == Clock::Realtime {
+            let refused = realtime::enter(&options.realtime);
+            if !refused.is_empty() {
+                runner.note("realtime_refused", 1, &refused.join("; "), &mut tell);
+            }
+        }
+        runner.run(start, &line.control, &mut tell)
+    })
+}
+
+/// The line to the supervisor.
+pub(crate) struct Line {
+    pub control: Arc<Control>,
+    start: Receiver<Start>,
+    out: SyncSender<Out>,
+    dropped: AtomicBool,
+    writer: Mutex<Option<JoinHandle<()>>>,
+}
+
+enum Out {
+    Told(Told),
+    Said(Box<FromNode>),
+}
+
+/// Set by SIGTERM.
+static TERMINATED: AtomicBool = AtomicBool::new(false);
+
+extern "C" fn on_terminate(_: i32) {
+    TERMINATED.store(true, Ordering::SeqCst);
+}
+
+impl Line {
+    /// Starts to listen and to talk.
+    pub fn open() -> Line {
+        // An interrupt from the keyboard goes to the whole group; the supervisor stops us in order.
+        // SAFETY: the handlers do nothing but store to an atomic.
+        unsafe {
+            let _ = signal(Signal::SIGINT, SigHandler::SigIgn);
+            let _ = signal(Signal::SIGTERM, SigHandler::Handler(on_terminate));
+        }
+        // The end of standard input tells that the supervisor is gone, but not to a process that is
+        // stopped: its death wakes it up. (The kernel sends this when the starting *thread* ends, so
+        // nothing that ends the process may be used here.)
+        let _ = nix::sys::prctl::set_pdeathsig(Signal::SIGCONT);
+        let control = Arc::new(Control::default());
+        let (to_start, start) = sync_channel(1);
+        let (out, said) = sync_channel(256);
+        let writer = std::thread::spawn(move || write_lines(&said));
+        let reader = Arc::clone(&control);
+        std::thread::spawn(move || {
+            read_lines(&reader, &to_start);
+            drop(to_start);
+            reader.stop();
+            std::thread::sleep(GRACE);
+            // The loop is stuck in a step: better gone than an orphan.
+            std::process::exit(5);
+        });
+        let watched = Arc::clone(&control);
+        std::thread::spawn(move || watch(&watched));
+        Line { control, start, out, dropped: AtomicBool::new(false), writer: Mutex::new(Some(writer)) }
+    }
+
+    /// Passes on what a loop tells; never blocks. What does not fit is dropped: it has been published as well.
+    pub fn tell(&self, told: Told) {
+        if let Err(TrySendError::Full(_)) = self.out.try_send(Out::Told(told)) {
+            self.dropped.store(true, Ordering::Relaxed);
+        }
+    }
+
+    fn say(&self, message: FromNode) {
+        // An error means that the writer is gone, and with it the one who would hear of it.
+        let _ = self.out.send(Out::Said(Box::new(message)));
+    }
+
+    /// Says `created`, then `ready` once nothing is missing, and waits for the start. `None` when stopped before.
+    pub fn meet(&self, mut missing: impl FnMut() -> Vec<String>) -> Option<Start> {
+        self.say(FromNode::Created);
+        let (mut complained, mut ready) = (Instant::now(), false);
+        loop {
+            if !ready {
+                let lacks = missing();
+                ready = lacks.is_empty();
+                if ready {
+                    self.say(FromNode::Ready);
+                } else if complained.elapsed() >= Duration::from_secs(2) {
+                    complained = Instant::now();
+                    self.say(FromNode::Waiting { missing: lacks });
+                }
+            }
+            if self.control.is_stopped() {
+                return None;
+            }
+            match self.start.recv_timeout(Duration::from_millis(if ready { 20 } else { 2 })) {
+                Ok(start) => return Some(start),
+                Err(RecvTimeoutError::Timeout) => {}
+                Err(RecvTimeoutError::Disconnected) => return None,
+            }
+        }
+    }
+
+    /// Does the work and says how it ended, last of all; the work's ports are gone by then.
+    pub fn supervised(&self, work: impl FnOnce(&Line) -> Result<NodeStatus, RunError>) -> ExitCode {
+        let result = work(self);
+        let (last, code) = match result {
+            Ok(status) => (FromNode::Done(status), ExitCode::SUCCESS),
+            Err(e) => {
+                (FromNode::Failed { error: e.to_string(), code: e.code() }, ExitCode::from(e.code()))
+            }
+        };
+        self.say(last);
+        if let Some(writer) = self.writer.lock().unwrap_or_else(PoisonError::into_inner).take() {
+            let _ = writer.join();
+        }
+        code
+    }
+}
+
+/// Writes one line per message; ends after the last one, or when nobody reads any more.
+fn write_lines(said: &Receiver<Out>) {
+    let mut stdout = std::io::stdout().lock();
+    for out in said.iter() {
+        let message = match out {
+            Out::Said(message) => *message,
+            Out::Told(told) => spell(told),
+        };
+        let is_last = matches!(message, FromNode::Done(_) | FromNode::Failed { .. });
+        let Ok(mut line) = serde_json::to_vec(&message) else { continue };
+        line.push(b'\n');
+        if stdout.write_all(&line).and_then(|()| stdout.flush()).is_err() || is_last {
+            return;
+        }
+    }
+}
+
+fn spell(told: Told) -> FromNode {
+    match told {
+        Told::Status(report) => FromNode::Status(report.into()),
+        Told::Event(event) => FromNode::Event {
+            step: event.step,
+            severity: event.severity,
+            kind: event.kind.as_str().to_string(),
+            text: event.text.as_str().to_string(),
+            value: measured(event.value),
+        },
+    }
+}
+
+/// Does what the supervisor says, until it says no more.
+fn read_lines(control: &Control, start: &SyncSender<Start>) {
+    for line in std::io::stdin().lock().lines() {
+        let Ok(line) = line else { return };
+        match serde_json::from_str(&line) {
+            Ok(ToNode::Start { t0_ns, unix_ns }) => {
+                let _ = start.try_send(Start { t0_ns, unix_ns });
+            }
+            Ok(ToNode::Stop) => control.stop(),
+            Ok(ToNode::Gains { mu, lambda, ramp_s }) => control.set_gains(mu, lambda, ramp_s),
+            Err(e) => eprintln!("not understood from the supervisor: {e}: {line}"),
+        }
+    }
+}
+
+/// Stops the loop on SIGTERM, or when the parent has died while something else still holds our standard input open.
+fn watch(control: &Control) {
+    let parent = nix::unistd::getppid();
+    while !control.is_stopped() {
+        std::thread::sleep(Duration::from_millis(100));
+        if TERMINATED.load(Ordering::SeqCst) || nix::unistd::getppid() != parent {
+            control.stop();
+            std::thread::sleep(GRACE);
+            std::process::exit(5);
+        }
+    }
+}

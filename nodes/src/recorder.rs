@@ -1,0 +1,260 @@
+//! The recorder: hears every topic, takes everything over in time, and slows nobody down.
+//!
+//! It polls rather than wakes, so a publisher never pays for it. In lockstep it says on its credit topic
+//! up to which step it has everything; sources wait for that, so the graph cannot outrun it and nothing
+//! is ever lost. In real time the buffers cover [`POLL`] many times over, and a hole is counted.
+
+use crate::clock::now_ns;
+use crate::process::Line;
+use crate::protocol::NodeStatus;
+use crate::runner::{Report, RunError, Told};
+use crate::sentences::sentence;
+use crate::stage::{Clock, Timing};
+use crate::transport::{Publisher, Subscriber, Transport, TransportError};
+use backdrive_bags::Completeness;
+use backdrive_msgs::text::Text;
+use backdrive_msgs::topic::{Kind, Topic};
+use backdrive_msgs::{Event, LAYOUT, Message, Sample, source_id};
+use std::process::ExitCode;
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+
+/// How often it looks: at 10 kHz a topic then has 50 messages for it, and room for 4096.
+const POLL: Duration = Duration::from_millis(5);
+
+/// Messages of one topic that it takes before it looks at the next.
+const AT_ONCE: usize = 512;
+
+/// After a stop, or when nobody speaks any more, how long it still listens.
+const LINGER: Duration = Duration::from_millis(50);
+
+/// Steps after which it gives credit again, however much there is to take.
+const CREDIT_EVERY: u64 = 256;
+
+/// Where a recorder puts what it hears.
+pub trait Sink {
+    /// Takes a message of topic number `topic`; `receive_ns` is its time of arrival, ns since the Unix
+    /// epoch, or in lockstep its own stamp. May wait in lockstep, never in real time.
+    fn push(&mut self, topic: usize, message: Message, receive_ns: i64) -> Result<(), RunError>;
+
+    /// Every topic has been asked for all it had.
+    fn checkpoint(&mut self) {}
+
+    /// Messages and bytes written so far, and messages lost.
+    fn health(&self) -> (u64, u64, u64);
+
+    /// Ends it: what is complete and what is not.
+    fn finish(self: Box<Self>) -> Result<Completeness, RunError>;
+}
+
+impl Sink for backdrive_bags::Recorder {
+    fn push(&mut self, topic: usize, message: Message, receive_ns: i64) -> Result<(), RunError> {
+        backdrive_bags::Recorder::push(self, topic, message, receive_ns).map_err(|e| RunError::Bag(e.to_string()))
+    }
+
+    fn checkpoint(&mut self) {
+        backdrive_bags::Recorder::checkpoint(self);
+    }
+
+    fn health(&self) -> (u64, u64, u64) {
+        let health = backdrive_bags::Recorder::health(self);
+        (health.written, health.bytes, health.lost)
+    }
+
+    fn finish(self: Box<Self>) -> Result<Completeness, RunError> {
+        backdrive_bags::Recorder::finish(*self).map_err(|e| RunError::Bag(e.to_string()))
+    }
+}
+
+/// What a recorder does.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RecorderPlan {
+    /// Name of the node, unique in the graph.
+    pub name: String,
+    /// What it records, in the order of the sink's topic numbers.
+    pub topics: Vec<Topic>,
+    /// Lockstep: where it says how far it has come, and how many sources listen to that.
+    pub credit: Option<(Topic, usize)>,
+}
+
+struct Heard {
+    topic: Topic,
+    subscriber: Box<dyn Subscriber>,
+    /// One more than the newest step of a sample topic.
+    upto: u64,
+}
+
+/// A recorder whose subscribers exist.
+pub struct Recording {
+    heard: Vec<Heard>,
+    credit: Option<(Box<dyn Publisher>, usize)>,
+    credited: u64,
+    credits: u64,
+    source: u32,
+    clock: Clock,
+    sink: Box<dyn Sink>,
+    /// Last, so that it outlives the ports that came from it.
+    _transport: Box<dyn Transport>,
+}
+
+impl Recording {
+    /// Subscribes to every topic.
+    ///
+    /// # Errors
+    /// The transport refuses.
+    pub fn new(
+        plan: &RecorderPlan,
+        timing: &Timing,
+        mut transport: Box<dyn Transport>,
+        sink: Box<dyn Sink>,
+    ) -> Result<Recording, TransportError> {
+        let mut heard = Vec::new();
+        for topic in &plan.topics {
+            let subscriber = transport.subscriber(topic, usize::MAX, false)?;
+            heard.push(Heard { topic: topic.clone(), subscriber, upto: 0 });
+        }
+        let credit = match &plan.credit {
+            Some((topic, listeners)) => Some((transport.publisher(topic, *listeners)?, *listeners)),
+            None => None,
+        };
+        let (source, clock) = (source_id(&plan.name), timing.clock);
+        Ok(Recording { heard, credit, credited: 0, credits: 0, source, clock, sink, _transport: transport })
+    }
+
+    /// What it still lacks before a run can start, one line each.
+    pub fn missing(&self) -> Vec<String> {
+        let silent = self.heard.iter().filter(|h| !h.subscriber.has_publisher());
+        let mut lines: Vec<String> = silent.map(|h| format!("{}: no publisher", h.topic.name)).collect();
+        if let Some((publisher, expected)) = &self.credit {
+            let has = publisher.listeners();
+            if has < *expected {
+                lines.push(format!("recorder credit: {has} of {expected} listeners"));
+            }
+        }
+        lines
+    }
+
+    /// Takes over what has arrived by now; returns how many messages that were.
+    ///
+    /// # Errors
+    /// A subscriber or the sink fails.
+    pub fn take(&mut self) -> Result<usize, RunError> {
+        let mut taken = 0;
+        loop {
+            let mut full = false;
+            let arrival = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |d| d.as_nanos() as i64);
+            for (index, heard) in self.heard.iter_mut().enumerate() {
+                let mut here = 0;
+                while here < AT_ONCE {
+                    let Some(message) = heard.subscriber.receive()? else { break };
+                    if heard.topic.kind == Kind::Sample {
+                        heard.upto = heard.upto.max(message.step() + 1);
+                    }
+                    // A lockstep bag holds nothing that the machine decides.
+                    let receive_ns = if self.clock == Clock::Lockstep { message.stamp_ns() } else { arrival };
+                    self.sink.push(index, message, receive_ns)?;
+                    here += 1;
+                }
+                full |= here == AT_ONCE;
+                taken += here;
+            }
+            if !full {
+                self.give_credit(1)?;
+                self.sink.checkpoint();
+                return Ok(taken);
+            }
+            self.give_credit(CREDIT_EVERY)?;
+        }
+    }
+
+    /// Steps of which every sample has been taken over.
+    pub fn steps(&self) -> u64 {
+        self.heard.iter().filter(|h| h.topic.kind == Kind::Sample).map(|h| h.upto).min().unwrap_or(0)
+    }
+
+    fn give_credit(&mut self, least: u64) -> Result<(), TransportError> {
+        let steps = self.steps();
+        let Some((publisher, _)) = self.credit.as_mut().filter(|_| steps >= self.credited + least) else {
+            return Ok(());
+        };
+        let sample = Sample { layout: LAYOUT, source: self.source, step: steps - 1, sequence: self.credits, ..Sample::new(0) };
+        publisher.send(&Message::Sample(sample))?;
+        self.credits += 1;
+        self.credited = steps;
+        Ok(())
+    }
+
+    fn is_deserted(&self) -> bool {
+        self.heard.iter().all(|h| !h.subscriber.has_publisher())
+    }
+
+    fn report(&self) -> Report {
+        let (written, bytes, lost) = self.sink.health();
+        Report { steps: self.steps(), lost, recorded: Some((written, bytes)), ..Report::default() }
+    }
+
+    /// Takes over until every topic has reached the last of `steps`, or `stopped` says so; then what is still
+    /// on its way. `tell` hears of losses and, about ten times a second, of progress.
+    ///
+    /// # Errors
+    /// A subscriber or the sink fails.
+    pub fn run(&mut self, steps: Option<u64>, stopped: impl Fn() -> bool, tell: &mut dyn FnMut(Told)) -> Result<(), RunError> {
+        let (mut reported, mut lost_before) = (Instant::now(), 0);
+        let mut ends_at: Option<Instant> = None;
+        loop {
+            let taken = self.take()?;
+            let lost = self.sink.health().2;
+            if lost > lost_before {
+                tell(Told::Event(self.loss(lost - lost_before)));
+                lost_before = lost;
+            }
+            if reported.elapsed() >= Duration::from_millis(100) {
+                reported = Instant::now();
+                tell(Told::Status(self.report()));
+            }
+            let complete = steps.is_some_and(|steps| self.steps() >= steps);
+            if complete || stopped() || ends_at.is_some() {
+                // Events and status may still be on their way; they are few, and their publishers end now.
+                let end = *ends_at.get_or_insert_with(|| Instant::now() + LINGER);
+                if (self.is_deserted() || Instant::now() >= end) && taken == 0 {
+                    return Ok(());
+                }
+            }
+            if taken < AT_ONCE {
+                std::thread::sleep(POLL);
+            }
+        }
+    }
+
+    fn loss(&self, lost: u64) -> Event {
+        let (value, stamp_ns) = (lost as f64, now_ns());
+        let (kind, text) = (Text::new("recorder_lost"), sentence("recorder_lost", value));
+        let step = self.steps();
+        Event { layout: LAYOUT, source: self.source, step, sequence: 0, stamp_ns, severity: 2, reserved: 0, value, kind, text }
+    }
+
+    /// Closes the bag.
+    ///
+    /// # Errors
+    /// The sink cannot be ended, or messages were lost: then the error says how many.
+    pub fn finish(self) -> Result<NodeStatus, RunError> {
+        let report = self.report();
+        let completeness = self.sink.finish()?;
+        match completeness.lost() {
+            0 => Ok(Report { recorded: Some((completeness.written(), report.recorded.map_or(0, |r| r.1))), ..report }.into()),
+            lost => Err(RunError::Incomplete { lost }),
+        }
+    }
+}
+
+/// Records as this process until every topic has reached its last step, or the supervisor says stop (see [`crate::process::run_process`]).
+/// The exit code is 4 when messages were lost.
+pub fn run_recorder(plan: &RecorderPlan, timing: &Timing, transport: Box<dyn Transport>, sink: Box<dyn Sink>) -> ExitCode {
+    Line::open().supervised(|line| {
+        let mut recording = Recording::new(plan, timing, transport, sink)?;
+        let Some(_start) = line.meet(|| recording.missing()) else {
+            return recording.finish();
+        };
+        recording.run(timing.steps, || line.control.is_stopped(), &mut |told| line.tell(told))?;
+        recording.finish()
+    })
+}

@@ -1,0 +1,103 @@
+//! What is odd about a model.
+
+use crate::elements::{Law, Mechanics, Role};
+use crate::linear::{LinearModel, Operating};
+use crate::model::Model;
+use crate::stepper::{Options, Plant};
+use serde::Serialize;
+
+/// How much a remark matters.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Severity {
+    /// Worth knowing.
+    Note,
+    /// Probably not meant.
+    Warning,
+    /// The model cannot be simulated.
+    Error,
+}
+
+/// Something odd.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Remark {
+    /// How much it matters.
+    pub severity: Severity,
+    /// Path of what it is about, such as `elements.linkage`.
+    pub about: String,
+    /// One sentence.
+    pub message: String,
+}
+
+/// Everything odd about a model, worst first.
+pub fn check(model: &Model, at: &Operating) -> Vec<Remark> {
+    let mut remarks = Vec::new();
+    let mut add = |severity: Severity, about: String, message: String| remarks.push(Remark { severity, about, message });
+    // Whether it can be stepped does not depend on the period; 1 kHz stands for any.
+    if let Err(error) = Plant::new(model, 1e-3, &Options::default()) {
+        add(Severity::Error, model.name.clone(), error.to_string());
+    }
+    for (index, body) in model.bodies.iter().enumerate() {
+        if !model.elements.iter().any(|e| e.between.contains(&Some(index))) && !model.inputs.iter().any(|i| i.on == index) {
+            add(Severity::Warning, format!("bodies.{}", body.name), "nothing is tied to this body and nothing drives it".into());
+        }
+    }
+    for element in &model.elements {
+        if let Some(message) = active(&element.law, at, &crate::describe::unit_for(model.motion, "m")) {
+            add(Severity::Warning, format!("elements.{}", element.name), message);
+        }
+    }
+    if model.inputs.is_empty() {
+        add(Severity::Warning, "inputs".into(), "nothing drives this model".into());
+    }
+    if model.outputs.is_empty() {
+        add(Severity::Warning, "outputs".into(), "nothing is measured".into());
+    }
+    for axis in &model.axes {
+        let about = format!("axes.{}", axis.name);
+        if axis.travel.is_none() {
+            add(Severity::Note, about.clone(), "no travel is given, so no run can tell that the hand left it".into());
+        }
+        let is_force = model.inputs.get(axis.feedback).is_some_and(|i| i.kind == crate::model::InputKind::Force);
+        if is_force && axis.force.is_none() {
+            add(Severity::Note, about, "no largest force is given, so the motor's force is not clamped".into());
+        }
+    }
+    if let Ok(linear) = LinearModel::new(model, at) {
+        for pole in linear.poles().unwrap_or_default() {
+            if pole.damping_ratio() < -1e-9 {
+                let message =
+                    format!("a motion about rest grows, at {:.4} Hz with damping ratio {:.4}", pole.frequency_hz(), pole.damping_ratio());
+                add(Severity::Warning, model.name.clone(), message);
+            }
+        }
+        let loose = linear.modes().unwrap_or_default().iter().filter(|m| m.omega_squared == 0.0).count();
+        if loose > 0 {
+            let message = format!("{loose} motion(s) that nothing holds: a free device, which a grip or a controller must hold");
+            add(Severity::Note, model.name.clone(), message);
+        }
+    }
+    remarks.sort_by(|a, b| b.severity.cmp(&a.severity));
+    remarks
+}
+
+/// Why an element may create energy, if it may.
+fn active(law: &Law, at: &Operating, unit: &str) -> Option<String> {
+    if let Law::HystereticSpring(spring) = law {
+        // The lines cross where the falling one is the steeper: cycles beyond create energy.
+        let slopes = spring.stiffness_positive - spring.stiffness_negative;
+        let crossing = (spring.offset_negative - spring.offset_positive) / slopes;
+        if slopes < 0.0 && crossing > at.amplitude {
+            return Some(format!("creates energy in cycles beyond {crossing:.4} {unit}, where its two lines cross"));
+        }
+        if slopes != 0.0 && crossing.abs() <= at.amplitude {
+            return Some(format!("creates energy in cycles about 0 already: its two lines cross at {crossing:.4} {unit}"));
+        }
+        return None;
+    }
+    match law.role() {
+        Role::Linear(linear) if linear.damping < 0.0 => Some(format!("creates energy: its damping is {}", linear.damping)),
+        Role::Linear(linear) if linear.stiffness < 0.0 => Some(format!("drives away from rest: its stiffness is {}", linear.stiffness)),
+        _ => None,
+    }
+}

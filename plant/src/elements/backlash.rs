@@ -1,0 +1,128 @@
+//! Backlash: a damped shaft behind a gap.
+
+use super::decay::decay;
+use super::{Kind, Law, Mechanics, Parameter, Range, Slopes};
+
+/// Shaft with a total gap: `f = k (x - xb) + c (v - dxb/dt)`, xb the position inside the gap, `|xb| <= gap/2`.
+/// Memory: xb, m.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Backlash {
+    /// m, total: 2α.
+    pub gap: f64,
+    /// N/m, of the shaft.
+    pub stiffness: f64,
+    /// N s/m, of the shaft.
+    pub damping: f64,
+}
+
+impl Backlash {
+    pub(super) const KIND: Kind = Kind {
+        name: "backlash",
+        equation: "f = k (x - xb) + c (v - dxb/dt); dxb/dt = v + (k/c)(x - xb) inside |xb| < α, held at ±α while it pushes",
+        source: "Nordin, Galic & Gutman 1997",
+        energy: "takes, creates none; pushes only",
+        parameters: &[
+            Parameter::number("gap", "m", Range::NonNegative, "2α"),
+            Parameter::number("stiffness", "N/m", Range::NonNegative, "k"),
+            Parameter::number("damping", "N s/m", Range::NonNegative, "c").or(0.0),
+        ],
+        build: |v| Ok(Law::Backlash(Backlash { gap: v[0][0], stiffness: v[1][0], damping: v[2][0] })),
+    };
+
+    pub(super) fn values(&self) -> Vec<Vec<f64>> {
+        vec![vec![self.gap], vec![self.stiffness], vec![self.damping]]
+    }
+}
+
+impl Mechanics for Backlash {
+    fn memory_len(&self) -> usize {
+        1
+    }
+
+    fn slopes(&self) -> Slopes {
+        Slopes { stiffness: self.stiffness, damping: self.damping, bounded: true }
+    }
+
+    /// Inside the gap the shaft relaxes, `d(x - xb)/dt = -(k/c)(x - xb)`, and its position follows exactly.
+    /// Without damping it is relaxed at once, which is a dead zone.
+    #[inline]
+    fn advance(&self, memory: &mut [f64], from: f64, to: f64, dt: f64) {
+        let [gap_position] = memory else { return };
+        let half_gap = 0.5 * self.gap;
+        if half_gap <= 0.0 {
+            *gap_position = 0.0;
+            return;
+        }
+        if self.damping <= 0.0 || dt <= 0.0 {
+            *gap_position = to.min(half_gap).max(-half_gap);
+            return;
+        }
+        let pushes = |side: f64| side * (self.stiffness * (to - side * half_gap) + self.damping * (to - from) / dt) >= 0.0;
+        if (*gap_position >= half_gap && pushes(1.0)) || (*gap_position <= -half_gap && pushes(-1.0)) {
+            return;
+        }
+        let shaft_twist = (from - *gap_position) * decay(self.stiffness * dt / self.damping);
+        *gap_position = (to - shaft_twist).min(half_gap).max(-half_gap);
+    }
+
+    #[inline]
+    fn force(&self, memory: &[f64], x: f64, v: f64) -> f64 {
+        let half_gap = 0.5 * self.gap;
+        let gap_position = memory.first().copied().unwrap_or(0.0);
+        if half_gap <= 0.0 {
+            self.stiffness * x + self.damping * v
+        } else if gap_position >= half_gap {
+            (self.stiffness * (x - half_gap) + self.damping * v).max(0.0)
+        } else if gap_position <= -half_gap {
+            (self.stiffness * (x + half_gap) + self.damping * v).min(0.0)
+        } else {
+            0.0
+        }
+    }
+
+    fn stored(&self, memory: &[f64], x: f64) -> f64 {
+        let shaft_twist = x - memory.first().copied().unwrap_or(0.0);
+        0.5 * self.stiffness * shaft_twist * shaft_twist
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn gap_position_stays_in_the_gap_and_the_force_pushes_only() {
+        let law = Backlash { gap: 2e-3, stiffness: 1e4, damping: 5.0 };
+        let mut memory = [0.0];
+        let at = |i: i32| 3e-3 * (0.01 * f64::from(i)).sin();
+        for i in 0..5000 {
+            law.advance(&mut memory, at(i), at(i + 1), 1e-4);
+            assert!(memory[0].abs() <= 1e-3);
+            let force = law.force(&memory, at(i + 1), (at(i + 1) - at(i)) / 1e-4);
+            assert!(force * at(i + 1) >= 0.0);
+        }
+    }
+
+    #[test]
+    fn little_damping_is_a_dead_zone() {
+        let dead_zone = |x: f64| if x.abs() > 1e-3 { 1e4 * (x - 1e-3f64.copysign(x)) } else { 0.0 };
+        let mut worst = [0.0f64; 3];
+        for (case, damping) in [1.0, 1e-2, 1e-4].into_iter().enumerate() {
+            let law = Backlash { gap: 2e-3, stiffness: 1e4, damping };
+            let mut memory = [0.0];
+            let at = |i: i32| 3e-3 * (1e-3 * f64::from(i)).sin();
+            for i in 0..10_000 {
+                law.advance(&mut memory, at(i), at(i + 1), 1e-4);
+                let force = law.force(&memory, at(i + 1), (at(i + 1) - at(i)) / 1e-4);
+                worst[case] = worst[case].max((force - dead_zone(at(i + 1))).abs());
+            }
+        }
+        assert!(worst[0] > worst[1] && worst[1] > worst[2] && worst[2] < 1e-4 * 20.0, "{worst:?}");
+    }
+
+    #[test]
+    fn no_gap_is_a_spring_and_a_damper() {
+        let law = Backlash { gap: 0.0, stiffness: 100.0, damping: 2.0 };
+        assert_eq!(law.force(&[0.0], -0.1, 0.5), -9.0);
+    }
+}

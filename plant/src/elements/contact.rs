@@ -1,0 +1,63 @@
+//! Contact with a wall.
+
+use super::{Kind, Law, Mechanics, Parameter, Range, Slopes};
+
+/// `f = max(0, stiffness q + damping v)` where `q = x - gap > 0`: pushes only.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Contact {
+    /// N/m.
+    pub stiffness: f64,
+    /// N s/m.
+    pub damping: f64,
+    /// m.
+    pub gap: f64,
+}
+
+impl Contact {
+    pub(super) const KIND: Kind = Kind {
+        name: "contact",
+        equation: "f = max(0, k q + b v) where q = x - gap > 0",
+        source: "Kelvin-Voigt, one-sided",
+        energy: "takes, creates none",
+        parameters: &[
+            Parameter::number("stiffness", "N/m", Range::NonNegative, "k"),
+            Parameter::number("damping", "N s/m", Range::NonNegative, "b").or(0.0),
+            Parameter::number("gap", "m", Range::Any, "displacement at which it touches").or(0.0),
+        ],
+        build: |v| Ok(Law::Contact(Contact { stiffness: v[0][0], damping: v[1][0], gap: v[2][0] })),
+    };
+
+    pub(super) fn values(&self) -> Vec<Vec<f64>> {
+        vec![vec![self.stiffness], vec![self.damping], vec![self.gap]]
+    }
+}
+
+impl Mechanics for Contact {
+    fn slopes(&self) -> Slopes {
+        Slopes { stiffness: self.stiffness, damping: self.damping, bounded: true }
+    }
+
+    #[inline]
+    fn force(&self, _memory: &[f64], x: f64, v: f64) -> f64 {
+        let depth = x - self.gap;
+        if depth > 0.0 { (self.stiffness * depth + self.damping * v).max(0.0) } else { 0.0 }
+    }
+
+    fn stored(&self, _memory: &[f64], x: f64) -> f64 {
+        let depth = (x - self.gap).max(0.0);
+        0.5 * self.stiffness * depth * depth
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pushes_only() {
+        let wall = Contact { stiffness: 100.0, damping: 5.0, gap: 0.01 };
+        assert_eq!(wall.force(&[], 0.0, 1.0), 0.0);
+        assert_eq!(wall.force(&[], 0.02, -10.0), 0.0);
+        assert!((wall.force(&[], 0.02, 1.0) - 6.0).abs() < 1e-12);
+    }
+}

@@ -1,0 +1,62 @@
+//! Dry friction that falls with speed.
+
+use super::{FrictionLevels, Kind, Law, Mechanics, Parameter, Range, Role};
+
+/// `f = (coulomb + (static - coulomb) exp(-(v/velocity)²)) sign(v)`, set-valued at rest.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Stribeck {
+    /// N, at speed.
+    pub coulomb: f64,
+    /// N, at rest; `static` in model files.
+    pub at_rest: f64,
+    /// m/s, speed at which the excess has fallen to 1/e.
+    pub velocity: f64,
+}
+
+impl Stribeck {
+    pub(super) const KIND: Kind = Kind {
+        name: "stribeck",
+        equation: "f = (c + (s - c) exp(-(v/vs)²)) sign(v), set-valued at rest",
+        source: "Stribeck 1902; Gaussian form of Armstrong-Helouvry 1991",
+        energy: "takes, creates none",
+        parameters: &[
+            Parameter::number("coulomb", "N", Range::NonNegative, "c"),
+            Parameter::number("static", "N", Range::NonNegative, "s, at least c"),
+            Parameter::number("velocity", "m/s", Range::Positive, "vs"),
+        ],
+        build: |v| {
+            let (coulomb, at_rest) = (v[0][0], v[1][0]);
+            if at_rest < coulomb {
+                return Err(format!("static ({at_rest}) must be at least coulomb ({coulomb}); friction that is lower at rest is a friction_deficit"));
+            }
+            Ok(Law::Stribeck(Stribeck { coulomb, at_rest, velocity: v[2][0] }))
+        },
+    };
+
+    pub(super) fn values(&self) -> Vec<Vec<f64>> {
+        vec![vec![self.coulomb], vec![self.at_rest], vec![self.velocity]]
+    }
+}
+
+impl Mechanics for Stribeck {
+    fn role(&self) -> Role {
+        Role::Friction(FrictionLevels { kinetic: [self.coulomb; 2], at_rest: [self.at_rest; 2], velocity: self.velocity })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn static_below_coulomb_is_refused() {
+        assert!((Stribeck::KIND.build)(&[vec![2.0], vec![1.0], vec![0.1]]).is_err());
+    }
+
+    #[test]
+    fn level_falls_to_one_part_in_e_at_the_stribeck_velocity() {
+        let Role::Friction(levels) = (Stribeck { coulomb: 1.0, at_rest: 3.0, velocity: 0.02 }).role() else { panic!("friction") };
+        assert!((levels.sliding(0, 0.02) - (1.0 + 2.0 * (-1.0f64).exp())).abs() < 1e-15);
+        assert_eq!(levels.sliding(1, 0.0), 3.0);
+    }
+}

@@ -1,0 +1,273 @@
+//! What a device is shaken with: named excitations as functions of time.
+//!
+//! An excitation is written `sweep:amplitude=2,from=1,to=200,duration=10` on a command line, and as a table with
+//! `kind = "sweep"` in a file. Amplitudes are in the unit of the input that is driven (N, N m, m or rad).
+
+mod multisine;
+mod parse;
+mod shapes;
+
+pub use parse::{Experiment, load_experiments};
+pub use shapes::{Grid, Spacing};
+
+use multisine::Lines;
+use std::f64::consts::PI;
+
+/// What shakes, and how it is framed.
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(try_from = "String", into = "String")]
+pub struct Excitation {
+    /// The kind and its numbers.
+    pub shape: Shape,
+    /// Rest before it, s.
+    pub quiet: f64,
+    /// Raised-cosine rise of the amplitude at its beginning, s.
+    pub fade_in: f64,
+    /// Raised-cosine fall of the amplitude at its end, s.
+    pub fade_out: f64,
+    /// Added to it, and faded with it; unit of the input.
+    pub offset: f64,
+    /// Largest magnitude that leaves it, unit of the input; infinite when there is no limit.
+    pub limit: f64,
+}
+
+/// The kinds of excitation.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Shape {
+    /// A sine of rising (or falling) frequency.
+    Sweep {
+        /// Unit of the input.
+        amplitude: f64,
+        /// Hz at the beginning.
+        from: f64,
+        /// Hz at the end.
+        to: f64,
+        /// s.
+        duration: f64,
+        /// How the frequency runs.
+        spacing: Spacing,
+        /// The amplitude is multiplied by (frequency/from) to this power: -1 for a displacement of constant speed.
+        tilt: f64,
+    },
+    /// A sum of sines on the lines of a period, with random phases.
+    Multisine {
+        /// Root mean square, unit of the input; `None` where the peak is given.
+        rms: Option<f64>,
+        /// Largest magnitude, unit of the input; `None` where the root mean square is given.
+        peak: Option<f64>,
+        /// Lowest frequency, Hz.
+        from: f64,
+        /// Highest frequency, Hz.
+        to: f64,
+        /// s; the lines are multiples of its inverse.
+        period: f64,
+        /// How many periods.
+        periods: u32,
+        /// Which lines.
+        grid: Grid,
+        /// Of the phases.
+        seed: u64,
+        /// Rounds of lowering the peak at the same power, 0 to leave the phases random.
+        crest: u32,
+    },
+    /// Slow ramps between reversals at constant speed: friction, hysteresis and their memory.
+    Triangle {
+        /// Unit of the input.
+        amplitude: f64,
+        /// Periods, s, one after the other: several speeds.
+        period: Vec<f64>,
+        /// Cycles of each period.
+        cycles: u32,
+        /// Closed inner loops in each rising branch: reversals within reversals.
+        nested: u32,
+        /// Size of an inner loop over the amplitude.
+        inner: f64,
+    },
+    /// Steps up, back, down and back, for each level.
+    Steps {
+        /// Levels, unit of the input.
+        amplitude: Vec<f64>,
+        /// s on each level.
+        hold: f64,
+        /// s from level to level; 0 for a jump.
+        rise: f64,
+        /// How often the whole is repeated.
+        count: u32,
+    },
+    /// Half-sine pulses, as the force of a tip that hits something.
+    Impacts {
+        /// Peaks, unit of the input; negative pushes back.
+        amplitude: Vec<f64>,
+        /// Length of a pulse, s.
+        width: f64,
+        /// From pulse to pulse, s.
+        interval: f64,
+        /// Pulses of each peak.
+        count: u32,
+        /// Lower pulses behind each, of half the height each, as of a tip that bounces.
+        bounces: u32,
+    },
+    /// Whole cycles of sines, of each frequency at each amplitude.
+    Sines {
+        /// Unit of the input.
+        amplitude: Vec<f64>,
+        /// Hz.
+        frequency: Vec<f64>,
+        /// Cycles of each.
+        cycles: u32,
+    },
+}
+
+/// Why an excitation cannot be had.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum ExcitationError {
+    /// The text is no excitation.
+    #[error("excitation \"{text}\": {message}")]
+    Text {
+        /// What was written.
+        text: String,
+        /// What is wrong in it.
+        message: String,
+    },
+    /// The sampling rate cannot carry it.
+    #[error("a sampling rate of {rate} Hz cannot carry {highest} Hz; it needs more than {needed} Hz")]
+    Rate {
+        /// Hz.
+        rate: String,
+        /// Hz.
+        highest: String,
+        /// Hz.
+        needed: String,
+    },
+    /// An experiment does not go with a model.
+    #[error("experiment \"{experiment}\": {message}")]
+    Experiment {
+        /// Its name.
+        experiment: String,
+        /// What is wrong.
+        message: String,
+    },
+    /// Too many samples to hold.
+    #[error("{seconds} s at {rate} Hz are more than {most} samples")]
+    TooLong {
+        /// s.
+        seconds: String,
+        /// Hz.
+        rate: String,
+        /// Samples.
+        most: usize,
+    },
+}
+
+/// Most samples that an excitation is made of.
+const MOST_SAMPLES: usize = 100_000_000;
+
+impl Excitation {
+    /// A shape without quiet, fades, offset or limit.
+    pub fn of(shape: Shape) -> Excitation {
+        Excitation { shape, quiet: 0.0, fade_in: 0.0, fade_out: 0.0, offset: 0.0, limit: f64::INFINITY }
+    }
+
+    /// Length, s, with the quiet before it.
+    pub fn duration(&self) -> f64 {
+        self.quiet + self.shape.duration()
+    }
+
+    /// Whether a sampling rate can carry it.
+    pub fn fits(&self, rate_hz: f64) -> Result<(), ExcitationError> {
+        let highest = self.shape.highest_hz();
+        // Written so that a rate that is no number is refused too.
+        if !(rate_hz > 2.0 * highest && rate_hz > 0.0) {
+            let (rate, needed, highest) = (rate_hz.to_string(), (2.0 * highest).to_string(), highest.to_string());
+            return Err(ExcitationError::Rate { rate, highest, needed });
+        }
+        if self.duration() * rate_hz > MOST_SAMPLES as f64 {
+            let (seconds, rate) = (self.duration().to_string(), rate_hz.to_string());
+            return Err(ExcitationError::TooLong { seconds, rate, most: MOST_SAMPLES });
+        }
+        Ok(())
+    }
+
+    /// Its samples at a rate, from time 0 on, up to but without its end.
+    pub fn samples(&self, rate_hz: f64) -> Result<Vec<f64>, ExcitationError> {
+        self.fits(rate_hz)?;
+        let count = (self.duration() * rate_hz).round().max(1.0) as usize;
+        let signal = self.signal();
+        if let (Core::Lines(lines), Some(rest)) = (&signal.core, whole(self.quiet * rate_hz))
+            && let Some(period) = lines.one_period(rate_hz)
+        {
+            let value = |i: usize| match i.checked_sub(rest) {
+                Some(k) => signal.framed(k as f64 / rate_hz, period[k % period.len()]),
+                None => 0.0,
+            };
+            return Ok((0..count).map(value).collect());
+        }
+        Ok((0..count).map(|i| signal.at(i as f64 / rate_hz)).collect())
+    }
+
+    /// The excitation ready to be asked for values: phases are drawn and turning points laid out once.
+    pub fn signal(&self) -> Signal {
+        let core = match &self.shape {
+            Shape::Multisine { rms, peak, from, to, period, grid, seed, crest, .. } => {
+                Core::Lines(Lines::new([*from, *to], *period, *grid, *seed, *crest, *rms, *peak))
+            }
+            Shape::Sweep { amplitude, from, to, duration, spacing, tilt } => {
+                Core::Sweep { amplitude: *amplitude, from: *from, to: *to, duration: *duration, spacing: *spacing, tilt: *tilt }
+            }
+            shape => Core::Pieces(shapes::pieces(shape)),
+        };
+        Signal { core, frame: self.clone(), length: self.shape.duration() }
+    }
+}
+
+/// An excitation that is ready to be asked for values.
+#[derive(Debug, Clone)]
+pub struct Signal {
+    core: Core,
+    frame: Excitation,
+    length: f64,
+}
+
+#[derive(Debug, Clone)]
+enum Core {
+    Lines(Lines),
+    Pieces(Vec<shapes::Piece>),
+    Sweep { amplitude: f64, from: f64, to: f64, duration: f64, spacing: Spacing, tilt: f64 },
+}
+
+impl Signal {
+    /// Value at a time, s from its start; 0 before and after it. Unit of the input.
+    pub fn at(&self, time: f64) -> f64 {
+        let t = time - self.frame.quiet;
+        if !(0.0..self.length).contains(&t) {
+            return 0.0;
+        }
+        let core = match &self.core {
+            Core::Lines(lines) => lines.at(t),
+            Core::Pieces(pieces) => shapes::at(pieces, t),
+            Core::Sweep { amplitude, from, to, duration, spacing, tilt } => {
+                let (phase, frequency) = spacing.phase(*from, *to, *duration, t);
+                amplitude * (frequency / from).powf(*tilt) * phase.sin()
+            }
+        };
+        self.framed(t, core)
+    }
+
+    /// The value at `t` of the shape with fades, offset and limit.
+    fn framed(&self, t: f64, core: f64) -> f64 {
+        let rise = fade(t, self.frame.fade_in);
+        let fall = fade(self.length - t, self.frame.fade_out);
+        ((core + self.frame.offset) * rise * fall).clamp(-self.frame.limit, self.frame.limit)
+    }
+}
+
+/// A number of samples, where it is whole.
+fn whole(samples: f64) -> Option<usize> {
+    let nearest = samples.round();
+    ((samples - nearest).abs() <= 1e-9 * nearest.max(1.0)).then_some(nearest as usize)
+}
+
+/// Raised cosine from 0 at 0 to 1 at `length`.
+fn fade(t: f64, length: f64) -> f64 {
+    if t >= length { 1.0 } else { 0.5 - 0.5 * (PI * t / length).cos() }
+}

@@ -1,0 +1,339 @@
+//! A model as a linear system about rest: modes, poles, frequency responses.
+//!
+//! Elements that are not linear are replaced by what they look like to a sine of a stated amplitude
+//! ([`Operating`]), so one model gives a stiff linkage at small amplitude and a soft one at large. A delay
+//! acts on frequency responses and not on poles.
+
+mod harmonic;
+
+use crate::elements::Linear;
+use crate::model::{InputKind, Model, OutputKind, Place};
+use nalgebra::{Complex, DMatrix, DVector, Schur, SymmetricEigen};
+use std::f64::consts::TAU;
+
+/// How dry (set-valued) friction enters.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Friction {
+    /// Not at all: everything slides freely.
+    #[default]
+    Ignored,
+    /// As the damper that takes as much energy per cycle at the operating amplitude and frequency.
+    Viscous,
+}
+
+/// The sine at which elements that are not linear are looked at.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Operating {
+    /// Amplitude of the displacement across each such element, m or rad, above 0.
+    pub amplitude: f64,
+    /// Its frequency, Hz, above 0; matters only to elements whose force depends on velocity, and to [`Friction::Viscous`].
+    pub frequency_hz: f64,
+    /// How dry friction enters.
+    pub friction: Friction,
+    /// Displacement about which an element is looked at, by index, m or rad; 0 where none is given. A wall that is
+    /// 5 mm away is free space unless its displacement is put beyond 5 mm here.
+    pub about: Vec<(usize, f64)>,
+}
+
+impl Operating {
+    /// So small an amplitude (1e-9 m or rad) that hysteresis and presliding show their steepest stiffness.
+    pub fn small() -> Operating {
+        Operating::amplitude(1e-9)
+    }
+
+    /// A sine of this amplitude, m or rad, at 10 Hz, friction ignored, about rest.
+    pub fn amplitude(amplitude: f64) -> Operating {
+        Operating { amplitude, frequency_hz: 10.0, friction: Friction::Ignored, about: Vec::new() }
+    }
+}
+
+/// Why a model cannot be looked at as a linear system.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum LinearError {
+    /// Amplitude or frequency of the operating sine is not above 0.
+    #[error("the operating amplitude and frequency must be above 0 and finite, are {amplitude} and {frequency_hz} Hz")]
+    Operating {
+        /// m or rad.
+        amplitude: f64,
+        /// Hz.
+        frequency_hz: f64,
+    },
+    /// The inertia of the free bodies is not positive definite.
+    #[error("body \"{body}\" has no inertia of its own, and no inerter gives it any")]
+    NoInertia {
+        /// Its name.
+        body: String,
+    },
+    /// A frequency at which the response is infinite: 0 Hz of a body that nothing holds.
+    #[error("the response at {frequency_hz} Hz is infinite: nothing holds the device there")]
+    Infinite {
+        /// Hz.
+        frequency_hz: f64,
+    },
+    /// The eigenvalue iteration did not converge.
+    #[error("the eigenvalues of this model cannot be found; its numbers may be too far apart")]
+    NotConverged,
+    /// No such input or output.
+    #[error("the model has no {what} number {index}")]
+    NoSuch {
+        /// `input` or `output`.
+        what: &'static str,
+        /// The index that was asked for.
+        index: usize,
+    },
+}
+
+/// A model as `M x'' + C x' + K x = F`, with the motion of prescribed bodies given.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LinearModel<'a> {
+    model: &'a Model,
+    /// Inertia with inerters, kg, all bodies.
+    pub inertia: DMatrix<f64>,
+    /// Damping with back-EMF, N s/m, all bodies.
+    pub damping: DMatrix<f64>,
+    /// Stiffness, N/m, all bodies.
+    pub stiffness: DMatrix<f64>,
+    /// Bodies that no motion input prescribes.
+    pub free: Vec<usize>,
+    /// What each element is taken as.
+    pub elements: Vec<Linear>,
+}
+
+/// An undamped mode.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Mode {
+    /// Square of its angular frequency, (rad/s)²; below 0 where a negative stiffness drives it away from rest.
+    pub omega_squared: f64,
+    /// Motion of every body (0 for prescribed ones), the largest being 1.
+    pub shape: Vec<f64>,
+}
+
+impl Mode {
+    /// Frequency, Hz; 0 for a body that nothing holds, and for a mode that is driven away.
+    pub fn frequency_hz(&self) -> f64 {
+        self.omega_squared.max(0.0).sqrt() / TAU
+    }
+}
+
+/// A pole, or a pair of conjugate ones, given once.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Pole {
+    /// rad/s; the one with positive imaginary part of a pair.
+    pub value: Complex<f64>,
+}
+
+impl Pole {
+    /// Its magnitude, Hz.
+    pub fn frequency_hz(&self) -> f64 {
+        self.value.norm() / TAU
+    }
+
+    /// Damping ratio; 1 for a decaying real pole, negative for a growing one; 0 at rest (a pole at 0).
+    pub fn damping_ratio(&self) -> f64 {
+        let norm = self.value.norm();
+        if norm == 0.0 { 0.0 } else { -self.value.re / norm }
+    }
+}
+
+impl<'a> LinearModel<'a> {
+    /// Linearises a model at an operating sine.
+    pub fn new(model: &'a Model, at: &Operating) -> Result<LinearModel<'a>, LinearError> {
+        let good = |x: f64| x.is_finite() && x > 0.0;
+        if !good(at.amplitude) || !good(at.frequency_hz) {
+            return Err(LinearError::Operating { amplitude: at.amplitude, frequency_hz: at.frequency_hz });
+        }
+        let n = model.bodies.len();
+        let mut inertia = DMatrix::from_diagonal(&DVector::from_iterator(n, model.bodies.iter().map(|b| b.inertia)));
+        let mut damping = DMatrix::zeros(n, n);
+        let mut stiffness = DMatrix::zeros(n, n);
+        let mut elements = Vec::with_capacity(model.elements.len());
+        for (index, element) in model.elements.iter().enumerate() {
+            let x0 = at.about.iter().find(|a| a.0 == index).map_or(0.0, |a| a.1);
+            let linear = harmonic::coefficients(&element.law, x0, at);
+            join(&mut inertia, element.between, linear.inertance);
+            join(&mut damping, element.between, linear.damping);
+            join(&mut stiffness, element.between, linear.stiffness);
+            elements.push(linear);
+        }
+        let prescribed = |body: usize| model.inputs.iter().any(|i| i.kind == InputKind::Motion && i.on == body);
+        for input in &model.inputs {
+            // The force lost is proportional to the velocity of the driven body: a damper to ground.
+            if input.kind == InputKind::Force {
+                damping[(input.on, input.on)] += input.back_emf;
+            }
+        }
+        let free = (0..n).filter(|body| !prescribed(*body)).collect();
+        Ok(LinearModel { model, inertia, damping, stiffness, free, elements })
+    }
+
+    fn of_free(&self, all: &DMatrix<f64>) -> DMatrix<f64> {
+        DMatrix::from_fn(self.free.len(), self.free.len(), |i, j| all[(self.free[i], self.free[j])])
+    }
+
+    /// Undamped modes of the free bodies, prescribed ones held, slowest first.
+    pub fn modes(&self) -> Result<Vec<Mode>, LinearError> {
+        let lower = self.inertia_factor()?;
+        let whitened = lower.solve_lower_triangular(&self.of_free(&self.stiffness)).ok_or(LinearError::NotConverged)?;
+        let whitened = lower.solve_lower_triangular(&whitened.transpose()).ok_or(LinearError::NotConverged)?;
+        let symmetric = (&whitened + whitened.transpose()) * 0.5;
+        if symmetric.is_empty() {
+            return Ok(Vec::new());
+        }
+        let eigen = SymmetricEigen::try_new(symmetric, 1e-14, 10_000).ok_or(LinearError::NotConverged)?;
+        let largest = eigen.eigenvalues.amax();
+        let mut modes = Vec::with_capacity(self.free.len());
+        for (value, vector) in eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter()) {
+            let moved = lower.tr_solve_lower_triangular(&vector).ok_or(LinearError::NotConverged)?;
+            let scale = moved.iter().fold(0.0_f64, |best, x| if x.abs() > best.abs() { *x } else { best });
+            let mut shape = vec![0.0; self.model.bodies.len()];
+            for (body, x) in self.free.iter().zip(moved.iter()) {
+                shape[*body] = x / scale;
+            }
+            // What rounding leaves of a rigid mode is 0.
+            let omega_squared = if value.abs() < 1e-12 * largest { 0.0 } else { *value };
+            modes.push(Mode { omega_squared, shape });
+        }
+        modes.sort_by(|a, b| a.omega_squared.total_cmp(&b.omega_squared));
+        Ok(modes)
+    }
+
+    fn inertia_factor(&self) -> Result<DMatrix<f64>, LinearError> {
+        let inertia = self.of_free(&self.inertia);
+        if let Some(i) = (0..self.free.len()).find(|i| inertia[(*i, *i)] <= 0.0) {
+            return Err(self.no_inertia(i));
+        }
+        let factor = inertia.clone().cholesky().map(|c| c.l());
+        factor.ok_or_else(|| {
+            // Bodies that only an inerter between them gives inertia can move together without any.
+            let own = |i: &usize| self.model.bodies[self.free[*i]].inertia;
+            let lightest = (0..self.free.len()).min_by(|a, b| own(a).total_cmp(&own(b))).unwrap_or(0);
+            self.no_inertia(lightest)
+        })
+    }
+
+    fn no_inertia(&self, free: usize) -> LinearError {
+        let body = self.free.get(free).and_then(|b| self.model.bodies.get(*b));
+        LinearError::NoInertia { body: body.map(|b| b.name.clone()).unwrap_or_default() }
+    }
+
+    /// Poles of the free bodies, prescribed ones held, slowest first; of a pair only the one above the real axis.
+    pub fn poles(&self) -> Result<Vec<Pole>, LinearError> {
+        let n = self.free.len();
+        if n == 0 {
+            return Ok(Vec::new());
+        }
+        let lower = self.inertia_factor()?;
+        let solve = |m: DMatrix<f64>| {
+            let half = lower.solve_lower_triangular(&m)?;
+            lower.tr_solve_lower_triangular(&half)
+        };
+        let per_inertia = |m: &DMatrix<f64>| solve(self.of_free(m)).ok_or(LinearError::NotConverged);
+        let (k, c) = (per_inertia(&self.stiffness)?, per_inertia(&self.damping)?);
+        // Time in units of the fastest mode: positions and velocities become of one size.
+        let omega = k.amax().sqrt().max(c.amax()).max(f64::MIN_POSITIVE);
+        let a = DMatrix::from_fn(2 * n, 2 * n, |i, j| match (i < n, j < n) {
+            (true, true) => 0.0,
+            (true, false) => f64::from(u8::from(j - n == i)),
+            (false, true) => -k[(i - n, j)] / omega / omega,
+            (false, false) => -c[(i - n, j - n)] / omega,
+        });
+        let schur = Schur::try_new(a, f64::EPSILON, 100_000).ok_or(LinearError::NotConverged)?;
+        let mut poles: Vec<Pole> = schur
+            .complex_eigenvalues()
+            .iter()
+            .map(|s| s * omega)
+            .filter(|s| s.im >= 0.0)
+            // A double pole at 0 comes out as a pair of the size of the square root of rounding.
+            .map(|s| if s.norm() < 1e-7 * omega { Complex::new(0.0, 0.0) } else { s })
+            .map(|value| Pole { value })
+            .collect();
+        poles.sort_by(|a, b| a.value.norm().total_cmp(&b.value.norm()));
+        Ok(poles)
+    }
+
+    /// Response of an output to an input (indices) at each frequency, Hz: the output's unit per the input's,
+    /// with what actuation (gain, delay, bandwidth, back-EMF) and sensor (gain, delay) do. Saturation, offset,
+    /// resolution and noise are not linear and stay out; every other input is 0.
+    pub fn response(&self, input: usize, output: usize, frequencies_hz: &[f64]) -> Result<Vec<Complex<f64>>, LinearError> {
+        self.model.inputs.get(input).ok_or(LinearError::NoSuch { what: "input", index: input })?;
+        self.model.outputs.get(output).ok_or(LinearError::NoSuch { what: "output", index: output })?;
+        frequencies_hz.iter().map(|f| self.response_at(input, output, *f)).collect()
+    }
+
+    fn response_at(&self, input: usize, output: usize, frequency_hz: f64) -> Result<Complex<f64>, LinearError> {
+        let (input, output) = (&self.model.inputs[input], &self.model.outputs[output]);
+        let s = Complex::new(0.0, TAU * frequency_hz);
+        let mut drive = Complex::new(input.gain, 0.0) * (-s * input.delay).exp();
+        if input.bandwidth.is_finite() {
+            drive /= Complex::new(1.0, 0.0) + s / (TAU * input.bandwidth);
+        }
+        let n = self.model.bodies.len();
+        let dynamic = |i: usize, j: usize| s * s * self.inertia[(i, j)] + s * self.damping[(i, j)] + self.stiffness[(i, j)];
+        let mut motion = DVector::from_element(n, Complex::new(0.0, 0.0));
+        let mut force = motion.clone();
+        match input.kind {
+            InputKind::Force => force[input.on] = drive,
+            InputKind::Motion => motion[input.on] = drive,
+        }
+        if !self.free.is_empty() {
+            let matrix = DMatrix::from_fn(self.free.len(), self.free.len(), |i, j| dynamic(self.free[i], self.free[j]));
+            let push = DVector::from_iterator(
+                self.free.len(),
+                self.free.iter().map(|i| force[*i] - (0..n).map(|j| dynamic(*i, j) * motion[j]).sum::<Complex<f64>>()),
+            );
+            let infinite = || LinearError::Infinite { frequency_hz };
+            let moved = matrix.lu().solve(&push).filter(|x| x.iter().all(|x| x.re.is_finite() && x.im.is_finite()));
+            for (body, x) in self.free.iter().zip(moved.ok_or_else(infinite)?.iter()) {
+                motion[*body] = *x;
+            }
+        }
+        let at = |place: Place| place.map_or(Complex::new(0.0, 0.0), |body| motion[body]);
+        let read = match &output.kind {
+            OutputKind::Position(body) => motion[*body],
+            OutputKind::Velocity(body) => s * motion[*body],
+            OutputKind::Acceleration(body) => s * s * motion[*body],
+            OutputKind::Force(elements) => elements
+                .iter()
+                .map(|e| {
+                    let (linear, between) = (&self.elements[*e], self.model.elements[*e].between);
+                    (s * s * linear.inertance + s * linear.damping + linear.stiffness) * (at(between[0]) - at(between[1]))
+                })
+                .sum(),
+            OutputKind::Reaction(body) => (0..n).map(|j| dynamic(*body, j) * motion[j]).sum::<Complex<f64>>() - force[*body],
+        };
+        Ok(read * output.gain * (-s * output.delay).exp())
+    }
+}
+
+/// Adds a coefficient between two places to a matrix over the bodies.
+fn join(matrix: &mut DMatrix<f64>, between: [Place; 2], value: f64) {
+    for (end, other) in [(between[0], between[1]), (between[1], between[0])] {
+        if let Some(i) = end {
+            matrix[(i, i)] += value;
+            if let Some(j) = other {
+                matrix[(i, j)] -= value;
+            }
+        }
+    }
+}
+
+/// Response of an output to an input, both by name, about rest: [`LinearModel::response`] in one call.
+///
+/// `None` where the model has no such input or output.
+pub fn frequency_response(
+    model: &Model,
+    at: &Operating,
+    input: &str,
+    output: &str,
+    frequencies_hz: &[f64],
+) -> Option<Result<Vec<Complex<f64>>, LinearError>> {
+    let input = model.inputs.iter().position(|i| i.name == input)?;
+    let output = model.outputs.iter().position(|o| o.name == output)?;
+    Some(LinearModel::new(model, at).and_then(|linear| linear.response(input, output, frequencies_hz)))
+}
+
+/// `count` frequencies from `from` to `to`, Hz, evenly spaced in their logarithm.
+pub fn log_frequencies(from: f64, to: f64, count: usize) -> Vec<f64> {
+    let last = count.saturating_sub(1).max(1) as f64;
+    (0..count).map(|i| from * (to / from).powf(i as f64 / last)).collect()
+}

@@ -1,0 +1,166 @@
+//! CSV recordings.
+
+use super::{Columns, Piece, Recording, RecordingError, Source};
+use crate::tomlfile::{self, FileError};
+use csv::{ReaderBuilder, StringRecord, Trim};
+use std::path::Path;
+
+/// A column to be read.
+struct Wanted {
+    signal: String,
+    heading: String,
+    index: usize,
+    scale: f64,
+    offset: f64,
+}
+
+/// Reads the named signals of a CSV file, or all of its columns where `signals` is `None`.
+///
+/// The first line is the heading; time is the column `t` unless `columns` says otherwise. Cells of other
+/// columns are not looked at. A cell that is no finite number, or a time that does not rise, is an error at its line.
+pub fn read_csv(path: &Path, signals: Option<&[&str]>, columns: &Columns, piece: &Piece) -> Result<Recording, FileError> {
+    let name = path.display().to_string();
+    let text = tomlfile::read_text(path)?;
+    let text = text.strip_prefix('\u{feff}').unwrap_or(&text);
+    let mut reader = ReaderBuilder::new().trim(Trim::All).flexible(true).comment(Some(b'#')).from_reader(text.as_bytes());
+    let headings = reader.headers().map_err(|e| FileError::at(&name, 1, "", e.to_string()))?.clone();
+    if headings.iter().all(str::is_empty) {
+        return Err(FileError::at(&name, 1, "", "is empty, expected a heading such as t,force,position"));
+    }
+    let file = Headings { name: &name, headings: &headings };
+    let time = file.find("t", columns)?;
+    let wanted = match signals {
+        Some(signals) => signals.iter().map(|s| file.find(s, columns)).collect::<Result<Vec<_>, _>>()?,
+        None => file.all(columns, &time)?,
+    };
+    let chosen = piece
+        .keep
+        .iter()
+        .map(|(column, cell)| Ok((file.index_of(column, column, "where")?, cell)))
+        .collect::<Result<Vec<_>, FileError>>()?;
+
+    let mut t = Vec::new();
+    let mut lines = Vec::new();
+    let mut samples = vec![Vec::new(); wanted.len()];
+    let mut record = StringRecord::new();
+    let mut row = 0;
+    let [from, to] = piece.rows.unwrap_or([0, usize::MAX]);
+    loop {
+        let more = reader.read_record(&mut record).map_err(|e| {
+            let line = e.position().map_or(1, |p| p.line() as usize);
+            FileError::at(&name, line, "", e.to_string())
+        })?;
+        if !more || row >= to {
+            break;
+        }
+        let line = record.position().map_or(row + 2, |p| p.line() as usize);
+        if record.len() != headings.len() {
+            let message = format!("expected {} cells, as the heading has, found {}", headings.len(), record.len());
+            return Err(FileError::at(&name, line, "", message));
+        }
+        row += 1;
+        if row <= from || !chosen.iter().all(|(index, cell)| cell.matches(&record[*index])) {
+            continue;
+        }
+        t.push(number(&name, line, &record, &time)?);
+        lines.push(line);
+        for (column, values) in wanted.iter().zip(&mut samples) {
+            values.push(number(&name, line, &record, column)?);
+        }
+    }
+    if piece.rows.is_some() && row < to {
+        return Err(FileError::whole(&name, format!("rows [{from}, {to}] reach beyond its {row} rows of data")));
+    }
+    if t.is_empty() && !piece.keep.is_empty() {
+        return Err(FileError::whole(&name, "no row has the values that where asks for"));
+    }
+    let signals = wanted.into_iter().map(|w| w.signal).zip(samples).collect();
+    Recording::new(&name, t, signals).map_err(|e| match e {
+        RecordingError::NotRising { index, before, now, .. } => {
+            let message = format!("time does not rise: {now} s after {before} s");
+            FileError::at(&name, lines.get(index).copied().unwrap_or(1), &time.heading, message)
+        }
+        RecordingError::TooShort { count, .. } => FileError::whole(&name, format!("needs at least 2 rows of data, has {count}")),
+        other => FileError::whole(&name, other.to_string()),
+    })
+}
+
+fn number(name: &str, line: usize, record: &StringRecord, column: &Wanted) -> Result<f64, FileError> {
+    let cell = &record[column.index];
+    let wrong = |found: String| FileError::at(name, line, &column.heading, format!("expected a number, found {found}"));
+    let value: f64 = cell.parse().map_err(|_| wrong(if cell.is_empty() { "an empty cell".into() } else { format!("\"{cell}\"") }))?;
+    if !value.is_finite() {
+        return Err(wrong(format!("\"{cell}\"; leave such rows out, or give a piece without them with rows")));
+    }
+    Ok(value * column.scale + column.offset)
+}
+
+struct Headings<'a> {
+    name: &'a str,
+    headings: &'a StringRecord,
+}
+
+impl Headings<'_> {
+    fn index_of(&self, heading: &str, signal: &str, asked_by: &str) -> Result<usize, FileError> {
+        let mut found = self.headings.iter().enumerate().filter(|h| h.1 == heading).map(|h| h.0);
+        match (found.next(), found.next()) {
+            (Some(index), None) => Ok(index),
+            (Some(_), Some(_)) => Err(FileError::at(self.name, 1, heading, "two columns have this heading")),
+            (None, _) => {
+                let mut message = tomlfile::unknown("column", heading, self.headings.iter());
+                if heading == signal && asked_by.is_empty() {
+                    message.push_str(&format!(" ([columns] {signal} = \"...\" says which column it is)"));
+                }
+                Err(FileError::at(self.name, 1, asked_by, message))
+            }
+        }
+    }
+
+    fn find(&self, signal: &str, columns: &Columns) -> Result<Wanted, FileError> {
+        let rule = columns.iter().find(|c| c.0 == signal).map(|c| &c.1);
+        let heading = match rule.map(|r| &r.source) {
+            None => signal,
+            Some(Source::Column(heading)) => heading,
+            Some(Source::Topic { topic, .. }) => {
+                let message = format!("[columns] takes \"{signal}\" from the topic {topic}, and a CSV file has columns");
+                return Err(FileError::at(self.name, 1, "", message));
+            }
+        };
+        let asked_by = if rule.is_some() && heading != signal { format!("[columns] {signal}") } else { String::new() };
+        Ok(Wanted {
+            signal: signal.to_string(),
+            heading: heading.to_string(),
+            index: self.index_of(heading, signal, &asked_by)?,
+            scale: rule.map_or(1.0, |r| r.scale),
+            offset: rule.map_or(0.0, |r| r.offset),
+        })
+    }
+
+    /// Every signal that `columns` names, and every other column by its own heading.
+    fn all(&self, columns: &Columns, time: &Wanted) -> Result<Vec<Wanted>, FileError> {
+        let ruled = columns.iter().map(|c| c.0.as_str()).filter(|s| *s != "t");
+        let mut wanted = ruled.map(|s| self.find(s, columns)).collect::<Result<Vec<_>, _>>()?;
+        for heading in self.headings {
+            let index = self.index_of(heading, heading, "")?;
+            if index != time.index && !wanted.iter().any(|w| w.index == index || w.signal == heading) {
+                let (signal, heading) = (heading.to_string(), heading.to_string());
+                wanted.push(Wanted { signal, heading, index, scale: 1.0, offset: 0.0 });
+            }
+        }
+        Ok(wanted)
+    }
+}
+
+/// Writes a recording as CSV: `t` first, then its signals; every number reads back as the same number.
+pub fn write_csv(recording: &Recording, path: &Path) -> Result<(), FileError> {
+    let name = path.display().to_string();
+    let failed = |e: csv::Error| FileError::whole(&name, format!("cannot be written: {e}"));
+    let mut writer = csv::Writer::from_path(path).map_err(failed)?;
+    writer.write_record(std::iter::once("t").chain(recording.signals.iter().map(|s| s.0.as_str()))).map_err(failed)?;
+    for (i, t) in recording.t.iter().enumerate() {
+        let values = recording.signals.iter().map(|s| s.1.get(i).copied().unwrap_or(f64::NAN));
+        let row = std::iter::once(*t).chain(values).map(|x| format!("{x:?}"));
+        writer.write_record(row).map_err(failed)?;
+    }
+    writer.flush().map_err(|e| FileError::whole(&name, format!("cannot be written: {e}")))
+}

@@ -1,0 +1,230 @@
+//! Recording sets: a folder of recordings, with `set.toml` saying which may be fitted and which may not be seen.
+
+use crate::elements::Range;
+use crate::recording::{Cell, Columns, Piece, Recording, read_columns, read_csv};
+use crate::tomlfile::{FileError, Table, unknown};
+use std::path::{Path, PathBuf};
+
+/// How the device starts in each file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Initial {
+    /// At rest at the first sample.
+    #[default]
+    Rest,
+    /// In any state: initial states are estimated.
+    Free,
+}
+
+/// What a parameter is in one file.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Condition {
+    /// Another value than in the other files, to be estimated.
+    Free,
+    /// This value.
+    Value(f64),
+}
+
+/// What is particular to one file of a set.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct FileRules {
+    /// Which rows count.
+    pub piece: Piece,
+    /// Parameters that differ in this file, by path: `elements.band.force`.
+    pub condition: Vec<(String, Condition)>,
+}
+
+/// A recording set.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RecordingSet {
+    /// The folder its files are in.
+    pub folder: PathBuf,
+    /// The nominal model; `None` where the set names none.
+    pub model: Option<PathBuf>,
+    /// Files a fit may see, relative to the folder.
+    pub fit: Vec<String>,
+    /// Files no fit may see, relative to the folder.
+    pub held_out: Vec<String>,
+    /// How the device starts.
+    pub initial: Initial,
+    /// Names and units in the files.
+    pub columns: Columns,
+    /// What is particular to a file, by its name in `fit` or `held_out`.
+    pub files: Vec<(String, FileRules)>,
+}
+
+impl RecordingSet {
+    /// Opens a set: a folder with a `set.toml`, that file itself, or a folder of recordings without one (all are then for fitting).
+    pub fn open(path: &Path) -> Result<RecordingSet, FileError> {
+        if !path.is_dir() {
+            let folder = path.parent().unwrap_or(Path::new("")).to_path_buf();
+            return read(Table::open(path)?, folder);
+        }
+        let file = path.join("set.toml");
+        match file.exists() {
+            true => read(Table::open(&file)?, path.to_path_buf()),
+            false => {
+                let fit = recordings_in(path)?;
+                if fit.is_empty() {
+                    return Err(FileError::whole(path.display().to_string(), "has no set.toml and no recordings (.csv or .mcap)"));
+                }
+                Ok(RecordingSet {
+                    folder: path.to_path_buf(),
+                    model: None,
+                    fit,
+                    held_out: Vec::new(),
+                    initial: Initial::Rest,
+                    columns: Columns::new(),
+                    files: Vec::new(),
+                })
+            }
+        }
+    }
+
+    /// Path of one of its files.
+    pub fn path_of(&self, file: &str) -> PathBuf {
+        self.folder.join(file)
+    }
+
+    /// What is particular to a file; the defaults where the set says nothing.
+    pub fn rules_of(&self, file: &str) -> FileRules {
+        self.files.iter().find(|f| f.0 == file).map(|f| f.1.clone()).unwrap_or_default()
+    }
+
+    /// Whether every condition names a number of the model; the error names the file of the set and the path.
+    pub fn check_conditions(&self, model: &crate::model::Model) -> Result<(), FileError> {
+        for (file, rules) in &self.files {
+            for (path, _) in &rules.condition {
+                model.values_at(path).map_err(|message| FileError {
+                    path: self.path_of("set.toml").display().to_string(),
+                    line: None,
+                    key: format!("files.{file}.condition.{path}"),
+                    message,
+                })?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Reads the named signals of one of its CSV files. An MCAP file is read by the crate for bags, with
+    /// `columns` and `rules_of` of this set.
+    pub fn read_csv(&self, file: &str, signals: &[&str]) -> Result<Recording, FileError> {
+        read_csv(&self.path_of(file), Some(signals), &self.columns, &self.rules_of(file).piece)
+    }
+}
+
+fn is_recording(name: &str) -> bool {
+    let lower = name.to_lowercase();
+    lower.ends_with(".csv") || lower.ends_with(".mcap")
+}
+
+fn recordings_in(folder: &Path) -> Result<Vec<String>, FileError> {
+    let failed = |e: std::io::Error| FileError::whole(folder.display().to_string(), format!("cannot be read: {e}"));
+    let mut names = Vec::new();
+    for entry in std::fs::read_dir(folder).map_err(failed)? {
+        let name = entry.map_err(failed)?.file_name().to_string_lossy().into_owned();
+        if is_recording(&name) {
+            names.push(name);
+        }
+    }
+    names.sort();
+    Ok(names)
+}
+
+fn read(mut top: Table, folder: PathBuf) -> Result<RecordingSet, FileError> {
+    let exists = |table: &Table, key: &str, name: &str| match folder.join(name).is_file() {
+        true => Ok(()),
+        false => Err(table.error_at(key, format!("there is no file \"{name}\" in {}", shown(&folder)))),
+    };
+    let model = top.string("model")?;
+    if let Some(name) = &model {
+        exists(&top, "model", name)?;
+    }
+    let held_out = top.strings("held_out")?.unwrap_or_default();
+    let fit = match top.strings("fit")? {
+        Some(fit) => fit,
+        None => recordings_in(&folder)?.into_iter().filter(|name| !held_out.contains(name)).collect(),
+    };
+    for (key, names) in [("fit", &fit), ("held_out", &held_out)] {
+        for (i, name) in names.iter().enumerate() {
+            if !is_recording(name) {
+                return Err(top.error_at(key, format!("\"{name}\" is no recording; expected .csv or .mcap")));
+            }
+            exists(&top, key, name)?;
+            if names[..i].contains(name) {
+                return Err(top.error_at(key, format!("names \"{name}\" twice")));
+            }
+        }
+    }
+    if let Some(both) = held_out.iter().find(|name| fit.contains(name)) {
+        return Err(top.error_at("held_out", format!("\"{both}\" is in fit too; no fit may see what is held out")));
+    }
+    if fit.is_empty() && held_out.is_empty() {
+        return Err(top.error("names no recordings; expected fit = [\"a.csv\", ...]"));
+    }
+    let initial = top.one_of("initial", &[("rest", Initial::Rest), ("free", Initial::Free)])?.unwrap_or_default();
+    let columns = top.table("columns")?.map(read_columns).transpose()?.unwrap_or_default();
+    let mut files = Vec::new();
+    if let Some(mut table) = top.table("files")? {
+        for name in table.keys() {
+            let all = fit.iter().chain(&held_out).map(String::as_str);
+            if !fit.contains(&name) && !held_out.contains(&name) {
+                return Err(table.error_at(&name, unknown("file", &name, all)));
+            }
+            let below = table.table(&name)?.ok_or_else(|| table.missing(&name))?;
+            files.push((name, read_rules(below)?));
+        }
+    }
+    top.finish()?;
+    Ok(RecordingSet { model: model.map(|name| folder.join(name)), folder, fit, held_out, initial, columns, files })
+}
+
+fn shown(folder: &Path) -> String {
+    if folder.as_os_str().is_empty() { "this folder".to_string() } else { folder.display().to_string() }
+}
+
+fn read_rules(mut table: Table) -> Result<FileRules, FileError> {
+    let mut rules = FileRules::default();
+    if let Some(rows) = table.numbers("rows", Range::NonNegative)? {
+        let whole = rows.iter().all(|x| x.fract() == 0.0);
+        match rows.as_slice() {
+            [from, to] if whole && from < to => rules.piece.rows = Some([*from as usize, *to as usize]),
+            _ => return Err(table.error_at("rows", "expected two row numbers, from 0: the first that counts and the first that does not")),
+        }
+    }
+    if let Some(mut keep) = table.table("where")? {
+        for column in keep.keys() {
+            let cell = match keep.is_string(&column) {
+                true => Cell::Text(keep.need_string(&column)?),
+                false => Cell::Number(keep.need_number(&column, Range::Any)?),
+            };
+            rules.piece.keep.push((column, cell));
+        }
+    }
+    if let Some(condition) = table.table("condition")? {
+        read_condition(condition, "", &mut rules.condition)?;
+    }
+    table.finish()?;
+    Ok(rules)
+}
+
+/// `{ "elements.band.force" = "free" }`, and the same without the quotes, which TOML reads as tables.
+fn read_condition(mut table: Table, path: &str, found: &mut Vec<(String, Condition)>) -> Result<(), FileError> {
+    for key in table.keys() {
+        let full = if path.is_empty() { key.clone() } else { format!("{path}.{key}") };
+        if table.is_table(&key) {
+            if let Some(below) = table.table(&key)? {
+                read_condition(below, &full, found)?;
+            }
+            continue;
+        }
+        if !full.contains('.') {
+            return Err(table.error_at(&key, "expected the path of a parameter, such as elements.band.force"));
+        }
+        let value = match table.is_string(&key) {
+            true => table.need_one_of(&key, &[("free", Condition::Free)])?,
+            false => Condition::Value(table.need_number(&key, Range::Any)?),
+        };
+        found.push((full, value));
+    }
+    Ok(())
+}

@@ -1,0 +1,288 @@
+//! One substep.
+
+use super::compile::Compiled;
+use super::constraints::{Bounds, Work};
+use super::energy::Done;
+use super::{FrictionContact, Plant, SLOTS, Slots, prescribed_slot};
+use crate::elements::Mechanics;
+
+/// Stands for a number of free bodies that is not known when the code is compiled.
+const ANY: usize = 0;
+
+impl Plant {
+    /// One period by substeps.
+    pub(super) fn step_by_substeps(&mut self) {
+        for index in 0..self.substeps {
+            let from = self.substep * index as f64;
+            let to = if index + 1 == self.substeps { self.period } else { self.substep * (index + 1) as f64 };
+            match self.fixed.free {
+                1 => self.substep::<1>(from, to),
+                2 => self.substep::<2>(from, to),
+                3 => self.substep::<3>(from, to),
+                4 => self.substep::<4>(from, to),
+                5 => self.substep::<5>(from, to),
+                6 => self.substep::<6>(from, to),
+                7 => self.substep::<7>(from, to),
+                8 => self.substep::<8>(from, to),
+                _ => self.substep::<ANY>(from, to),
+            }
+            if self.sense.watches_substeps() {
+                self.note_pushes(to);
+                self.note_outputs();
+            }
+        }
+        self.note_pushes(self.period);
+    }
+
+    /// `N` is the number of free bodies, or [`ANY`].
+    #[inline]
+    fn substep<const N: usize>(&mut self, from: f64, to: f64) {
+        let h = self.substep;
+        let half = 0.5 * h;
+        let fixed = &self.fixed;
+        let n = if N == ANY { fixed.free.min(SLOTS) } else { N };
+
+        // Forces on each place over the substep, and velocity and position in its middle as far as known.
+        let mut force = fixed.constant;
+        let mut pushed = [0.0; SLOTS];
+        let mut middle = [0.0; SLOTS];
+        let mut mean_velocity = [0.0; SLOTS];
+        let mut end = [0.0; SLOTS];
+        let mut end_velocity = [0.0; SLOTS];
+        for drive in &mut self.drives {
+            if drive.moves {
+                let slot = drive.slot;
+                let (x0, v0, _) = drive.motion(from);
+                let (x1, v1, a1) = drive.motion(to);
+                (self.x[slot], end[slot], end_velocity[slot]) = (x0, x1, v1);
+                self.prescribed_acceleration[slot] = a1;
+                // Mean of the cubic through both ends.
+                middle[slot] = 0.5 * (x0 + x1) + h / 12.0 * (v0 - v1);
+                mean_velocity[slot] = (x1 - x0) / h;
+            } else {
+                let push = drive.mean(from, to);
+                force[drive.slot] += push;
+                pushed[drive.slot] += push;
+            }
+        }
+        for i in 0..n {
+            middle[i] = self.x[i] + half * self.v[i];
+            mean_velocity[i] = self.v[i];
+        }
+
+        for path in &mut self.paths {
+            let (first, second) = (path.first, path.second);
+            let v0 = self.v[first] - self.v[second];
+            if path.constraint.is_none() {
+                let x = middle[first] - middle[second];
+                // Velocity in the middle by extrapolation: second order for laws that depend on it.
+                let v = 1.5 * v0 - 0.5 * path.velocity_before;
+                path.law.advance(&mut path.memory, path.reached, x, half);
+                path.reached = x;
+                path.force = path.law.force(&path.memory, x, v);
+                force[first] -= path.force;
+                force[second] += path.force;
+            } else {
+                // A prescribed body may have jumped to the start of this substep.
+                let x = self.x[first] - self.x[second];
+                if x != path.reached {
+                    path.law.advance(&mut path.memory, path.reached, x, 0.0);
+                    path.reached = x;
+                }
+            }
+            path.velocity_before = v0;
+        }
+
+        // Half the velocity change without constraints.
+        let mut change = [0.0; SLOTS];
+        for j in 0..n {
+            let (f, x, v) = (force[j], self.x[j], self.v[j]);
+            let (by_force, by_position, by_velocity) = (&fixed.from_force[j], &fixed.from_position[j], &fixed.from_velocity[j]);
+            for i in 0..n {
+                change[i] += by_force[i] * f + by_position[i] * x + by_velocity[i] * v;
+            }
+        }
+        for p in 0..fixed.prescribed {
+            let slot = prescribed_slot(p);
+            let acceleration = (end_velocity[slot] - self.v[slot]) / h;
+            let [by_position, by_velocity, by_acceleration] = &fixed.from_prescribed;
+            for i in 0..n {
+                change[i] += by_position[p][i] * middle[slot] + by_velocity[p][i] * mean_velocity[slot] + by_acceleration[p][i] * acceleration;
+            }
+        }
+        for i in 0..n {
+            mean_velocity[i] += change[i];
+            end_velocity[i] = mean_velocity[i] + change[i];
+        }
+
+                if fixed.constraints.len() > 0 {
+            let work = &mut *self.work;
+            for (c, contact) in self.frictions.iter_mut().enumerate() {
+                work.base[c] = 0.5 * fixed.constraints.across(c, &end_velocity);
+                let v0 = self.v[contact.first] - self.v[contact.second];
+                work.bounds[c] = contact.bounds(v0);
+                work.force[c] = contact.force.min(work.bounds[c].high).max(work.bounds[c].low);
+                contact.velocity_before = v0;
+            }
+            for path in &self.paths {
+                if let Some(c) = path.constraint {
+                    work.base[c] = fixed.constraints.across(c, &mean_velocity);
+                    work.force[c] = path.force;
+                }
+            }
+            fixed.constraints.solve(work, &mut self.paths, h);
+
+            let stops = self.frictions.iter().enumerate().any(|(c, contact)| contact.leaves_its_level(c, work));
+            if stops && stop(fixed, &self.frictions, work) {
+                fixed.constraints.solve(work, &mut self.paths, h);
+                for (c, (share, sliding)) in work.stop.iter_mut().enumerate().take(self.frictions.len()) {
+                    if *share > 0.0 && *share < 1.0 {
+                        // The force acted in two levels, the first one early: so much more (or less) way was made.
+                        let after = (work.force[c] - *share * *sliding) / (1.0 - *share);
+                        let moment = (*sliding - after) * h * *share * (1.0 - *share);
+                        for i in 0..n {
+                            end[i] -= fixed.constraints.response[c][i] * moment;
+                        }
+                    }
+                    *share = 0.0;
+                }
+            }
+            for c in 0..fixed.constraints.len() {
+                let (f, response) = (work.force[c], &fixed.constraints.response[c]);
+                for i in 0..n {
+                    mean_velocity[i] -= response[i] * f;
+                    end_velocity[i] -= 2.0 * response[i] * f;
+                }
+            }
+            for (c, contact) in self.frictions.iter_mut().enumerate() {
+                contact.force = work.force[c];
+                let Bounds { low, high } = work.bounds[c];
+                contact.mode = if contact.force > low && contact.force < high {
+                    0
+                } else if low == high {
+                    let v = end_velocity[contact.first] - end_velocity[contact.second];
+                    i8::from(v > 0.0) - i8::from(v < 0.0)
+                } else if contact.force >= high {
+                    1
+                } else {
+                    -1
+                };
+            }
+            for path in &mut self.paths {
+                if let Some(c) = path.constraint {
+                    path.force = work.force[c];
+                }
+            }
+            settle(&self.frictions, n, &mut end_velocity);
+        }
+
+        if let Some(account) = &mut self.energy {
+            let done = Done {
+                velocity: &self.v,
+                middle: &middle,
+                mean_velocity: &mean_velocity,
+                end_velocity: &end_velocity,
+                pushed: &pushed,
+                length: h,
+            };
+            account.count(fixed, &self.drives, &self.frictions, &mut self.paths, &done);
+        }
+        for i in 0..n {
+            end[i] += self.x[i] + half * (self.v[i] + end_velocity[i]);
+        }
+        self.x = end;
+        self.v = end_velocity;
+        for path in &mut self.paths {
+            let x = end[path.first] - end[path.second];
+            if path.constraint.is_some() {
+                let middle = 0.5 * (path.reached + x);
+                path.law.advance(&mut path.memory, path.reached, middle, half);
+                path.reached = middle;
+            }
+            path.law.advance(&mut path.memory, path.reached, x, half);
+            path.reached = x;
+        }
+    }
+
+    /// Forces of the inputs at `s` of this period, seen from before.
+    pub(super) fn note_pushes(&mut self, s: f64) {
+        self.pushed = [0.0; SLOTS];
+        for drive in &self.drives {
+            if !drive.moves {
+                self.pushed[drive.slot] += drive.force_before(s);
+            }
+        }
+    }
+}
+
+/// Gives contacts that stop in this substep the bounds of their mean force: each slides until then, and sticks or slides back
+/// after. Whether there are any.
+#[cold]
+fn stop(fixed: &Compiled, frictions: &[FrictionContact], work: &mut Work) -> bool {
+    let mut any = false;
+    for (c, contact) in frictions.iter().enumerate() {
+        if !contact.leaves_its_level(c, work) {
+            continue;
+        }
+        let Bounds { low, high } = work.bounds[c];
+        let sliding = if contact.mode > 0 { high } else { low };
+        let v0 = contact.velocity_before;
+        // Velocity at the end if it went on sliding.
+        let v1 = 2.0 * (fixed.constraints.velocity(c, work) + fixed.constraints.own_compliance(c) * (work.force[c] - sliding));
+        if v0 * f64::from(contact.mode) <= 0.0 || v0 * v1 >= 0.0 {
+            continue;
+        }
+        let share = v0 / (v0 - v1);
+        let bounds = &mut work.bounds[c];
+        if contact.mode > 0 {
+            bounds.low = share * sliding + (1.0 - share) * low;
+        } else {
+            bounds.high = share * sliding + (1.0 - share) * high;
+        }
+        work.stop[c] = (share, sliding);
+        any = true;
+    }
+    any
+}
+
+/// Makes the ends of each sticking contact move as one to the last bit, so that nothing creeps.
+#[inline]
+fn settle(frictions: &[FrictionContact], free: usize, velocity: &mut Slots) {
+    for contact in frictions {
+        if contact.mode == 0 && velocity[contact.first] != velocity[contact.second] {
+            if contact.first < free {
+                velocity[contact.first] = velocity[contact.second];
+            } else if contact.second < free {
+                velocity[contact.second] = velocity[contact.first];
+            }
+        }
+    }
+}
+
+impl FrictionContact {
+    /// Whether it was sliding and its force is not that of sliding on.
+    #[inline]
+    fn leaves_its_level(&self, c: usize, work: &Work) -> bool {
+        match self.mode {
+            0 => false,
+            1 => work.force[c] != work.bounds[c].high,
+            _ => work.force[c] != work.bounds[c].low,
+        }
+    }
+
+    /// Between what its force may be over a substep that begins with relative velocity `v0`.
+    #[inline]
+    fn bounds(&self, v0: f64) -> Bounds {
+        let (mut high, mut low) = (self.levels.at_rest[0], -self.levels.at_rest[1]);
+        if self.mode != 0 {
+            let middle = 1.5 * v0 - 0.5 * self.velocity_before;
+            let v = if middle * f64::from(self.mode) < 0.0 { 0.0 } else { middle };
+            if self.mode > 0 {
+                high = self.levels.sliding(0, v);
+            } else {
+                low = -self.levels.sliding(1, v);
+            }
+        }
+        Bounds { low, high }
+    }
+}

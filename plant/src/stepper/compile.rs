@@ -1,0 +1,372 @@
+//! From a model to the numbers that a substep needs.
+
+use super::constraints::{Constraints, Work};
+use super::dense;
+use super::drive::Drive;
+use super::exact::Propagator;
+use super::sense::Sense;
+use super::{
+    CompileError, FrictionContact, GROUND, MAX_BODIES, MAX_ELEMENTS, Options, PathElement, Plant, SLOTS, Slots, prescribed_slot,
+};
+use crate::elements::{Law, Linear, Mechanics, Range, Role};
+use crate::model::{InputKind, Model, OutputKind, Place};
+use nalgebra::DMatrix;
+
+/// A symmetric matrix over the places.
+pub(super) type Square = Box<[Slots; SLOTS]>;
+/// `columns[j][i]`: what a unit at free body j does to free body i.
+pub(super) type Columns = [Slots; SLOTS];
+
+/// What an element has become.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Share {
+    /// Part of the matrices, between two places.
+    Linear(Linear, usize, usize),
+    /// Index among the friction contacts.
+    Friction(usize),
+    /// Index among the path elements.
+    Path(usize),
+}
+
+/// Everything that does not change while a model moves.
+#[derive(Debug, Clone)]
+pub(super) struct Compiled {
+    /// Place of each body of the model.
+    pub(super) slots: Vec<usize>,
+    pub(super) free: usize,
+    pub(super) prescribed: usize,
+    pub(super) mass: Square,
+    pub(super) damping: Square,
+    pub(super) stiffness: Square,
+    /// Constant force onto each place, N.
+    pub(super) constant: Slots,
+    /// Inverse of the free bodies' inertia, 1/kg.
+    pub(super) inverse_mass: Columns,
+    /// Share θ of the implicit rule in the position.
+    pub(super) theta: f64,
+    /// Half the velocity change from: force, position, velocity of the free bodies.
+    pub(super) from_force: Columns,
+    pub(super) from_position: Columns,
+    pub(super) from_velocity: Columns,
+    /// The same from mean position, mean velocity and mean acceleration of the prescribed bodies.
+    pub(super) from_prescribed: [[Slots; SLOTS]; 3],
+    pub(super) elements: Vec<Share>,
+    pub(super) constraints: Constraints,
+}
+
+/// The constant matrices of a network.
+struct Network {
+    slots: Vec<usize>,
+    /// Body of each free place, for messages.
+    free_bodies: Vec<usize>,
+    prescribed: usize,
+    mass: Square,
+    damping: Square,
+    stiffness: Square,
+    constant: Slots,
+}
+
+fn square() -> Square {
+    Box::new([[0.0; SLOTS]; SLOTS])
+}
+
+/// Adds a coefficient between two places. Ground's row and column collect what has no effect.
+fn join(matrix: &mut Square, first: usize, second: usize, value: f64) {
+    matrix[first][first] += value;
+    matrix[second][second] += value;
+    matrix[first][second] -= value;
+    matrix[second][first] -= value;
+}
+
+/// The block between the free places.
+fn block(matrix: &Square, free: usize) -> DMatrix<f64> {
+    DMatrix::from_fn(free, free, |i, j| matrix[i][j])
+}
+
+fn columns(matrix: &DMatrix<f64>) -> Columns {
+    let mut columns = [[0.0; SLOTS]; SLOTS];
+    for j in 0..matrix.ncols() {
+        for i in 0..matrix.nrows() {
+            columns[j][i] = matrix[(i, j)];
+        }
+    }
+    columns
+}
+
+fn number(place: impl Fn() -> String, key: &'static str, value: f64, expected: &'static str, holds: bool) -> Result<(), CompileError> {
+    if holds { Ok(()) } else { Err(CompileError::Number { place: place(), key, expected, value }) }
+}
+
+/// Refuses what a model file could not say, in models that were built by hand.
+fn check(model: &Model) -> Result<(), CompileError> {
+    for body in &model.bodies {
+        let holds = body.inertia.is_finite() && body.inertia >= 0.0;
+        number(|| format!("body `{}`", body.name), "inertia", body.inertia, "at least 0", holds)?;
+    }
+    let exists = |place: &Place| place.is_none_or(|body| body < model.bodies.len());
+    for element in &model.elements {
+        let reason = |reason: String| CompileError::Element { element: element.name.clone(), reason };
+        if !element.between.iter().all(exists) {
+            return Err(CompileError::Dangling(format!("element `{}`", element.name)));
+        }
+        let kind = element.law.kind();
+        if element.law.role() == Role::Unavailable {
+            return Err(CompileError::NotAvailable { element: element.name.clone(), kind: kind.name });
+        }
+        let values = element.law.values();
+        for (parameter, list) in kind.parameters.iter().zip(&values) {
+            for value in list {
+                let expected = match parameter.range {
+                    _ if !value.is_finite() => "a finite number".to_owned(),
+                    Range::NonNegative if *value < 0.0 => "at least 0".to_owned(),
+                    Range::Positive if *value <= 0.0 => "above 0".to_owned(),
+                    Range::Between(low, high) if !(low..=high).contains(&value) => format!("from {low} to {high}"),
+                    _ => continue,
+                };
+                return Err(reason(format!("{} must be {expected}, not {value}", parameter.key)));
+            }
+        }
+        (kind.build)(&values).map_err(reason)?;
+    }
+    for input in &model.inputs {
+        let place = || format!("input `{}`", input.name);
+        if input.on >= model.bodies.len() {
+            return Err(CompileError::Dangling(place()));
+        }
+        number(place, "gain", input.gain, "a finite number", input.gain.is_finite())?;
+        number(place, "saturation", input.saturation, "at least 0", input.saturation >= 0.0)?;
+        number(place, "delay", input.delay, "at least 0 and finite", input.delay >= 0.0 && input.delay.is_finite())?;
+        number(place, "bandwidth", input.bandwidth, "above 0", input.bandwidth > 0.0)?;
+        number(place, "back_emf", input.back_emf, "a finite number", input.back_emf.is_finite())?;
+    }
+    for output in &model.outputs {
+        let place = || format!("output `{}`", output.name);
+        let known = match &output.kind {
+            OutputKind::Position(body) | OutputKind::Velocity(body) | OutputKind::Acceleration(body) | OutputKind::Reaction(body) => {
+                *body < model.bodies.len()
+            }
+            OutputKind::Force(elements) => elements.iter().all(|element| *element < model.elements.len()),
+        };
+        if !known {
+            return Err(CompileError::Dangling(place()));
+        }
+        number(place, "gain", output.gain, "a finite number", output.gain.is_finite())?;
+        number(place, "delay", output.delay, "at least 0 and finite", output.delay >= 0.0 && output.delay.is_finite())?;
+        number(place, "offset", output.offset, "a finite number", output.offset.is_finite())?;
+        number(place, "resolution", output.resolution, "at least 0 and finite", output.resolution >= 0.0 && output.resolution.is_finite())?;
+        number(place, "noise", output.noise, "at least 0 and finite", output.noise >= 0.0 && output.noise.is_finite())?;
+        if let OutputKind::Reaction(body) = output.kind
+            && !model.inputs.iter().any(|input| input.kind == InputKind::Motion && input.on == body)
+        {
+            return Err(CompileError::NoReaction { output: output.name.clone(), body: model.bodies[body].name.clone() });
+        }
+    }
+    Ok(())
+}
+
+/// Delays of more periods than this would only fill memory.
+const LONGEST_DELAY_PERIODS: f64 = 1e6;
+
+fn check_sizes(model: &Model, period: f64, options: &Options) -> Result<(), CompileError> {
+    if !(period.is_finite() && period > 0.0) {
+        return Err(CompileError::Period(period));
+    }
+    if let Some(n) = options.substeps.filter(|n| !(1..=100_000).contains(n)) {
+        return Err(CompileError::Substeps(n));
+    }
+    if model.elements.len() > MAX_ELEMENTS {
+        return Err(CompileError::TooMany { what: "elements", count: model.elements.len(), limit: MAX_ELEMENTS });
+    }
+    let inputs = model.inputs.iter().map(|input| ("input", &input.name, input.delay));
+    for (what, name, delay) in inputs.chain(model.outputs.iter().map(|output| ("output", &output.name, output.delay))) {
+        number(|| format!("{what} `{name}`"), "delay", delay, "at most a million sample periods", delay / period <= LONGEST_DELAY_PERIODS)?;
+    }
+    Ok(())
+}
+
+fn assemble(model: &Model) -> Result<Network, CompileError> {
+    if model.bodies.len() > MAX_BODIES {
+        return Err(CompileError::TooMany { what: "bodies", count: model.bodies.len(), limit: MAX_BODIES });
+    }
+    let mut mover: Vec<Option<usize>> = vec![None; model.bodies.len()];
+    for (index, input) in model.inputs.iter().enumerate().filter(|(_, input)| input.kind == InputKind::Motion) {
+        if let Some(first) = mover[input.on].replace(index) {
+            return Err(CompileError::MovedTwice {
+                body: model.bodies[input.on].name.clone(),
+                first: model.inputs[first].name.clone(),
+                second: input.name.clone(),
+            });
+        }
+    }
+    let (mut slots, mut free_bodies, mut prescribed) = (Vec::new(), Vec::new(), 0);
+    for (body, mover) in mover.iter().enumerate() {
+        if mover.is_some() {
+            slots.push(prescribed_slot(prescribed));
+            prescribed += 1;
+        } else {
+            slots.push(free_bodies.len());
+            free_bodies.push(body);
+        }
+    }
+    let mut network =
+        Network { slots, free_bodies, prescribed, mass: square(), damping: square(), stiffness: square(), constant: [0.0; SLOTS] };
+    for (body, slot) in model.bodies.iter().zip(&network.slots) {
+        network.mass[*slot][*slot] += body.inertia;
+    }
+    for element in &model.elements {
+        let [first, second] = element.between.map(|place| place.map_or(GROUND, |body| network.slots[body]));
+        if let Role::Linear(linear) = element.law.role()
+            && first != second
+        {
+            join(&mut network.mass, first, second, linear.inertance);
+            join(&mut network.damping, first, second, linear.damping);
+            join(&mut network.stiffness, first, second, linear.stiffness);
+            network.constant[first] -= linear.force;
+            network.constant[second] += linear.force;
+        }
+    }
+    for input in model.inputs.iter().filter(|input| input.kind == InputKind::Force) {
+        let slot = network.slots[input.on];
+        network.damping[slot][slot] += input.back_emf;
+    }
+    Ok(network)
+}
+
+/// Phase per substep of the fastest mode, rad: its shape is resolved and its frequency right to 3e-4.
+const PHASE_PER_SUBSTEP: f64 = 0.6;
+/// Decay per substep of the fastest damped motion; the rule rings above 2.
+const DECAY_PER_SUBSTEP: f64 = 3.0;
+/// Longest substep with nonlinear elements, s.
+const LONGEST_SUBSTEP_S: f64 = 5e-4;
+/// Shortest substep that is chosen, s. What is faster than that is stable, but not resolved.
+const SHORTEST_SUBSTEP_S: f64 = 4e-6;
+
+fn choose_substeps(network: &Network, model: &Model, factor: &DMatrix<f64>, period: f64) -> usize {
+    let free = network.free_bodies.len();
+    let (mut stiffness, mut damping) = (network.stiffness.clone(), network.damping.clone());
+    for element in model.elements.iter().filter(|element| element.law.role() == Role::Path) {
+        let [first, second] = element.between.map(|place| place.map_or(GROUND, |body| network.slots[body]));
+        if first != second {
+            let slopes = element.law.slopes();
+            join(&mut stiffness, first, second, slopes.stiffness);
+            join(&mut damping, first, second, slopes.damping);
+        }
+    }
+    let fastest = dense::largest_ratio(factor, &block(&stiffness, free)).sqrt();
+    let quickest_decay = dense::largest_ratio(factor, &block(&damping, free));
+    let longest = LONGEST_SUBSTEP_S.min(PHASE_PER_SUBSTEP / fastest).min(DECAY_PER_SUBSTEP / quickest_decay).max(SHORTEST_SUBSTEP_S);
+    let count = (period / longest - 1e-9).ceil();
+    if count.is_finite() { count.clamp(1.0, 100_000.0) as usize } else { 1 }
+}
+
+/// See [`Plant::new`].
+pub(super) fn plant(model: &Model, period: f64, options: &Options) -> Result<Plant, CompileError> {
+    check_sizes(model, period, options)?;
+    check(model)?;
+    let network = assemble(model)?;
+    let free = network.free_bodies.len();
+    let mass = block(&network.mass, free);
+    let massless = |row: usize| CompileError::Massless(model.bodies[network.free_bodies[row]].name.clone());
+    let factor = dense::cholesky(&mass).map_err(massless)?;
+    let inverse_mass = dense::inverse(&mass).ok_or(CompileError::Singular)?;
+
+    let linear = model.elements.iter().all(|element| {
+        let nothing_between = element.between[0] == element.between[1];
+        nothing_between || matches!(element.law.role(), Role::Linear(_))
+    });
+    let delayed = model.outputs.iter().any(|output| output.delay > 0.0);
+    let substeps = match options.substeps {
+        Some(n) => n,
+        None if linear && !delayed => 1,
+        None => choose_substeps(&network, model, &factor, period),
+    };
+    let substep = period / substeps as f64;
+    let drives: Vec<Drive> = model.inputs.iter().map(|input| Drive::new(input, network.slots[input.on], period, substep)).collect();
+
+    let (mut frictions, mut paths, mut elements) = (Vec::new(), Vec::new(), Vec::new());
+    for element in &model.elements {
+        let [first, second] = element.between.map(|place| place.map_or(GROUND, |body| network.slots[body]));
+        elements.push(match element.law.role() {
+            Role::Linear(linear) => Share::Linear(linear, first, second),
+            Role::Friction(levels) => {
+                frictions.push(FrictionContact { first, second, levels, mode: 0, force: 0.0, velocity_before: 0.0 });
+                Share::Friction(frictions.len() - 1)
+            }
+            Role::Path | Role::Unavailable => {
+                paths.push(path_element(first, second, &element.law));
+                Share::Path(paths.len() - 1)
+            }
+        });
+    }
+
+    let stiffness = block(&network.stiffness, free);
+    let damping = block(&network.damping, free);
+    let theta = if dense::largest_ratio(&factor, &stiffness).sqrt() * substep < 1.2 { 1.0 / 3.0 } else { 1.0 };
+    let system = &mass * (2.0 / substep) + &damping + &stiffness * (theta * 0.5 * substep);
+    let from_force = dense::inverse(&system).ok_or(CompileError::Singular)?;
+    let mut from_prescribed = [[[0.0; SLOTS]; SLOTS]; 3];
+    for (matrix, weights) in [&network.stiffness, &network.damping, &network.mass].into_iter().zip(&mut from_prescribed) {
+        for (p, weights) in weights.iter_mut().enumerate().take(network.prescribed) {
+            for (i, weight) in weights.iter_mut().enumerate().take(free) {
+                *weight = -(0..free).map(|j| from_force[(i, j)] * matrix[j][prescribed_slot(p)]).sum::<f64>();
+            }
+        }
+    }
+    let constraints = Constraints::new(&columns(&from_force), free, substep, &frictions, &mut paths);
+    let fixed = Compiled {
+        free,
+        prescribed: network.prescribed,
+        inverse_mass: columns(&inverse_mass),
+        theta,
+        from_position: columns(&(-(&from_force * &stiffness))),
+        from_velocity: columns(&(-(&from_force * (&damping + &stiffness * (0.5 * substep))))),
+        from_force: columns(&from_force),
+        from_prescribed,
+        elements,
+        constraints,
+        slots: network.slots,
+        mass: network.mass,
+        damping: network.damping,
+        stiffness: network.stiffness,
+        constant: network.constant,
+    };
+    let exact = if linear { Propagator::new(&fixed, &drives, substep) } else { None };
+    let sense = Sense::new(model, &fixed.slots, substep, options);
+    let mut plant = Plant {
+        fixed,
+        period,
+        substep,
+        substeps,
+        periods: 0,
+        started: false,
+        x: [0.0; SLOTS],
+        v: [0.0; SLOTS],
+        prescribed_acceleration: [0.0; SLOTS],
+        pushed: [0.0; SLOTS],
+        drives,
+        frictions,
+        paths,
+        work: Box::new(Work::new()),
+        sense,
+        energy: None,
+        exact,
+    };
+    plant.reset();
+    Ok(plant)
+}
+
+fn path_element(first: usize, second: usize, law: &Law) -> PathElement {
+    let memory = vec![0.0; law.memory_len()];
+    PathElement {
+        first,
+        second,
+        law: law.clone(),
+        trial: memory.clone(),
+        memory,
+        reached: 0.0,
+        force: 0.0,
+        velocity_before: 0.0,
+        constraint: None,
+        absorbed: 0.0,
+    }
+}

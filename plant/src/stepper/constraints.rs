@@ -1,0 +1,285 @@
+//! Dry friction and stiff elements, solved together.
+//!
+//! Each constraint is a scalar law between its force f and the mean relative velocity of its ends, `u = w - Σ P f`,
+//! with w the velocity that the rest would give and P = G A⁻¹ Gᵀ the compliance between constraints. Block
+//! Gauss-Seidel solves one law at a time exactly. Where friction contacts share their load so closely that it
+//! converges slowly, those that stick are solved directly.
+
+use super::compile::Columns;
+use super::{FrictionContact, MAX_ELEMENTS, PathElement, SLOTS, Slots};
+use crate::elements::Mechanics;
+
+/// Sweeps before the sticking contacts are solved directly.
+const SWEEPS: usize = 25;
+/// Direct solutions at most.
+const ROUNDS: usize = 12;
+/// Change of a force in a sweep, against its span, that counts as none.
+const TOLERANCE: f64 = 1e-14;
+/// Elements whose force changes by more than this share per share of velocity are solved implicitly.
+const STIFF: f64 = 0.1;
+/// The same where slopes are only estimates.
+const STIFF_UNBOUNDED: f64 = 0.01;
+/// Evaluations of a law in one scalar solution.
+const EVALUATIONS: usize = 60;
+
+/// The constraints of a network at a given substep. Friction contacts come first.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Constraints {
+    /// Ends of each.
+    ends: Vec<(usize, usize)>,
+    /// Index among the path elements, of those that are no friction contacts.
+    paths: Vec<usize>,
+    /// How many are friction contacts.
+    frictions: usize,
+    /// P, row by row, m/s per N.
+    compliance: Vec<f64>,
+    /// A⁻¹ Gᵀ: change of the mean velocity of each free body per unit of each force, m/s per N.
+    pub(super) response: Vec<Slots>,
+}
+
+/// Bounds and start of a friction force during a solution.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Bounds {
+    pub(super) low: f64,
+    pub(super) high: f64,
+}
+
+/// Space for a solution.
+#[derive(Debug, Clone)]
+pub(super) struct Work {
+    /// w, m/s: half the relative velocity at the end for friction, the mean for others, before any constraint acts.
+    pub(super) base: [f64; MAX_ELEMENTS],
+    pub(super) bounds: [Bounds; MAX_ELEMENTS],
+    pub(super) force: [f64; MAX_ELEMENTS],
+    /// Of contacts that stop: share of the substep until then, and force until then, N. Else (0, 0).
+    pub(super) stop: [(f64, f64); MAX_ELEMENTS],
+}
+
+impl Work {
+    pub(super) fn new() -> Work {
+        Work { base: [0.0; MAX_ELEMENTS], bounds: [Bounds::default(); MAX_ELEMENTS], force: [0.0; MAX_ELEMENTS], stop: [(0.0, 0.0); MAX_ELEMENTS] }
+    }
+}
+
+impl Constraints {
+    /// Lists the friction contacts and those path elements that are too stiff for the substep; the latter are told so.
+    pub(super) fn new(
+        from_force: &Columns,
+        free: usize,
+        substep: f64,
+        frictions: &[FrictionContact],
+        paths: &mut [PathElement],
+    ) -> Constraints {
+        let mut all = Constraints { frictions: frictions.len(), ..Constraints::default() };
+        for contact in frictions {
+            all.ends.push((contact.first, contact.second));
+        }
+        let weight = |slot: usize, column: &Slots| if slot < free { column[slot] } else { 0.0 };
+        let respond = |(first, second): (usize, usize)| {
+            let mut response = [0.0; SLOTS];
+            for i in 0..free {
+                response[i] = weight(first, &transposed(from_force, i)) - weight(second, &transposed(from_force, i));
+            }
+            response
+        };
+        for (index, path) in paths.iter_mut().enumerate() {
+            let ends = (path.first, path.second);
+            let response = respond(ends);
+            let slopes = path.law.slopes();
+            let stiffness = (weight(ends.0, &response) - weight(ends.1, &response)) * (0.5 * substep * slopes.stiffness + slopes.damping);
+            if stiffness > if slopes.bounded { STIFF } else { STIFF_UNBOUNDED } {
+                path.constraint = Some(all.ends.len());
+                all.paths.push(index);
+                all.ends.push(ends);
+            }
+        }
+        all.response = all.ends.iter().map(|ends| respond(*ends)).collect();
+        for ends in &all.ends {
+            for response in &all.response {
+                all.compliance.push(weight(ends.0, response) - weight(ends.1, response));
+            }
+        }
+        all
+    }
+
+    #[inline]
+    pub(super) fn len(&self) -> usize {
+        self.ends.len()
+    }
+
+    #[inline]
+    pub(super) fn own_compliance(&self, c: usize) -> f64 {
+        self.compliance[c * self.ends.len() + c]
+    }
+
+    /// Relative velocity of a constraint's ends.
+    #[inline]
+    pub(super) fn across(&self, c: usize, velocity: &Slots) -> f64 {
+        let (first, second) = self.ends[c];
+        velocity[first] - velocity[second]
+    }
+
+    /// Mean velocity across constraint `c` under the forces so far (for friction: half that at the end), m/s.
+    #[inline]
+    pub(super) fn velocity(&self, c: usize, work: &Work) -> f64 {
+        let count = self.ends.len();
+        let row = &self.compliance[c * count..(c + 1) * count];
+        row.iter().zip(&work.force).fold(work.base[c], |u, (p, f)| u - p * f)
+    }
+
+    /// One law solved for the others as they are; returns the change of its force.
+    #[inline]
+    fn relax(&self, c: usize, work: &mut Work, paths: &mut [PathElement], substep: f64) -> f64 {
+        let before = work.force[c];
+        let u = self.velocity(c, work);
+        let own = self.own_compliance(c);
+        if c < self.frictions {
+            let Bounds { low, high } = work.bounds[c];
+            work.force[c] = if own > 0.0 {
+                (before + u / own).min(high).max(low)
+            } else if u > 0.0 {
+                high
+            } else if u < 0.0 {
+                low
+            } else {
+                before.min(high).max(low)
+            };
+        } else if let Some(path) = self.paths.get(c - self.frictions).and_then(|p| paths.get_mut(*p)) {
+            work.force[c] = solve_law(path, u + own * before, own, before, substep);
+        }
+        work.force[c] - before
+    }
+
+    /// Solves all laws at once. `work.force` holds the start and then the solution.
+    #[inline]
+    pub(super) fn solve(&self, work: &mut Work, paths: &mut [PathElement], substep: f64) {
+        let count = self.ends.len();
+        if count == 1 {
+            self.relax(0, work, paths, substep);
+            return;
+        }
+        for _ in 0..ROUNDS {
+            for _ in 0..SWEEPS {
+                let mut settled = true;
+                for c in 0..count {
+                    let change = self.relax(c, work, paths, substep).abs();
+                    let span = if c < self.frictions { work.bounds[c].high - work.bounds[c].low } else { work.force[c].abs() };
+                    settled &= change <= TOLERANCE * span;
+                }
+                if settled {
+                    return;
+                }
+            }
+            self.solve_sticking(work);
+        }
+    }
+
+    /// Newton step for the contacts inside their bounds: makes all of them stick at once. Contacts that depend on
+    /// others (several in one place) keep their force.
+    fn solve_sticking(&self, work: &mut Work) {
+        let mut inside = [0usize; MAX_ELEMENTS];
+        let mut count = 0;
+        for c in 0..self.frictions {
+            if work.force[c] > work.bounds[c].low && work.force[c] < work.bounds[c].high {
+                inside[count] = c;
+                count += 1;
+            }
+        }
+        let p = |i: usize, j: usize| self.compliance[inside[i] * self.ends.len() + inside[j]];
+        let mut factor = [[0.0; MAX_ELEMENTS]; MAX_ELEMENTS];
+        let mut kept = [true; MAX_ELEMENTS];
+        let mut right = [0.0; MAX_ELEMENTS];
+        for i in 0..count {
+            right[i] = self.velocity(inside[i], work);
+        }
+        for j in 0..count {
+            let pivot = p(j, j) - (0..j).filter(|k| kept[*k]).map(|k| factor[j][k] * factor[j][k]).sum::<f64>();
+            kept[j] = pivot > 1e-10 * p(j, j);
+            if !kept[j] {
+                continue;
+            }
+            factor[j][j] = pivot.sqrt();
+            for i in j + 1..count {
+                let sum: f64 = (0..j).filter(|k| kept[*k]).map(|k| factor[i][k] * factor[j][k]).sum();
+                factor[i][j] = (p(i, j) - sum) / factor[j][j];
+            }
+        }
+        for i in (0..count).filter(|i| kept[*i]) {
+            let sum: f64 = (0..i).filter(|k| kept[*k]).map(|k| factor[i][k] * right[k]).sum();
+            right[i] = (right[i] - sum) / factor[i][i];
+        }
+        for i in (0..count).rev().filter(|i| kept[*i]) {
+            let sum: f64 = (i + 1..count).filter(|k| kept[*k]).map(|k| factor[k][i] * right[k]).sum();
+            right[i] = (right[i] - sum) / factor[i][i];
+            let Bounds { low, high } = work.bounds[inside[i]];
+            work.force[inside[i]] = (work.force[inside[i]] + right[i]).min(high).max(low);
+        }
+    }
+}
+
+/// Row i of A⁻¹ as a column (it is symmetric but for rounding).
+fn transposed(columns: &Columns, i: usize) -> Slots {
+    let mut row = [0.0; SLOTS];
+    for (j, column) in columns.iter().enumerate() {
+        row[j] = column[i];
+    }
+    row
+}
+
+/// Force of a path element in the middle of a substep whose mean relative velocity is `u`.
+#[inline]
+pub(super) fn trial_force(path: &mut PathElement, u: f64, substep: f64) -> f64 {
+    let middle = path.reached + 0.5 * substep * u;
+    path.trial.copy_from_slice(&path.memory);
+    path.law.advance(&mut path.trial, path.reached, middle, 0.5 * substep);
+    path.law.force(&path.trial, middle, u)
+}
+
+/// Solves `u + own f(u) = w` for f, starting from the force `start`: secant steps kept inside a bracket. The left side
+/// rises with u for every law that does not push back harder the slower it is pushed.
+fn solve_law(path: &mut PathElement, w: f64, own: f64, start: f64, substep: f64) -> f64 {
+    if own <= 0.0 {
+        return trial_force(path, w, substep);
+    }
+    let mut best_force = start;
+    let mut excess = |u: f64, best: &mut f64| {
+        *best = trial_force(path, u, substep);
+        u + own * *best - w
+    };
+    let scale = 1e-15 * (w.abs() + own * start.abs());
+    let mut a = w - own * start;
+    let mut at_a = excess(a, &mut best_force);
+    if at_a.abs() <= scale {
+        return best_force;
+    }
+    // The first step treats the force as constant, the next bracket the solution by widening.
+    let mut b = a - at_a;
+    let mut at_b = excess(b, &mut best_force);
+    let mut reach = 1.0;
+    let mut evaluations = 2;
+    while at_a * at_b > 0.0 && evaluations < EVALUATIONS {
+        if at_b.abs() <= scale {
+            return best_force;
+        }
+        let secant = if at_b == at_a { b - at_b } else { b - at_b * (b - a) / (at_b - at_a) };
+        let step = (secant - b).abs().min(4.0 * reach * at_b.abs().max((b - a).abs()));
+        reach *= 2.0;
+        (a, at_a) = (b, at_b);
+        b -= step.copysign(at_b);
+        at_b = excess(b, &mut best_force);
+        evaluations += 1;
+    }
+    // Illinois: the stale end's value is halved so that both ends close in.
+    while evaluations < EVALUATIONS && at_b.abs() > scale && (b - a).abs() > 1e-16 * (a.abs() + b.abs()) {
+        let next = b - at_b * (b - a) / (at_b - at_a);
+        let value = excess(next, &mut best_force);
+        if value * at_b < 0.0 {
+            (a, at_a) = (b, at_b);
+        } else {
+            at_a *= 0.5;
+        }
+        (b, at_b) = (next, value);
+        evaluations += 1;
+    }
+    best_force
+}

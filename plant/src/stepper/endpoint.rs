@@ -1,0 +1,123 @@
+//! Forces and accelerations at an instant, from the balance of forces there.
+//!
+//! A substep knows forces as means over it; outputs want them at the sample.
+
+use super::compile::Share;
+use super::{MAX_ELEMENTS, Plant, SLOTS, Slots};
+use crate::elements::Mechanics;
+
+/// Sweeps over the friction contacts: accelerations need no more digits than an output has.
+const SWEEPS: usize = 200;
+
+/// An instant.
+pub(super) struct Endpoint {
+    /// m/s².
+    pub(super) acceleration: Slots,
+    /// Of each friction contact, N.
+    pub(super) friction: [f64; MAX_ELEMENTS],
+    /// Of each path element, N.
+    pub(super) path: [f64; MAX_ELEMENTS],
+}
+
+impl Plant {
+    /// The balance of forces now. Sliding contacts have the level of their speed; those that stick what keeps their
+    /// ends together.
+    pub(super) fn endpoint(&self) -> Endpoint {
+        let fixed = &self.fixed;
+        let mut now = Endpoint { acceleration: self.prescribed_acceleration, friction: [0.0; MAX_ELEMENTS], path: [0.0; MAX_ELEMENTS] };
+        let mut force = [0.0; SLOTS];
+        for i in 0..fixed.free {
+            let row = |matrix: &Slots, q: &Slots| matrix.iter().zip(q).map(|(m, q)| m * q).sum::<f64>();
+            force[i] = fixed.constant[i] + self.pushed[i] - row(&fixed.stiffness[i], &self.x) - row(&fixed.damping[i], &self.v)
+                - row(&fixed.mass[i], &self.prescribed_acceleration);
+        }
+        for (path, f) in self.paths.iter().zip(&mut now.path) {
+            let (first, second) = (path.first, path.second);
+            *f = path.law.force(&path.memory, self.x[first] - self.x[second], self.v[first] - self.v[second]);
+            force[first] -= *f;
+            force[second] += *f;
+        }
+        for (contact, f) in self.frictions.iter().zip(&mut now.friction) {
+            let v = self.v[contact.first] - self.v[contact.second];
+            *f = match contact.mode {
+                1 => contact.levels.sliding(0, v),
+                -1 => -contact.levels.sliding(1, v),
+                _ => contact.force,
+            };
+            force[contact.first] -= *f;
+            force[contact.second] += *f;
+        }
+        self.accelerate(&force, &mut now.acceleration);
+        self.hold_sticking(&mut force, &mut now);
+        now
+    }
+
+    fn accelerate(&self, force: &Slots, acceleration: &mut Slots) {
+        for i in 0..self.fixed.free {
+            acceleration[i] = (0..self.fixed.free).map(|j| self.fixed.inverse_mass[j][i] * force[j]).sum();
+        }
+    }
+
+    /// Gauss-Seidel over the sticking contacts: no relative acceleration, within the level at rest.
+    fn hold_sticking(&self, force: &mut Slots, now: &mut Endpoint) {
+        let free = self.fixed.free;
+        let inverse = |i: usize, j: usize| if i < free && j < free { self.fixed.inverse_mass[j][i] } else { 0.0 };
+        for _ in 0..SWEEPS {
+            let mut settled = true;
+            for (contact, f) in self.frictions.iter().zip(&mut now.friction).filter(|(contact, _)| contact.mode == 0) {
+                let (a, b) = (contact.first, contact.second);
+                let own = inverse(a, a) + inverse(b, b) - inverse(a, b) - inverse(b, a);
+                if own <= 0.0 {
+                    continue;
+                }
+                let relative = now.acceleration[a] - now.acceleration[b];
+                let wanted = (*f + relative / own).min(contact.levels.at_rest[0]).max(-contact.levels.at_rest[1]);
+                let change = wanted - *f;
+                if change.abs() > 1e-13 * (contact.levels.at_rest[0] + contact.levels.at_rest[1]) {
+                    settled = false;
+                }
+                *f = wanted;
+                force[a] -= change;
+                force[b] += change;
+                for i in 0..free {
+                    now.acceleration[i] -= (inverse(i, a) - inverse(i, b)) * change;
+                }
+            }
+            if settled {
+                return;
+            }
+        }
+    }
+
+    /// Force of an element, N; not a number when there is no such element.
+    pub(super) fn force_at(&self, element: usize, now: &Endpoint) -> f64 {
+        match self.fixed.elements.get(element) {
+            None => f64::NAN,
+            Some(Share::Friction(c)) => now.friction[*c],
+            Some(Share::Path(p)) => now.path[*p],
+            Some(Share::Linear(linear, a, b)) => {
+                let across = |q: &Slots| q[*a] - q[*b];
+                linear.force + linear.stiffness * across(&self.x) + linear.damping * across(&self.v) + linear.inertance * across(&now.acceleration)
+            }
+        }
+    }
+
+    /// What the mover of a prescribed body has to do, N.
+    pub(super) fn reaction_at(&self, slot: usize, now: &Endpoint) -> f64 {
+        if slot < self.fixed.free {
+            return 0.0;
+        }
+        let fixed = &self.fixed;
+        let mut reaction = -fixed.constant[slot] - self.pushed[slot];
+        for j in 0..SLOTS {
+            reaction += fixed.mass[slot][j] * now.acceleration[j] + fixed.damping[slot][j] * self.v[j] + fixed.stiffness[slot][j] * self.x[j];
+        }
+        let frictions = self.frictions.iter().zip(&now.friction).map(|(c, f)| (c.first, c.second, *f));
+        for (first, second, f) in frictions.chain(self.paths.iter().zip(&now.path).map(|(p, f)| (p.first, p.second, *f))) {
+            if first != second {
+                reaction += if first == slot { f } else { 0.0 } - if second == slot { f } else { 0.0 };
+            }
+        }
+        reaction
+    }
+}

@@ -1,0 +1,112 @@
+//! `backdrive bag ...`
+
+use crate::cli;
+use crate::failure::{Failure, code};
+use backdrive_bags::{ColumnMap, DiffOptions, ImportOptions, Quantity, Reader, diff, export_csv, import_csv, info, recover};
+use std::path::Path;
+
+/// Does what `backdrive bag` is asked.
+pub fn bag(command: &cli::Bag) -> Result<u8, Failure> {
+    match command {
+        cli::Bag::Info { bag, json } => show(bag, *json),
+        cli::Bag::Import { csv, bag, map } => import(csv, bag, map),
+        cli::Bag::Export { bag, csv, topic } => export(bag, csv, topic),
+        cli::Bag::Recover { damaged, bag } => save(damaged, bag),
+        cli::Bag::Play { bag, speed } => crate::play::play(bag, *speed),
+        cli::Bag::Diff { a, b, tolerance, ignore, json } => compare(a, b, tolerance, ignore, *json),
+    }
+}
+
+fn print_json(value: &impl serde::Serialize) -> Result<(), Failure> {
+    println!("{}", serde_json::to_string_pretty(value).map_err(Failure::input)?);
+    Ok(())
+}
+
+fn show(bag: &Path, json: bool) -> Result<u8, Failure> {
+    let info = info(bag).map_err(Failure::input)?;
+    if json {
+        print_json(&info)?;
+    } else {
+        print!("{info}");
+    }
+    Ok(0)
+}
+
+fn import(csv: &[std::path::PathBuf], bag: &Path, maps: &[String]) -> Result<u8, Failure> {
+    let columns = maps.iter().map(|map| column_map(map)).collect::<Result<Vec<_>, _>>()?;
+    // One table is one experiment and one bag: several go into a folder.
+    let into = |table: &Path| -> std::path::PathBuf {
+        match csv.len() {
+            1 => bag.to_path_buf(),
+            _ => bag.join(table.with_extension("mcap").file_name().unwrap_or_default()),
+        }
+    };
+    if csv.len() > 1 {
+        std::fs::create_dir_all(bag).map_err(|e| Failure::write(bag, e))?;
+    }
+    for table in csv {
+        let options = ImportOptions { columns: columns.clone(), ..ImportOptions::default() };
+        let report = import_csv(table, &into(table), &options).map_err(Failure::input)?;
+        for column in &report.skipped {
+            eprintln!("warning: {}: column \"{column}\" holds something that is no number and was left out", table.display());
+        }
+        println!("{}: {} rows, {} topics -> {}", table.display(), report.rows, report.topics.len(), into(table).display());
+    }
+    Ok(0)
+}
+
+/// `COLUMN=TOPIC.FIELD[AXIS]`
+fn column_map(text: &str) -> Result<ColumnMap, Failure> {
+    let wrong = || Failure { code: 2, message: format!("--map \"{text}\": expected COLUMN=TOPIC.FIELD[AXIS], such as force=/master/servo_jf.effort[0]") };
+    let (column, rest) = text.split_once('=').ok_or_else(wrong)?;
+    let (topic, field) = rest.rsplit_once('.').ok_or_else(wrong)?;
+    let (field, axis) = field.strip_suffix(']').and_then(|f| f.split_once('[')).ok_or_else(wrong)?;
+    let quantity = match field {
+        "position" => Quantity::Position,
+        "velocity" => Quantity::Velocity,
+        "effort" => Quantity::Effort,
+        _ => return Err(wrong()),
+    };
+    let axis = axis.parse().map_err(|_| wrong())?;
+    Ok(ColumnMap { column: column.to_string(), topic: topic.to_string(), quantity, axis, scale: 1.0, offset: 0.0 })
+}
+
+fn export(bag: &Path, csv: &Path, topics: &[String]) -> Result<u8, Failure> {
+    let reader = Reader::open(bag).map_err(Failure::input)?;
+    let rows = export_csv(&reader, csv, (!topics.is_empty()).then_some(topics)).map_err(Failure::input)?;
+    println!("{}: {rows} rows", csv.display());
+    Ok(0)
+}
+
+fn save(damaged: &Path, bag: &Path) -> Result<u8, Failure> {
+    let report = recover(damaged, bag).map_err(Failure::input)?;
+    if report.was_clean {
+        println!("{}: had ended cleanly; copied", damaged.display());
+    }
+    let until = report.last_step.map_or(String::new(), |step| format!(", up to step {step}"));
+    println!("{}: {} messages saved{until}", bag.display(), report.messages);
+    for place in &report.damaged {
+        eprintln!("warning: damaged and left out: {place}");
+    }
+    let lost = report.completeness.as_ref().is_some_and(|c| c.lost() > 0);
+    Ok(if lost { code::LOST_DATA } else { 0 })
+}
+
+fn compare(a: &Path, b: &Path, tolerances: &[String], ignore: &[String], json: bool) -> Result<u8, Failure> {
+    let mut options = DiffOptions { ignore: ignore.to_vec(), ..DiffOptions::default() };
+    for text in tolerances {
+        let parsed = text.rsplit_once('=').and_then(|(topic, value)| Some((topic.to_string(), value.parse::<f64>().ok()?)));
+        match parsed {
+            Some((topic, value)) if value >= 0.0 => options.tolerances.insert(topic, value),
+            _ => return Err(Failure { code: 2, message: format!("--tolerance \"{text}\": expected TOPIC=VALUE with a value of at least 0") }),
+        };
+    }
+    let (a, b) = (Reader::open(a).map_err(Failure::input)?, Reader::open(b).map_err(Failure::input)?);
+    let report = diff(&a, &b, &options).map_err(Failure::input)?;
+    if json {
+        print_json(&report)?;
+    } else {
+        print!("{report}");
+    }
+    Ok(if report.same { 0 } else { code::NEGATIVE })
+}

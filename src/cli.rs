@@ -1,0 +1,356 @@
+//! The command line: its doc comments are the help.
+
+use backdrive_nodes::graph::Overrides;
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use std::path::PathBuf;
+
+/// Run force-reflecting telerobots, record them, and ask whether they are stable.
+///
+/// Results go to standard output, everything else to standard error.
+/// Exit codes: 0 fine; 1 the finding is negative (not stable, bags differ); 2 usage; 3 bad input;
+/// 4 data was lost; 5 this machine does not let it (shared memory, disk, permission); 6 a node failed;
+/// 130 interrupted.
+#[derive(Debug, Parser)]
+#[command(name = "backdrive", version, propagate_version = true, arg_required_else_help = true)]
+pub struct Cli {
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+/// The verbs.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Run a graph: every node its own process, every topic recorded.
+    #[command(after_help = "Example:\n  backdrive run launch/contact.toml --master plant/models/rigid-mass.toml --lambda 0.2")]
+    Run(Run),
+    /// Run a bag's graph again from its recorded operator, with what you change, and say whether it was stable.
+    #[command(after_help = "Example:\n  backdrive replay contact.mcap --mu 1 --lambda 0.6 --bag again.mcap")]
+    Replay(Replay),
+    /// Check a graph file; errors point at the line.
+    #[command(after_help = "Example:\n  backdrive check launch/contact.toml")]
+    Check(Graph),
+    /// Draw a graph.
+    #[command(after_help = "Example:\n  backdrive graph launch/contact.toml")]
+    Graph(Graph),
+    /// Run a model on a recording, a set of recordings, or a named excitation.
+    #[command(after_help = "Examples:
+  backdrive simulate plant/models/impulse-engine.toml sweep:amplitude=2,from=1,to=200,duration=10 --out sweep.csv
+  backdrive simulate model.toml recording.csv --out predicted.csv")]
+    Simulate(Simulate),
+    /// Look at a model file.
+    #[command(subcommand)]
+    Model(Model),
+    /// Look at bags and convert them.
+    #[command(subcommand)]
+    Bag(Bag),
+    /// Remove what dead runs left in shared memory and on disk; live runs are not touched.
+    #[command(after_help = "Example:\n  backdrive clean")]
+    Clean,
+    /// One node of a running graph; the supervisor starts it.
+    #[command(hide = true)]
+    Node(Node),
+}
+
+/// Changes to a graph file.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Changes to the graph")]
+pub struct Changes {
+    /// Model of the master.
+    #[arg(long, value_name = "FILE")]
+    pub master: Option<PathBuf>,
+    /// Grip that holds the master; `none` for no hand.
+    #[arg(long, value_name = "FILE|none")]
+    pub grip: Option<PathBuf>,
+    /// Model of the slave.
+    #[arg(long, value_name = "FILE")]
+    pub slave: Option<PathBuf>,
+    /// What the slave touches; `none` for nothing.
+    #[arg(long, value_name = "FILE|none")]
+    pub environment: Option<PathBuf>,
+    /// Model that predicts the induced motion; `none` to cancel nothing. Without this it stays the graph's, whatever the master is.
+    #[arg(long, value_name = "FILE|none")]
+    pub canceller: Option<PathBuf>,
+    /// Grip that the canceller assumes; without this it stays the graph's, whatever the real grip is.
+    #[arg(long, value_name = "FILE|none")]
+    pub canceller_grip: Option<PathBuf>,
+    /// Corner of a high-pass on the canceller's estimate; 0 for none.
+    #[arg(long, value_name = "HZ")]
+    pub high_pass: Option<f64>,
+    /// Position scale from master to slave.
+    #[arg(long)]
+    pub mu: Option<f64>,
+    /// Force scale from slave to master.
+    #[arg(long)]
+    pub lambda: Option<f64>,
+    /// Add a small recorded multisine to the force channel, such as `multisine:peak=0.1,from=1,to=500,period=2`.
+    #[arg(long, value_name = "EXCITATION", num_args = 0..=1, default_missing_value = DEFAULT_DITHER)]
+    pub dither: Option<String>,
+    /// Watch the loop and back the force gain off when it begins to oscillate.
+    #[arg(long)]
+    pub guard: bool,
+    /// Whether sensors round and are noisy as the model files say.
+    #[arg(long, value_enum)]
+    pub sensors: Option<Sensors>,
+    /// Whether the device's limits of force, rate and speed act; `ignored` asks what the loop would do with stronger motors.
+    #[arg(long, value_enum)]
+    pub limits: Option<Limits>,
+    /// Length of the run.
+    #[arg(long, value_name = "S")]
+    pub duration: Option<f64>,
+    /// Steps per second, up to 10000.
+    #[arg(long, value_name = "HZ")]
+    pub rate: Option<f64>,
+    /// Seed of everything random.
+    #[arg(long)]
+    pub seed: Option<u64>,
+    /// The bag to record.
+    #[arg(long, value_name = "FILE")]
+    pub bag: Option<PathBuf>,
+}
+
+/// A dither that is small beside a finger's force, and broad enough for a frequency response.
+const DEFAULT_DITHER: &str = "multisine:peak=0.05,from=1,to=500,period=2";
+
+/// See [`Changes::sensors`].
+#[derive(Debug, Clone, Copy, ValueEnum)]
+pub enum Sensors {
+    /// As the model files say.
+    AsModelled,
+    /// Exact.
+    Ideal,
+}
+
+/// See [`Changes::limits`].
+#[derive(Debug, Clone, Copy, ValueEnum)]
+pub enum Limits {
+    /// As the model files say.
+    Enforced,
+    /// None act.
+    Ignored,
+}
+
+impl Changes {
+    /// As the graph's reader takes them.
+    pub fn overrides(&self, clock: Option<Clock>) -> Overrides {
+        Overrides {
+            master: self.master.clone(),
+            grip: self.grip.clone(),
+            slave: self.slave.clone(),
+            environment: self.environment.clone(),
+            canceller: self.canceller.clone(),
+            canceller_grip: self.canceller_grip.clone(),
+            high_pass_hz: self.high_pass,
+            mu: self.mu,
+            lambda: self.lambda,
+            dither: self.dither.clone(),
+            guard: self.guard.then_some(true),
+            bag: self.bag.clone(),
+            clock: clock.map(|c| if matches!(c, Clock::Lockstep) { "lockstep" } else { "realtime" }.to_string()),
+            rate_hz: self.rate,
+            duration_s: self.duration,
+            seed: self.seed,
+            sensors: self.sensors.map(|s| if matches!(s, Sensors::Ideal) { "ideal" } else { "as_modelled" }.to_string()),
+            limits: self.limits.map(|l| if matches!(l, Limits::Ignored) { "ignored" } else { "enforced" }.to_string()),
+        }
+    }
+}
+
+/// How time runs.
+#[derive(Debug, Clone, Copy, ValueEnum)]
+pub enum Clock {
+    /// As fast as the machine allows, and reproducible.
+    Lockstep,
+    /// With the wall clock.
+    Realtime,
+}
+
+/// How messages travel.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Transport {
+    /// A process per node over shared memory.
+    Iceoryx2,
+    /// All nodes in this process.
+    Inproc,
+}
+
+/// `backdrive run`
+#[derive(Debug, Args)]
+pub struct Run {
+    /// The graph file.
+    pub graph: PathBuf,
+    /// How messages travel.
+    #[arg(long, value_enum, default_value = "iceoryx2")]
+    pub transport: Transport,
+    /// How time runs.
+    #[arg(long, value_enum)]
+    pub clock: Option<Clock>,
+    /// Folder for the recordings of a graph with experiments.
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Print the result as JSON.
+    #[arg(long)]
+    pub json: bool,
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub changes: Changes,
+}
+
+/// `backdrive replay`
+#[derive(Debug, Args)]
+pub struct Replay {
+    /// The bag of a run.
+    pub recording: PathBuf,
+    /// Print the result as JSON.
+    #[arg(long)]
+    pub json: bool,
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub changes: Changes,
+}
+
+/// `backdrive check`, `backdrive graph`
+#[derive(Debug, Args)]
+pub struct Graph {
+    /// The graph file.
+    pub graph: PathBuf,
+}
+
+/// `backdrive simulate`
+#[derive(Debug, Args)]
+pub struct Simulate {
+    /// The model file.
+    pub model: PathBuf,
+    /// A recording (CSV or bag), a folder with a set.toml, an excitation file, or an excitation such as `steps:amplitude=1,duration=2`.
+    pub drive: String,
+    /// Where the prediction goes, as CSV; for a set a folder.
+    #[arg(long, value_name = "FILE")]
+    pub out: PathBuf,
+    /// Grip or environment to attach at the model's user's body.
+    #[arg(long, value_name = "FILE")]
+    pub grip: Option<PathBuf>,
+    /// Which input an excitation drives; the first one if not given.
+    #[arg(long)]
+    pub input: Option<String>,
+    /// Samples per second of an excitation.
+    #[arg(long, value_name = "HZ", default_value_t = 5000.0)]
+    pub rate: f64,
+    /// Substeps per sample; chosen from the model if not given.
+    #[arg(long)]
+    pub substeps: Option<usize>,
+    /// Add the sensors' noise and rounding, with this seed.
+    #[arg(long, value_name = "SEED")]
+    pub noise: Option<u64>,
+    /// Columns that are named differently: a set.toml whose `[columns]` are used.
+    #[arg(long, value_name = "SET.TOML")]
+    pub columns: Option<PathBuf>,
+    /// Print the result as JSON.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// `backdrive model`
+#[derive(Debug, Subcommand)]
+pub enum Model {
+    /// Print the network, its modes and its frequency response.
+    #[command(after_help = "Example:\n  backdrive model show plant/models/impulse-engine.toml --grip plant/grips/normal.toml")]
+    Show(ModelFile),
+    /// Check a model file; errors point at the line.
+    #[command(after_help = "Example:\n  backdrive model check plant/models/impulse-engine.toml")]
+    Check(ModelFile),
+}
+
+/// A model file.
+#[derive(Debug, Args)]
+pub struct ModelFile {
+    /// The model file, or a fragment.
+    pub model: PathBuf,
+    /// Grip or environment to attach at the model's user's body.
+    #[arg(long, value_name = "FILE")]
+    pub grip: Option<PathBuf>,
+}
+
+/// `backdrive bag`
+#[derive(Debug, Subcommand)]
+pub enum Bag {
+    /// What is in a bag, and whether it is complete.
+    #[command(after_help = "Example:\n  backdrive bag info contact.mcap")]
+    Info {
+        /// The bag; any MCAP file.
+        bag: PathBuf,
+        /// Print it as JSON.
+        #[arg(long)]
+        json: bool,
+    },
+    /// CSV recordings into a bag.
+    #[command(after_help = "Example:\n  backdrive bag import sweep.csv --bag sweep.mcap")]
+    Import {
+        /// CSV files with a column `t`, s; all go into one bag, one file after the other.
+        #[arg(required = true)]
+        csv: Vec<PathBuf>,
+        /// The new bag.
+        #[arg(long, value_name = "FILE")]
+        bag: PathBuf,
+        /// Which column is what, as `motor_position=/master/measured_js.position[0]`; repeatable.
+        #[arg(long, value_name = "COLUMN=TOPIC.FIELD[AXIS]")]
+        map: Vec<String>,
+    },
+    /// A bag's signals as CSV.
+    #[command(after_help = "Example:\n  backdrive bag export contact.mcap --csv contact.csv")]
+    Export {
+        /// The bag.
+        bag: PathBuf,
+        /// The CSV file.
+        #[arg(long, value_name = "FILE")]
+        csv: PathBuf,
+        /// Only these topics; repeatable.
+        #[arg(long)]
+        topic: Vec<String>,
+    },
+    /// What can be saved of a bag that was cut off.
+    #[command(after_help = "Example:\n  backdrive bag recover contact.mcap --bag saved.mcap")]
+    Recover {
+        /// The damaged bag; it is not changed.
+        damaged: PathBuf,
+        /// The new bag.
+        #[arg(long, value_name = "FILE")]
+        bag: PathBuf,
+    },
+    /// Publish a bag's messages again, verbatim and at their times.
+    #[command(after_help = "Example:\n  backdrive bag play contact.mcap --speed 0.5")]
+    Play {
+        /// The bag.
+        bag: PathBuf,
+        /// Times real time.
+        #[arg(long, default_value_t = 1.0)]
+        speed: f64,
+    },
+    /// Where two bags part; exit code 1 if they do.
+    #[command(after_help = "Example:\n  backdrive bag diff a.mcap b.mcap --tolerance /master/measured_js=1e-6")]
+    Diff {
+        /// One bag.
+        a: PathBuf,
+        /// The other.
+        b: PathBuf,
+        /// Largest difference of a topic that counts as none, in its units; repeatable. Without one every bit counts.
+        #[arg(long, value_name = "TOPIC=VALUE")]
+        tolerance: Vec<String>,
+        /// A topic that is not compared; repeatable.
+        #[arg(long, value_name = "TOPIC")]
+        ignore: Vec<String>,
+        /// Print it as JSON.
+        #[arg(long)]
+        json: bool,
+    },
+}
+
+/// `backdrive node`
+#[derive(Debug, Args)]
+pub struct Node {
+    /// The run's folder.
+    #[arg(long)]
+    pub run: PathBuf,
+    /// Name of the node.
+    #[arg(long)]
+    pub name: String,
+}

@@ -1,0 +1,73 @@
+//! Why a command fails, and the exit code that goes with it.
+
+use backdrive_launch::LaunchError;
+use backdrive_nodes::build::BuildError;
+use backdrive_plant::tomlfile::FileError;
+use std::fmt::Display;
+
+/// A command that fails: one message and an exit code.
+#[derive(Debug)]
+pub struct Failure {
+    /// See [`code`].
+    pub code: u8,
+    /// What was wrong, where, and what to do.
+    pub message: String,
+}
+
+/// Exit codes. 2 is usage and comes from the argument parser.
+pub mod code {
+    /// The finding is negative: not stable, bags differ.
+    pub const NEGATIVE: u8 = 1;
+    /// A file is missing, broken, or does not hold what is needed.
+    pub const BAD_INPUT: u8 = 3;
+    /// Data was lost.
+    pub const LOST_DATA: u8 = 4;
+    /// This machine does not let it: shared memory, disk, permission.
+    pub const MACHINE: u8 = 5;
+    /// A node failed or died.
+    pub const NODE: u8 = 6;
+    /// Interrupted by the user.
+    pub const INTERRUPTED: u8 = 130;
+}
+
+impl Failure {
+    /// A file or an argument is wrong.
+    pub fn input(message: impl Display) -> Failure {
+        Failure { code: code::BAD_INPUT, message: message.to_string() }
+    }
+
+    /// This machine does not let it.
+    pub fn machine(message: impl Display) -> Failure {
+        Failure { code: code::MACHINE, message: message.to_string() }
+    }
+
+    /// A file of ours cannot be written.
+    pub fn write(path: &std::path::Path, error: std::io::Error) -> Failure {
+        Failure::machine(format!("{}: cannot be written: {error}", path.display()))
+    }
+}
+
+impl From<FileError> for Failure {
+    fn from(error: FileError) -> Failure {
+        Failure::input(error)
+    }
+}
+
+impl From<BuildError> for Failure {
+    fn from(error: BuildError) -> Failure {
+        Failure::input(error)
+    }
+}
+
+impl From<LaunchError> for Failure {
+    fn from(error: LaunchError) -> Failure {
+        let code = match &error {
+            LaunchError::RunDir { .. } | LaunchError::SharedMemory { .. } | LaunchError::Runtime { .. } => code::MACHINE,
+            LaunchError::NoNodes | LaunchError::Spawn { .. } => code::BAD_INPUT,
+            LaunchError::NodeFailed { code, .. } => *code,
+            LaunchError::NotReady { .. } | LaunchError::DiedAtStart { .. } => code::NODE,
+            LaunchError::Stopped { .. } => code::INTERRUPTED,
+        };
+        Failure { code, message: error.to_string() }
+    }
+}

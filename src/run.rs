@@ -1,0 +1,224 @@
+//! `backdrive run` and `backdrive clean`.
+
+use crate::cli::{self, Transport};
+use crate::failure::{Failure, code};
+use crate::progress;
+use crate::summary::{Summary, Traces, summarise};
+use backdrive_bags::Recorder;
+use backdrive_launch::join::{recorder_options, recording};
+use backdrive_launch::{Cause, RunHome, RunReport, SuperviseOptions};
+use backdrive_msgs::Message;
+use backdrive_nodes::build::plan;
+use backdrive_nodes::graph::{Graph, NodeKind};
+use backdrive_nodes::sequence::Sequence;
+use backdrive_nodes::stage::Clock;
+use backdrive_stability::outcome::Outcome;
+use serde_json::json;
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+/// Runs a graph, or each experiment of one.
+pub fn run(options: &cli::Run) -> Result<u8, Failure> {
+    let changes = options.changes.overrides(options.clock);
+    let graph = Graph::load(&options.graph, &changes)?;
+    if !graph.experiments.is_empty() {
+        return crate::experiments::run(options, &graph, &changes);
+    }
+    if options.out.is_some() {
+        return Err(Failure::input(format!("{}: has no [[experiments]], so --out means nothing here; use --bag", options.graph.display())));
+    }
+    let done = run_graph(&graph, options.transport)?;
+    if options.json {
+        println!("{}", done.json());
+    } else {
+        println!("{}", done.text());
+    }
+    Ok(done.exit_code())
+}
+
+/// What a run gave.
+pub struct Done {
+    /// Steps done by the node that did most.
+    pub steps: u64,
+    /// Wall-clock time, s.
+    pub duration_s: f64,
+    /// From the supervisor; `None` for a run in one process.
+    pub report: Option<RunReport>,
+    /// Messages that are not in the bag, and samples that a node did not get.
+    pub lost: u64,
+    /// The bag, if one was recorded.
+    pub bag: Option<std::path::PathBuf>,
+    /// What happened.
+    pub summary: Option<Summary>,
+}
+
+/// Runs one graph to its end.
+pub fn run_graph(graph: &Graph, transport: Transport) -> Result<Done, Failure> {
+    if let Some(bag) = &graph.bag {
+        writable(bag)?;
+    }
+    match transport {
+        Transport::Iceoryx2 => run_processes(graph),
+        Transport::Inproc => run_here(graph, &mut |_, _| {}),
+    }
+}
+
+/// A run that ends with its last step, for a bag that cannot be written, would be lost whole.
+fn writable(bag: &Path) -> Result<(), Failure> {
+    let existed = bag.exists();
+    std::fs::OpenOptions::new().append(true).create(true).open(bag).map_err(|e| Failure::write(bag, e))?;
+    if !existed {
+        let _ = std::fs::remove_file(bag);
+    }
+    Ok(())
+}
+
+fn run_processes(graph: &Graph) -> Result<Done, Failure> {
+    let report = backdrive_launch::run(graph, SuperviseOptions::default())?;
+    let bag = report.bag.clone().filter(|bag| bag.exists());
+    let summary = bag.as_ref().map(|bag| summarise(bag)).transpose()?;
+    let lost = report.lost + report.unrecorded.unwrap_or(0);
+    Ok(Done { steps: report.steps, duration_s: report.duration_s, lost, bag, summary, report: Some(report) })
+}
+
+/// Runs a graph in this process, in lockstep; `hear` gets every message with its topic.
+pub fn run_here(graph: &Graph, hear: &mut dyn FnMut(&str, &Message)) -> Result<Done, Failure> {
+    if graph.timing.clock == Clock::Realtime {
+        return Err(Failure::input("one process runs in lockstep only; use --clock lockstep, or --transport iceoryx2"));
+    }
+    let Some(steps) = graph.timing.steps else {
+        return Err(Failure::input(format!("{}: needs a duration_s to run in one process", graph.path.display())));
+    };
+    if let Some(node) = graph.nodes.iter().find(|n| n.command.is_some()) {
+        return Err(Failure::input(format!("node \"{}\" is a program of its own, which one process cannot hold; use --transport iceoryx2", node.name)));
+    }
+    let plans = graph.nodes.iter().filter(|n| n.kind != NodeKind::Recorder).map(|n| plan(graph, &n.name));
+    let mut sequence = Sequence::new(plans.collect::<Result<_, _>>()?, &graph.timing).map_err(Failure::input)?;
+    let (record, header) = recording(graph, "recorder");
+    let names: Vec<String> = sequence.topics().iter().map(|t| t.name.clone()).collect();
+    let place: Vec<Option<usize>> = names.iter().map(|name| record.topics.iter().position(|t| t.name == *name)).collect();
+    let mut recorder = match &graph.bag {
+        Some(bag) => Some(Recorder::create(bag, &header, &recorder_options(graph)).map_err(Failure::machine)?),
+        None => None,
+    };
+    let bar = progress::steps(steps, &graph.title);
+    let mut traces = Traces::of(graph);
+    let (started, mut failed) = (Instant::now(), None);
+    let mut done = 0;
+    while done < steps && failed.is_none() {
+        let some = (steps - done).min(512);
+        let mut tap = |topic: usize, message: &Message| {
+            if let Message::Sample(sample) = message {
+                traces.take(&names[topic], sample);
+            }
+            hear(&names[topic], message);
+            if let (Some(recorder), Some(place)) = (&mut recorder, place[topic])
+                && let Err(e) = recorder.push(place, *message, 0)
+            {
+                failed.get_or_insert(e);
+            }
+        };
+        sequence.run(some, Some(&mut tap));
+        if let Some(recorder) = &mut recorder {
+            recorder.checkpoint();
+        }
+        done += some;
+        bar.set_position(done);
+    }
+    bar.finish_and_clear();
+    let lost = match recorder.map(Recorder::finish).transpose() {
+        Ok(completeness) => completeness.map_or(0, |c| c.lost()),
+        Err(e) => return Err(Failure::machine(failed.unwrap_or(e))),
+    };
+    let summary = Some(traces.summary(graph));
+    Ok(Done { steps, duration_s: started.elapsed().as_secs_f64(), report: None, lost, bag: graph.bag.clone(), summary })
+}
+
+impl Done {
+    /// 0 fine, 1 not stable, 4 lost data, 6 a node failed, 130 interrupted.
+    pub fn exit_code(&self) -> u8 {
+        if let Some(report) = &self.report {
+            match &report.cause {
+                Cause::NodeFailed { code, .. } if *code != 0 => return *code,
+                Cause::NodeDied { .. } | Cause::NodeFailed { .. } | Cause::EndedEarly { .. } => return code::NODE,
+                Cause::Stopped { .. } => return code::INTERRUPTED,
+                Cause::Completed if !report.orderly() => return code::NODE,
+                Cause::Completed => {}
+            }
+        }
+        if self.lost > 0 {
+            return code::LOST_DATA;
+        }
+        let outcome = self.summary.as_ref().and_then(|s| s.outcome);
+        if outcome.is_none_or(|o| o == Outcome::Stable) { 0 } else { code::NEGATIVE }
+    }
+
+    /// A few lines for a person.
+    pub fn text(&self) -> String {
+        let mut lines = Vec::new();
+        let rate = self.steps as f64 / self.duration_s.max(1e-9);
+        lines.push(format!("ran      {} steps in {:.3} s: {rate:.0} steps/s", self.steps, self.duration_s));
+        if let Some(report) = &self.report {
+            if let (Some(p50), Some(p99), Some(node)) = (report.loop_p50_us, report.loop_p99_us, &report.loop_node) {
+                lines.push(format!("timing   {node}: p50 {p50:.1} us, p99 {p99:.1} us; {} missed deadlines", report.missed_deadlines));
+            }
+            if report.cause != Cause::Completed {
+                lines.push(format!("ended    {}", report.cause));
+            }
+            for death in &report.deaths {
+                lines.push(format!("died     {} {} at {:.3} s", death.node, death.how, death.t_s));
+            }
+        }
+        if let Some(summary) = &self.summary {
+            lines.push(summary.text());
+        }
+        if let Some(bag) = &self.bag {
+            let complete = if self.lost == 0 { "complete".to_string() } else { format!("{} messages lost", self.lost) };
+            lines.push(format!("bag      {} ({complete})", bag.display()));
+        }
+        lines.retain(|l| !l.is_empty());
+        lines.join("\n")
+    }
+
+    /// For scripts.
+    pub fn json(&self) -> serde_json::Value {
+        let report = self.report.as_ref();
+        let summary = self.summary.as_ref();
+        json!({
+            "steps": self.steps,
+            "duration_s": self.duration_s,
+            "steps_per_s": self.steps as f64 / self.duration_s.max(1e-9),
+            "loop_p50_us": report.and_then(|r| r.loop_p50_us),
+            "loop_p99_us": report.and_then(|r| r.loop_p99_us),
+            "missed_deadlines": report.map_or(0, |r| r.missed_deadlines),
+            "lost": self.lost,
+            "bag": self.bag,
+            "loop_gain": summary.map(|s| s.loop_gain),
+            "peak_contact_force_n": summary.and_then(|s| s.peak_contact_force),
+            "peak_feedback_force_n": summary.and_then(|s| s.peak_feedback_force),
+            "first_contact_s": summary.and_then(|s| s.first_contact_s),
+            "contact_s": summary.map(|s| s.contact_s),
+            "outcome": summary.and_then(|s| s.outcome).map(|o| o.word()),
+            "outcome_detail": summary.and_then(|s| s.outcome),
+            "run": report,
+        })
+    }
+}
+
+/// Removes what dead runs left.
+pub fn clean() -> Result<u8, Failure> {
+    let swept = RunHome::system().sweep(Duration::from_secs(60));
+    for run in &swept.removed {
+        println!("removed {} and {} files in shared memory", run.root.display(), run.shm.len());
+    }
+    for run in &swept.alive {
+        println!("{run} is alive and was left alone");
+    }
+    for failure in &swept.failed {
+        eprintln!("error: {failure}");
+    }
+    if swept.removed.is_empty() && swept.failed.is_empty() {
+        println!("nothing to remove");
+    }
+    Ok(if swept.failed.is_empty() { 0 } else { code::MACHINE })
+}

@@ -1,0 +1,152 @@
+//! What happened in a run, read from its bag.
+
+use crate::failure::Failure;
+use backdrive_bags::Reader;
+use backdrive_msgs::{Message, flag};
+use backdrive_nodes::graph::{Files, Graph, NodeKind, Overrides};
+use backdrive_stability::outcome::{Outcome, Trace, judge};
+use std::path::Path;
+
+/// What happened in a run.
+#[derive(Debug, Clone)]
+pub struct Summary {
+    /// Position scale times force scale at the start.
+    pub loop_gain: f64,
+    /// What the loop did; `None` where there is no master, slave or contact to judge by.
+    pub outcome: Option<Outcome>,
+    /// Largest magnitude of the environment's force on the slave, N or N m.
+    pub peak_contact_force: Option<f64>,
+    /// Largest magnitude of the force applied to the master, N or N m.
+    pub peak_feedback_force: Option<f64>,
+    /// Time of the first contact, s.
+    pub first_contact_s: Option<f64>,
+    /// Time in contact, s.
+    pub contact_s: f64,
+    /// Steps in the bag.
+    pub steps: u64,
+}
+
+/// The graph that a bag holds, with the command line's changes.
+pub fn graph_of(reader: &Reader, changes: &Overrides) -> Result<Graph, Failure> {
+    let path = reader.path();
+    let header = reader.header().ok_or_else(|| Failure::input(format!("{}: is not a bag of a run: it holds no graph", path.display())))?;
+    if header.graph_toml.is_empty() {
+        return Err(Failure::input(format!("{}: holds recordings, but no graph to run", path.display())));
+    }
+    Ok(Graph::from_text(&header.graph_toml, path, changes, &Files::Bag(&header.files))?)
+}
+
+/// Reads a bag and says what happened.
+pub fn summarise(path: &Path) -> Result<Summary, Failure> {
+    let reader = Reader::open(path).map_err(Failure::input)?;
+    let graph = graph_of(&reader, &Overrides::default())?;
+    let mut traces = Traces::of(&graph);
+    for entry in reader.messages().map_err(Failure::input)? {
+        let entry = entry.map_err(Failure::input)?;
+        if let Some(Message::Sample(sample)) = entry.message(path).map_err(Failure::input)? {
+            traces.take(&entry.topic.name, &sample);
+        }
+    }
+    Ok(traces.summary(&graph))
+}
+
+/// Collects what a verdict needs while messages go by, from a bag or from a run.
+pub struct Traces {
+    intent: Option<String>,
+    measured: Option<String>,
+    contact: Option<String>,
+    axes: Vec<Trace>,
+    steps: u64,
+}
+
+impl Traces {
+    /// Ready for the messages of a graph.
+    pub fn of(graph: &Graph) -> Traces {
+        let topic = |kind: NodeKind, port: &str| {
+            graph.nodes.iter().position(|n| n.kind == kind).map(|index| graph.topic_of(index, port).name)
+        };
+        let master = graph.node_of(NodeKind::Master);
+        let model = master.and_then(|node| match &node.settings {
+            backdrive_nodes::graph::Settings::Master(files) => files.model.as_ref(),
+            _ => None,
+        });
+        let axes = (0..master.map_or(0, |n| n.axes)).map(|axis| {
+            let known = model.map(|m| (&m.axes[axis], &m.outputs[m.axes[axis].measured]));
+            Trace {
+                period_s: graph.period_s(),
+                travel: known.and_then(|(axis, _)| axis.travel),
+                resolution: known.map_or(0.0, |(axis, output)| axis.scale * output.resolution),
+                ..Trace::default()
+            }
+        });
+        Traces {
+            intent: topic(NodeKind::Operator, "intent"),
+            measured: topic(NodeKind::Master, "measured"),
+            contact: topic(NodeKind::Slave, "measured"),
+            axes: axes.collect(),
+            steps: 0,
+        }
+    }
+
+    /// Hears a message.
+    pub fn take(&mut self, topic: &str, sample: &backdrive_msgs::Sample) {
+        self.steps = self.steps.max(sample.step + 1);
+        let is = |name: &Option<String>| name.as_deref() == Some(topic);
+        let (intent, measured, contact) = (is(&self.intent), is(&self.measured), is(&self.contact));
+        for (index, trace) in self.axes.iter_mut().enumerate() {
+            if intent {
+                trace.intent.push(sample.position[index]);
+            } else if measured {
+                trace.position.push(sample.position[index]);
+                trace.feedback.push(sample.effort[index]);
+                trace.clamped.push(sample.flags & flag::LIMITED != 0);
+            } else if contact {
+                trace.contact.push(sample.effort[index]);
+                // The slave's limits count as the master's do.
+                if sample.flags & flag::LIMITED != 0
+                    && let Some(last) = trace.clamped.last_mut()
+                {
+                    *last = true;
+                }
+            }
+        }
+    }
+
+    /// The verdict on all that went by.
+    pub fn summary(&self, graph: &Graph) -> Summary {
+        let peak = |pick: fn(&Trace) -> &Vec<f64>| {
+            let values = self.axes.iter().flat_map(|t| pick(t).iter()).filter(|f| !f.is_nan());
+            values.fold(None, |m: Option<f64>, f| Some(m.unwrap_or(0.0).max(f.abs())))
+        };
+        let touching: Vec<u64> = self.axes.iter().flat_map(|t| t.contact.iter().enumerate().filter(|(_, f)| **f != 0.0).map(|(i, _)| i as u64)).collect();
+        let judged = self.axes.iter().filter(|t| !t.position.is_empty() && !t.contact.is_empty());
+        Summary {
+            loop_gain: graph.gains.mu * graph.gains.lambda,
+            outcome: Outcome::worst(judged.map(judge)),
+            peak_contact_force: peak(|t| &t.contact),
+            peak_feedback_force: peak(|t| &t.feedback),
+            first_contact_s: touching.iter().min().map(|i| *i as f64 * graph.period_s()),
+            contact_s: touching.len() as f64 * graph.period_s(),
+            steps: self.steps,
+        }
+    }
+}
+
+impl Summary {
+    /// A few lines for a person.
+    pub fn text(&self) -> String {
+        let mut lines = Vec::new();
+        if let (Some(start), Some(peak)) = (self.first_contact_s, self.peak_contact_force) {
+            lines.push(format!("contact  first at {start:.3} s, {:.3} s in all, force up to {peak:.3} N", self.contact_s));
+        } else if self.peak_contact_force.is_some() {
+            lines.push("contact  none".to_string());
+        }
+        if let Some(peak) = self.peak_feedback_force {
+            lines.push(format!("master   reflected force up to {peak:.3} N"));
+        }
+        if let Some(outcome) = &self.outcome {
+            lines.push(format!("loop     {outcome} at mu*lambda = {}", self.loop_gain));
+        }
+        lines.join("\n")
+    }
+}

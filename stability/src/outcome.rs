@@ -1,0 +1,217 @@
+//! What a run did: stable, a limit cycle, unstable, or limited.
+
+use crate::oscillation::oscillation;
+use serde::Serialize;
+
+/// One axis of a run, one value per step.
+#[derive(Debug, Clone, Default)]
+pub struct Trace {
+    /// Time of one step, s.
+    pub period_s: f64,
+    /// What the hand wanted, m or rad; empty where nobody recorded it.
+    pub intent: Vec<f64>,
+    /// The master's measured position, m or rad.
+    pub position: Vec<f64>,
+    /// Force of the environment on the slave, N or N m.
+    pub contact: Vec<f64>,
+    /// Force applied to the master, N or N m.
+    pub feedback: Vec<f64>,
+    /// Whether a clamp acted.
+    pub clamped: Vec<bool>,
+    /// The device's limits of motion, m or rad.
+    pub travel: Option<[f64; 2]>,
+    /// Step of the position sensor, m or rad; 0 for an ideal one.
+    pub resolution: f64,
+}
+
+/// The verdict on a run.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[serde(tag = "outcome", rename_all = "snake_case")]
+pub enum Outcome {
+    /// What oscillates dies.
+    Stable,
+    /// It oscillates on in contact and neither grows nor dies.
+    LimitCycle {
+        /// Half the peak-to-peak of the master's position, m or rad.
+        amplitude_m: f64,
+        /// Hz.
+        frequency_hz: f64,
+    },
+    /// It grows.
+    Unstable {
+        /// Exponential growth of the envelope, 1/s.
+        growth_per_s: f64,
+    },
+    /// A clamp acted for more than 1 % of the contact, or the hand left the device's travel: never called stable.
+    Limited {
+        /// Share of the steps in contact in which a clamp acted.
+        clamped_share: f64,
+        /// Whether the master left its travel.
+        beyond_travel: bool,
+    },
+}
+
+impl Outcome {
+    /// The word for scripts.
+    pub fn word(&self) -> &'static str {
+        match self {
+            Outcome::Stable => "stable",
+            Outcome::LimitCycle { .. } => "limit_cycle",
+            Outcome::Unstable { .. } => "unstable",
+            Outcome::Limited { .. } => "limited",
+        }
+    }
+
+    /// How bad it is, for several axes: the worst counts.
+    fn rank(&self) -> u8 {
+        match self {
+            Outcome::Stable => 0,
+            Outcome::Limited { .. } => 1,
+            Outcome::LimitCycle { .. } => 2,
+            Outcome::Unstable { .. } => 3,
+        }
+    }
+
+    /// The worst of several axes.
+    pub fn worst(outcomes: impl IntoIterator<Item = Outcome>) -> Option<Outcome> {
+        outcomes.into_iter().max_by_key(Outcome::rank)
+    }
+}
+
+impl std::fmt::Display for Outcome {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Outcome::Stable => write!(f, "stable"),
+            Outcome::LimitCycle { amplitude_m, frequency_hz } => {
+                write!(f, "limit cycle of {:.3} mm at {frequency_hz:.1} Hz", amplitude_m * 1e3)
+            }
+            Outcome::Unstable { growth_per_s } => write!(f, "unstable, grows by {growth_per_s:.2} per second"),
+            Outcome::Limited { clamped_share, beyond_travel } => {
+                let travel = if *beyond_travel { "; the master left its travel" } else { "" };
+                write!(f, "limited: a clamp acted in {:.1} % of the contact{travel}", clamped_share * 100.0)
+            }
+        }
+    }
+}
+
+/// Slower than this is the hand moving, not the loop oscillating, Hz.
+const LOWEST_HZ: f64 = 8.0;
+/// The first part of a hold is the transient of getting there, s.
+const TRANSIENT_S: f64 = 0.15;
+/// A hold must last this long beyond its transient to be judged, s.
+const LEAST_HOLD_S: f64 = 0.3;
+/// An oscillation below this is not felt and not counted, m or rad.
+const LEAST_AMPLITUDE: f64 = 2e-6;
+
+/// Judges a run by what the master does while the hand holds still and the slave is in contact.
+pub fn judge(trace: &Trace) -> Outcome {
+    let finite = trace.position.iter().chain(&trace.contact).position(|x| !x.is_finite());
+    let span = trace.travel.map_or(1.0, |[low, high]| high - low);
+    let largest = trace.position.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+    if finite.is_some() || largest > 10.0 * span {
+        return Outcome::Unstable { growth_per_s: runaway_growth(trace) };
+    }
+    let contact: Vec<usize> = (0..trace.contact.len()).filter(|i| trace.contact[*i] != 0.0).collect();
+    let clamped = contact.iter().filter(|i| trace.clamped.get(**i).copied().unwrap_or(false)).count();
+    let clamped_share = if contact.is_empty() { 0.0 } else { clamped as f64 / contact.len() as f64 };
+    let beyond_travel = trace.travel.is_some_and(|[low, high]| trace.position.iter().any(|x| *x < low || *x > high));
+    if clamped_share > 0.01 || beyond_travel {
+        return Outcome::Limited { clamped_share, beyond_travel };
+    }
+    Outcome::worst(holds(trace).into_iter().filter_map(|(from, to)| judge_hold(trace, from, to))).unwrap_or(Outcome::Stable)
+}
+
+fn judge_hold(trace: &Trace, from: usize, to: usize) -> Option<Outcome> {
+    let found = oscillation(&trace.position[from..to], trace.period_s, LOWEST_HZ)?;
+    let floor = LEAST_AMPLITUDE.max(2.0 * trace.resolution);
+    let grows = found.amplitude > 1.5 * found.amplitude_before && found.growth_per_s > 0.2;
+    let dies = found.amplitude < 0.7 * found.amplitude_before && found.growth_per_s < -0.2;
+    Some(if found.amplitude <= floor || dies {
+        Outcome::Stable
+    } else if grows {
+        Outcome::Unstable { growth_per_s: found.growth_per_s }
+    } else {
+        Outcome::LimitCycle { amplitude_m: found.amplitude, frequency_hz: found.frequency_hz }
+    })
+}
+
+/// Pieces in which the hand holds still and the slave touches something at least now and then; transients cut off.
+fn holds(trace: &Trace) -> Vec<(usize, usize)> {
+    let n = trace.position.len().min(trace.contact.len());
+    let still = |i: usize| trace.intent.is_empty() || i == 0 || i >= trace.intent.len() || trace.intent[i] == trace.intent[i - 1];
+    let (transient, least) = ((TRANSIENT_S / trace.period_s) as usize, (LEAST_HOLD_S / trace.period_s) as usize);
+    let mut holds = Vec::new();
+    let mut start = None;
+    for i in 0..=n {
+        match (i < n && still(i), start) {
+            (true, None) => start = Some(i),
+            (false, Some(from)) => {
+                let from = from + transient;
+                let touches = from < i && trace.contact[from..i].iter().any(|f| *f != 0.0);
+                if touches && i - from >= least {
+                    holds.push((from, i));
+                }
+                start = None;
+            }
+            _ => {}
+        }
+    }
+    holds
+}
+
+/// Growth of a run that left all bounds: from the logarithm of its last decade of magnitude.
+fn runaway_growth(trace: &Trace) -> f64 {
+    let good: Vec<f64> = trace.position.iter().copied().take_while(|x| x.is_finite()).map(f64::abs).collect();
+    let peak = good.iter().copied().fold(0.0, f64::max);
+    let (Some(end), Some(start)) = (good.iter().position(|x| *x >= peak), good.iter().position(|x| *x >= peak / 10.0)) else {
+        return f64::INFINITY;
+    };
+    if end > start { 10.0_f64.ln() / ((end - start) as f64 * trace.period_s) } else { f64::INFINITY }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn trace(position: impl Fn(f64) -> f64) -> Trace {
+        let times = (0..10_000).map(|i| i as f64 * 2e-4);
+        Trace {
+            period_s: 2e-4,
+            intent: vec![0.006; 10_000],
+            position: times.map(position).collect(),
+            contact: vec![-1.0; 10_000],
+            feedback: vec![-0.3; 10_000],
+            clamped: vec![false; 10_000],
+            travel: Some([-0.05, 0.05]),
+            resolution: 2e-6,
+        }
+    }
+
+    fn sine(t: f64) -> f64 {
+        (2.0 * std::f64::consts::PI * 60.0 * t).sin()
+    }
+
+    #[test]
+    fn a_dying_ringing_is_stable_and_a_standing_one_is_a_limit_cycle() {
+        assert_eq!(judge(&trace(|t| 0.005 + 1e-3 * (-8.0 * t).exp() * sine(t))), Outcome::Stable);
+        let Outcome::LimitCycle { amplitude_m, frequency_hz } = judge(&trace(|t| 0.005 + 2e-4 * sine(t))) else { panic!() };
+        assert!((amplitude_m - 2e-4).abs() < 1e-5 && (frequency_hz - 60.0).abs() < 0.2);
+        let Outcome::Unstable { growth_per_s } = judge(&trace(|t| 0.005 + 1e-5 * (1.5 * t).exp() * sine(t))) else { panic!() };
+        assert!((growth_per_s - 1.5).abs() < 0.1);
+    }
+
+    #[test]
+    fn a_clamped_run_is_never_stable() {
+        let mut clamped = trace(|_| 0.005);
+        clamped.clamped[..200].fill(true);
+        assert_eq!(judge(&clamped).word(), "limited");
+        assert_eq!(judge(&trace(|t| 0.06 * t)).word(), "limited");
+    }
+
+    #[test]
+    fn a_run_away_is_unstable() {
+        let Outcome::Unstable { growth_per_s } = judge(&trace(|t| 1e-6 * (9.0 * t).exp())) else { panic!() };
+        assert!((growth_per_s - 9.0).abs() < 0.1);
+        assert_eq!(judge(&trace(|t| if t > 1.0 { f64::NAN } else { 0.0 })).word(), "unstable");
+    }
+}
