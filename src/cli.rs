@@ -268,6 +268,12 @@ pub struct ModelFile {
     /// Grip or environment to attach at the model's user's body.
     #[arg(long, value_name = "FILE")]
     pub grip: Option<PathBuf>,
+    /// Amplitude of motion at which hysteresis, friction and backlash are looked at, m or rad; very small if not given.
+    #[arg(long, value_name = "M")]
+    pub amplitude: Option<f64>,
+    /// Print it as JSON.
+    #[arg(long)]
+    pub json: bool,
 }
 
 /// `backdrive bag`

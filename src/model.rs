@@ -3,6 +3,8 @@
 use crate::cli;
 use crate::failure::Failure;
 use crate::simulate::held_model;
+use backdrive_plant::describe::{Severity, check as remarks, describe};
+use backdrive_plant::linear::Operating;
 use backdrive_plant::parse::ModelFile;
 use backdrive_plant::stepper::{Options, Plant};
 
@@ -24,6 +26,9 @@ fn check(file: &cli::ModelFile) -> Result<u8, Failure> {
             let model = held_model(&file.model, file.grip.as_deref())?;
             // What cannot be stepped is told now, not at the start of a run.
             let plant = Plant::new(&model, 2e-4, &Options::default()).map_err(|e| Failure::input(format!("{path}: {e}")))?;
+            for remark in remarks(&model, &Operating::small()) {
+                eprintln!("{}: {path}: {}", if remark.severity == Severity::Note { "note" } else { "warning" }, remark.message);
+            }
             println!(
                 "{path}: fine: {} bodies, {} elements, {} inputs, {} outputs, {} axes; {} substeps at 5 kHz",
                 model.bodies.len(),
@@ -39,13 +44,19 @@ fn check(file: &cli::ModelFile) -> Result<u8, Failure> {
 }
 
 fn show(file: &cli::ModelFile) -> Result<u8, Failure> {
-    let text = match ModelFile::load(&file.model)? {
-        ModelFile::Fragment(fragment) => backdrive_plant::describe::network(&fragment.network),
-        ModelFile::Device(_) => {
-            let model = held_model(&file.model, file.grip.as_deref())?;
-            backdrive_plant::describe::describe(&model)
-        }
+    let at = match file.amplitude {
+        Some(amplitude) if amplitude > 0.0 && amplitude.is_finite() => Operating::amplitude(amplitude),
+        Some(amplitude) => return Err(Failure { code: 2, message: format!("--amplitude must be above 0, is {amplitude}") }),
+        None => Operating::small(),
     };
-    print!("{text}");
+    let description = match ModelFile::load(&file.model)? {
+        ModelFile::Fragment(fragment) => describe(&fragment.network, &at),
+        ModelFile::Device(_) => describe(&held_model(&file.model, file.grip.as_deref())?, &at),
+    };
+    if file.json {
+        println!("{}", serde_json::to_string_pretty(&description).map_err(Failure::input)?);
+    } else {
+        print!("{description}");
+    }
     Ok(0)
 }

@@ -2,9 +2,9 @@
 
 use crate::cli;
 use crate::failure::Failure;
-use backdrive_bags::{Hold as BagHold, Reader, Signal, signals};
+use backdrive_bags::{Reader, Signal, signals};
 use backdrive_plant::excitation::{Excitation, load_experiments};
-use backdrive_plant::model::{Fragment, Model, OutputKind};
+use backdrive_plant::model::{Fragment, Hold, Model, OutputKind};
 use backdrive_plant::recording::{Columns, Piece, Recording, Source, read_csv, signals_of, write_csv};
 use backdrive_plant::set::RecordingSet;
 use backdrive_plant::stepper::{Options, simulate as simulate_model};
@@ -120,7 +120,7 @@ fn from_bag(path: &Path, wanted: &[&str], columns: &Columns) -> Result<Recording
         match rule.map(|r| &r.source) {
             Some(Source::Topic { topic, field }) => {
                 let (scale, offset) = rule.map_or((1.0, 0.0), |r| (r.scale, r.offset));
-                list.push(Signal { scale, offset, hold: BagHold::Zero, ..Signal::new(name, topic, field) });
+                list.push(Signal { scale, offset, hold: Hold::Zero, ..Signal::new(name, topic, field) });
             }
             Some(Source::Column(column)) => {
                 return Err(Failure::input(format!("{}: is a bag: name a topic and a field for \"{name}\", not the column \"{column}\"", path.display())));

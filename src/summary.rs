@@ -22,8 +22,6 @@ pub struct Summary {
     pub first_contact_s: Option<f64>,
     /// Time in contact, s.
     pub contact_s: f64,
-    /// Steps in the bag.
-    pub steps: u64,
 }
 
 /// The graph that a bag holds, with the command line's changes.
@@ -56,7 +54,6 @@ pub struct Traces {
     measured: Option<String>,
     contact: Option<String>,
     axes: Vec<Trace>,
-    steps: u64,
 }
 
 impl Traces {
@@ -84,13 +81,11 @@ impl Traces {
             measured: topic(NodeKind::Master, "measured"),
             contact: topic(NodeKind::Slave, "measured"),
             axes: axes.collect(),
-            steps: 0,
         }
     }
 
     /// Hears a message.
     pub fn take(&mut self, topic: &str, sample: &backdrive_msgs::Sample) {
-        self.steps = self.steps.max(sample.step + 1);
         let is = |name: &Option<String>| name.as_deref() == Some(topic);
         let (intent, measured, contact) = (is(&self.intent), is(&self.measured), is(&self.contact));
         for (index, trace) in self.axes.iter_mut().enumerate() {
@@ -127,7 +122,6 @@ impl Traces {
             peak_feedback_force: peak(|t| &t.feedback),
             first_contact_s: touching.iter().min().map(|i| *i as f64 * graph.period_s()),
             contact_s: touching.len() as f64 * graph.period_s(),
-            steps: self.steps,
         }
     }
 }

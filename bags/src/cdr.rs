@@ -123,6 +123,25 @@ impl Schema {
     ///
     /// Integers beyond 2⁵³ are rounded. A time is in s. Errors: a sentence, the message ends early.
     pub fn read(&self, path: &FieldPath, payload: &[u8]) -> Result<Option<f64>, String> {
+        self.read_with(path, payload, |cdr, of| match of {
+            Type::Message(_) => Ok(cdr.time_ns()? as f64 * 1e-9),
+            of => cdr.number(of),
+        })
+    }
+
+    /// Reads a time in ns: as a number of s since 1970 it would have a grain of 0.2 µs.
+    ///
+    /// `None` as of [`Schema::read`], and for a field that is no time.
+    pub(crate) fn read_time_ns(&self, path: &FieldPath, payload: &[u8]) -> Result<Option<i64>, String> {
+        if path.is_time { self.read_with(path, payload, |cdr, _| cdr.time_ns()) } else { Ok(None) }
+    }
+
+    fn read_with<T>(
+        &self,
+        path: &FieldPath,
+        payload: &[u8],
+        value: impl Fn(&mut Cdr, Type) -> Result<T, String>,
+    ) -> Result<Option<T>, String> {
         let mut cdr = Cdr::new(payload)?;
         let mut at = 0;
         for (depth, (place, index)) in path.steps.iter().enumerate() {
@@ -140,11 +159,7 @@ impl Schema {
             }
             match field.of {
                 Type::Message(inner) if depth + 1 < path.steps.len() => at = inner,
-                Type::Message(_) if path.is_time => {
-                    let (sec, nanosec) = (cdr.signed(4)?, cdr.unsigned(4)?);
-                    return Ok(Some(sec as f64 + nanosec as f64 * 1e-9));
-                }
-                of => return cdr.number(of).map(Some),
+                of => return value(&mut cdr, of).map(Some),
             }
         }
         Err("the path is empty".to_owned())
@@ -327,6 +342,12 @@ impl<'a> Cdr<'a> {
     fn signed(&mut self, size: u8) -> Result<i64, String> {
         let unused = 64 - 8 * u32::from(size);
         Ok((self.unsigned(size)? << unused) as i64 >> unused)
+    }
+
+    /// `builtin_interfaces/Time`; 32 bits of seconds always fit.
+    fn time_ns(&mut self) -> Result<i64, String> {
+        let sec = self.signed(4)?;
+        Ok(sec * 1_000_000_000 + self.unsigned(4)? as i64)
     }
 
     fn number(&mut self, of: Type) -> Result<f64, String> {

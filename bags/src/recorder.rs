@@ -193,8 +193,8 @@ impl Recorder {
 
     /// Writes what is queued, the verdict and the summary.
     ///
-    /// Errors: the bag could not be written to its end. What it has lost by then is in the error's bag only
-    /// as far as it got; [`Recorder::health`] before has the counts.
+    /// Errors: the bag could not be written to its end; it then holds what had been written before, and
+    /// [`Recorder::health`], asked before, has the counts.
     pub fn finish(mut self) -> Result<Completeness, BagError> {
         self.close()
     }

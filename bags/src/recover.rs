@@ -82,6 +82,10 @@ fn copy(from: &Path, frames: &mut Frames, to: &Path, file: File) -> Result<Recov
     }
     // Only a walk to the very end tells whether the file was closed.
     while frames.next()?.is_some() {}
+    // Topics on which nothing was said are topics of the bag too.
+    for id in copy.found.channels.keys().copied().collect::<Vec<_>>() {
+        copy.channel(id).map_err(failed)?;
+    }
     let Copy { mut begun, trackers, run, mut report, .. } = copy;
     report.was_clean = frames.closed;
     report.last_log_time_s = last.map(|time| time as f64 * 1e-9);
@@ -183,7 +187,7 @@ impl Copy<'_> {
             return Ok(Some(*kind));
         }
         let Some(channel) = self.found.channels.get(&id) else { return Ok(None) };
-        let schema = self.found.schemas.get(&channel.schema_id);
+        let schema = self.found.schemas.get(&channel.schema_id).filter(|_| channel.schema_id != 0); // 0 means none
         let out = self.begun.writer("", "")?;
         let mut schema_id = 0;
         if let Some((name, encoding, text)) = schema {

@@ -109,17 +109,20 @@ pub(crate) fn gather(reader: &Reader, wanted: &[Signal], trim: bool) -> Result<S
         }
     }
     let mut series: Vec<Series> = wanted.iter().chain(&clock).map(|_| Series::default()).collect();
+    let mut begin = None;
     for entry in reader.messages()? {
         let entry = entry?;
         let Some(plan) = plans.get(&entry.topic.channel) else { continue };
         let step = entry.message(reader.path())?.map(|message| message.step());
         let wrong = |field: &FieldPath, what| BagError::Field { topic: entry.topic.name.clone(), field: field.to_string(), what };
         let stamp = match &plan.stamp {
-            Some(path) => plan.schema.read(path, &entry.payload).map_err(|what| wrong(path, what))?,
+            Some(path) => plan.schema.read_time_ns(path, &entry.payload).map_err(|what| wrong(path, what))?,
             None => None,
         };
         // A stamp that nobody filled in is 0.
-        let time = stamp.filter(|stamp| *stamp != 0.0 || step.is_some()).unwrap_or(entry.log_time_ns as f64 * 1e-9);
+        let ns = stamp.filter(|stamp| *stamp != 0 || step.is_some()).unwrap_or(entry.log_time_ns as i64);
+        // Seconds since 1970 would leave only 0.2 µs of a double; seconds since the first message are exact to the ns.
+        let time = ns.saturating_sub(*begin.get_or_insert(ns)) as f64 / 1e9;
         for (place, path) in &plan.fields {
             let value = plan.schema.read(path, &entry.payload).map_err(|what| wrong(path, what))?;
             let series = &mut series[*place];

@@ -127,12 +127,12 @@ fn bags_of_any_making_are_summed_up_and_read_by_field() {
         // Rows are the wrenches between the first and the last joint state: k = 1 .. 996.
         assert_eq!((found.t.len(), found.t[0]), (996, 0.0), "{name}");
         for (row, t) in found.t.iter().enumerate() {
-            assert!((t - row as f64 * 1e-3).abs() < 1e-6, "stamps near the present have a grain of 0.2 us");
+            assert!((t - row as f64 * 1e-3).abs() < 1e-12, "{t} s: stamps near the present keep their ns");
             assert_eq!(found.columns[0][row], 2.0 * (row as f64 + 1.0));
-            assert!((found.columns[1][row] - (row as f64 + 1.0) * 1e-3).abs() < 1e-6, "{name}: interpolated");
+            assert!((found.columns[1][row] - (row as f64 + 1.0) * 1e-3).abs() < 1e-12, "{name}: interpolated");
         }
         assert_eq!((found.alignment.gaps, found.alignment.disordered), (0, 0));
-        assert!(found.alignment.jitter_s < 1e-6);
+        assert!(found.alignment.jitter_s < 1e-12);
 
         let error = signals(&reader, &[Signal::new("x", "/notes", "text")]).expect_err("it is JSON").to_string();
         assert!(error.contains("json"), "{error}");

@@ -184,7 +184,14 @@ impl Ear {
     }
 }
 
-async fn attend(mut process: Process, pid: Pid, alive: Arc<AtomicBool>, stdout: impl AsyncRead + Unpin, stderr: impl AsyncRead + Unpin, ear: Ear) {
+async fn attend(
+    mut process: Process,
+    pid: Pid,
+    alive: Arc<AtomicBool>,
+    stdout: impl AsyncRead + Unpin,
+    stderr: impl AsyncRead + Unpin,
+    ear: Ear,
+) {
     let said = async {
         let mut lines = Lines::new(stdout);
         while let Some(line) = lines.next().await {

@@ -142,7 +142,7 @@ impl RunHome {
             }
         }
         if let Ok(stat) = nix::sys::statvfs::statvfs(&self.shm) {
-            let free = (stat.blocks_available() as u64).saturating_mul(stat.fragment_size() as u64);
+            let free = stat.blocks_available().saturating_mul(stat.fragment_size());
             // A file system without a size limit tells 0 blocks.
             if stat.blocks() > 0 && free < need {
                 return Err(full(free));

@@ -117,7 +117,11 @@ fn draw(shown: &mpsc::Receiver<Show>, dropped: &AtomicU64, display: Display, eve
                     bar.set_position(summary.steps.min(planned));
                 }
                 let left = summary.remaining().filter(|_| with_end).map(|d| format!("{} left, ", crate::status::clock(d)));
-                let at = if with_end || !summary.doing.is_empty() { String::new() } else { format!("{}, ", crate::status::clock(summary.elapsed)) };
+                let at = if with_end || !summary.doing.is_empty() {
+                    String::new()
+                } else {
+                    format!("{}, ", crate::status::clock(summary.elapsed))
+                };
                 bar.set_message(format!("{}{at}{}", left.unwrap_or_default(), summary.line()));
                 bar.tick();
             }

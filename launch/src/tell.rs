@@ -84,9 +84,8 @@ impl Supervisor {
     }
 
     fn doing(&self, now: Instant) -> String {
-        let names = |with: fn(&Slot) -> bool| -> Vec<&str> {
-            self.slots.iter().filter(|s| with(s)).map(|s| s.plan.name.as_str()).collect()
-        };
+        let names =
+            |with: fn(&Slot) -> bool| -> Vec<&str> { self.slots.iter().filter(|s| with(s)).map(|s| s.plan.name.as_str()).collect() };
         if self.stopping {
             return format!("stopping, waiting for {}", names(|s| !s.ended()).join(", "));
         }
@@ -136,7 +135,8 @@ impl Supervisor {
 
     /// The master's loop times, or without a master those of the slowest node.
     fn loop_times(&self) -> (Option<String>, Option<f64>, Option<f64>) {
-        let timed = || self.slots.iter().filter(|s| !s.plan.records && s.status.as_ref().is_some_and(|t| t.steps > 0 && t.loop_p50_us > 0.0));
+        let timed =
+            || self.slots.iter().filter(|s| !s.plan.records && s.status.as_ref().is_some_and(|t| t.steps > 0 && t.loop_p50_us > 0.0));
         let time = |s: &&Slot| s.status.as_ref().map_or(0.0, |t| t.loop_p50_us);
         let slot = timed().find(|s| s.plan.kind == "master").or_else(|| timed().max_by(|a, b| time(a).total_cmp(&time(b))));
         let status = slot.and_then(|s| s.status.as_ref());

@@ -291,7 +291,9 @@ impl Supervisor {
             Command::Stop => self.stop(Cause::Stopped { by: "command".to_string() }),
             Command::Gains { mu, lambda, ramp_s } => {
                 if !(mu.is_finite() && lambda.is_finite() && ramp_s.is_finite() && ramp_s >= 0.0) {
-                    let text = format!("gains mu = {mu}, lambda = {lambda} over {ramp_s} s are refused: they must be finite, the ramp not negative");
+                    let text = format!(
+                        "gains mu = {mu}, lambda = {lambda} over {ramp_s} s are refused: they must be finite, the ramp not negative"
+                    );
                     return self.tell(1, "gains_refused", text);
                 }
                 self.gains = Some(ToNode::Gains { mu, lambda, ramp_s });
@@ -516,7 +518,10 @@ impl Supervisor {
                 slot.ask(Asked::Kill, now);
             }
             (Phase::Running, Asked::No) => {
-                let late = self.finishing.is_some_and(|f| now.saturating_duration_since(f.max(slot.progress)) > self.options.grace);
+                // Only on the way to the planned end do further steps buy further time.
+                let on_the_way = self.cause.is_none() && self.plan.timing.steps.is_some_and(|planned| slot.steps() < planned);
+                let progress = if on_the_way { slot.progress } else { self.begun };
+                let late = self.finishing.is_some_and(|f| now.saturating_duration_since(f.max(progress)) > self.options.grace);
                 if late && !slot.plan.records {
                     slot.ask(Asked::Stop, now);
                     let text = format!("`{}` has not ended with the others; it is stopped", slot.plan.name);

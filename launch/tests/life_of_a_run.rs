@@ -85,7 +85,8 @@ async fn a_program_that_is_not_there_is_named() -> Outcome {
     let temp = tempfile::tempdir()?;
     let mut nodes = vec![toy("master", ""), toy("slave", "")];
     nodes[1].command = Some(vec!["/nonexistent/driver".to_string()]);
-    let told = run(temp.path(), plan(Clock::Lockstep, None, nodes), options(temp.path())).await.err().map(|e| e.to_string()).unwrap_or_default();
+    let told =
+        run(temp.path(), plan(Clock::Lockstep, None, nodes), options(temp.path())).await.err().map(|e| e.to_string()).unwrap_or_default();
     assert!(told.contains("`slave`") && told.contains("/nonexistent/driver"), "{told}");
     Ok(())
 }
@@ -198,16 +199,7 @@ async fn a_talkative_node_holds_nobody() -> Outcome {
 async fn one_that_ends_early_ends_the_others_in_lockstep() -> Outcome {
     let temp = tempfile::tempdir()?;
     let nodes = vec![toy("master", ""), toy("hand", "steps 200")];
-    let report = run(temp.path(), plan(Clock::Lockstep, Some(1_000_000), nodes), {
-        // The toy master goes on counting where a real one would stand still.
-        let (send, commands) = tokio::sync::mpsc::channel(1);
-        tokio::spawn(async move {
-            tokio::time::sleep(Duration::from_secs(3)).await;
-            let _ = send.send(Command::Stop).await;
-        });
-        SuperviseOptions { commands: Some(commands), ..options(temp.path()) }
-    })
-    .await?;
+    let report = run(temp.path(), plan(Clock::Lockstep, Some(1_000_000), nodes), options(temp.path())).await?;
     assert_eq!(report.cause, Cause::EndedEarly { node: "hand".to_string(), steps: 200 });
     Ok(())
 }
@@ -217,20 +209,18 @@ async fn gains_reach_the_node_that_has_them_also_when_it_comes_back() -> Outcome
     let temp = tempfile::tempdir()?;
     let (send, commands) = tokio::sync::mpsc::channel(4);
     let once = temp.path().join("once");
-    let mut scaling = restarting("scaling", &format!("gains exit 300 once {} steps 2500", once.display()));
+    let mut scaling = restarting("scaling", &format!("exit 300 once {} steps 2500", once.display()));
     scaling.has_gains = true;
     let home = temp.path().join("runs");
     let options = SuperviseOptions { commands: Some(commands), ..options(&home) };
     send.send(Command::Gains { mu: f64::NAN, lambda: 1.0, ramp_s: 0.0 }).await?;
     send.send(Command::Gains { mu: 0.5, lambda: 2.0, ramp_s: 0.1 }).await?;
     drop(send);
-    // Its last words are in the report only of a death, so it dies once more at the end.
-    let mut nodes = vec![toy("master", "steps 2500"), scaling];
-    nodes.push(toy("watch", &format!("steps 2500 bag {}", temp.path().join("x").display())));
-    let report = run(&home, plan(Clock::Realtime, Some(2500), nodes), options).await?;
+    let report = run(&home, plan(Clock::Realtime, Some(2500), vec![toy("master", "steps 2500"), scaling]), options).await?;
     assert!(report.events.iter().any(|e| e.kind == "gains_refused"));
     assert_eq!(report.nodes[1].restarts, 1);
-    assert_eq!(report.cause, Cause::Completed);
+    let told: Vec<&str> = report.events.iter().filter(|e| e.kind == "gains").map(|e| e.text.as_str()).collect();
+    assert_eq!(told, ["0.5 2", "0.5 2"]);
     Ok(())
 }
 

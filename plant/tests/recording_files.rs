@@ -75,7 +75,10 @@ fn wrong_recordings_are_refused_at_their_line() {
     assert_eq!(read("t,y\n0,1\n1,abc\n"), "x.csv:3: y: expected a number, found \"abc\"");
     assert_eq!(read("t,y\n0,1\n1,\n"), "x.csv:3: y: expected a number, found an empty cell");
     assert_eq!(read("t,y\n0,1\n1\n"), "x.csv:3: expected 2 cells, as the heading has, found 1");
-    assert_eq!(read("t,y\n0,1\n2,1\n1,1\n"), "x.csv:4: t: time does not rise: 1 s after 2 s");
+    assert_eq!(
+        read("t,y\n0,1\n2,1\n1,1\n"),
+        "x.csv:4: t: time does not rise: 1 s after 2 s; of a file with several runs, set.toml takes one with where or rows"
+    );
     assert_eq!(read("t,y\n0,1\n0,1\n"), "x.csv:3: t: time does not rise: 0 s after 0 s");
     assert_eq!(read("t,y\n0,1\n"), "x.csv: needs at least 2 rows of data, has 1");
     assert_eq!(read("t,y,y\n0,1,1\n1,1,1\n"), "x.csv:1: y: two columns have this heading");

@@ -10,7 +10,8 @@ use stepper_common::*;
 #[test]
 fn coulomb_takes_four_c_over_k_from_each_cycle_and_then_holds() {
     let (m, k, c, period) = (0.5, 800.0, 0.6, 1e-4);
-    let model = model(&[m], vec![spring([at(0), GROUND], k), coulomb([at(0), GROUND], c)], vec![force_input(0)], vec![Position(0), Velocity(0)]);
+    let model =
+        model(&[m], vec![spring([at(0), GROUND], k), coulomb([at(0), GROUND], c)], vec![force_input(0)], vec![Position(0), Velocity(0)]);
     let y = run(&model, &[knock(40_000, period, 1.0)], period, None);
     let x = &y[0];
     // Peak of the parabola through the highest sample and its neighbours.
@@ -49,7 +50,8 @@ fn free_chain_has_its_frequency_both_exactly_and_by_substeps() {
 
 #[test]
 fn long_periods_do_not_hurt_a_linear_model() {
-    let elements = vec![spring([at(0), at(1)], 4e4), damper([at(0), at(1)], 3.0), spring([at(1), GROUND], 500.0), damper([at(1), GROUND], 5.0)];
+    let elements =
+        vec![spring([at(0), at(1)], 4e4), damper([at(0), at(1)], 3.0), spring([at(1), GROUND], 500.0), damper([at(1), GROUND], 5.0)];
     let model = model(&[0.02, 0.1], elements, vec![force_input(0)], vec![Position(0), Velocity(1)]);
     let slow = samples(200, 1e-2, |t| (9.0 * t).sin());
     let fine: Vec<f64> = (0..199 * 50 + 1)
@@ -127,7 +129,12 @@ fn maxwell_slip_keeps_masing_and_wipes_out() {
     way_in.hold = backdrive_plant::model::Hold::Linear;
     let model = model(&[1.0], vec![sliders], vec![way_in], vec![Force(vec![0])]);
     let corners = [0.0, 1e-3, 2e-4, 1e-3, 1.5e-3];
-    let way: Vec<f64> = (0..2001).map(|i: usize| if i == 2000 { corners[4] } else { corners[i / 500] + (corners[i / 500 + 1] - corners[i / 500]) * (i % 500) as f64 / 500.0 }).collect();
+    let way: Vec<f64> =
+        (0..2001)
+            .map(|i: usize| {
+                if i == 2000 { corners[4] } else { corners[i / 500] + (corners[i / 500 + 1] - corners[i / 500]) * (i % 500) as f64 / 500.0 }
+            })
+            .collect();
     let f = &run(&model, &[way.clone()], 1e-3, None)[0];
     assert!((f[500] - virgin(1e-3)).abs() < 1e-12);
     assert!((f[500] - f[1000] - 2.0 * virgin(4e-4)).abs() < 1e-12);
@@ -137,8 +144,12 @@ fn maxwell_slip_keeps_masing_and_wipes_out() {
 #[test]
 fn hysteretic_spring_is_the_limit_of_equations_2_and_3() {
     let (kp, kn, fp, fneg, gamma) = (390.0, 400.0, 0.05, -0.06, 5000.0);
-    let model =
-        model(&[1.0], vec![element("hysteretic_spring", [at(0), GROUND], &[kp, kn, fp, fneg, gamma])], vec![motion_input(0)], vec![Position(0), Force(vec![0])]);
+    let model = model(
+        &[1.0],
+        vec![element("hysteretic_spring", [at(0), GROUND], &[kp, kn, fp, fneg, gamma])],
+        vec![motion_input(0)],
+        vec![Position(0), Force(vec![0])],
+    );
     let way = |t: f64| 2e-3 * (TAU * t).sin() * (1.0 - (-t).exp());
     let y = run(&model, &[samples(4000, 1e-3, way)], 1e-3, Some(2));
     let (mut discrete, mut line, mut last, mut worst) = (0.0, 0.0, 0.0, 0.0f64);
@@ -215,7 +226,12 @@ fn compensator_without_damper_rings_at_the_limit_of_equation_2() {
     let (k, b1) = (480e3, 21.6);
     // c = 0: the disc alone on the spring, f = sqrt(k/b1)/2π = 23.725 Hz; c = inf: with the flywheel, 10.066 Hz.
     for (inertance, hz) in [(b1, 23.725), (b1 + 98.4, 10.066)] {
-        let model = model(&[0.0], vec![spring([at(0), GROUND], k), element("inerter", [at(0), GROUND], &[inertance])], vec![force_input(0)], vec![Position(0)]);
+        let model = model(
+            &[0.0],
+            vec![spring([at(0), GROUND], k), element("inerter", [at(0), GROUND], &[inertance])],
+            vec![force_input(0)],
+            vec![Position(0)],
+        );
         let y = run(&model, &[knock(20_000, 1e-3, 1.0)], 1e-3, None);
         let crossings: Vec<f64> =
             (30..19_999).filter(|i| y[0][*i] < 0.0 && y[0][i + 1] >= 0.0).map(|i| i as f64 + y[0][i] / (y[0][i] - y[0][i + 1])).collect();

@@ -114,14 +114,17 @@ fn motion_inputs_have_gain_and_delay() {
 fn outputs_have_gain_delay_offset_and_resolution() {
     for exact in [true, false] {
         let elements = if exact { vec![] } else { vec![coulomb([at(0), GROUND], 0.0)] };
-        let mut model = model(&[1.0], elements, vec![force_input(0)], vec![Position(0), Position(0), Position(0)]);
+        let input = backdrive_plant::model::Input { hold: Hold::Cubic, ..force_input(0) };
+        let mut model = model(&[1.0], elements, vec![input], vec![Position(0), Position(0), Position(0)]);
         (model.outputs[1].gain, model.outputs[1].delay, model.outputs[1].offset) = (-2.0, 0.0037, 0.1);
         (model.outputs[2].resolution, model.outputs[2].noise) = (1e-3, 1e-3);
         let y = run(&model, &[sine()], PERIOD, None);
         let way = |t: f64| t / (TAU * 5.0) - (TAU * 5.0 * t).sin() / (TAU * 5.0).powi(2);
         assert!(largest((10..3000).map(|i| y[1][i] - 0.1 + 2.0 * way(i as f64 * PERIOD - 0.0037))) / range(&y[1]) < 1e-5);
         assert_eq!(y[2], y[0], "noise and resolution are options");
-        let with = |seed| simulate(&model, &[sine()], PERIOD, &Options { add_noise: Some(seed), quantise: true, ..Options::default() }).expect("model");
+        let with = |seed| {
+            simulate(&model, &[sine()], PERIOD, &Options { add_noise: Some(seed), quantise: true, ..Options::default() }).expect("model")
+        };
         let (a, b, other) = (with(1), with(1), with(2));
         assert_eq!(a[2], b[2]);
         assert_ne!(a[2], other[2]);
@@ -169,7 +172,10 @@ fn what_cannot_be_stepped_is_named() {
     assert!(matches!(Plant::new(&dangling, PERIOD, &Options::default()), Err(CompileError::Dangling(_))));
     let crowd = model(&[0.1; 40], vec![], vec![], vec![]);
     assert!(matches!(Plant::new(&crowd, PERIOD, &Options::default()), Err(CompileError::TooMany { .. })));
-    assert!(matches!(Plant::new(&model(&[f64::NAN], vec![], vec![], vec![]), PERIOD, &Options::default()), Err(CompileError::Number { .. })));
+    assert!(matches!(
+        Plant::new(&model(&[f64::NAN], vec![], vec![], vec![]), PERIOD, &Options::default()),
+        Err(CompileError::Number { .. })
+    ));
     for period in [0.0, -1.0, f64::NAN, f64::INFINITY] {
         assert!(matches!(Plant::new(&reaction, period, &Options::default()), Err(CompileError::Period(_))));
     }

@@ -1,4 +1,5 @@
 //! Graphs of toy nodes.
+#![allow(dead_code)] // each test file uses its part
 
 use backdrive_launch::{Display, NodePlan, Plan, RunHome, SuperviseOptions};
 use backdrive_nodes::stage::{Clock, Timing};

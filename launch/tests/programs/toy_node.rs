@@ -54,7 +54,8 @@ fn main() -> Outcome {
         unsafe { signal(Signal::SIGTERM, SigHandler::SigIgn) }?;
     }
     if toy.has("breed") {
-        std::process::Command::new("sleep").arg("600").spawn()?;
+        // The directory among its arguments, so that a test finds it.
+        std::process::Command::new("sh").args(["-c", "sleep 600; true"]).arg(paths.root()).spawn()?;
     }
     if toy.has("mute") {
         std::thread::sleep(Duration::from_secs(600));
@@ -82,7 +83,6 @@ fn main() -> Outcome {
 
 fn run(toy: &Toy, name: &str, words: &mpsc::Receiver<ToNode>) -> Outcome {
     let mut begun: Option<Instant> = None;
-    let mut gains = String::new();
     let once = toy.value("once").map(PathBuf::from);
     let spared = once.as_ref().is_some_and(|f| f.exists());
     loop {
@@ -100,10 +100,13 @@ fn run(toy: &Toy, name: &str, words: &mpsc::Receiver<ToNode>) -> Outcome {
                     println!("hello");
                 }
             }
-            Ok(ToNode::Gains { mu, lambda, .. }) => gains = format!("{mu} {lambda}"),
+            Ok(ToNode::Gains { mu, lambda, .. }) => {
+                let (kind, text) = ("gains".to_string(), format!("{mu} {lambda}"));
+                say(&FromNode::Event { step: 0, severity: 0, kind, text, value: None })?;
+            }
             Ok(ToNode::Stop) | Err(mpsc::RecvTimeoutError::Disconnected) => {
                 if !toy.has("deaf") {
-                    return end(toy, name, begun, &gains);
+                    return end(toy, name, begun);
                 }
                 std::thread::sleep(Duration::from_millis(20));
             }
@@ -112,10 +115,8 @@ fn run(toy: &Toy, name: &str, words: &mpsc::Receiver<ToNode>) -> Outcome {
         let Some(begun) = begun else { continue };
         say(&FromNode::Status(status(toy, Some(begun))))?;
         let due = |what: &str| !spared && toy.number(what).is_some_and(|ms| begun.elapsed() >= Duration::from_millis(ms));
-        if due("crash") || due("exit") || due("fail") {
-            if let Some(once) = &once {
-                std::fs::write(once, "")?;
-            }
+        if let (true, Some(once)) = (due("crash") || due("exit") || due("fail"), &once) {
+            std::fs::write(once, "")?;
         }
         if due("crash") {
             eprintln!("about to crash");
@@ -129,7 +130,7 @@ fn run(toy: &Toy, name: &str, words: &mpsc::Receiver<ToNode>) -> Outcome {
             std::process::exit(5);
         }
         if toy.number("steps").is_some_and(|n| status(toy, Some(begun)).steps >= n) {
-            return end(toy, name, Some(begun), &gains);
+            return end(toy, name, Some(begun));
         }
     }
 }
@@ -144,12 +145,9 @@ fn status(toy: &Toy, begun: Option<Instant>) -> NodeStatus {
 }
 
 /// Writes what it knows into the bag, so that a test sees an orderly end.
-fn end(toy: &Toy, name: &str, begun: Option<Instant>, gains: &str) -> Outcome {
+fn end(toy: &Toy, name: &str, begun: Option<Instant>) -> Outcome {
     if let Some(bag) = toy.value("bag") {
         std::fs::write(bag, format!("{name} finished"))?;
-    }
-    if toy.has("gains") {
-        eprintln!("gains {gains}");
     }
     // Nobody may be left to hear it.
     let _ = say(&FromNode::Done(status(toy, begun)));

@@ -1,5 +1,5 @@
 //! Supervises a graph of toy nodes: `HOME CLOCK STEPS NAME[,restart][,records] ARGUMENTS.. [/ NAME ..]`.
-//! Prints the report as JSON.
+//! Prints the report as JSON. `graph HOME FILE BAG SECONDS CLOCK` does the same with a graph file, whose nodes are this program too.
 
 use backdrive_launch::{Display, NodePlan, Plan, RunHome, SuperviseOptions, supervise_plan};
 use backdrive_nodes::stage::{Clock, Timing};
@@ -13,7 +13,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let mut flags = words.first()?.split(',');
         let name = flags.next()?.to_string();
         let flags: Vec<&str> = flags.collect();
-        let command = Some([&[toy.clone()], &words[1..]].concat());
+        let command = Some([std::slice::from_ref(&toy), &words[1..]].concat());
         let (restart, records) = (flags.contains(&"restart"), flags.contains(&"records"));
         Some(NodePlan { kind: name.clone(), name, command, restart, records, has_gains: false })
     });

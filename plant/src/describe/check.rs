@@ -77,7 +77,7 @@ pub fn check(model: &Model, at: &Operating) -> Vec<Remark> {
             add(Severity::Note, model.name.clone(), message);
         }
     }
-    remarks.sort_by(|a, b| b.severity.cmp(&a.severity));
+    remarks.sort_by_key(|r| std::cmp::Reverse(r.severity));
     remarks
 }
 

@@ -58,13 +58,21 @@ impl Description {
         table(f, &["damped Hz", "damping ratio"], &rows)?;
         for response in &self.responses {
             writeln!(f, "\n{} -> {}", response.input, response.output)?;
-            let rows: Vec<Vec<String>> =
-                response.points.iter().map(|p| vec![short(p.frequency_hz), short(p.magnitude), format!("{:.1}", p.phase_deg)]).collect();
+            let rows: Vec<Vec<String>> = response
+                .points
+                .iter()
+                .map(|p| vec![short(p.frequency_hz), short(p.magnitude), format!("{:.1}", tenths(p.phase_deg))])
+                .collect();
             let magnitude = format!("magnitude {}", response.unit);
             table(f, &["Hz", &magnitude, "phase deg"], &rows)?;
         }
         Ok(())
     }
+}
+
+/// Rounded to tenths, without the sign that a rounded -0.04 would keep.
+fn tenths(x: f64) -> f64 {
+    (x * 10.0).round() / 10.0 + 0.0
 }
 
 fn number(n: &NamedNumber) -> String {

@@ -27,7 +27,9 @@ impl Stribeck {
         build: |v| {
             let (coulomb, at_rest) = (v[0][0], v[1][0]);
             if at_rest < coulomb {
-                return Err(format!("static ({at_rest}) must be at least coulomb ({coulomb}); friction that is lower at rest is a friction_deficit"));
+                return Err(format!(
+                    "static ({at_rest}) must be at least coulomb ({coulomb}); friction that is lower at rest is a friction_deficit"
+                ));
             }
             Ok(Law::Stribeck(Stribeck { coulomb, at_rest, velocity: v[2][0] }))
         },

@@ -77,7 +77,10 @@ pub fn read_csv(path: &Path, signals: Option<&[&str]>, columns: &Columns, piece:
     let signals = wanted.into_iter().map(|w| w.signal).zip(samples).collect();
     Recording::new(&name, t, signals).map_err(|e| match e {
         RecordingError::NotRising { index, before, now, .. } => {
-            let message = format!("time does not rise: {now} s after {before} s");
+            let mut message = format!("time does not rise: {now} s after {before} s");
+            if now < before {
+                message.push_str("; of a file with several runs, set.toml takes one with where or rows");
+            }
             FileError::at(&name, lines.get(index).copied().unwrap_or(1), &time.heading, message)
         }
         RecordingError::TooShort { count, .. } => FileError::whole(&name, format!("needs at least 2 rows of data, has {count}")),

@@ -107,7 +107,8 @@ impl Plant {
             let acceleration = (end_velocity[slot] - self.v[slot]) / h;
             let [by_position, by_velocity, by_acceleration] = &fixed.from_prescribed;
             for i in 0..n {
-                change[i] += by_position[p][i] * middle[slot] + by_velocity[p][i] * mean_velocity[slot] + by_acceleration[p][i] * acceleration;
+                change[i] +=
+                    by_position[p][i] * middle[slot] + by_velocity[p][i] * mean_velocity[slot] + by_acceleration[p][i] * acceleration;
             }
         }
         for i in 0..n {
@@ -115,7 +116,7 @@ impl Plant {
             end_velocity[i] = mean_velocity[i] + change[i];
         }
 
-                if fixed.constraints.len() > 0 {
+        if fixed.constraints.len() > 0 {
             let work = &mut *self.work;
             for (c, contact) in self.frictions.iter_mut().enumerate() {
                 work.base[c] = 0.5 * fixed.constraints.across(c, &end_velocity);
@@ -130,11 +131,11 @@ impl Plant {
                     work.force[c] = path.force;
                 }
             }
-            fixed.constraints.solve(work, &mut self.paths, h);
+            fixed.constraints.solve(work, &mut self.paths);
 
             let stops = self.frictions.iter().enumerate().any(|(c, contact)| contact.leaves_its_level(c, work));
             if stops && stop(fixed, &self.frictions, work) {
-                fixed.constraints.solve(work, &mut self.paths, h);
+                fixed.constraints.solve(work, &mut self.paths);
                 for (c, (share, sliding)) in work.stop.iter_mut().enumerate().take(self.frictions.len()) {
                     if *share > 0.0 && *share < 1.0 {
                         // The force acted in two levels, the first one early: so much more (or less) way was made.
@@ -194,12 +195,9 @@ impl Plant {
         self.v = end_velocity;
         for path in &mut self.paths {
             let x = end[path.first] - end[path.second];
-            if path.constraint.is_some() {
-                let middle = 0.5 * (path.reached + x);
-                path.law.advance(&mut path.memory, path.reached, middle, half);
-                path.reached = middle;
-            }
-            path.law.advance(&mut path.memory, path.reached, x, half);
+            // An explicit one has already come to the middle.
+            let left = if path.constraint.is_some() { h } else { half };
+            path.law.advance(&mut path.memory, path.reached, x, left);
             path.reached = x;
         }
     }
@@ -219,29 +217,36 @@ impl Plant {
 /// after. Whether there are any.
 #[cold]
 fn stop(fixed: &Compiled, frictions: &[FrictionContact], work: &mut Work) -> bool {
+    // Until the first of them stops all go on sliding: that motion tells when.
+    let solved = work.force;
+    let sliding = |contact: &FrictionContact, bounds: Bounds| if contact.mode > 0 { bounds.high } else { bounds.low };
+    for (c, contact) in frictions.iter().enumerate() {
+        if contact.leaves_its_level(c, work) {
+            work.force[c] = sliding(contact, work.bounds[c]);
+            work.stop[c].1 = f64::NAN;
+        }
+    }
     let mut any = false;
     for (c, contact) in frictions.iter().enumerate() {
-        if !contact.leaves_its_level(c, work) {
+        if !work.stop[c].1.is_nan() {
             continue;
         }
-        let Bounds { low, high } = work.bounds[c];
-        let sliding = if contact.mode > 0 { high } else { low };
-        let v0 = contact.velocity_before;
-        // Velocity at the end if it went on sliding.
-        let v1 = 2.0 * (fixed.constraints.velocity(c, work) + fixed.constraints.own_compliance(c) * (work.force[c] - sliding));
+        work.stop[c] = (0.0, 0.0);
+        let (v0, v1) = (contact.velocity_before, 2.0 * fixed.constraints.velocity(c, work));
         if v0 * f64::from(contact.mode) <= 0.0 || v0 * v1 >= 0.0 {
             continue;
         }
-        let share = v0 / (v0 - v1);
+        let (share, level) = (v0 / (v0 - v1), sliding(contact, work.bounds[c]));
         let bounds = &mut work.bounds[c];
         if contact.mode > 0 {
-            bounds.low = share * sliding + (1.0 - share) * low;
+            bounds.low = share * level + (1.0 - share) * bounds.low;
         } else {
-            bounds.high = share * sliding + (1.0 - share) * high;
+            bounds.high = share * level + (1.0 - share) * bounds.high;
         }
-        work.stop[c] = (share, sliding);
+        work.stop[c] = (share, level);
         any = true;
     }
+    work.force = solved;
     any
 }
 

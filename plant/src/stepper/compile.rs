@@ -5,9 +5,7 @@ use super::dense;
 use super::drive::Drive;
 use super::exact::Propagator;
 use super::sense::Sense;
-use super::{
-    CompileError, FrictionContact, GROUND, MAX_BODIES, MAX_ELEMENTS, Options, PathElement, Plant, SLOTS, Slots, prescribed_slot,
-};
+use super::{CompileError, FrictionContact, GROUND, MAX_BODIES, MAX_ELEMENTS, Options, PathElement, Plant, SLOTS, Slots, prescribed_slot};
 use crate::elements::{Law, Linear, Mechanics, Range, Role};
 use crate::model::{InputKind, Model, OutputKind, Place};
 use nalgebra::DMatrix;
@@ -367,6 +365,7 @@ fn path_element(first: usize, second: usize, law: &Law) -> PathElement {
         force: 0.0,
         velocity_before: 0.0,
         constraint: None,
+        ahead: 0.0,
         absorbed: 0.0,
     }
 }

@@ -19,6 +19,10 @@ const TOLERANCE: f64 = 1e-14;
 const STIFF: f64 = 0.1;
 /// The same where slopes are only estimates.
 const STIFF_UNBOUNDED: f64 = 0.01;
+/// Above this the substep does not resolve the element. Its force is then taken at the end of the substep, not in the
+/// middle: first order, but the work it does is never more than what it stored, so a stiff wall throws nothing back
+/// quicker than it came.
+const UNRESOLVED: f64 = 1.0;
 /// Evaluations of a law in one scalar solution.
 const EVALUATIONS: usize = 60;
 
@@ -57,7 +61,12 @@ pub(super) struct Work {
 
 impl Work {
     pub(super) fn new() -> Work {
-        Work { base: [0.0; MAX_ELEMENTS], bounds: [Bounds::default(); MAX_ELEMENTS], force: [0.0; MAX_ELEMENTS], stop: [(0.0, 0.0); MAX_ELEMENTS] }
+        Work {
+            base: [0.0; MAX_ELEMENTS],
+            bounds: [Bounds::default(); MAX_ELEMENTS],
+            force: [0.0; MAX_ELEMENTS],
+            stop: [(0.0, 0.0); MAX_ELEMENTS],
+        }
     }
 }
 
@@ -89,6 +98,7 @@ impl Constraints {
             let stiffness = (weight(ends.0, &response) - weight(ends.1, &response)) * (0.5 * substep * slopes.stiffness + slopes.damping);
             if stiffness > if slopes.bounded { STIFF } else { STIFF_UNBOUNDED } {
                 path.constraint = Some(all.ends.len());
+                path.ahead = if stiffness > if slopes.bounded { UNRESOLVED } else { STIFF } { substep } else { 0.5 * substep };
                 all.paths.push(index);
                 all.ends.push(ends);
             }
@@ -129,7 +139,7 @@ impl Constraints {
 
     /// One law solved for the others as they are; returns the change of its force.
     #[inline]
-    fn relax(&self, c: usize, work: &mut Work, paths: &mut [PathElement], substep: f64) -> f64 {
+    fn relax(&self, c: usize, work: &mut Work, paths: &mut [PathElement]) -> f64 {
         let before = work.force[c];
         let u = self.velocity(c, work);
         let own = self.own_compliance(c);
@@ -145,24 +155,24 @@ impl Constraints {
                 before.min(high).max(low)
             };
         } else if let Some(path) = self.paths.get(c - self.frictions).and_then(|p| paths.get_mut(*p)) {
-            work.force[c] = solve_law(path, u + own * before, own, before, substep);
+            work.force[c] = solve_law(path, u + own * before, own, before);
         }
         work.force[c] - before
     }
 
     /// Solves all laws at once. `work.force` holds the start and then the solution.
     #[inline]
-    pub(super) fn solve(&self, work: &mut Work, paths: &mut [PathElement], substep: f64) {
+    pub(super) fn solve(&self, work: &mut Work, paths: &mut [PathElement]) {
         let count = self.ends.len();
         if count == 1 {
-            self.relax(0, work, paths, substep);
+            self.relax(0, work, paths);
             return;
         }
         for _ in 0..ROUNDS {
             for _ in 0..SWEEPS {
                 let mut settled = true;
                 for c in 0..count {
-                    let change = self.relax(c, work, paths, substep).abs();
+                    let change = self.relax(c, work, paths).abs();
                     let span = if c < self.frictions { work.bounds[c].high - work.bounds[c].low } else { work.force[c].abs() };
                     settled &= change <= TOLERANCE * span;
                 }
@@ -226,24 +236,24 @@ fn transposed(columns: &Columns, i: usize) -> Slots {
     row
 }
 
-/// Force of a path element in the middle of a substep whose mean relative velocity is `u`.
+/// Force of a path element over a substep whose mean relative velocity is `u`.
 #[inline]
-pub(super) fn trial_force(path: &mut PathElement, u: f64, substep: f64) -> f64 {
-    let middle = path.reached + 0.5 * substep * u;
+fn trial_force(path: &mut PathElement, u: f64) -> f64 {
+    let ahead = path.reached + path.ahead * u;
     path.trial.copy_from_slice(&path.memory);
-    path.law.advance(&mut path.trial, path.reached, middle, 0.5 * substep);
-    path.law.force(&path.trial, middle, u)
+    path.law.advance(&mut path.trial, path.reached, ahead, path.ahead);
+    path.law.force(&path.trial, ahead, u)
 }
 
 /// Solves `u + own f(u) = w` for f, starting from the force `start`: secant steps kept inside a bracket. The left side
 /// rises with u for every law that does not push back harder the slower it is pushed.
-fn solve_law(path: &mut PathElement, w: f64, own: f64, start: f64, substep: f64) -> f64 {
+fn solve_law(path: &mut PathElement, w: f64, own: f64, start: f64) -> f64 {
     if own <= 0.0 {
-        return trial_force(path, w, substep);
+        return trial_force(path, w);
     }
     let mut best_force = start;
     let mut excess = |u: f64, best: &mut f64| {
-        *best = trial_force(path, u, substep);
+        *best = trial_force(path, u);
         u + own * *best - w
     };
     let scale = 1e-15 * (w.abs() + own * start.abs());

@@ -28,7 +28,9 @@ impl Plant {
         let mut force = [0.0; SLOTS];
         for i in 0..fixed.free {
             let row = |matrix: &Slots, q: &Slots| matrix.iter().zip(q).map(|(m, q)| m * q).sum::<f64>();
-            force[i] = fixed.constant[i] + self.pushed[i] - row(&fixed.stiffness[i], &self.x) - row(&fixed.damping[i], &self.v)
+            force[i] = fixed.constant[i] + self.pushed[i]
+                - row(&fixed.stiffness[i], &self.x)
+                - row(&fixed.damping[i], &self.v)
                 - row(&fixed.mass[i], &self.prescribed_acceleration);
         }
         for (path, f) in self.paths.iter().zip(&mut now.path) {
@@ -97,7 +99,10 @@ impl Plant {
             Some(Share::Path(p)) => now.path[*p],
             Some(Share::Linear(linear, a, b)) => {
                 let across = |q: &Slots| q[*a] - q[*b];
-                linear.force + linear.stiffness * across(&self.x) + linear.damping * across(&self.v) + linear.inertance * across(&now.acceleration)
+                linear.force
+                    + linear.stiffness * across(&self.x)
+                    + linear.damping * across(&self.v)
+                    + linear.inertance * across(&now.acceleration)
             }
         }
     }
@@ -110,7 +115,8 @@ impl Plant {
         let fixed = &self.fixed;
         let mut reaction = -fixed.constant[slot] - self.pushed[slot];
         for j in 0..SLOTS {
-            reaction += fixed.mass[slot][j] * now.acceleration[j] + fixed.damping[slot][j] * self.v[j] + fixed.stiffness[slot][j] * self.x[j];
+            reaction +=
+                fixed.mass[slot][j] * now.acceleration[j] + fixed.damping[slot][j] * self.v[j] + fixed.stiffness[slot][j] * self.x[j];
         }
         let frictions = self.frictions.iter().zip(&now.friction).map(|(c, f)| (c.first, c.second, *f));
         for (first, second, f) in frictions.chain(self.paths.iter().zip(&now.path).map(|(p, f)| (p.first, p.second, *f))) {

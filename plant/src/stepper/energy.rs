@@ -44,7 +44,14 @@ pub(super) struct Done<'a> {
 }
 
 impl Account {
-    pub(super) fn count(&mut self, fixed: &Compiled, drives: &[Drive], frictions: &[FrictionContact], paths: &mut [PathElement], done: &Done) {
+    pub(super) fn count(
+        &mut self,
+        fixed: &Compiled,
+        drives: &[Drive],
+        frictions: &[FrictionContact],
+        paths: &mut [PathElement],
+        done: &Done,
+    ) {
         let h = done.length;
         // What friction and path elements do to the prescribed bodies.
         let mut pull = *done.pushed;

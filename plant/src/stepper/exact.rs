@@ -3,9 +3,9 @@
 //! With the state s = (x, v, lags) and inputs that are polynomials over the substep, `s' = A s + B u(t) + g` has the
 //! solution of an augmented system whose generator is constant; one matrix exponential gives it for every substep.
 
+use super::Plant;
 use super::compile::Compiled;
 use super::drive::Drive;
-use super::Plant;
 use nalgebra::DMatrix;
 
 /// Rows at most: positions, velocities, lags.

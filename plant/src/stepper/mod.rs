@@ -209,6 +209,8 @@ struct PathElement {
     velocity_before: f64,
     /// Index among the constraints when it is solved implicitly.
     constraint: Option<usize>,
+    /// How far ahead of the start of a substep its force is then taken, s.
+    ahead: f64,
     /// What its force took out of the bodies so far, J.
     absorbed: f64,
 }

@@ -50,9 +50,10 @@ impl Sense {
             .map(|output| {
                 let delay = output.delay / substep;
                 let slot = match &output.kind {
-                    OutputKind::Position(body) | OutputKind::Velocity(body) | OutputKind::Acceleration(body) | OutputKind::Reaction(body) => {
-                        slots.get(*body).copied().unwrap_or(super::GROUND)
-                    }
+                    OutputKind::Position(body)
+                    | OutputKind::Velocity(body)
+                    | OutputKind::Acceleration(body)
+                    | OutputKind::Reaction(body) => slots.get(*body).copied().unwrap_or(super::GROUND),
                     OutputKind::Force(_) => super::GROUND,
                 };
                 Sensor {
