@@ -24,7 +24,9 @@ impl Supervisor {
     /// Keeps an event and shows it, unless its node tells too many.
     pub fn event(&mut self, from: Option<usize>, event: RunEvent) {
         let now = Instant::now();
-        let wanted = event.severity > 0 || self.options.display != Display::Quiet;
+        // While the run is stopped, nodes tell that others are gone; that is kept, but no news.
+        let aftermath = self.stopping && from.is_some() && event.severity < 2;
+        let wanted = !aftermath && (event.severity > 0 || self.options.display != Display::Quiet);
         if wanted {
             match from.map(|index| self.slots[index].events.pass(now)) {
                 None => self.screen.line(event.to_string()),
@@ -104,7 +106,7 @@ impl Supervisor {
 
     fn summary(&self, now: Instant) -> Summary {
         let steps_per_s = match (self.pace.front(), self.pace.back()) {
-            (Some((from, first)), Some((to, last))) if to > from => {
+            (Some((from, first)), Some((to, last))) if to.saturating_duration_since(*from) > WINDOW / 4 => {
                 Some((last - first) as f64 / to.saturating_duration_since(*from).as_secs_f64())
             }
             _ => None,

@@ -313,7 +313,7 @@ impl Supervisor {
             }
             _ => {
                 if self.options.display != Display::Quiet {
-                    self.screen.line("stopping; Ctrl-C kills".to_string());
+                    self.screen.line("stopping in order; another Ctrl-C kills".to_string());
                 }
                 let by = signal.as_str().to_string();
                 if self.start.is_none() && self.error.is_none() {
@@ -437,7 +437,7 @@ impl Supervisor {
                 OnDeath::Stop => true,
                 OnDeath::Continue => false,
             };
-        let others = match (self.stopping, stops) {
+        let others = match (self.stopping || self.finished.is_some(), stops) {
             (true, _) => "",
             (false, true) => "; the run stops",
             (false, false) => "; the others go on without it",

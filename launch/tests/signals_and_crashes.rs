@@ -2,48 +2,11 @@
 
 mod common;
 
-use backdrive_launch::{Cause, RunHome, RunReport};
-use common::{Outcome, processes_of, runs_in, shm_of, until};
-use nix::sys::signal::{Signal, kill};
-use nix::unistd::Pid;
-use std::io::{BufRead, BufReader, Read};
-use std::path::Path;
-use std::process::{Child, Command, Stdio};
+use backdrive_launch::{Cause, RunHome};
+use common::{Outcome, processes_of, report_of, runs_in, send, shm_of, supervisor, until, wait_for_start};
+use nix::sys::signal::Signal;
+use std::io::{BufRead, Read};
 use std::time::Duration;
-
-fn supervisor(home: &Path, graph: &str) -> Result<Child, std::io::Error> {
-    Command::new(env!("CARGO_BIN_EXE_toy-supervisor"))
-        .arg(home)
-        .args(graph.split_whitespace())
-        .stdin(Stdio::null())
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-}
-
-/// Waits for the first status line: the run has started.
-fn wait_for_start(child: &mut Child) -> Result<BufReader<std::process::ChildStderr>, Box<dyn std::error::Error>> {
-    let mut errors = BufReader::new(child.stderr.take().ok_or("no stderr")?);
-    let mut line = String::new();
-    while errors.read_line(&mut line)? > 0 {
-        if line.contains("lost 0") {
-            return Ok(errors);
-        }
-        line.clear();
-    }
-    Err("it ended before it had started".into())
-}
-
-fn send(child: &Child, signal: Signal) -> Outcome {
-    Ok(kill(Pid::from_raw(child.id() as i32), signal)?)
-}
-
-fn report_of(child: &mut Child) -> Result<RunReport, Box<dyn std::error::Error>> {
-    let mut text = String::new();
-    child.stdout.take().ok_or("no stdout")?.read_to_string(&mut text)?;
-    child.wait()?;
-    Ok(serde_json::from_str(&text)?)
-}
 
 #[test]
 fn a_signal_ends_the_run_in_order() -> Outcome {

@@ -60,7 +60,7 @@ fn long_periods_do_not_hurt_a_linear_model() {
             if whole + 1 < slow.len() { slow[whole] + rest * (slow[whole + 1] - slow[whole]) } else { slow[whole] }
         })
         .collect();
-    let (a, b) = (run(&model, &[slow.clone()], 1e-2, None), run(&model, &[fine], 2e-4, None));
+    let (a, b) = (run(&model, std::slice::from_ref(&slow), 1e-2, None), run(&model, &[fine], 2e-4, None));
     for (a, b) in a.iter().zip(&b) {
         let every: Vec<f64> = b.iter().step_by(50).copied().collect();
         assert!(difference(a, &every) < 1e-11, "{}", difference(a, &every));
@@ -135,7 +135,7 @@ fn maxwell_slip_keeps_masing_and_wipes_out() {
                 if i == 2000 { corners[4] } else { corners[i / 500] + (corners[i / 500 + 1] - corners[i / 500]) * (i % 500) as f64 / 500.0 }
             })
             .collect();
-    let f = &run(&model, &[way.clone()], 1e-3, None)[0];
+    let f = &run(&model, std::slice::from_ref(&way), 1e-3, None)[0];
     assert!((f[500] - virgin(1e-3)).abs() < 1e-12);
     assert!((f[500] - f[1000] - 2.0 * virgin(4e-4)).abs() < 1e-12);
     assert!((f[1800] - virgin(way[1800])).abs() < 1e-12);
@@ -175,7 +175,7 @@ fn admittance(model: &backdrive_plant::model::Model, hz: f64, substeps: Option<u
     let period = 1e-3;
     let count = (6.0 / hz / period) as usize + 9000;
     let x = samples(count, period, |t| 1e-3 * (TAU * hz * t).sin() * (0.5 - 0.5 * (TAU / 4.0 * t.min(2.0)).cos()));
-    let y = run(model, &[x.clone()], period, substeps);
+    let y = run(model, std::slice::from_ref(&x), period, substeps);
     let window = (4.0 / hz / period).round() as usize;
     let phasor = |q: &[f64]| {
         (count - window..count).fold((0.0, 0.0), |s, i| {

@@ -56,7 +56,7 @@ fn backlash_without_a_gap_is_a_spring_and_a_damper() {
     let mut plain = rest();
     plain.extend([spring([at(0), at(1)], 4000.0), damper([at(0), at(1)], 2.0)]);
     let device = |elements| model(&[0.1, 0.2], elements, vec![force_input(0)], vec![Position(0), Velocity(1)]);
-    let (a, b) = (run(&device(joint), &[u.clone()], 5e-4, Some(8)), run(&device(plain), &[u], 5e-4, Some(8)));
+    let (a, b) = (run(&device(joint), std::slice::from_ref(&u), 5e-4, Some(8)), run(&device(plain), &[u], 5e-4, Some(8)));
     for (a, b) in a.iter().zip(&b) {
         assert!(difference(a, b) < 1e-4, "{}", difference(a, b));
     }
@@ -119,7 +119,7 @@ fn a_contact_beside_an_inerter() {
     ];
     let model = model(&[0.05, 0.1], elements, vec![force_input(0)], vec![Position(0), Position(1), Force(vec![1])]);
     let u = sweep(4000, 5e-4, 1.0, 8.0, 3.0);
-    let (coarse, fine) = (run(&model, &[u.clone()], 5e-4, None), run(&model, &[u], 5e-4, Some(64)));
+    let (coarse, fine) = (run(&model, std::slice::from_ref(&u), 5e-4, None), run(&model, &[u], 5e-4, Some(64)));
     for output in 0..2 {
         assert!(difference(&coarse[output], &fine[output]) < 2e-3, "{}", difference(&coarse[output], &fine[output]));
     }

@@ -57,12 +57,13 @@ fn eight_contacts_in_the_same_place_are_one() {
         elements.extend(frictions.iter().map(|c| coulomb([at(1), GROUND], *c)));
         model(&[0.1, 0.2], elements, vec![force_input(0)], vec![Position(0), Position(1), Velocity(1)])
     };
-    let one = run(&device(vec![0.36]), &[u.clone()], period, Some(2));
+    let one = run(&device(vec![0.36]), std::slice::from_ref(&u), period, Some(2));
     let eight = run(&device((1..=8).map(|i| 0.01 * f64::from(i)).collect()), &[u], period, Some(2));
     for (a, b) in one.iter().zip(&eight) {
         assert!(difference(b, a) < 1e-9, "{}", difference(b, a));
     }
-    assert!(eight[2].iter().filter(|v| **v == 0.0).count() > 100, "it never sticks");
+    let rests = [&one, &eight].map(|y| y[2].iter().filter(|v| **v == 0.0).count());
+    assert!(rests[0] > 50 && rests[1] == rests[0], "{rests:?}");
 }
 
 #[test]
@@ -114,7 +115,7 @@ fn friction_without_force_is_nothing() {
         );
         let without = model(&[0.5], vec![spring([at(0), GROUND], 50.0)], vec![force_input(0)], vec![Position(0)]);
         let u = sweep(2000, 1e-3, 1.0, 5.0, 1.0);
-        let (a, b) = (run(&with, &[u.clone()], 1e-3, Some(4)), run(&without, &[u], 1e-3, Some(4)));
+        let (a, b) = (run(&with, std::slice::from_ref(&u), 1e-3, Some(4)), run(&without, &[u], 1e-3, Some(4)));
         assert!(difference(&a[0], &b[0]) < 1e-5, "{}: {}", kind.0, difference(&a[0], &b[0]));
     }
 }
@@ -165,7 +166,7 @@ fn stribeck_and_deficit_converge_with_second_order() {
         ];
         let model = model(&[0.1, 0.2], elements, vec![force_input(0)], vec![Position(0)]);
         let u = sweep(3000, 2e-4, 4.0, 30.0, 3.0);
-        let y: Vec<Vec<f64>> = [1, 2, 4, 8, 64].into_iter().map(|n| run(&model, &[u.clone()], 2e-4, Some(n)).remove(0)).collect();
+        let y: Vec<Vec<f64>> = [1, 2, 4, 8, 64].into_iter().map(|n| run(&model, std::slice::from_ref(&u), 2e-4, Some(n)).remove(0)).collect();
         let errors: Vec<f64> = y[..4].iter().map(|q| difference(q, &y[4])).collect();
         println!("{kind}: errors {errors:?}");
         assert!(errors[0] < 2e-4, "{kind}: {errors:?}");

@@ -1,9 +1,13 @@
 //! Graphs of toy nodes.
 #![allow(dead_code)] // each test file uses its part
 
-use backdrive_launch::{Display, NodePlan, Plan, RunHome, SuperviseOptions};
+use backdrive_launch::{Display, NodePlan, Plan, RunHome, RunReport, SuperviseOptions};
 use backdrive_nodes::stage::{Clock, Timing};
+use nix::sys::signal::{Signal, kill};
+use nix::unistd::Pid;
+use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
+use std::process::{Child, ChildStderr, Command, Stdio};
 use std::time::{Duration, Instant};
 
 pub type Outcome = Result<(), Box<dyn std::error::Error>>;
@@ -79,4 +83,39 @@ pub fn shm_of(ids: &[String]) -> Vec<String> {
 pub fn runs_in(home: &Path) -> Vec<String> {
     let Ok(entries) = std::fs::read_dir(home) else { return Vec::new() };
     entries.flatten().map(|e| e.file_name().to_string_lossy().into_owned()).collect()
+}
+
+/// A supervisor as a process of its own.
+pub fn supervisor(home: &Path, graph: &str) -> Result<Child, std::io::Error> {
+    Command::new(env!("CARGO_BIN_EXE_toy-supervisor"))
+        .arg(home)
+        .args(graph.split_whitespace())
+        .stdin(Stdio::null())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+}
+
+/// Waits for the first status line: the run has started.
+pub fn wait_for_start(child: &mut Child) -> Result<BufReader<ChildStderr>, Box<dyn std::error::Error>> {
+    let mut errors = BufReader::new(child.stderr.take().ok_or("no stderr")?);
+    let mut line = String::new();
+    while errors.read_line(&mut line)? > 0 {
+        if line.contains("lost 0") {
+            return Ok(errors);
+        }
+        line.clear();
+    }
+    Err("it ended before it had started".into())
+}
+
+pub fn send(child: &Child, signal: Signal) -> Outcome {
+    Ok(kill(Pid::from_raw(child.id() as i32), signal)?)
+}
+
+pub fn report_of(child: &mut Child) -> Result<RunReport, Box<dyn std::error::Error>> {
+    let mut text = String::new();
+    child.stdout.take().ok_or("no stdout")?.read_to_string(&mut text)?;
+    child.wait()?;
+    Ok(serde_json::from_str(&text)?)
 }

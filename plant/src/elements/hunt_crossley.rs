@@ -55,6 +55,21 @@ impl Mechanics for HuntCrossley {
         if depth > 0.0 { (self.power(depth) * (self.stiffness + self.damping * v)).max(0.0) } else { 0.0 }
     }
 
+    #[inline]
+    fn mean_force(&self, memory: &[f64], from: f64, to: f64, v: f64) -> f64 {
+        let (start, end) = (from - self.gap, to - self.gap);
+        let deepest = start.max(end);
+        if deepest <= 0.0 {
+            0.0
+        } else if start > 0.0 && end > 0.0 {
+            self.force(memory, 0.5 * (from + to), v)
+        } else {
+            // The mean of qⁿ between 0 and the deepest, for the share of the path in touch.
+            let share = deepest / (start - end).abs();
+            (share * self.power(deepest) / (self.exponent + 1.0) * (self.stiffness + self.damping * v)).max(0.0)
+        }
+    }
+
     fn stored(&self, _memory: &[f64], x: f64) -> f64 {
         let depth = (x - self.gap).max(0.0);
         self.stiffness * self.power(depth) * depth / (self.exponent + 1.0)

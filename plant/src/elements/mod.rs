@@ -179,6 +179,12 @@ pub trait Mechanics {
         0.0
     }
 
+    /// Mean force over the straight path from `from` to `to` at speed `v`, with the memory of its middle. Worth its own
+    /// form where the force jumps on the way.
+    fn mean_force(&self, memory: &[f64], from: f64, to: f64, v: f64) -> f64 {
+        self.force(memory, 0.5 * (from + to), v)
+    }
+
     /// Energy that can be had back, J.
     fn stored(&self, _memory: &[f64], _x: f64) -> f64 {
         0.0
@@ -223,6 +229,10 @@ macro_rules! register {
             #[inline]
             fn force(&self, memory: &[f64], x: f64, v: f64) -> f64 {
                 match self { $(Law::$law(law) => law.force(memory, x, v)),* }
+            }
+            #[inline]
+            fn mean_force(&self, memory: &[f64], from: f64, to: f64, v: f64) -> f64 {
+                match self { $(Law::$law(law) => law.mean_force(memory, from, to, v)),* }
             }
             fn stored(&self, memory: &[f64], x: f64) -> f64 {
                 match self { $(Law::$law(law) => law.stored(memory, x)),* }

@@ -79,7 +79,8 @@ impl Plant {
                 let v = 1.5 * v0 - 0.5 * path.velocity_before;
                 path.law.advance(&mut path.memory, path.reached, x, half);
                 path.reached = x;
-                path.force = path.law.force(&path.memory, x, v);
+                let start = self.x[first] - self.x[second];
+                path.force = path.law.mean_force(&path.memory, start, 2.0 * x - start, v);
                 force[first] -= path.force;
                 force[second] += path.force;
             } else {
@@ -217,13 +218,20 @@ impl Plant {
 /// after. Whether there are any.
 #[cold]
 fn stop(fixed: &Compiled, frictions: &[FrictionContact], work: &mut Work) -> bool {
-    // Until the first of them stops all go on sliding: that motion tells when.
     let solved = work.force;
     let sliding = |contact: &FrictionContact, bounds: Bounds| if contact.mode > 0 { bounds.high } else { bounds.low };
+    // By velocity, not by force: of several contacts in one place some may still have the level of sliding on.
     for (c, contact) in frictions.iter().enumerate() {
-        if contact.leaves_its_level(c, work) {
-            work.force[c] = sliding(contact, work.bounds[c]);
+        let direction = f64::from(contact.mode);
+        let (v0, v1) = (contact.velocity_before * direction, 2.0 * fixed.constraints.velocity(c, work) * direction);
+        if v0 > 0.0 && v1 <= 1e-9 * v0 {
             work.stop[c].1 = f64::NAN;
+        }
+    }
+    // Until the first of them stops all go on sliding: that motion tells when.
+    for (c, contact) in frictions.iter().enumerate() {
+        if work.stop[c].1.is_nan() {
+            work.force[c] = sliding(contact, work.bounds[c]);
         }
     }
     let mut any = false;
@@ -233,7 +241,7 @@ fn stop(fixed: &Compiled, frictions: &[FrictionContact], work: &mut Work) -> boo
         }
         work.stop[c] = (0.0, 0.0);
         let (v0, v1) = (contact.velocity_before, 2.0 * fixed.constraints.velocity(c, work));
-        if v0 * f64::from(contact.mode) <= 0.0 || v0 * v1 >= 0.0 {
+        if v0 * v1 >= 0.0 {
             continue;
         }
         let (share, level) = (v0 / (v0 - v1), sliding(contact, work.bounds[c]));

@@ -118,7 +118,7 @@ fn check(model: &Model) -> Result<(), CompileError> {
                     _ if !value.is_finite() => "a finite number".to_owned(),
                     Range::NonNegative if *value < 0.0 => "at least 0".to_owned(),
                     Range::Positive if *value <= 0.0 => "above 0".to_owned(),
-                    Range::Between(low, high) if !(low..=high).contains(&value) => format!("from {low} to {high}"),
+                    Range::Between(low, high) if !(low..=high).contains(value) => format!("from {low} to {high}"),
                     _ => continue,
                 };
                 return Err(reason(format!("{} must be {expected}, not {value}", parameter.key)));
@@ -366,6 +366,7 @@ fn path_element(first: usize, second: usize, law: &Law) -> PathElement {
         velocity_before: 0.0,
         constraint: None,
         ahead: 0.0,
+        unresolved: false,
         absorbed: 0.0,
     }
 }

@@ -98,7 +98,8 @@ impl Constraints {
             let stiffness = (weight(ends.0, &response) - weight(ends.1, &response)) * (0.5 * substep * slopes.stiffness + slopes.damping);
             if stiffness > if slopes.bounded { STIFF } else { STIFF_UNBOUNDED } {
                 path.constraint = Some(all.ends.len());
-                path.ahead = if stiffness > if slopes.bounded { UNRESOLVED } else { STIFF } { substep } else { 0.5 * substep };
+                path.unresolved = stiffness > if slopes.bounded { UNRESOLVED } else { STIFF };
+                path.ahead = if path.unresolved { substep } else { 0.5 * substep };
                 all.paths.push(index);
                 all.ends.push(ends);
             }
@@ -242,7 +243,7 @@ fn trial_force(path: &mut PathElement, u: f64) -> f64 {
     let ahead = path.reached + path.ahead * u;
     path.trial.copy_from_slice(&path.memory);
     path.law.advance(&mut path.trial, path.reached, ahead, path.ahead);
-    path.law.force(&path.trial, ahead, u)
+    if path.unresolved { path.law.force(&path.trial, ahead, u) } else { path.law.mean_force(&path.trial, path.reached, 2.0 * ahead - path.reached, u) }
 }
 
 /// Solves `u + own f(u) = w` for f, starting from the force `start`: secant steps kept inside a bracket. The left side

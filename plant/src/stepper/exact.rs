@@ -182,10 +182,8 @@ impl Plant {
                 }
             }
             add(1.0);
-            for i in 0..n.min(R / 2) {
-                self.x[i] = next[i];
-                self.v[i] = next[n + i];
-            }
+            self.x[..n].copy_from_slice(&next[..n]);
+            self.v[..n].copy_from_slice(&next[n..2 * n]);
             for (drive, lag) in self.drives.iter_mut().zip(&propagator.lags) {
                 if let Some(row) = lag.filter(|row| *row < propagator.rows) {
                     drive.lagged = next[row];

@@ -211,6 +211,8 @@ struct PathElement {
     constraint: Option<usize>,
     /// How far ahead of the start of a substep its force is then taken, s.
     ahead: f64,
+    /// Whether that is the end of the substep, because it is too stiff for more.
+    unresolved: bool,
     /// What its force took out of the bodies so far, J.
     absorbed: f64,
 }
