@@ -3,7 +3,10 @@
 use crate::cli;
 use crate::failure::Failure;
 use crate::run::run_graph;
-use backdrive_nodes::graph::{Graph, NodeKind, Overrides, Settings};
+use backdrive_bags::{Reader, Signal, signals};
+use backdrive_nodes::graph::{Experiment, Graph, NodeKind, Overrides, Settings};
+use backdrive_plant::model::Model;
+use backdrive_plant::tomlfile::FileError;
 use serde_json::json;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -16,14 +19,26 @@ pub fn run(options: &cli::Run, graph: &Graph, changes: &Overrides) -> Result<u8,
     }
     let stem = options.graph.file_stem().map_or("experiments".into(), |s| s.to_string_lossy().to_string());
     let out = options.out.clone().unwrap_or_else(|| PathBuf::from(stem));
+    // All are read before the first runs: what is wrong with the last is told now.
+    let load = |e: &Experiment| {
+        let folder = e.step.as_ref().map_or(out.clone(), |step| out.join(step));
+        let changes = Overrides { bag: Some(folder.join(format!("{}.mcap", e.name))), ..changes.clone() };
+        Ok((folder, Graph::load_experiment(&options.graph, &changes, &e.name)?))
+    };
+    let graphs = graph.experiments.iter().map(load).collect::<Result<Vec<_>, Failure>>()?;
     let mut sets: Vec<Set> = Vec::new();
     let mut worst = 0;
-    for (index, experiment) in graph.experiments.iter().enumerate() {
-        let folder = experiment.step.as_ref().map_or(out.clone(), |step| out.join(step));
+    for (index, (experiment, (folder, each))) in graph.experiments.iter().zip(graphs).enumerate() {
         std::fs::create_dir_all(&folder).map_err(|e| Failure::write(&folder, e))?;
-        let file = format!("{}.mcap", experiment.name);
-        let changes = Overrides { bag: Some(folder.join(&file)), ..changes.clone() };
-        let each = Graph::load_experiment(&options.graph, &changes, &experiment.name)?;
+        let device = Device::of(&each)?;
+        let set = match sets.iter().position(|s| s.folder == folder) {
+            Some(there) => there,
+            None => {
+                sets.push(Set::new(folder, &device));
+                sets.len() - 1
+            }
+        };
+        sets[set].add(experiment, &device).map_err(|message| at(graph, experiment, message))?;
         eprintln!("{}/{}  {}{}", index + 1, graph.experiments.len(), experiment.name, if experiment.held_out { " (held out)" } else { "" });
         let done = run_graph(&each, options.transport)?;
         // Of an experiment it does not matter whether a loop was stable: there is none. Losses do.
@@ -32,16 +47,9 @@ pub fn run(options: &cli::Run, graph: &Graph, changes: &Overrides) -> Result<u8,
             return Ok(code);
         }
         worst = worst.max(if done.lost > 0 { code } else { 0 });
-        let set = match sets.iter().position(|s| s.folder == folder) {
-            Some(index) => &mut sets[index],
-            None => {
-                sets.push(Set::new(folder, &each)?);
-                let last = sets.len() - 1;
-                &mut sets[last]
-            }
-        };
-        let list = if experiment.held_out { &mut set.held_out } else { &mut set.fit };
-        list.push(file);
+        if let Some(bag) = &done.bag {
+            within_travel(bag, &device, graph, experiment)?;
+        }
     }
     for set in &sets {
         set.write()?;
@@ -57,17 +65,20 @@ pub fn run(options: &cli::Run, graph: &Graph, changes: &Overrides) -> Result<u8,
     Ok(worst)
 }
 
-/// A set of recordings in the making.
-struct Set {
-    folder: PathBuf,
-    model: String,
-    columns: Vec<(String, String, String)>,
-    fit: Vec<String>,
-    held_out: Vec<String>,
+/// An error at an experiment's line.
+fn at(graph: &Graph, experiment: &Experiment, message: String) -> Failure {
+    Failure::from(FileError::at(graph.path.display().to_string(), experiment.line, format!("experiment \"{}\"", experiment.name), message))
 }
 
-impl Set {
-    fn new(folder: PathBuf, graph: &Graph) -> Result<Set, Failure> {
+/// What an experiment records: the device as held, its grip a part of the model, and where each signal is told.
+struct Device {
+    model: Model,
+    /// Signal, topic, field.
+    columns: Vec<(String, String, String)>,
+}
+
+impl Device {
+    fn of(graph: &Graph) -> Result<Device, Failure> {
         let master = graph.nodes.iter().position(|n| n.kind == NodeKind::Master);
         let device = master.map(|index| (index, &graph.nodes[index].settings));
         let Some((index, Settings::Master(files))) = device else {
@@ -76,41 +87,82 @@ impl Set {
         let Some(model) = &files.model else {
             return Err(Failure::input(format!("{}: experiments need a master's model", graph.path.display())));
         };
-        // What is recorded is the device as held: its grip is part of the model, the hand at rest.
         let mut held = model.clone();
         let mut columns = Vec::new();
         let topic = graph.topic_of(index, "measured").name;
+        let intent = graph.nodes.iter().position(|n| n.kind == NodeKind::Operator);
         for (number, axis) in model.axes.iter().enumerate() {
             let (input, output) = (&model.inputs[axis.feedback].name, &model.outputs[axis.measured].name);
             columns.push((input.clone(), topic.clone(), format!("effort[{number}]")));
             columns.push((output.clone(), topic.clone(), format!("position[{number}]")));
-            if let Some(fragment) = &files.fragment {
-                let several = model.axes.len() > 1;
-                let prefix = if several { format!("{}{number}", fragment.network.name) } else { fragment.network.name.clone() };
-                let attached = held.attach(fragment, axis.user, &prefix);
-                if let Some(hand) = attached.hand_input {
-                    let intent = graph.nodes.iter().position(|n| n.kind == NodeKind::Operator);
-                    if let Some(intent) = intent {
-                        let topic = graph.topic_of(intent, "intent").name;
-                        columns.push((held.inputs[hand].name.clone(), topic, format!("position[{number}]")));
-                    }
-                }
+            let Some(fragment) = files.fragment.as_ref().filter(|_| !axis.holds_user) else { continue };
+            let several = model.axes.len() > 1;
+            let prefix = if several { format!("{}{number}", fragment.network.name) } else { fragment.network.name.clone() };
+            let attached = held.attach(fragment, axis.user, &prefix);
+            if let (Some(hand), Some(intent)) = (attached.hand_input, intent) {
+                columns.push((held.inputs[hand].name.clone(), graph.topic_of(intent, "intent").name, format!("position[{number}]")));
             }
-        }
-        for axis in &mut held.axes {
-            axis.holds_user = files.fragment.is_some();
+            held.axes[number].holds_user = true;
         }
         // Only what is recorded can be compared.
-        let kept: Vec<usize> = model.axes.iter().map(|a| a.measured).collect();
-        let wanted = |index: usize| kept.contains(&index);
-        let renumber = |index: usize| (0..index).filter(|i| wanted(*i)).count();
+        let recorded: Vec<usize> = model.axes.iter().map(|a| a.measured).collect();
+        let renumber = |index: usize| (0..index).filter(|i| recorded.contains(i)).count();
         let mut number = 0;
         held.outputs.retain(|_| {
             number += 1;
-            wanted(number - 1)
+            recorded.contains(&(number - 1))
         });
         held.axes.iter_mut().for_each(|a| a.measured = renumber(a.measured));
-        Ok(Set { folder, model: held.to_toml(), columns, fit: Vec::new(), held_out: Vec::new() })
+        Ok(Device { model: held, columns })
+    }
+}
+
+/// An experiment that throws the device against its stops records the stops, which no model has.
+fn within_travel(bag: &Path, device: &Device, graph: &Graph, experiment: &Experiment) -> Result<(), Failure> {
+    let reader = Reader::open(bag).map_err(Failure::input)?;
+    for axis in &device.model.axes {
+        let Some([low, high]) = axis.travel else { continue };
+        let measured = &device.model.outputs[axis.measured].name;
+        let Some((name, topic, field)) = device.columns.iter().find(|(signal, ..)| signal == measured) else { continue };
+        let found = signals(&reader, &[Signal::new(name, topic, field)]).map_err(Failure::input)?;
+        let outside = found.columns.iter().flatten().find(|x| **x < low || **x > high);
+        if let Some(x) = outside {
+            let name = &axis.name;
+            let message = format!("axis \"{name}\" went to {x:.4}, beyond its travel from {low} to {high}; weaken the excitation");
+            return Err(at(graph, experiment, message));
+        }
+    }
+    Ok(())
+}
+
+/// A set of recordings in the making.
+struct Set {
+    folder: PathBuf,
+    model: Model,
+    columns: Vec<(String, String, String)>,
+    fit: Vec<String>,
+    held_out: Vec<String>,
+    /// Per file, what is another number there than in the model: path and value.
+    conditions: Vec<(String, Vec<(String, f64)>)>,
+}
+
+impl Set {
+    fn new(folder: PathBuf, device: &Device) -> Set {
+        let (model, columns) = (device.model.clone(), device.columns.clone());
+        Set { folder, model, columns, fit: Vec::new(), held_out: Vec::new(), conditions: Vec::new() }
+    }
+
+    /// Adds an experiment's recording. It must be of the set's device, in which single numbers may differ.
+    fn add(&mut self, experiment: &Experiment, device: &Device) -> Result<(), String> {
+        let file = format!("{}.mcap", experiment.name);
+        let conditions = differences(&self.model, &device.model).filter(|_| self.columns == device.columns);
+        let conditions = conditions.ok_or("records a device of other bodies or elements than the experiments before it; give it a step of its own")?;
+        if !conditions.is_empty() {
+            self.conditions.push((file.clone(), conditions));
+        }
+        let list = if experiment.held_out { &mut self.held_out } else { &mut self.fit };
+        list.push(file);
+        Ok(())
     }
 
     fn write(&self) -> Result<(), Failure> {
@@ -123,9 +175,28 @@ impl Set {
         for (name, topic, field) in &self.columns {
             let _ = writeln!(text, "\"{name}\" = {{ topic = \"{topic}\", field = \"{field}\" }}");
         }
+        for (file, conditions) in &self.conditions {
+            let list = conditions.iter().map(|(path, value)| format!("\"{path}\" = {value:?}")).collect::<Vec<_>>().join(", ");
+            let _ = writeln!(text, "\n[files.\"{file}\"]\ncondition = {{ {list} }}");
+        }
         put(&self.folder.join("set.toml"), &text)?;
-        put(&self.folder.join("model.toml"), &self.model)
+        put(&self.folder.join("model.toml"), &self.model.to_toml())
     }
+}
+
+/// Numbers of bodies and elements that `other` has in place of `model`'s; `None` where more than single numbers differ.
+fn differences(model: &Model, other: &Model) -> Option<Vec<(String, f64)>> {
+    let mut alike = model.clone();
+    let mut found = Vec::new();
+    for path in other.parameter_paths() {
+        let (mine, theirs) = (model.values_at(&path).ok()?, other.values_at(&path).ok()?);
+        if mine != theirs {
+            let [value] = theirs.as_slice() else { return None };
+            alike.set_values_at(&path, &theirs).ok()?;
+            found.push((path, *value));
+        }
+    }
+    (alike == *other).then_some(found)
 }
 
 fn put(path: &Path, text: &str) -> Result<(), Failure> {

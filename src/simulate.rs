@@ -2,10 +2,10 @@
 
 use crate::cli;
 use crate::failure::Failure;
-use backdrive_bags::{Reader, Signal, signals};
+use backdrive_bags::{Reader, recording};
 use backdrive_plant::excitation::{Excitation, load_experiments};
 use backdrive_plant::model::{Fragment, Hold, Model, OutputKind};
-use backdrive_plant::recording::{Columns, Piece, Recording, Source, read_csv, signals_of, write_csv};
+use backdrive_plant::recording::{Columns, Piece, Recording, read_csv, signals_of, write_csv};
 use backdrive_plant::set::RecordingSet;
 use backdrive_plant::stepper::{Options, simulate as simulate_model};
 use serde_json::json;
@@ -96,8 +96,7 @@ fn drives(options: &cli::Simulate, model: &Model) -> Result<Vec<(Recording, Path
 /// The signals of a model from a recording: all of its inputs, and those of its outputs that were recorded.
 pub fn read_recording(path: &Path, model: &Model, columns: &Columns, piece: &Piece) -> Result<Recording, Failure> {
     let is_bag = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("mcap"));
-    let wanted = signals_of(model);
-    let recording = if is_bag { from_bag(path, &wanted, columns)? } else { read_csv(path, None, columns, piece)? };
+    let recording = if is_bag { from_bag(path, model, columns, piece)? } else { read_csv(path, None, columns, piece)? };
     for input in &model.inputs {
         if recording.signal(&input.name).is_none() && !input.name.ends_with(".hand") {
             let there: Vec<&str> = recording.signals.iter().map(|(name, _)| name.as_str()).collect();
@@ -112,38 +111,21 @@ pub fn read_recording(path: &Path, model: &Model, columns: &Columns, piece: &Pie
     Ok(recording.regular_for(model).map_err(Failure::input)?)
 }
 
-fn from_bag(path: &Path, wanted: &[&str], columns: &Columns) -> Result<Recording, Failure> {
+fn from_bag(path: &Path, model: &Model, columns: &Columns, piece: &Piece) -> Result<Recording, Failure> {
     let reader = Reader::open(path).map_err(Failure::input)?;
-    let mut list = Vec::new();
-    for name in wanted {
-        let rule = columns.iter().find(|(signal, _)| signal == name).map(|(_, rule)| rule);
-        match rule.map(|r| &r.source) {
-            Some(Source::Topic { topic, field }) => {
-                let (scale, offset) = rule.map_or((1.0, 0.0), |r| (r.scale, r.offset));
-                list.push(Signal { scale, offset, hold: Hold::Zero, ..Signal::new(name, topic, field) });
-            }
-            Some(Source::Column(column)) => {
-                return Err(Failure::input(format!("{}: is a bag: name a topic and a field for \"{name}\", not the column \"{column}\"", path.display())));
-            }
-            // An imported table has a topic of its own for every column.
-            None if reader.topic(&format!("/recording/{name}")).is_ok() => {
-                list.push(Signal::new(name, &format!("/recording/{name}"), "position[0]"));
-            }
-            None => {}
-        }
-    }
-    if list.is_empty() {
+    let there = |name: &str| columns.iter().any(|(signal, _)| signal == name) || reader.topic(&format!("/recording/{name}")).is_ok();
+    let wanted: Vec<&str> = signals_of(model).into_iter().filter(|name| there(name)).collect();
+    if wanted.is_empty() {
         let topics: Vec<&str> = reader.topics().iter().map(|t| t.name.as_str()).collect();
         return Err(Failure::input(format!(
             "{}: say in [columns] of a set.toml which topics hold {}; the bag has {}",
             path.display(),
-            wanted.join(", "),
+            signals_of(model).join(", "),
             topics.join(", ")
         )));
     }
-    let found = signals(&reader, &list).map_err(Failure::input)?;
-    let named = found.names.into_iter().zip(found.columns).collect();
-    Recording::new(path.display().to_string(), found.t, named).map_err(Failure::input)
+    let hold = |name: &str| model.inputs.iter().find(|i| i.name == name).map_or(Hold::Linear, |i| i.hold);
+    recording(&reader, Some(&wanted), columns, piece, &hold).map_err(Failure::input)
 }
 
 /// A recording of inputs only, made from excitations.

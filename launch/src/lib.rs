@@ -4,7 +4,7 @@
 //! - [`plan`]: what the supervisor needs to know of a graph
 //! - [`rundir`]: the directory of a run; [`sweep`]: removing what dead runs have left
 //! - `child`: one process, heard and ended; `slot`: the place of a node in a run, over all its lives
-//! - [`supervise`]: starting and ending a run; `watch`: what happens between
+//! - [`mod@supervise`]: starting and ending a run; `watch`: what happens between
 //! - [`status`], `screen`: what a person sees meanwhile
 //! - [`report`]: what is known afterwards
 //!

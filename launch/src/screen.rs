@@ -122,8 +122,7 @@ fn draw(shown: &mpsc::Receiver<Show>, dropped: &AtomicU64, display: Display, eve
                 } else {
                     format!("{}, ", crate::status::clock(summary.elapsed))
                 };
-                let message = format!("{}{at}{}", left.unwrap_or_default(), summary.line());
-                bar.set_message(message.chars().take(room(with_end)).collect::<String>());
+                bar.set_message(format!("{}{at}{}", left.unwrap_or_default(), summary.line()));
                 bar.tick();
             }
             Show::Summary(summary) if display != Display::Quiet => {
@@ -146,24 +145,7 @@ fn new_bar() -> ProgressBar {
     bar
 }
 
-/// Columns for the message. The line ends before the edge: a terminal echoes `^C` where the cursor is, and an echo that
-/// wraps would leave the line behind.
-fn room(with_end: bool) -> usize {
-    let mut size = nix::libc::winsize { ws_row: 0, ws_col: 0, ws_xpixel: 0, ws_ypixel: 0 };
-    // SAFETY: the call fills the structure in or fails.
-    let known = unsafe { nix::libc::ioctl(nix::libc::STDERR_FILENO, nix::libc::TIOCGWINSZ, &mut size) } == 0;
-    let columns = if known && size.ws_col > 0 { usize::from(size.ws_col) } else { 80 };
-    columns.saturating_sub(ECHO + if with_end { BAR } else { SPINNER })
-}
-
-/// Columns of two echoed control characters.
-const ECHO: usize = 4;
-
-/// Columns before the message, with a bar and without.
-const BAR: usize = 29;
-const SPINNER: usize = 2;
-
 fn style(with_end: bool) -> ProgressStyle {
-    let template = if with_end { "[{bar:20}] {percent:>3} % {msg}" } else { "{spinner} {msg}" };
+    let template = if with_end { "[{bar:20}] {percent:>3} % {wide_msg}" } else { "{spinner} {wide_msg}" };
     ProgressStyle::with_template(template).map_or_else(|_| ProgressStyle::default_bar(), |s| s.progress_chars("=> "))
 }

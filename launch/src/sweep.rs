@@ -53,15 +53,18 @@ struct Dead {
 }
 
 impl RunHome {
-    /// Removes everything that dead runs have left, in about this time at most. Called at every start.
+    /// Removes everything that dead runs have left, in about this time at most, and 3 s more if processes of
+    /// theirs must be ended. Called at every start.
     pub fn sweep(&self, limit: Duration) -> Swept {
-        let deadline = Instant::now() + limit;
+        let mut deadline = Instant::now() + limit;
         let mut swept = Swept::default();
         let mut dead = self.find_dead(deadline, &mut swept);
         if dead.is_empty() {
             return swept;
         }
+        let before = Instant::now();
         end_orphans(&mut dead);
+        deadline += before.elapsed();
         let prefixes: Vec<String> = dead.iter().map(|d| prefix_of(&d.run.id)).collect();
         let prefixes: Vec<&str> = prefixes.iter().map(String::as_str).collect();
         let shm = match shm_files(&self.shm, &prefixes) {

@@ -182,7 +182,8 @@ impl Supervisor {
         });
         argv.extend(["--run".to_string(), root, "--name".to_string(), slot.plan.name.clone()]);
         slot.life += 1;
-        // The end of its standard input tells a recorder to finish its file; whoever hangs is left to the next sweep.
+        // A recorder may finish its file: the end of its standard input tells it to. Our own nodes set a signal
+        // that only wakes them, and end by themselves within seconds. Whoever hangs is left to the next sweep.
         let orphaned = if slot.plan.records { Signal::SIGTERM } else { Signal::SIGKILL };
         let spawn = Spawn { name: &slot.plan.name, node: index, life: slot.life, argv: &argv, orphaned };
         let child = Child::spawn(&spawn, self.notices.clone())?;

@@ -9,6 +9,7 @@
 mod common;
 
 use backdrive_bags::Completeness;
+use backdrive_control::core::{Core, Events, Port, Tick};
 use backdrive_msgs::{Message, Sample};
 use backdrive_nodes::clock::{Start, now_ns};
 use backdrive_nodes::histogram::Histogram;
@@ -16,6 +17,7 @@ use backdrive_nodes::process::{ProcessOptions, run_process};
 use backdrive_nodes::protocol::{FromNode, NodeStatus, ToNode};
 use backdrive_nodes::recorder::{Sink, run_recorder};
 use backdrive_nodes::runner::{Options, RunError};
+use backdrive_nodes::sequence::Sequence;
 use backdrive_nodes::stage::{Clock, Timing};
 use backdrive_nodes::transport::Location;
 use backdrive_nodes::transport::iceoryx2::Iceoryx2;
@@ -50,8 +52,30 @@ fn compare(loops: u64, runs: u64) -> Result<ExitCode> {
     }
     let pipe = show("pipe ring of 5", &pipes);
     let own = show("lockstep of 5 + recorder", &ours);
+    println!("in one thread: {:.0} ns per loop of the same nodes around empty cores", one_thread()?);
     println!("ratio of p50: {:.2} (target at most 4, aim 2); of loops/s: {:.2}", own[1] / pipe[1], pipe[0] / own[0]);
     Ok(ExitCode::SUCCESS)
+}
+
+/// Does nothing, so that only what is around it is measured.
+struct Empty;
+
+impl Core for Empty {
+    fn step(&mut self, _: &Tick, _: &[Port], _: &mut [Sample], _: &mut Events) {}
+}
+
+/// ns per step of all five nodes, the best of ten runs.
+fn one_thread() -> Result<f64> {
+    const STEPS: u64 = 200_000;
+    let mut plans = plans(None, true);
+    plans.iter_mut().flat_map(|p| &mut p.stages).for_each(|s| s.core = Box::new(Empty));
+    let mut sequence = Sequence::new(plans, &ring_timing(STEPS))?;
+    let runs = (0..10).map(|_| {
+        let begun = now_ns();
+        sequence.run(STEPS, None);
+        (now_ns() - begun) as f64 / STEPS as f64
+    });
+    Ok(runs.fold(f64::INFINITY, f64::min))
 }
 
 /// loops/s, p50 µs, p99 µs.

@@ -56,18 +56,7 @@ impl Book {
     pub fn event(&mut self, step: u64, stamp_ns: i64, kind: &str, value: f64, severity: u32, text: Text<128>) -> Event {
         let sequence = self.events;
         self.events += 1;
-        Event {
-            layout: LAYOUT,
-            source: self.source,
-            step,
-            sequence,
-            stamp_ns,
-            severity,
-            reserved: 0,
-            value,
-            kind: Text::new(kind),
-            text,
-        }
+        Event { layout: LAYOUT, source: self.source, step, sequence, stamp_ns, severity, reserved: 0, value, kind: Text::new(kind), text }
     }
 
     /// Takes out what a core has noted, one message each.

@@ -125,6 +125,9 @@ mod tests {
         assert_eq!(first, again);
         assert_ne!(first, other);
         assert!((fresh(&first) as f64 / 20_000.0 - 0.8).abs() < 0.02);
-        assert!(lossy(3).len() == 20_000 && run(Impairment { delay_s: 0.0, jitter_s: 0.0, loss: 1.0, seed: 1 }, 100).iter().all(Option::is_none));
+        assert!(
+            lossy(3).len() == 20_000
+                && run(Impairment { delay_s: 0.0, jitter_s: 0.0, loss: 1.0, seed: 1 }, 100).iter().all(Option::is_none)
+        );
     }
 }

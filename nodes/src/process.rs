@@ -14,7 +14,7 @@ use nix::sys::signal::{SigHandler, Signal, signal};
 use std::io::{BufRead, Write};
 use std::process::ExitCode;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TrySendError, sync_channel};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
@@ -59,7 +59,6 @@ pub(crate) struct Line {
     pub control: Arc<Control>,
     start: Receiver<Start>,
     out: SyncSender<Out>,
-    dropped: AtomicBool,
     writer: Mutex<Option<JoinHandle<()>>>,
 }
 
@@ -103,14 +102,12 @@ impl Line {
         });
         let watched = Arc::clone(&control);
         std::thread::spawn(move || watch(&watched));
-        Line { control, start, out, dropped: AtomicBool::new(false), writer: Mutex::new(Some(writer)) }
+        Line { control, start, out, writer: Mutex::new(Some(writer)) }
     }
 
     /// Passes on what a loop tells; never blocks. What does not fit is dropped: it has been published as well.
     pub fn tell(&self, told: Told) {
-        if let Err(TrySendError::Full(_)) = self.out.try_send(Out::Told(told)) {
-            self.dropped.store(true, Ordering::Relaxed);
-        }
+        let _ = self.out.try_send(Out::Told(told));
     }
 
     fn say(&self, message: FromNode) {
@@ -149,9 +146,7 @@ impl Line {
         let result = work(self);
         let (last, code) = match result {
             Ok(status) => (FromNode::Done(status), ExitCode::SUCCESS),
-            Err(e) => {
-                (FromNode::Failed { error: e.to_string(), code: e.code() }, ExitCode::from(e.code()))
-            }
+            Err(e) => (FromNode::Failed { error: e.to_string(), code: e.code() }, ExitCode::from(e.code())),
         };
         self.say(last);
         if let Some(writer) = self.writer.lock().unwrap_or_else(PoisonError::into_inner).take() {

@@ -2,7 +2,6 @@
 
 use nix::libc;
 use nix::sched::{CpuSet, sched_setaffinity};
-use nix::sys::mman::{MlockAllFlags, mlockall};
 use nix::unistd::Pid;
 
 /// What to ask for.
@@ -47,9 +46,11 @@ pub fn enter(options: &Options) -> Vec<String> {
         }
     }
     if options.lock_memory {
-        // Only what is mapped now: later buffers of other threads must not fail for want of lockable memory.
-        if let Err(e) = mlockall(MlockAllFlags::MCL_CURRENT) {
-            refused.push(format!("memory lock: {} (see RLIMIT_MEMLOCK)", e.desc()));
+        // Only what is mapped now: later buffers must not fail for want of lockable memory. And only pages
+        // that are touched: most of a topic's segment is room for listeners that never come.
+        // SAFETY: takes flags only.
+        if unsafe { libc::mlockall(libc::MCL_CURRENT | libc::MCL_ONFAULT) } != 0 {
+            refused.push(format!("memory lock: {} (see RLIMIT_MEMLOCK)", nix::errno::Errno::last().desc()));
         }
     }
     refused

@@ -206,6 +206,8 @@ struct Teller {
     status: Output,
     noted: Events,
     report: Report,
+    /// When a broken connection was last told, ns: once a second is enough.
+    broken_told_at: i64,
 }
 
 impl Runner {
@@ -260,7 +262,7 @@ impl Runner {
             timing: timing.clone(),
             options,
             stages,
-            teller: Teller { book, events, status, noted: Events::default(), report: Report::default() },
+            teller: Teller { book, events, status, noted: Events::default(), report: Report::default(), broken_told_at: i64::MIN },
             gains_in,
             gains_out,
             loop_time: Histogram::default(),
@@ -584,7 +586,10 @@ impl Teller {
 
     /// Real time goes on without a message that could not be moved. Returns "not ready".
     fn tell_broken(&mut self, step: u64, stamp_ns: i64, error: &TransportError, tell: &mut dyn FnMut(Told)) -> bool {
-        self.tell_event(step, stamp_ns, "connection_broken", NO_VALUE, 2, Text::new(&error.to_string()), tell);
+        if stamp_ns.saturating_sub(self.broken_told_at) >= 1_000_000_000 {
+            self.broken_told_at = stamp_ns;
+            self.tell_event(step, stamp_ns, "connection_broken", NO_VALUE, 2, Text::new(&error.to_string()), tell);
+        }
         false
     }
 }

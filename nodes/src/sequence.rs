@@ -48,7 +48,8 @@ enum Source {
 struct Input {
     source: Source,
     lag: u64,
-    line: Option<Line>,
+    /// Boxed: few inputs have one, and the others should lie close together.
+    line: Option<Box<Line>>,
 }
 
 /// Past samples of an output; the length is a power of two greater than any delay on it.
@@ -83,7 +84,8 @@ pub struct Sequence {
     nodes: Vec<Node>,
     /// The outputs of all stages, one after the other.
     samples: Vec<Sample>,
-    axes: Vec<usize>,
+    /// What each of them is before its core fills it.
+    blank: Vec<Sample>,
     rings: Vec<Ring>,
     topics: Vec<Topic>,
     noted: Events,
@@ -166,7 +168,7 @@ impl Sequence {
             let slots = first_slot..first_slot + stage.outputs.len();
             first_slot = slots.end;
             let inputs = seen(&stage.inputs).zip(sources).map(|(port, source)| {
-                let line = port.impairment.as_ref().map(|i| Line::new(i, rate_hz));
+                let line = port.impairment.as_ref().map(|i| Box::new(Line::new(i, rate_hz)));
                 let lag = port.delay + line.as_ref().map_or(0, |l| l.delay);
                 let source = if let Source::Ring(slot, delay) = source { Source::Ring(ring_of[slot], delay) } else { source };
                 Input { source, lag, line }
@@ -185,8 +187,12 @@ impl Sequence {
                 wanted: Wanted::default(),
             });
         }
-        let samples = axes.iter().map(|a| Sample::new(*a)).collect();
-        Ok(Sequence { rate_hz, step: 0, stages, nodes, samples, axes, rings, topics, noted: Events::default() })
+        let mut blank: Vec<Sample> = axes.iter().map(|a| Sample::new(*a)).collect();
+        for stage in &stages {
+            let source = nodes[stage.node].book.source;
+            blank[stage.slots.clone()].iter_mut().for_each(|s| (s.layout, s.source) = (LAYOUT, source));
+        }
+        Ok(Sequence { rate_hz, step: 0, stages, nodes, samples: blank.clone(), blank, rings, topics, noted: Events::default() })
     }
 
     /// All topics, in the order of the numbers that a [`Tap`] hears: first those of samples.
@@ -240,7 +246,7 @@ impl Sequence {
                     Source::Ring(ring, delay) => step.checked_sub(delay).map(|past| self.rings[ring].at(past)),
                 };
                 match &mut input.line {
-                    None => *port = Port { sample: sample.copied(), age_steps: 0 },
+                    None => hold(port, sample),
                     Some(line) => {
                         if let Some(sample) = sample {
                             line.insert(sample, step);
@@ -251,12 +257,11 @@ impl Sequence {
                 }
             }
             let outputs = &mut self.samples[stage.slots.clone()];
-            for (sample, axes) in outputs.iter_mut().zip(&self.axes[stage.slots.clone()]) {
-                *sample = Sample::new(*axes);
-            }
+            outputs.copy_from_slice(&self.blank[stage.slots.clone()]);
             stage.core.step(&tick, &stage.ports, outputs, &mut self.noted);
             let node = &mut self.nodes[stage.node];
             for sample in outputs.iter_mut() {
+                // A core may have put a whole sample there.
                 (sample.layout, sample.source) = (LAYOUT, node.book.source);
                 // Every output speaks once per step, so its count is the step.
                 (sample.step, sample.sequence, sample.stamp_ns) = (step, step, stamp_ns);
@@ -307,6 +312,15 @@ impl Ring {
     }
 }
 
+/// Copies a sample straight into its port; building the port beside it first would copy it twice.
+#[inline]
+fn hold(port: &mut Port, sample: Option<&Sample>) {
+    match (&mut port.sample, sample) {
+        (Some(held), Some(sample)) => *held = *sample,
+        (held, sample) => *held = sample.copied(),
+    }
+}
+
 /// The inputs that a core sees. Nothing needs to be held back where everything is stepped in turn.
 fn seen(inputs: &[InputPort]) -> impl Iterator<Item = &InputPort> {
     inputs.iter().filter(|p| p.name != PACE_PORT)
@@ -321,9 +335,8 @@ struct Place {
 /// Stages so that each comes after those it waits for in the same step; otherwise as the plans have them.
 fn order(plans: &[NodePlan]) -> Result<Vec<Place>, SequenceError> {
     let stage_at = |p: &Place| &plans[p.node].stages[p.stage];
-    let mut waiting: Vec<Place> = (0..plans.len())
-        .flat_map(|node| (0..plans[node].stages.len()).map(move |stage| Place { node, stage }))
-        .collect();
+    let mut waiting: Vec<Place> =
+        (0..plans.len()).flat_map(|node| (0..plans[node].stages.len()).map(move |stage| Place { node, stage })).collect();
     let outputs: Vec<&str> = waiting.iter().flat_map(|p| &stage_at(p).outputs).map(|o| o.topic.name.as_str()).collect();
     if let Some(twice) = outputs.iter().enumerate().find_map(|(i, name)| outputs[..i].contains(name).then_some(*name)) {
         return Err(SequenceError::TwoPublishers(twice.to_string()));

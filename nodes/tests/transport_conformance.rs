@@ -286,7 +286,8 @@ fn a_publisher_may_come_again(world: &dyn World, _: &dyn World) {
 fn carries_every_kind_and_no_other(world: &dyn World, _: &dyn World) {
     let gains = Message::Gains(Gains { layout: LAYOUT, source: 1, step: 2, sequence: 3, stamp_ns: 4, mu: 5.0, lambda: 6.0, ramp_s: 7.0 });
     let (missed_deadlines, lost, loop_p50_s, loop_p99_s) = (6, 7, 8.0, 9.0);
-    let status = Status { layout: LAYOUT, source: 1, step: 2, sequence: 3, stamp_ns: 4, steps: 5, missed_deadlines, lost, loop_p50_s, loop_p99_s };
+    let status =
+        Status { layout: LAYOUT, source: 1, step: 2, sequence: 3, stamp_ns: 4, steps: 5, missed_deadlines, lost, loop_p50_s, loop_p99_s };
     let messages = [sample(3), gains, event(3), Message::Status(status)];
     let (mut a, mut b) = (world.join("a"), world.join("b"));
     for (i, message) in messages.iter().enumerate() {
@@ -344,13 +345,14 @@ mod killed {
         let Ok(role) = std::env::var("BACKDRIVE_TEST_ROLE") else { return };
         let location: Location = serde_json::from_str(&std::env::var("BACKDRIVE_TEST_LOCATION").unwrap()).unwrap();
         let mut transport = Iceoryx2::open(&location, "victim").unwrap();
+        let (mut receiver, mut sender);
         if role == "subscriber" {
-            let mut receiver = transport.subscriber(&samples(), 16, true).unwrap();
+            receiver = transport.subscriber(&samples(), 16, true).unwrap();
             while receiver.receive().unwrap().is_none() {
                 transport.wait(Duration::from_millis(100)).unwrap();
             }
         } else {
-            let mut sender = transport.publisher(&samples(), 1).unwrap();
+            sender = transport.publisher(&samples(), 1).unwrap();
             while sender.listeners() == 0 {}
             (0..100).for_each(|i| sender.send(&sample(i)).unwrap());
         }
@@ -408,7 +410,7 @@ mod killed {
             let mut child = start("publisher", &world.0);
             let mut heard = Vec::new();
             until_ready(&mut child, || heard.extend(sequences(&mut receiver)));
-            // Connected is who has received; nothing is promised of a publisher that nobody has met alive.
+            // Nothing is promised of a publisher that nobody has met alive.
             assert!(receiver.has_publisher(), "the publisher has died of itself");
             child.kill().unwrap();
             child.wait().unwrap();

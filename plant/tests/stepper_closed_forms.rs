@@ -239,3 +239,18 @@ fn compensator_without_damper_rings_at_the_limit_of_equation_2() {
         assert!((found / hz - 1.0).abs() < 1e-4, "{found}");
     }
 }
+
+#[test]
+fn a_chain_of_fourteen_bodies_and_a_hand() {
+    let n = 14;
+    let mut elements: Vec<_> = (0..n).map(|i| spring([at(i), at(i + 1)], 2000.0 + 100.0 * i as f64)).collect();
+    elements.extend((0..n).map(|i| damper([at(i), at(i + 1)], 0.3)));
+    let mut linear = model(&[0.1; 15], elements, vec![force_input(0), motion_input(n)], vec![Position(0), Velocity(7), Reaction(n)]);
+    let inputs = [sweep(2000, 1e-3, 1.0, 20.0, 1.0), sweep(2000, 1e-3, 1.0, 9.0, 1e-3)];
+    let exact = run(&linear, &inputs, 1e-3, None);
+    linear.elements.push(coulomb([at(3), at(9)], 0.0));
+    let by_substeps = run(&linear, &inputs, 1e-3, Some(10));
+    for (a, b) in by_substeps.iter().zip(&exact) {
+        assert!(difference(a, b) < 2e-4, "{}", difference(a, b));
+    }
+}

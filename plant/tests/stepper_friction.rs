@@ -166,7 +166,8 @@ fn stribeck_and_deficit_converge_with_second_order() {
         ];
         let model = model(&[0.1, 0.2], elements, vec![force_input(0)], vec![Position(0)]);
         let u = sweep(3000, 2e-4, 4.0, 30.0, 3.0);
-        let y: Vec<Vec<f64>> = [1, 2, 4, 8, 64].into_iter().map(|n| run(&model, std::slice::from_ref(&u), 2e-4, Some(n)).remove(0)).collect();
+        let y: Vec<Vec<f64>> =
+            [1, 2, 4, 8, 64].into_iter().map(|n| run(&model, std::slice::from_ref(&u), 2e-4, Some(n)).remove(0)).collect();
         let errors: Vec<f64> = y[..4].iter().map(|q| difference(q, &y[4])).collect();
         println!("{kind}: errors {errors:?}");
         assert!(errors[0] < 2e-4, "{kind}: {errors:?}");

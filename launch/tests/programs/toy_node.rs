@@ -113,7 +113,10 @@ fn run(toy: &Toy, name: &str, words: &mpsc::Receiver<ToNode>) -> Outcome {
             Err(mpsc::RecvTimeoutError::Timeout) => {}
         }
         let Some(begun) = begun else { continue };
-        say(&FromNode::Status(status(toy, Some(begun))))?;
+        let told = say(&FromNode::Status(status(toy, Some(begun))));
+        if !toy.has("deaf") {
+            told?;
+        }
         let due = |what: &str| !spared && toy.number(what).is_some_and(|ms| begun.elapsed() >= Duration::from_millis(ms));
         if let (true, Some(once)) = (due("crash") || due("exit") || due("fail"), &once) {
             std::fs::write(once, "")?;

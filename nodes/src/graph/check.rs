@@ -21,6 +21,7 @@ pub(super) fn check(graph: &Graph, top: &Table) -> Result<(), FileError> {
     one_publisher(graph, &of_node)?;
     axes_agree(graph, &of_node, &of_connection)?;
     no_loop_without_delay(graph, &of_connection)?;
+    excitations_within_limits(graph, top)?;
     for node in &graph.nodes {
         if node.restart && graph.timing.clock == crate::stage::Clock::Lockstep {
             return Err(of_node(node, "restart needs clock = \"realtime\": in lockstep the others cannot go on without it".into()));
@@ -91,6 +92,30 @@ fn axes_agree(graph: &Graph, of_node: &OfNode, of_connection: &OfConnection) -> 
         }
     }
     Ok(())
+}
+
+/// A device would cut an excitation off at its limit of force, and a recording would show the cut one.
+fn excitations_within_limits(graph: &Graph, top: &Table) -> Result<(), FileError> {
+    for connection in graph.connections.iter().filter(|c| c.to.1 == "force") {
+        let (exciter, master) = (&graph.nodes[connection.from.0], &graph.nodes[connection.to.0]);
+        let (Settings::Exciter(forces), Settings::Master(files)) = (&exciter.settings, &master.settings) else { continue };
+        for (samples, axis) in forces.iter().zip(files.model.iter().flat_map(|m| &m.axes)) {
+            let peak = samples.iter().fold(0.0_f64, |peak, f| peak.max(f.abs()));
+            // A little more passes: a peak at the limit may be rounded up.
+            if let Some(limit) = axis.force.filter(|limit| peak > limit * (1.0 + 1e-9)) {
+                let message = format!("reaches {peak:.3} on axis \"{}\", but \"{}\" is limited to a force of {limit}; lower its amplitude, or cut it off with limit={limit}", axis.name, master.name);
+                return Err(FileError::at(top.file_name(), line_in(top, &exciter.name, "force"), format!("node \"{}\" force", exciter.name), message));
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Line of a key of a node.
+fn line_in(top: &Table, node: &str, key: &str) -> usize {
+    let tables = Table::parse(top.text(), top.file_name()).and_then(|mut top| top.tables("nodes")).unwrap_or_default();
+    let is_it = |table: &mut Table| table.string("name").ok().flatten().as_deref() == Some(node);
+    tables.into_iter().find_map(|mut table| is_it(&mut table).then(|| table.line_of(key))).unwrap_or(1)
 }
 
 fn no_loop_without_delay(graph: &Graph, of_connection: &OfConnection) -> Result<(), FileError> {

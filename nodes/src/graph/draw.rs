@@ -1,7 +1,8 @@
 //! Draws a graph as text: every node with its ports, every connection as a line beside them.
 
-use super::{Connection, Direction, Graph, NodeKind, Settings, check::order};
+use super::{Connection, Direction, Graph, Node, NodeKind, Settings, check::order};
 use std::fmt::Write;
+use std::path::Path;
 
 struct Row {
     text: String,
@@ -51,7 +52,7 @@ fn rows(graph: &Graph) -> Vec<Row> {
     for (node_index, stage_index) in stages {
         let (node, stage) = (&graph.nodes[node_index], &graph.nodes[node_index].kind.stages()[stage_index]);
         let part = if node.kind.stages().len() > 1 { format!(".{}", stage.name) } else { String::new() };
-        rows.push(Row { text: format!("[{}{part}]  {}", node.name, describe(&node.settings, node.kind)), port: None });
+        rows.push(Row { text: format!("[{}{part}]  {}", node.name, describe(node)), port: None });
         for port in stage.inputs {
             let connected = graph.connections.iter().any(|c| c.to.0 == node_index && c.to.1 == port.name);
             if connected {
@@ -70,8 +71,13 @@ fn rows(graph: &Graph) -> Vec<Row> {
     rows
 }
 
-fn describe(settings: &Settings, kind: NodeKind) -> String {
-    match settings {
+fn describe(node: &Node) -> String {
+    let kind = node.kind;
+    if let Some(program) = node.command.as_ref().and_then(|words| words.first()) {
+        let name = Path::new(program).file_name().map_or(program.clone(), |n| n.to_string_lossy().to_string());
+        return format!("{}: the program {name}", kind.name());
+    }
+    match &node.settings {
         Settings::Master(device) | Settings::Slave(device) | Settings::Canceller(device, _) => {
             let model = device.model.as_ref().map_or("subtracts nothing", |m| m.name.as_str());
             match &device.fragment {

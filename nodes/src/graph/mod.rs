@@ -8,6 +8,7 @@ mod draw;
 mod kinds;
 mod overrides;
 mod parse;
+mod recorded;
 
 pub use draw::draw;
 pub use kinds::{Direction, NodeKind, PortKind, StageKind};
@@ -60,6 +61,8 @@ pub struct Experiment {
     pub held_out: bool,
     /// Which step of a protocol it belongs to: its recordings make a set of their own.
     pub step: Option<String>,
+    /// Line of the file where it begins.
+    pub line: usize,
 }
 
 /// A node of a graph: one process.
@@ -88,7 +91,7 @@ pub struct Node {
 /// A simulated device's files, read.
 #[derive(Debug, Clone)]
 pub struct DeviceFiles {
-    /// The model; `None` for a canceller that subtracts nothing.
+    /// The model; `None` for a canceller that subtracts nothing, and for a device that only the user's own program knows.
     pub model: Option<Model>,
     /// A grip or an environment.
     pub fragment: Option<Fragment>,

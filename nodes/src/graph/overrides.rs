@@ -1,6 +1,7 @@
 //! What the command line changes in a graph file, without touching the file.
 
 use super::NodeKind;
+use super::recorded::Recorded;
 use backdrive_plant::tomlfile::FileError;
 use std::path::{Path, PathBuf};
 use toml_edit::{DocumentMut, Item, Value, value};
@@ -136,18 +137,46 @@ fn set(table: &mut Item, key: &str, item: Item) {
     }
 }
 
+/// Keys of node tables that hold excitations, which may name a file.
+const EXCITATION_KEYS: &[&str] = &["force", "dither"];
+
 fn make_absolute(doc: &mut DocumentMut, beside: &Path) {
+    let full = |path: &str| absolute(beside, Path::new(path)).display().to_string();
     for node in node_tables(doc) {
         for key in FILE_KEYS {
-            if let Some(Item::Value(Value::String(text))) = node.get_mut(key)
-                && text.value() != "none"
+            if let Some(Item::Value(value)) = node.get_mut(key)
+                && value.as_str() != Some("none")
             {
-                let full = absolute(beside, Path::new(text.value())).display().to_string();
-                let decor = text.decor().clone();
-                *text = toml_edit::Formatted::new(full);
-                *text.decor_mut() = decor;
+                rewrite(value, &full);
             }
         }
+        for key in EXCITATION_KEYS {
+            if let Some(Item::Value(value)) = node.get_mut(key) {
+                rewrite(value, &|spec| Recorded::with_absolute_file(spec, beside));
+            }
+        }
+        // A program that is named with its folder lies beside the graph; a bare name is looked for as a shell would.
+        let program = match node.get_mut("command") {
+            Some(Item::Value(Value::Array(words))) => words.get_mut(0),
+            Some(Item::Value(value)) => Some(value),
+            _ => None,
+        };
+        if let Some(program) = program.filter(|p| p.as_str().is_some_and(|p| p.contains('/'))) {
+            rewrite(program, &full);
+        }
+    }
+}
+
+/// Changes a string, or each string of a list, and leaves comments and spaces where they are.
+fn rewrite(value: &mut Value, change: &dyn Fn(&str) -> String) {
+    match value {
+        Value::String(text) => {
+            let decor = text.decor().clone();
+            *text = toml_edit::Formatted::new(change(text.value()));
+            *text.decor_mut() = decor;
+        }
+        Value::Array(list) => list.iter_mut().for_each(|each| rewrite(each, change)),
+        _ => {}
     }
 }
 

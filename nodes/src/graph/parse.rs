@@ -1,6 +1,6 @@
 //! Reads a graph file and the files that it names.
 
-use super::{Connection, DeviceFiles, Direction, Experiment, Graph, Node, NodeKind, Overrides, Settings, check, overrides::{absolute, experiment_text}};
+use super::{Connection, DeviceFiles, Direction, Experiment, Graph, Node, NodeKind, Overrides, Settings, check, overrides::{absolute, experiment_text}, recorded::Recorded};
 use crate::stage::{Clock, Impairment, Timing};
 use backdrive_control::operator::Intent;
 use backdrive_control::scaling::{GainChange, GainPlan};
@@ -49,8 +49,9 @@ impl Graph {
     /// One experiment of a graph file that has some: a graph of its own, in which the experiment's keys stand in
     /// place of the nodes' and the length of the run.
     pub fn load_experiment(path: &Path, changes: &Overrides, experiment: &str) -> Result<Graph, FileError> {
-        let text = experiment_text(&read_text(path)?, experiment);
-        Graph::from_text(&text, path, changes, &Files::Disk)
+        let whole = read_text(path)?;
+        let text = experiment_text(&whole, experiment);
+        Graph::from_text(&text, path, changes, &Files::Disk).map_err(|e| in_experiment(e, &whole, path, experiment))
     }
 
     /// The same from text, such as a bag holds; `path` is where its relative paths start and what errors name.
@@ -113,6 +114,30 @@ impl Graph {
     }
 }
 
+/// An error about a graph that an experiment was written into, at the experiment's line: the other lines are not the file's.
+fn in_experiment(error: FileError, whole: &str, path: &Path, name: &str) -> FileError {
+    let file = path.display().to_string();
+    if error.path != file {
+        return error;
+    }
+    let tables = Table::parse(whole, file.as_str()).and_then(|mut top| top.tables("experiments")).unwrap_or_default();
+    for mut table in tables {
+        if table.string("name").ok().flatten().as_deref() != Some(name) {
+            continue;
+        }
+        // The key that it changes, where the error is about that one.
+        let mut line = table.line();
+        for node in table.keys().into_iter().filter(|node| error.key.contains(&format!("\"{node}\""))) {
+            line = table.line_of(&node);
+            if let Ok(Some(changes)) = table.table(&node) {
+                line = changes.keys().iter().find(|key| error.key.ends_with(key.as_str())).map_or(line, |key| changes.line_of(key));
+            }
+        }
+        return FileError { line: Some(line), key: format!("experiment \"{name}\": {}", error.key), ..error };
+    }
+    error
+}
+
 fn read_gains(top: &mut Table) -> Result<GainPlan, FileError> {
     let mut plan = GainPlan { mu: 1.0, lambda: 0.0, ramp_s: 0.05, changes: Vec::new() };
     let Some(mut gains) = top.table("gains")? else { return Ok(plan) };
@@ -159,15 +184,20 @@ impl NodeReader<'_> {
             None => Vec::new(),
             Some(topics) => read_topics(topics, kind)?,
         };
-        let (settings, axis_names) = self.settings(&mut table, kind)?;
+        let (settings, axis_names) = self.settings(&mut table, kind, command.is_some())?;
         table.finish()?;
         let node = Node { name, kind, command, restart, axes: axis_names.len(), axis_names, topics, settings, line };
         self.graph.nodes.push(node);
         Ok(())
     }
 
-    fn settings(&mut self, table: &mut Table, kind: NodeKind) -> Result<(Settings, Vec<String>), FileError> {
+    fn settings(&mut self, table: &mut Table, kind: NodeKind, own: bool) -> Result<(Settings, Vec<String>), FileError> {
         Ok(match kind {
+            NodeKind::Master | NodeKind::Slave if own && !table.contains("model") => {
+                let names = own_axes(table)?;
+                let device = DeviceFiles { model: None, fragment: None, substeps: None, real_sensors: true };
+                (if kind == NodeKind::Master { Settings::Master(device) } else { Settings::Slave(device) }, names)
+            }
             NodeKind::Operator => {
                 let intents = self.intents(table)?;
                 let names = (0..intents.len()).map(|i| format!("axis{i}")).collect();
@@ -284,7 +314,7 @@ impl NodeReader<'_> {
         Ok(Intent::Rest)
     }
 
-    /// A string or a list of strings, one excitation per axis, as samples at the graph's rate.
+    /// A string or a list of strings, an excitation or a recorded force per axis, as samples at the graph's rate.
     fn excitations(&mut self, table: &mut Table, key: &str) -> Result<Vec<Vec<f64>>, FileError> {
         let Some(specs) = table.string_or_strings(key)? else { return Ok(Vec::new()) };
         if specs.len() > MAX_AXES {
@@ -293,6 +323,11 @@ impl NodeReader<'_> {
         specs
             .iter()
             .map(|spec| {
+                if let Some(recorded) = Recorded::parse(spec) {
+                    let recorded = recorded.map_err(|e| table.error_at(key, e))?;
+                    let text = self.files.read(Path::new(&recorded.file), &mut self.graph.files)?;
+                    return recorded.samples(&text, self.graph.timing.rate_hz).map_err(|e| table.error_at(key, e));
+                }
                 let excitation: Excitation = spec.parse().map_err(|e: ExcitationError| table.error_at(key, e.to_string()))?;
                 excitation.samples(self.graph.timing.rate_hz).map_err(|e| table.error_at(key, e.to_string()))
             })
@@ -313,6 +348,15 @@ fn isolate(mut model: Model, table: &mut Table) -> Result<Model, FileError> {
         model.axes.iter_mut().for_each(|axis| axis.user = body);
     }
     Ok(model)
+}
+
+/// Names of the axes of a device that only the user's own program knows.
+fn own_axes(table: &mut Table) -> Result<Vec<String>, FileError> {
+    let names = table.strings("axes")?.ok_or_else(|| table.error("needs a model, or axes = [\"...\"]: the names of the axes of your program's device"))?;
+    if names.is_empty() || names.len() > MAX_AXES {
+        return Err(table.error_at("axes", format!("expected 1 to {MAX_AXES} names, found {}", names.len())));
+    }
+    Ok(names)
 }
 
 fn axis_names(device: &DeviceFiles) -> Vec<String> {
@@ -340,8 +384,9 @@ fn read_experiment(mut table: Table, graph: &Graph) -> Result<Experiment, FileEr
         }
         table.skip(&key);
     }
+    let line = table.line();
     table.finish()?;
-    Ok(Experiment { name, held_out, step })
+    Ok(Experiment { name, held_out, step, line })
 }
 
 fn read_topics(mut table: Table, kind: NodeKind) -> Result<Vec<(String, String)>, FileError> {

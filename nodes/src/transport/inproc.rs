@@ -70,11 +70,8 @@ impl Transport for Inproc {
     fn subscriber(&mut self, topic: &Topic, depth: usize, wakes: bool) -> Result<Box<dyn Subscriber>, TransportError> {
         let channel = self.hub.channel(topic, "subscribe")?;
         let depth = depth.clamp(1, capacity(topic.kind).0);
-        let queue = Arc::new(Queue {
-            messages: Mutex::new(VecDeque::with_capacity(depth)),
-            depth,
-            bell: wakes.then(|| Arc::clone(&self.bell)),
-        });
+        let queue =
+            Arc::new(Queue { messages: Mutex::new(VecDeque::with_capacity(depth)), depth, bell: wakes.then(|| Arc::clone(&self.bell)) });
         let mut open = lock(&channel);
         open.history.iter().for_each(|m| queue.push(*m));
         open.queues.push(Arc::clone(&queue));

@@ -5,8 +5,8 @@ mod board;
 pub mod iceoryx2;
 pub mod inproc;
 
-use backdrive_msgs::topic::{Kind, Topic};
 use backdrive_msgs::Message;
+use backdrive_msgs::topic::{Kind, Topic};
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 use std::time::Duration;

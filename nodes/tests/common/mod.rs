@@ -97,12 +97,20 @@ pub fn plans(impairment: Option<Impairment>, credit: bool) -> Vec<NodePlan> {
             "master",
             vec![stage("master", Toy::new(0.41), vec![input("hand", "/operator/intent", 0), input("force", "/force", 1)], &["/master/js"])],
         ),
-        node("canceller", vec![stage("canceller", Toy::new(0.51), vec![input("motion", "/master/js", 0), input("force", "/force", 1)], &["/cancelled"])]),
+        node(
+            "canceller",
+            vec![stage("canceller", Toy::new(0.51), vec![input("motion", "/master/js", 0), input("force", "/force", 1)], &["/cancelled"])],
+        ),
         node(
             "scaling",
             vec![
                 stage("forward", Toy::new(0.61), vec![input("motion", "/cancelled", 0)], &["/command"]),
-                stage("backward", Toy::with_gains(0.71), vec![impaired(input("contact", "/contact", 0)), input("motion", "/master/js", 7)], &["/force", "/dither"]),
+                stage(
+                    "backward",
+                    Toy::with_gains(0.71),
+                    vec![impaired(input("contact", "/contact", 0)), input("motion", "/master/js", 7)],
+                    &["/force", "/dither"],
+                ),
             ],
         ),
         node("slave", vec![stage("slave", Toy::new(0.81), vec![impaired(input("command", "/command", 0))], &["/contact"])]),

@@ -76,7 +76,9 @@ mod tests {
     #[test]
     fn mean_force_is_the_mean_of_the_force() {
         let wall = Contact { stiffness: 100.0, damping: 5.0, gap: 0.01 };
-        for (from, to, v) in [(0.0, 0.03, 0.2), (0.03, 0.0, -0.2), (0.02, 0.05, -0.4), (0.012, 0.011, 0.0), (0.0, 0.009, 1.0), (0.03, 0.02, -9.0)] {
+        for (from, to, v) in
+            [(0.0, 0.03, 0.2), (0.03, 0.0, -0.2), (0.02, 0.05, -0.4), (0.012, 0.011, 0.0), (0.0, 0.009, 1.0), (0.03, 0.02, -9.0)]
+        {
             let sum: f64 = (0..100_000).map(|i| wall.force(&[], from + (to - from) * (f64::from(i) + 0.5) / 1e5, v)).sum();
             assert!((wall.mean_force(&[], from, to, v) - sum / 1e5).abs() < 1e-4, "{from} {to} {v}");
         }

@@ -236,23 +236,29 @@ const PHASE_PER_SUBSTEP: f64 = 0.6;
 const DECAY_PER_SUBSTEP: f64 = 3.0;
 /// Longest substep with nonlinear elements, s.
 const LONGEST_SUBSTEP_S: f64 = 5e-4;
+/// The same where an element's slope is only an estimate, and it may be steeper for some of the time.
+const LONGEST_SUBSTEP_UNBOUNDED_S: f64 = 1.25e-4;
 /// Shortest substep that is chosen, s. What is faster than that is stable, but not resolved.
 const SHORTEST_SUBSTEP_S: f64 = 4e-6;
 
 fn choose_substeps(network: &Network, model: &Model, factor: &DMatrix<f64>, period: f64) -> usize {
     let free = network.free_bodies.len();
     let (mut stiffness, mut damping) = (network.stiffness.clone(), network.damping.clone());
+    let mut longest = LONGEST_SUBSTEP_S;
     for element in model.elements.iter().filter(|element| element.law.role() == Role::Path) {
         let [first, second] = element.between.map(|place| place.map_or(GROUND, |body| network.slots[body]));
         if first != second {
             let slopes = element.law.slopes();
+            if !slopes.bounded {
+                longest = LONGEST_SUBSTEP_UNBOUNDED_S;
+            }
             join(&mut stiffness, first, second, slopes.stiffness);
             join(&mut damping, first, second, slopes.damping);
         }
     }
     let fastest = dense::largest_ratio(factor, &block(&stiffness, free)).sqrt();
     let quickest_decay = dense::largest_ratio(factor, &block(&damping, free));
-    let longest = LONGEST_SUBSTEP_S.min(PHASE_PER_SUBSTEP / fastest).min(DECAY_PER_SUBSTEP / quickest_decay).max(SHORTEST_SUBSTEP_S);
+    let longest = longest.min(PHASE_PER_SUBSTEP / fastest).min(DECAY_PER_SUBSTEP / quickest_decay).max(SHORTEST_SUBSTEP_S);
     let count = (period / longest - 1e-9).ceil();
     if count.is_finite() { count.clamp(1.0, 100_000.0) as usize } else { 1 }
 }
@@ -336,7 +342,6 @@ pub(super) fn plant(model: &Model, period: f64, options: &Options) -> Result<Pla
         substep,
         substeps,
         periods: 0,
-        started: false,
         x: [0.0; SLOTS],
         v: [0.0; SLOTS],
         prescribed_acceleration: [0.0; SLOTS],

@@ -91,12 +91,14 @@ impl Constraints {
             }
             response
         };
+        // Several in one place add up: all that stay explicit must be stable together.
+        let stiff = STIFF.min(0.5 / paths.len().max(1) as f64);
         for (index, path) in paths.iter_mut().enumerate() {
             let ends = (path.first, path.second);
             let response = respond(ends);
             let slopes = path.law.slopes();
             let stiffness = (weight(ends.0, &response) - weight(ends.1, &response)) * (0.5 * substep * slopes.stiffness + slopes.damping);
-            if stiffness > if slopes.bounded { STIFF } else { STIFF_UNBOUNDED } {
+            if stiffness > if slopes.bounded { stiff } else { STIFF_UNBOUNDED } {
                 path.constraint = Some(all.ends.len());
                 path.unresolved = stiffness > if slopes.bounded { UNRESOLVED } else { STIFF };
                 path.ahead = if path.unresolved { substep } else { 0.5 * substep };
@@ -243,7 +245,11 @@ fn trial_force(path: &mut PathElement, u: f64) -> f64 {
     let ahead = path.reached + path.ahead * u;
     path.trial.copy_from_slice(&path.memory);
     path.law.advance(&mut path.trial, path.reached, ahead, path.ahead);
-    if path.unresolved { path.law.force(&path.trial, ahead, u) } else { path.law.mean_force(&path.trial, path.reached, 2.0 * ahead - path.reached, u) }
+    if path.unresolved {
+        path.law.force(&path.trial, ahead, u)
+    } else {
+        path.law.mean_force(&path.trial, path.reached, 2.0 * ahead - path.reached, u)
+    }
 }
 
 /// Solves `u + own f(u) = w` for f, starting from the force `start`: secant steps kept inside a bracket. The left side

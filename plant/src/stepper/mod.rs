@@ -4,9 +4,9 @@
 //!   velocity changes by `2 δ`, `(2M/h + D + θ h K/2) δ = F - K (x + h v/2) - D v`, and the position by the mean
 //!   velocity. θ = 1 is the implicit midpoint rule. θ = 1/3 gives every undamped mode its frequency to fourth
 //!   order and is taken where the substep resolves the fastest one.
-//! - A model of such elements alone is advanced by its exact propagator instead ([`exact`]).
+//! - A model of such elements alone is advanced by its exact propagator instead (`exact.rs`).
 //! - Dry friction is a box-constrained multiplier on the velocity at the end of the substep (Moreau 1988, Jean 1999),
-//!   solved for all contacts at once: what sticks has velocity 0, not a small one ([`constraints`]).
+//!   solved for all contacts at once: what sticks has velocity 0, not a small one (`constraints.rs`).
 //! - Hysteresis is advanced along its path by the kind's own update. An element that is too stiff for the substep
 //!   joins the friction contacts in their implicit solution.
 
@@ -225,7 +225,6 @@ pub struct Plant {
     substep: f64,
     substeps: usize,
     periods: u64,
-    started: bool,
     x: Slots,
     v: Slots,
     /// Acceleration of prescribed bodies at this instant, m/s².
@@ -259,7 +258,6 @@ impl Plant {
     /// input in the order of the model (m; those of force inputs are not used); what is missing is 0.
     pub fn start_at(&mut self, first: &[f64]) {
         self.periods = 0;
-        self.started = false;
         self.x = [0.0; SLOTS];
         self.v = [0.0; SLOTS];
         self.prescribed_acceleration = [0.0; SLOTS];
@@ -297,7 +295,6 @@ impl Plant {
             self.step_by_substeps();
         }
         self.periods += 1;
-        self.started = true;
     }
 
     /// Position of a body of the model, m; not a number when there is no such body.
