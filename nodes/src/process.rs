@@ -62,6 +62,8 @@ pub(crate) struct Line {
     writer: Mutex<Option<JoinHandle<()>>>,
 }
 
+/// Told often, said seldom.
+#[allow(clippy::large_enum_variant)]
 enum Out {
     Told(Told),
     Said(Box<FromNode>),

@@ -457,10 +457,10 @@ impl Runner {
             first_error = self.publish_status(step, stamp_ns);
         }
         let stage = &mut self.stages[index];
-        if let (Some(output), Some(now)) = (&mut self.gains_out, stage.core.gains()) {
-            if let Some(gains) = self.teller.book.gains(step, stamp_ns, now) {
-                first_error = first_error.and(output.publisher.send(&Message::Gains(gains)));
-            }
+        if let (Some(output), Some(now)) = (&mut self.gains_out, stage.core.gains())
+            && let Some(gains) = self.teller.book.gains(step, stamp_ns, now)
+        {
+            first_error = first_error.and(output.publisher.send(&Message::Gains(gains)));
         }
         for (sample, output) in stage.samples.iter_mut().zip(&mut stage.outputs) {
             (sample.layout, sample.source) = (LAYOUT, self.teller.book.source);

@@ -288,15 +288,15 @@ impl Node {
     fn tell(&mut self, stage: &Stage, step: u64, stamp_ns: i64, noted: &mut Events, tap: Tap) {
         let events = self.events;
         self.book.drain(step, stamp_ns, noted, |_, event| tap(events, &Message::Event(event)));
-        if stage.is_first {
-            if let Some(status) = self.book.status(step, stamp_ns, Health::default) {
-                tap(self.status, &Message::Status(status));
-            }
+        if stage.is_first
+            && let Some(status) = self.book.status(step, stamp_ns, Health::default)
+        {
+            tap(self.status, &Message::Status(status));
         }
-        if let (Some(topic), Some(now)) = (self.gains, stage.core.gains()) {
-            if let Some(gains) = self.book.gains(step, stamp_ns, now) {
-                tap(topic, &Message::Gains(gains));
-            }
+        if let (Some(topic), Some(now)) = (self.gains, stage.core.gains())
+            && let Some(gains) = self.book.gains(step, stamp_ns, now)
+        {
+            tap(topic, &Message::Gains(gains));
         }
     }
 }

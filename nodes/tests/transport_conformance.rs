@@ -120,10 +120,10 @@ struct Flipping(Box<dyn Publisher>);
 impl Publisher for Flipping {
     fn send(&mut self, message: &Message) -> Result<(), TransportError> {
         let mut message = *message;
-        if let Message::Sample(s) = &mut message {
-            if s.sequence == 500 {
-                s.velocity[7] = f64::from_bits(s.velocity[7].to_bits() ^ 1);
-            }
+        if let Message::Sample(s) = &mut message
+            && s.sequence == 500
+        {
+            s.velocity[7] = f64::from_bits(s.velocity[7].to_bits() ^ 1);
         }
         self.0.send(&message)
     }

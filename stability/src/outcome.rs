@@ -1,6 +1,6 @@
 //! What a run did: stable, a limit cycle, unstable, or limited.
 
-use crate::oscillation::oscillation;
+use crate::oscillation::{Oscillation, oscillation};
 use serde::Serialize;
 
 /// One axis of a run, one value per step.
@@ -103,6 +103,9 @@ const LEAST_HOLD_S: f64 = 0.3;
 /// An oscillation below this is not felt and not counted, m or rad.
 const LEAST_AMPLITUDE: f64 = 2e-6;
 
+/// A master that moves less than this while the hand holds still is at rest, m or rad.
+const WANDER: f64 = 20e-6;
+
 /// Judges a run by what the master does while the hand holds still and the slave is in contact.
 pub fn judge(trace: &Trace) -> Outcome {
     let finite = trace.position.iter().chain(&trace.contact).position(|x| !x.is_finite());
@@ -123,16 +126,62 @@ pub fn judge(trace: &Trace) -> Outcome {
 
 fn judge_hold(trace: &Trace, from: usize, to: usize) -> Option<Outcome> {
     let found = oscillation(&trace.position[from..to], trace.period_s, LOWEST_HZ)?;
-    let floor = LEAST_AMPLITUDE.max(2.0 * trace.resolution);
+    let (fast, slow) = (judge_fast(&found, trace.resolution), judge_slow(trace, from, to));
+    // The edges of a slow wandering have lines at every frequency, the strongest of them at the lowest.
+    let spills_over = found.frequency_hz < 1.5 * LOWEST_HZ && slow != Outcome::Stable;
+    Some(if fast == Outcome::Stable || spills_over { slow } else { fast })
+}
+
+/// Whether the master comes to rest while the hand holds still: a loop whose canceller takes out too much at DC, or
+/// sticks and slips, wanders slowly and may never oscillate at a frequency of its own.
+fn judge_slow(trace: &Trace, from: usize, to: usize) -> Outcome {
+    let piece = &trace.position[from..to];
+    let quarter = piece.len() / 4;
+    let range = |piece: &[f64]| {
+        let (low, high) = piece.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(*x), h.max(*x)));
+        high - low
+    };
+    let (third, last) = (range(&piece[2 * quarter..3 * quarter]), range(&piece[3 * quarter..]));
+    let floor = WANDER.max(4.0 * trace.resolution);
+    let turns = turns(&piece[quarter..], floor);
+    if last <= floor || (last < 0.5 * third && turns == 0) {
+        return Outcome::Stable;
+    }
+    let whole = range(&piece[quarter..]);
+    if turns == 0 && last > 1.5 * third {
+        let time = quarter as f64 * trace.period_s;
+        return Outcome::Unstable { growth_per_s: (last / third.max(floor)).ln() / time };
+    }
+    let time = (piece.len() - quarter) as f64 * trace.period_s;
+    Outcome::LimitCycle { amplitude_m: 0.5 * whole, frequency_hz: (turns.max(1) as f64) / (2.0 * time) }
+}
+
+/// How often a signal turns back by more than `least`.
+fn turns(signal: &[f64], least: f64) -> usize {
+    let (mut turns, mut rising, mut low, mut high) = (0, None, signal[0], signal[0]);
+    for x in signal {
+        (low, high) = (low.min(*x), high.max(*x));
+        match rising {
+            None if high - low > least => rising = Some(*x == high),
+            Some(true) if high - x > least => (turns, rising, low) = (turns + 1, Some(false), *x),
+            Some(false) if x - low > least => (turns, rising, high) = (turns + 1, Some(true), *x),
+            _ => {}
+        }
+    }
+    turns
+}
+
+fn judge_fast(found: &Oscillation, resolution: f64) -> Outcome {
+    let floor = LEAST_AMPLITUDE.max(2.0 * resolution);
     let grows = found.amplitude > 1.5 * found.amplitude_before && found.growth_per_s > 0.2;
     let dies = found.amplitude < 0.7 * found.amplitude_before && found.growth_per_s < -0.2;
-    Some(if found.amplitude <= floor || dies {
+    if found.amplitude <= floor || dies {
         Outcome::Stable
     } else if grows {
         Outcome::Unstable { growth_per_s: found.growth_per_s }
     } else {
         Outcome::LimitCycle { amplitude_m: found.amplitude, frequency_hz: found.frequency_hz }
-    })
+    }
 }
 
 /// Pieces in which the hand holds still and the slave touches something at least now and then; transients cut off.
@@ -198,6 +247,14 @@ mod tests {
         assert!((amplitude_m - 2e-4).abs() < 1e-5 && (frequency_hz - 60.0).abs() < 0.2);
         let Outcome::Unstable { growth_per_s } = judge(&trace(|t| 0.005 + 1e-5 * (1.5 * t).exp() * sine(t))) else { panic!() };
         assert!((growth_per_s - 1.5).abs() < 0.1);
+    }
+
+    #[test]
+    fn a_slow_wandering_is_a_limit_cycle_and_a_settling_is_stable() {
+        let Outcome::LimitCycle { frequency_hz, .. } = judge(&trace(|t| 0.005 + 1e-3 * (5.0 * t).sin().signum())) else { panic!() };
+        assert!((frequency_hz - 5.0 / (2.0 * std::f64::consts::PI)).abs() < 0.2, "{frequency_hz}");
+        assert_eq!(judge(&trace(|t| 0.005 + 1e-3 * (-4.0 * t).exp())), Outcome::Stable);
+        let Outcome::Unstable { .. } = judge(&trace(|t| 0.005 + 1e-5 * (2.0 * t).exp())) else { panic!() };
     }
 
     #[test]

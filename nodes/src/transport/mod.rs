@@ -68,10 +68,10 @@ impl Location {
         self.check()?;
         let failed = |path: &std::path::Path, e: std::io::Error| TransportError::Start(format!("cannot remove {}: {e}", path.display()));
         let absent = |e: &std::io::Error| e.kind() == std::io::ErrorKind::NotFound;
-        if let Err(e) = std::fs::remove_dir_all(&self.root) {
-            if !absent(&e) {
-                return Err(failed(&self.root, e));
-            }
+        if let Err(e) = std::fs::remove_dir_all(&self.root)
+            && !absent(&e)
+        {
+            return Err(failed(&self.root, e));
         }
         let shm = PathBuf::from(board::SHM);
         let entries = std::fs::read_dir(&shm).map_err(|e| failed(&shm, e))?;
