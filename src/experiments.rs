@@ -125,8 +125,9 @@ fn within_travel(bag: &Path, device: &Device, graph: &Graph, experiment: &Experi
         let measured = &device.model.outputs[axis.measured].name;
         let Some((name, topic, field)) = device.columns.iter().find(|(signal, ..)| signal == measured) else { continue };
         let found = signals(&reader, &[Signal::new(name, topic, field)]).map_err(Failure::input)?;
-        let outside = found.columns.iter().flatten().find(|x| **x < low || **x > high);
-        if let Some(x) = outside {
+        let beyond = |x: &f64| (low - x).max(x - high);
+        let farthest = found.columns.iter().flatten().copied().max_by(|a, b| beyond(a).total_cmp(&beyond(b)));
+        if let Some(x) = farthest.filter(|x| beyond(x) > 0.0) {
             let name = &axis.name;
             let message = format!("axis \"{name}\" went to {x:.4}, beyond its travel from {low} to {high}; weaken the excitation");
             return Err(at(graph, experiment, message));
