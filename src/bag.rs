@@ -33,6 +33,9 @@ fn show(bag: &Path, json: bool) -> Result<u8, Failure> {
 }
 
 fn import(csv: &[std::path::PathBuf], bag: &Path, maps: &[String]) -> Result<u8, Failure> {
+    if csv.len() == 1 {
+        is_new(bag)?;
+    }
     let columns = maps.iter().map(|map| column_map(map)).collect::<Result<Vec<_>, _>>()?;
     // One table is one experiment and one bag: several go into a folder.
     let into = |table: &Path| -> std::path::PathBuf {
@@ -53,6 +56,13 @@ fn import(csv: &[std::path::PathBuf], bag: &Path, maps: &[String]) -> Result<u8,
         println!("{}: {} rows, {} topics -> {}", table.display(), report.rows, report.topics.len(), into(table).display());
     }
     Ok(0)
+}
+
+fn is_new(bag: &Path) -> Result<(), Failure> {
+    match bag.exists() {
+        true => Err(Failure::input(format!("{}: exists already; name another with --bag", bag.display()))),
+        false => Ok(()),
+    }
 }
 
 /// `COLUMN=TOPIC.FIELD[AXIS]`
@@ -79,6 +89,7 @@ fn export(bag: &Path, csv: &Path, topics: &[String]) -> Result<u8, Failure> {
 }
 
 fn save(damaged: &Path, bag: &Path) -> Result<u8, Failure> {
+    is_new(bag)?;
     let report = recover(damaged, bag).map_err(Failure::input)?;
     if report.was_clean {
         println!("{}: had ended cleanly; copied", damaged.display());

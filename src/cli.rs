@@ -1,6 +1,6 @@
 //! The command line: its doc comments are the help.
 
-use backdrive_nodes::graph::Overrides;
+use backdrive_nodes::graph::{MAX_RATE_HZ, Overrides};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
 
@@ -75,13 +75,13 @@ pub struct Changes {
     #[arg(long, value_name = "FILE|none")]
     pub canceller_grip: Option<PathBuf>,
     /// Corner of a high-pass on the canceller's estimate; 0 for none.
-    #[arg(long, value_name = "HZ")]
+    #[arg(long, value_name = "HZ", value_parser = not_negative, allow_negative_numbers = true)]
     pub high_pass: Option<f64>,
     /// Position scale from master to slave.
-    #[arg(long)]
+    #[arg(long, value_parser = not_negative, allow_negative_numbers = true)]
     pub mu: Option<f64>,
     /// Force scale from slave to master.
-    #[arg(long)]
+    #[arg(long, value_parser = not_negative, allow_negative_numbers = true)]
     pub lambda: Option<f64>,
     /// Add a small recorded multisine to the force channel, such as `multisine:peak=0.1,from=1,to=500,period=2`.
     #[arg(long, value_name = "EXCITATION", num_args = 0..=1, default_missing_value = DEFAULT_DITHER)]
@@ -96,10 +96,10 @@ pub struct Changes {
     #[arg(long, value_enum)]
     pub limits: Option<Limits>,
     /// Length of the run.
-    #[arg(long, value_name = "S")]
+    #[arg(long, value_name = "S", value_parser = positive, allow_negative_numbers = true)]
     pub duration: Option<f64>,
     /// Steps per second, up to 10000.
-    #[arg(long, value_name = "HZ")]
+    #[arg(long, value_name = "HZ", value_parser = rate, allow_negative_numbers = true)]
     pub rate: Option<f64>,
     /// Seed of everything random.
     #[arg(long)]
@@ -107,6 +107,22 @@ pub struct Changes {
     /// The bag to record.
     #[arg(long, value_name = "FILE")]
     pub bag: Option<PathBuf>,
+}
+
+fn number(text: &str) -> Result<f64, String> {
+    text.parse().ok().filter(|x: &f64| x.is_finite()).ok_or("must be a finite number".to_string())
+}
+
+fn not_negative(text: &str) -> Result<f64, String> {
+    number(text).and_then(|x| if x >= 0.0 { Ok(x) } else { Err("must be at least 0".to_string()) })
+}
+
+fn positive(text: &str) -> Result<f64, String> {
+    number(text).and_then(|x| if x > 0.0 { Ok(x) } else { Err("must be above 0".to_string()) })
+}
+
+fn rate(text: &str) -> Result<f64, String> {
+    positive(text).and_then(|x| if x <= MAX_RATE_HZ { Ok(x) } else { Err(format!("must be at most {MAX_RATE_HZ}")) })
 }
 
 /// A dither that is small beside a finger's force, and broad enough for a frequency response.
@@ -291,10 +307,10 @@ pub enum Bag {
     /// CSV recordings into a bag.
     #[command(after_help = "Example:\n  backdrive bag import sweep.csv --bag sweep.mcap")]
     Import {
-        /// CSV files with a column `t`, s; all go into one bag, one file after the other.
+        /// CSV files with a column `t`, s.
         #[arg(required = true)]
         csv: Vec<PathBuf>,
-        /// The new bag.
+        /// The new bag; of several CSV files the folder in which each becomes one.
         #[arg(long, value_name = "FILE")]
         bag: PathBuf,
         /// Which column is what, as `motor_position=/master/measured_js.position[0]`; repeatable.

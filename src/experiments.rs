@@ -157,7 +157,8 @@ impl Set {
     fn add(&mut self, experiment: &Experiment, device: &Device) -> Result<(), String> {
         let file = format!("{}.mcap", experiment.name);
         let conditions = differences(&self.model, &device.model).filter(|_| self.columns == device.columns);
-        let conditions = conditions.ok_or("records a device of other bodies or elements than the experiments before it; give it a step of its own")?;
+        let conditions =
+            conditions.ok_or("records a device of other bodies or elements than the experiments before it; give it a step of its own")?;
         if !conditions.is_empty() {
             self.conditions.push((file.clone(), conditions));
         }

@@ -13,9 +13,7 @@ pub fn check(options: &cli::Graph) -> Result<u8, Failure> {
         graphs.push(Graph::load_experiment(&options.graph, &Overrides::default(), &experiment.name)?);
     }
     for each in std::iter::once(&graph).chain(&graphs) {
-        for node in each.nodes.iter().filter(|n| n.kind != NodeKind::Recorder && n.command.is_none()) {
-            plan(each, &node.name)?;
-        }
+        buildable(each)?;
     }
     let experiments = if graphs.is_empty() { String::new() } else { format!(", {} experiments", graphs.len()) };
     println!(
@@ -26,6 +24,14 @@ pub fn check(options: &cli::Graph) -> Result<u8, Failure> {
         topics(&graph).len()
     );
     Ok(0)
+}
+
+/// Whether every node of ours can be built: told before a process is started, and once.
+pub fn buildable(graph: &Graph) -> Result<(), Failure> {
+    for node in graph.nodes.iter().filter(|n| n.kind != NodeKind::Recorder && n.command.is_none()) {
+        plan(graph, &node.name).map_err(|e| Failure::input(format!("{}: {e}", graph.path.display())))?;
+    }
+    Ok(())
 }
 
 /// Draws a graph as text.

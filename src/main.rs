@@ -19,6 +19,9 @@ use cli::{Cli, Command};
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
+    // A file that reaches the size a user is allowed is an error of its writer, with a name, and no end without a word.
+    // SAFETY: ignoring a signal runs no code of ours.
+    let _ = unsafe { nix::sys::signal::signal(nix::sys::signal::Signal::SIGXFSZ, nix::sys::signal::SigHandler::SigIgn) };
     let result = match Cli::parse().command {
         Command::Run(options) => run::run(&options),
         Command::Replay(options) => replay::replay(&options),

@@ -25,10 +25,17 @@ pub fn replay(options: &cli::Replay) -> Result<u8, Failure> {
         return Err(Failure::input(format!("{}: is the bag that is replayed; name another with --bag", path.display())));
     }
 
+    if !reader.ended_cleanly() {
+        eprintln!("warning: {}: was not closed; what it holds is replayed, and `backdrive bag recover` makes a clean copy", path.display());
+    }
     let Some(operator) = graph.nodes.iter().position(|n| n.kind == NodeKind::Operator) else {
         return Err(Failure::input(format!("{}: its graph has no operator whose intent could be replayed", path.display())));
     };
     let topic = graph.topic_of(operator, "intent").name;
+    let missing = reader.completeness().and_then(|c| c.topics.iter().find(|t| t.topic == topic)).map_or(0, |t| t.lost);
+    if missing > 0 {
+        eprintln!("warning: {}: {missing} messages of {topic} are missing; the hand rests where it was", path.display());
+    }
     let (intents, steps) = recorded_intents(&reader, &topic, graph.nodes[operator].axes)?;
     graph.timing.steps = Some(options.changes.duration.map_or(steps, |d| ((d * graph.timing.rate_hz).round() as u64).max(1)));
     graph.nodes[operator].settings = Settings::Operator(intents);

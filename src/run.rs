@@ -2,9 +2,10 @@
 
 use crate::cli::{self, Transport};
 use crate::failure::{Failure, code};
+use crate::graph::buildable;
 use crate::progress;
 use crate::summary::{Summary, Traces, summarise};
-use backdrive_bags::Recorder;
+use backdrive_bags::{Completeness, Reader, Recorder};
 use backdrive_launch::join::{recorder_options, recording};
 use backdrive_launch::{Cause, RunHome, RunReport, SuperviseOptions};
 use backdrive_msgs::Message;
@@ -14,6 +15,7 @@ use backdrive_nodes::sequence::Sequence;
 use backdrive_nodes::stage::Clock;
 use backdrive_stability::outcome::Outcome;
 use serde_json::json;
+use std::io::Read;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
@@ -48,12 +50,15 @@ pub struct Done {
     pub lost: u64,
     /// The bag, if one was recorded.
     pub bag: Option<std::path::PathBuf>,
+    /// Whether its recorder ended and nothing is missing in it.
+    pub complete: bool,
     /// What happened.
     pub summary: Option<Summary>,
 }
 
 /// Runs one graph to its end.
 pub fn run_graph(graph: &Graph, transport: Transport) -> Result<Done, Failure> {
+    buildable(graph)?;
     if let Some(bag) = &graph.bag {
         writable(bag)?;
     }
@@ -63,9 +68,13 @@ pub fn run_graph(graph: &Graph, transport: Transport) -> Result<Done, Failure> {
     }
 }
 
-/// A run that ends with its last step, for a bag that cannot be written, would be lost whole.
+/// A run that ends with its last step, for a bag that cannot be written, would be lost whole. A bag that exists is
+/// replaced, anything else is not.
 fn writable(bag: &Path) -> Result<(), Failure> {
     let existed = bag.exists();
+    if std::fs::metadata(bag).is_ok_and(|m| m.is_file() && m.len() > 0) && !begins_as_bag(bag) {
+        return Err(Failure::input(format!("{}: exists and is not a bag, so it is not replaced; name another with --bag", bag.display())));
+    }
     std::fs::OpenOptions::new().append(true).create(true).open(bag).map_err(|e| Failure::write(bag, e))?;
     if !existed {
         let _ = std::fs::remove_file(bag);
@@ -73,12 +82,19 @@ fn writable(bag: &Path) -> Result<(), Failure> {
     Ok(())
 }
 
+fn begins_as_bag(path: &Path) -> bool {
+    let mut start = [0; 8];
+    std::fs::File::open(path).and_then(|mut file| file.read_exact(&mut start)).is_ok() && start == *b"\x89MCAP0\r\n"
+}
+
 fn run_processes(graph: &Graph) -> Result<Done, Failure> {
     let report = backdrive_launch::run(graph, SuperviseOptions::default())?;
     let bag = report.bag.clone().filter(|bag| bag.exists());
     let summary = bag.as_ref().map(|bag| summarise(bag)).transpose()?;
+    let whole = |bag| Reader::open(bag).is_ok_and(|r| r.ended_cleanly() && r.completeness().is_some_and(Completeness::is_complete));
+    let complete = bag.as_deref().is_some_and(whole);
     let lost = report.lost + report.unrecorded.unwrap_or(0);
-    Ok(Done { steps: report.steps, duration_s: report.duration_s, lost, bag, summary, report: Some(report) })
+    Ok(Done { steps: report.steps, duration_s: report.duration_s, lost, bag, complete, summary, report: Some(report) })
 }
 
 /// Runs a graph in this process, in lockstep; `hear` gets every message with its topic.
@@ -90,7 +106,7 @@ pub fn run_here(graph: &Graph, hear: &mut dyn FnMut(&str, &Message)) -> Result<D
         return Err(Failure::input(format!("{}: needs a duration_s to run in one process", graph.path.display())));
     };
     if let Some(node) = graph.nodes.iter().find(|n| n.command.is_some()) {
-        return Err(Failure::input(format!("node \"{}\" is a program of its own, which one process cannot hold; use --transport iceoryx2", node.name)));
+        return Err(Failure::input(format!("node \"{}\" is a program of its own, which one process cannot hold; run it with --transport iceoryx2", node.name)));
     }
     let plans = graph.nodes.iter().filter(|n| n.kind != NodeKind::Recorder).map(|n| plan(graph, &n.name));
     let mut sequence = Sequence::new(plans.collect::<Result<_, _>>()?, &graph.timing).map_err(Failure::input)?;
@@ -103,13 +119,18 @@ pub fn run_here(graph: &Graph, hear: &mut dyn FnMut(&str, &Message)) -> Result<D
     };
     let bar = progress::steps(steps, &graph.title);
     let mut traces = Traces::of(graph);
-    let (started, mut failed) = (Instant::now(), None);
+    let (started, mut failed, mut told) = (Instant::now(), None, Vec::new());
     let mut done = 0;
     while done < steps && failed.is_none() {
         let some = (steps - done).min(512);
         let mut tap = |topic: usize, message: &Message| {
             if let Message::Sample(sample) = message {
                 traces.take(&names[topic], sample);
+            }
+            if let Message::Event(event) = message
+                && event.severity > 0
+            {
+                told.push(format!("{}: step {}: {}", names[topic], event.step, event.text.as_str()));
             }
             hear(&names[topic], message);
             if let (Some(recorder), Some(place)) = (&mut recorder, place[topic])
@@ -119,6 +140,7 @@ pub fn run_here(graph: &Graph, hear: &mut dyn FnMut(&str, &Message)) -> Result<D
             }
         };
         sequence.run(some, Some(&mut tap));
+        bar.suspend(|| told.drain(..).for_each(|line| eprintln!("{line}")));
         if let Some(recorder) = &mut recorder {
             recorder.checkpoint();
         }
@@ -131,7 +153,7 @@ pub fn run_here(graph: &Graph, hear: &mut dyn FnMut(&str, &Message)) -> Result<D
         Err(e) => return Err(Failure::machine(failed.unwrap_or(e))),
     };
     let summary = Some(traces.summary(graph));
-    Ok(Done { steps, duration_s: started.elapsed().as_secs_f64(), report: None, lost, bag: graph.bag.clone(), summary })
+    Ok(Done { steps, duration_s: started.elapsed().as_secs_f64(), report: None, lost, bag: graph.bag.clone(), complete: lost == 0, summary })
 }
 
 impl Done {
@@ -156,8 +178,9 @@ impl Done {
     /// A few lines for a person.
     pub fn text(&self) -> String {
         let mut lines = Vec::new();
-        let rate = self.steps as f64 / self.duration_s.max(1e-9);
-        lines.push(format!("ran      {} steps in {:.3} s: {rate:.0} steps/s", self.steps, self.duration_s));
+        let rate = self.steps as f64 / self.duration_s;
+        let rate = if rate.is_finite() { format!(": {rate:.0} steps/s") } else { String::new() };
+        lines.push(format!("ran      {} steps in {:.3} s{rate}", self.steps, self.duration_s));
         if let Some(report) = &self.report {
             if let (Some(p50), Some(p99), Some(node)) = (report.loop_p50_us, report.loop_p99_us, &report.loop_node) {
                 lines.push(format!("timing   {node}: p50 {p50:.1} us, p99 {p99:.1} us; {} missed deadlines", report.missed_deadlines));
@@ -165,7 +188,11 @@ impl Done {
             if report.cause != Cause::Completed {
                 lines.push(format!("ended    {}", report.cause));
             }
-            for death in &report.deaths {
+            let told = match &report.cause {
+                Cause::NodeDied { node, .. } | Cause::NodeFailed { node, .. } => node.as_str(),
+                _ => "",
+            };
+            for death in report.deaths.iter().filter(|d| d.node != told || d.recovered) {
                 lines.push(format!("died     {} {} at {:.3} s", death.node, death.how, death.t_s));
             }
         }
@@ -173,7 +200,11 @@ impl Done {
             lines.push(summary.text());
         }
         if let Some(bag) = &self.bag {
-            let complete = if self.lost == 0 { "complete".to_string() } else { format!("{} messages lost", self.lost) };
+            let complete = match self.lost {
+                0 if self.complete => "complete".to_string(),
+                0 => "cut off; `backdrive bag recover` makes a clean copy of what it holds".to_string(),
+                lost => format!("{lost} messages lost"),
+            };
             lines.push(format!("bag      {} ({complete})", bag.display()));
         }
         lines.retain(|l| !l.is_empty());
@@ -187,12 +218,13 @@ impl Done {
         json!({
             "steps": self.steps,
             "duration_s": self.duration_s,
-            "steps_per_s": self.steps as f64 / self.duration_s.max(1e-9),
+            "steps_per_s": (self.duration_s > 0.0).then(|| self.steps as f64 / self.duration_s),
             "loop_p50_us": report.and_then(|r| r.loop_p50_us),
             "loop_p99_us": report.and_then(|r| r.loop_p99_us),
-            "missed_deadlines": report.map_or(0, |r| r.missed_deadlines),
+            "missed_deadlines": report.map(|r| r.missed_deadlines),
             "lost": self.lost,
             "bag": self.bag,
+            "complete": self.bag.as_ref().map(|_| self.complete),
             "loop_gain": summary.map(|s| s.loop_gain),
             "peak_contact_force_n": summary.and_then(|s| s.peak_contact_force),
             "peak_feedback_force_n": summary.and_then(|s| s.peak_feedback_force),

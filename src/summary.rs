@@ -107,6 +107,14 @@ impl Traces {
         }
     }
 
+    /// How far the hand has come by each step, summed over its axes.
+    fn path(&self) -> Vec<f64> {
+        let steps = self.axes.iter().map(|t| t.intent.len()).min().unwrap_or(0);
+        let mut come = 0.0;
+        let moved = |step: usize| self.axes.iter().map(|t| (t.intent[step] - t.intent[step.saturating_sub(1)]).abs()).sum::<f64>();
+        (0..steps).map(|step| { come += moved(step); come }).collect()
+    }
+
     /// The verdict on all that went by.
     pub fn summary(&self, graph: &Graph) -> Summary {
         let peak = |pick: fn(&Trace) -> &Vec<f64>| {
@@ -114,10 +122,13 @@ impl Traces {
             values.fold(None, |m: Option<f64>, f| Some(m.unwrap_or(0.0).max(f.abs())))
         };
         let touching: Vec<u64> = self.axes.iter().flat_map(|t| t.contact.iter().enumerate().filter(|(_, f)| **f != 0.0).map(|(i, _)| i as u64)).collect();
+        let path = self.path();
         let judged = self.axes.iter().filter(|t| !t.position.is_empty() && !t.contact.is_empty());
+        // On several axes the hand holds still when it does so on all of them: one moves the others.
+        let judged = judged.map(|t| if self.axes.len() > 1 { Trace { intent: path.clone(), ..t.clone() } } else { t.clone() });
         Summary {
             loop_gain: graph.gains.mu * graph.gains.lambda,
-            outcome: Outcome::worst(judged.map(judge)),
+            outcome: Outcome::worst(judged.map(|t| judge(&t))),
             peak_contact_force: peak(|t| &t.contact),
             peak_feedback_force: peak(|t| &t.feedback),
             first_contact_s: touching.iter().min().map(|i| *i as f64 * graph.period_s()),

@@ -177,11 +177,15 @@ pub fn import_csv(table: &Path, bag: &Path, options: &ImportOptions) -> Result<I
     let missing = |heading: &str| {
         let what = match skipped.iter().any(|skipped| skipped == heading) {
             true => format!("column {heading:?} holds something that is no number"),
+            false if headings.iter().all(String::is_empty) => "is empty, expected a heading such as t,force,position".to_owned(),
             false => format!("there is no column {heading:?}; there is {}", headings.join(", ")),
         };
         BagError::Table { path: table.to_owned(), line: 1, what }
     };
     let times = &columns[at(&options.time).ok_or_else(|| missing(&options.time))?];
+    if times.is_empty() {
+        return Err(BagError::Table { path: table.to_owned(), line: 1, what: "there are no rows below the heading".to_owned() });
+    }
     for (row, pair) in times.windows(2).enumerate() {
         if pair[1].is_nan() || pair[1] <= pair[0] {
             let what = format!("time goes from {:?} to {:?} s; it must grow", pair[0], pair[1]);

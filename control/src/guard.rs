@@ -78,6 +78,11 @@ impl Guard {
         self.share
     }
 
+    /// Share that the gain is on its way to.
+    pub fn target(&self) -> f64 {
+        self.target
+    }
+
     /// New gains have been asked for: start again from the full gain.
     pub fn restore(&mut self) {
         self.target = 1.0;

@@ -17,6 +17,10 @@ pub struct Master {
     force: Freshness,
     intent: Freshness,
     last_force: [f64; MAX_AXES],
+    /// The newest force came of a slave that no command reaches any more.
+    outdated: bool,
+    /// Steps without a force, at most, since it began to decay.
+    gap_steps: u64,
     applied: [f64; MAX_AXES],
     hand: [f64; MAX_AXES],
     started: bool,
@@ -33,6 +37,8 @@ impl Master {
             force: Freshness::default(),
             intent: Freshness::default(),
             last_force: [0.0; MAX_AXES],
+            outdated: false,
+            gap_steps: 0,
             applied: [0.0; MAX_AXES],
             hand: [0.0; MAX_AXES],
             started: false,
@@ -60,7 +66,12 @@ impl Core for Master {
     fn step(&mut self, tick: &Tick, inputs: &[Port], outputs: &mut [Sample], events: &mut Events) {
         let axes = self.device.axes();
         if let Some(intent) = self.intent.new_sample(&inputs[0], |s| s.position[0]) {
-            self.hand[..axes].copy_from_slice(&intent.position[..axes]);
+            for axis in 0..axes {
+                // Where the intent says nothing, the hand stays.
+                if !intent.position[axis].is_nan() {
+                    self.hand[axis] = intent.position[axis];
+                }
+            }
         }
         if self.started {
             self.device.step(&self.applied[..axes], &self.hand[..axes]);
@@ -70,18 +81,27 @@ impl Core for Master {
         }
 
         if let Some(force) = self.force.new_sample(&inputs[1], |s| s.effort[0]) {
+            self.outdated = force.flags & flag::STALE != 0;
             for axis in 0..axes {
                 // What is not measured on a further axis is not commanded there.
                 self.last_force[axis] = if force.effort[axis].is_nan() { 0.0 } else { force.effort[axis] };
             }
         }
-        let share = self.authority.share(if self.force.begun() { self.force.stale_steps } else { 0 });
+        let share = self.authority.share(match (self.force.begun(), self.outdated) {
+            (false, _) => 0,
+            (true, false) => self.force.stale_steps,
+            // The slave has waited its time already.
+            (true, true) => u64::MAX,
+        });
         let decaying = self.authority.is_decaying();
         if decaying && !self.was_decaying {
-            events.push("force_stale", self.force.stale_steps as f64, 1);
+            let kind = if self.outdated { "force_outdated" } else { "force_stale" };
+            events.push(kind, self.force.stale_steps as f64, 1);
+            self.gap_steps = 0;
         } else if !decaying && self.was_decaying {
-            events.push("force_back", self.force.stale_steps as f64, 0);
+            events.push("force_back", self.gap_steps as f64, 0);
         }
+        self.gap_steps = self.gap_steps.max(self.force.stale_steps);
         self.was_decaying = decaying;
 
         let mut flags = if decaying { flag::STALE } else { 0 };

@@ -71,7 +71,9 @@ impl Operator {
 
 impl Core for Operator {
     fn step(&mut self, tick: &Tick, _inputs: &[Port], outputs: &mut [Sample], _events: &mut Events) {
-        for (axis, intent) in self.axes.iter().enumerate() {
+        // A short script leaves the further axes at rest.
+        for axis in 0..outputs[0].len() {
+            let intent = self.axes.get(axis).unwrap_or(&Intent::Rest);
             (outputs[0].position[axis], outputs[0].velocity[axis]) = intent.at(tick);
         }
     }

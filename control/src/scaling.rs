@@ -107,7 +107,8 @@ impl Core for Forward {
 /// Inputs `contact` (effort F_s), `measured` (the master's, one step late: what the guard watches); outputs
 /// `force` (effort F_f = lambda F_s + dither), `dither` (effort: the added excitation alone).
 ///
-/// Without a new contact force the output is not measured: the master then lets go.
+/// Without a new contact force the output is not measured: the master then lets go. It does so too where the contact
+/// force is that of a slave that holds because no command reaches it.
 pub struct Backward {
     plan: GainPlan,
     changes_done: usize,
@@ -139,7 +140,7 @@ impl Core for Backward {
         let guarded = self.guard.as_mut().map_or(1.0, |guard| {
             let verdict = guard.step(&self.force, inputs.get(1).and_then(|p| p.sample.as_ref()));
             if let Some(reason) = verdict {
-                events.push(reason.event(), lambda * guard.share(), 1);
+                events.push(reason.event(), lambda * guard.target(), 1);
             }
             guard.share()
         });
@@ -157,6 +158,10 @@ impl Core for Backward {
         let contact = self.contact.new_sample(&inputs[0], |s| s.effort[0]).copied();
         if contact.is_none() && self.contact.begun() {
             return;
+        }
+        // A slave that holds for want of commands no longer feels what the hand does.
+        if contact.is_some_and(|c| c.flags & flag::STALE != 0) {
+            force[0].flags |= flag::STALE;
         }
         for axis in 0..force[0].len() {
             let felt = contact.map_or(0.0, |c| if c.effort[axis].is_nan() { 0.0 } else { c.effort[axis] });

@@ -12,6 +12,7 @@ use backdrive_nodes::stage::Clock;
 use backdrive_nodes::transport::iceoryx2::Iceoryx2;
 use backdrive_msgs::topic::{Kind, Topic};
 use std::collections::BTreeMap;
+use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -114,10 +115,13 @@ fn host() -> String {
     std::fs::read_to_string("/proc/sys/kernel/hostname").map(|s| s.trim().to_string()).unwrap_or_default()
 }
 
-/// Says why the node cannot begin, to the supervisor and to whoever started it by hand.
+/// Says why the node cannot begin, to the supervisor, or to whoever started it by hand.
 fn fail(error: String, code: u8) -> ExitCode {
     let line = serde_json::to_string(&FromNode::Failed { error: error.clone(), code });
     println!("{}", line.unwrap_or_default());
-    eprintln!("{error}");
+    // The supervisor has heard it, and shows it with the node's name.
+    if code == 2 || std::io::stdout().is_terminal() || std::io::stderr().is_terminal() {
+        eprintln!("{error}");
+    }
     ExitCode::from(code)
 }

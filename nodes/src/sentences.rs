@@ -9,6 +9,7 @@ const SENTENCES: &[(&str, &str, Option<&str>)] = &[
     ("canceller_off", "the canceller's prediction is not finite: it no longer subtracts, since", Some("s")),
     ("connection_broken", "a message could not be sent or received", None),
     ("force_back", "forces arrive again, after", Some("steps without any")),
+    ("force_outdated", "the slave gets no commands any more: the master's force decays to zero", None),
     ("force_stale", "no force has come for", Some("steps: the master's force decays to zero")),
     ("guard_growing", "an oscillation grows: the guard lowers lambda to", Some("")),
     ("guard_persistent", "an oscillation does not die: the guard lowers lambda to", Some("")),

@@ -76,20 +76,23 @@ class Table:
     """Rows of measured agreement with their limits; remembers whether one was broken."""
 
     def __init__(self, first, columns):
-        self.columns = columns
         self.broken = []
-        self.first = first
-        print(f"{first:<52}" + "".join(f"{name:>14}" for name in columns) + f"{'limit':>11}", flush=True)
+        self.head(first, columns)
 
-    def row(self, name, numbers, limit, judged=0, why=""):
-        """`numbers[judged]` has to be at most `limit`; `why` says why a limit is what it is."""
-        fine = numbers[judged] <= limit
-        if not fine:
-            self.broken.append(f"{name}: {numbers[judged]:.2e} is above {limit:.0e}")
-        cells = "".join(f"{number:>14.1e}" if number is not None else f"{'':>14}" for number in numbers)
-        print(f"{name:<52}{cells}{limit:>11.0e}{'' if fine else '  <-- above the limit'}", flush=True)
+    def head(self, first, columns):
+        """A line with the names of the columns."""
+        self.columns = columns
+        print(f"{first:<46}" + "".join(f"{name:>14}" for name in columns) + "   limits", flush=True)
+
+    def row(self, name, numbers, limits, why=""):
+        """The first `len(limits)` numbers must each be at most their limit; `why` says why one is what it is."""
+        above = [i for i, limit in enumerate(limits) if not numbers[i] <= limit]
+        self.broken += [f"{name}, {self.columns[i]}: {numbers[i]:.2e} is above {limits[i]:.0e}" for i in above]
+        cells = "".join(f"{number:>14.1e}" for number in numbers)
+        shown = ", ".join(f"{limit:.0e}" for limit in dict.fromkeys(limits))
+        print(f"{name:<46}{cells}   {shown}{'  <-- ABOVE' if above else ''}", flush=True)
         if why:
-            print(f"    {why}")
+            print(f"    {why}", flush=True)
 
     def verdict(self):
         """Ends the script: 0 when every row held."""

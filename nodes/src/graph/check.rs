@@ -57,9 +57,8 @@ fn inputs_are_fed(graph: &Graph, of_node: &OfNode, of_connection: &OfConnection)
 
 /// (topic, node index, port) of every output.
 fn outputs(graph: &Graph) -> Vec<(String, usize, &'static str)> {
-    let ports = |(index, node): (usize, &Node)| {
-        node.kind.ports(Direction::Output).into_iter().map(move |port| (index, port)).collect::<Vec<_>>()
-    };
+    let ports =
+        |(index, node): (usize, &Node)| node.kind.ports(Direction::Output).into_iter().map(move |port| (index, port)).collect::<Vec<_>>();
     graph.nodes.iter().enumerate().flat_map(ports).map(|(index, port)| (graph.topic_of(index, port).name, index, port)).collect()
 }
 
@@ -103,8 +102,16 @@ fn excitations_within_limits(graph: &Graph, top: &Table) -> Result<(), FileError
             let peak = samples.iter().fold(0.0_f64, |peak, f| peak.max(f.abs()));
             // A little more passes: a peak at the limit may be rounded up.
             if let Some(limit) = axis.force.filter(|limit| peak > limit * (1.0 + 1e-9)) {
-                let message = format!("reaches {peak:.3} on axis \"{}\", but \"{}\" is limited to a force of {limit}; lower its amplitude, or cut it off with limit={limit}", axis.name, master.name);
-                return Err(FileError::at(top.file_name(), line_in(top, &exciter.name, "force"), format!("node \"{}\" force", exciter.name), message));
+                let message = format!(
+                    "reaches {peak:.3} on axis \"{}\", but \"{}\" is limited to a force of {limit}; lower its amplitude, or cut it off with limit={limit}",
+                    axis.name, master.name
+                );
+                return Err(FileError::at(
+                    top.file_name(),
+                    line_in(top, &exciter.name, "force"),
+                    format!("node \"{}\" force", exciter.name),
+                    message,
+                ));
             }
         }
     }
@@ -122,12 +129,15 @@ fn no_loop_without_delay(graph: &Graph, of_connection: &OfConnection) -> Result<
     match order(graph) {
         Ok(_) => Ok(()),
         Err(stuck) => {
-            let loop_names: Vec<String> =
-                stuck.iter().map(|(node, stage)| format!("{}.{}", graph.nodes[*node].name, graph.nodes[*node].kind.stages()[*stage].name)).collect();
+            let loop_names: Vec<String> = stuck
+                .iter()
+                .map(|(node, stage)| format!("{}.{}", graph.nodes[*node].name, graph.nodes[*node].kind.stages()[*stage].name))
+                .collect();
             let inside = |c: &&Connection| c.delay == 0 && stuck.contains(&stage_of(graph, &c.to, Direction::Input));
             let message = format!("a loop without delay runs through {}; give one of its connections delay = 1", loop_names.join(", "));
             let line = graph.connections.iter().rev().find(inside);
-            Err(line.map_or_else(|| FileError::whole(graph.path.display().to_string(), message.clone()), |c| of_connection(c, message.clone())))
+            Err(line
+                .map_or_else(|| FileError::whole(graph.path.display().to_string(), message.clone()), |c| of_connection(c, message.clone())))
         }
     }
 }

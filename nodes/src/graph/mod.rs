@@ -13,7 +13,7 @@ mod recorded;
 pub use draw::draw;
 pub use kinds::{Direction, NodeKind, PortKind, StageKind};
 pub use overrides::Overrides;
-pub use parse::Files;
+pub use parse::{Files, MAX_RATE_HZ};
 
 use crate::stage::{Impairment, Timing};
 use backdrive_control::operator::Intent;

@@ -1,6 +1,10 @@
 //! Reads a graph file and the files that it names.
 
-use super::{Connection, DeviceFiles, Direction, Experiment, Graph, Node, NodeKind, Overrides, Settings, check, overrides::{absolute, experiment_text}, recorded::Recorded};
+use super::{
+    Connection, DeviceFiles, Direction, Experiment, Graph, Node, NodeKind, Overrides, Settings, check,
+    overrides::{absolute, experiment_text},
+    recorded::Recorded,
+};
 use crate::stage::{Clock, Impairment, Timing};
 use backdrive_control::operator::Intent;
 use backdrive_control::scaling::{GainChange, GainPlan};
@@ -12,7 +16,7 @@ use backdrive_plant::tomlfile::{FileError, Table, read_text, unknown};
 use std::path::{Path, PathBuf};
 
 /// Highest rate of a graph, Hz.
-const MAX_RATE_HZ: f64 = 10_000.0;
+pub const MAX_RATE_HZ: f64 = 10_000.0;
 
 /// Where the files that a graph names are read from: the disk, or a bag that holds them.
 pub enum Files<'a> {
@@ -352,7 +356,9 @@ fn isolate(mut model: Model, table: &mut Table) -> Result<Model, FileError> {
 
 /// Names of the axes of a device that only the user's own program knows.
 fn own_axes(table: &mut Table) -> Result<Vec<String>, FileError> {
-    let names = table.strings("axes")?.ok_or_else(|| table.error("needs a model, or axes = [\"...\"]: the names of the axes of your program's device"))?;
+    let names = table
+        .strings("axes")?
+        .ok_or_else(|| table.error("needs a model, or axes = [\"...\"]: the names of the axes of your program's device"))?;
     if names.is_empty() || names.len() > MAX_AXES {
         return Err(table.error_at("axes", format!("expected 1 to {MAX_AXES} names, found {}", names.len())));
     }

@@ -25,7 +25,11 @@ impl Recorded {
         let keys = spec.strip_prefix(PREFIX)?;
         let mut recorded = Recorded { file: String::new(), column: String::new(), scale: 1.0, quiet: 0.0 };
         let number = |key: &str, value: &str| {
-            value.parse::<f64>().ok().filter(|x| x.is_finite()).ok_or_else(|| format!("recorded: {key}: expected a number, found \"{value}\""))
+            value
+                .parse::<f64>()
+                .ok()
+                .filter(|x| x.is_finite())
+                .ok_or_else(|| format!("recorded: {key}: expected a number, found \"{value}\""))
         };
         for pair in keys.split(',').map(str::trim).filter(|p| !p.is_empty()) {
             let taken = match pair.split_once('=').map(|(key, value)| (key.trim(), value.trim())) {
