@@ -10,8 +10,8 @@ use backdrive_msgs::{Message, Sample};
 use backdrive_nodes::build::plan;
 use backdrive_nodes::graph::{Graph, NodeKind, Overrides, Settings};
 use backdrive_nodes::sequence::Sequence;
-use std::path::Path;
 use nix::time::{ClockId, clock_gettime};
+use std::path::Path;
 use std::time::{Duration, Instant};
 
 const END_OF_PUSH_S: f64 = 3.0;
@@ -33,11 +33,14 @@ fn sequence(graph: &Graph) -> Sequence {
     Sequence::new(plans, &graph.timing).expect("has no loop")
 }
 
+/// Name and one value per step.
+type Column = (String, Vec<f64>);
+
 /// Every measured number of every topic, a column each.
-fn outputs(graph: &Graph) -> Vec<(String, Vec<f64>)> {
+fn outputs(graph: &Graph) -> Vec<Column> {
     let mut sequence = sequence(graph);
     let names: Vec<String> = sequence.topics().iter().map(|t| t.name.clone()).collect();
-    let mut columns: Vec<(String, Vec<f64>)> =
+    let mut columns: Vec<Column> =
         names.iter().flat_map(|n| ["position", "velocity", "effort"].map(|q| (format!("{n}.{q}"), Vec::new()))).collect();
     let mut take = |topic: usize, message: &Message| {
         if let Message::Sample(Sample { position, velocity, effort, .. }) = message {
@@ -54,7 +57,7 @@ fn outputs(graph: &Graph) -> Vec<(String, Vec<f64>)> {
 /// The output that halving the step moves most, and by what share of its range.
 fn moved(coarse: &Graph, fine: &Graph) -> (String, f64) {
     let (coarse, fine) = (outputs(coarse), outputs(fine));
-    let share = |((name, a), (_, b)): (&(String, Vec<f64>), &(String, Vec<f64>))| {
+    let share = |((name, a), (_, b)): (&Column, &Column)| {
         let (low, high) = b.iter().filter(|x| !x.is_nan()).fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(*x), h.max(*x)));
         let most = a.iter().zip(b).filter(|(x, _)| !x.is_nan()).map(|(x, y)| (x - y).abs()).fold(0.0, f64::max);
         (name.clone(), if high > low { most / (high - low) } else { 0.0 })

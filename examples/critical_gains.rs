@@ -82,7 +82,9 @@ fn main() {
     show("no canceller", critical(|l| with(&canceller("none"), l, 1.0)));
     show("second order, as in the model file", critical(|l| with(&canceller("plant/models/impulse-engine-second-order.toml"), l, 1.0)));
     show("second order, best found for this script", critical(|l| with(&second, l, 1.0)));
-    for (name, path) in [("sixth order, linear", "plant/models/impulse-engine-linear.toml"), ("sixth order, nonlinear", "plant/models/impulse-engine.toml")] {
+    for (name, path) in
+        [("sixth order, linear", "plant/models/impulse-engine-linear.toml"), ("sixth order, nonlinear", "plant/models/impulse-engine.toml")]
+    {
         let graph = canceller(path);
         show(name, critical(|l| with(&graph, l, 1.0)));
         show(&format!("{name}, real grip 10 % firmer"), critical(|l| with(&graph, l, 1.1)));

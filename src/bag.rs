@@ -67,7 +67,10 @@ fn is_new(bag: &Path) -> Result<(), Failure> {
 
 /// `COLUMN=TOPIC.FIELD[AXIS]`
 fn column_map(text: &str) -> Result<ColumnMap, Failure> {
-    let wrong = || Failure { code: 2, message: format!("--map \"{text}\": expected COLUMN=TOPIC.FIELD[AXIS], such as force=/master/servo_jf.effort[0]") };
+    let wrong = || Failure {
+        code: 2,
+        message: format!("--map \"{text}\": expected COLUMN=TOPIC.FIELD[AXIS], such as force=/master/servo_jf.effort[0]"),
+    };
     let (column, rest) = text.split_once('=').ok_or_else(wrong)?;
     let (topic, field) = rest.rsplit_once('.').ok_or_else(wrong)?;
     let (field, axis) = field.strip_suffix(']').and_then(|f| f.split_once('[')).ok_or_else(wrong)?;
@@ -109,7 +112,12 @@ fn compare(a: &Path, b: &Path, tolerances: &[String], ignore: &[String], json: b
         let parsed = text.rsplit_once('=').and_then(|(topic, value)| Some((topic.to_string(), value.parse::<f64>().ok()?)));
         match parsed {
             Some((topic, value)) if value >= 0.0 => options.tolerances.insert(topic, value),
-            _ => return Err(Failure { code: 2, message: format!("--tolerance \"{text}\": expected TOPIC=VALUE with a value of at least 0") }),
+            _ => {
+                return Err(Failure {
+                    code: 2,
+                    message: format!("--tolerance \"{text}\": expected TOPIC=VALUE with a value of at least 0"),
+                });
+            }
         };
     }
     let (a, b) = (Reader::open(a).map_err(Failure::input)?, Reader::open(b).map_err(Failure::input)?);

@@ -38,7 +38,12 @@ pub fn play(bag: &Path, speed: f64) -> Result<u8, Failure> {
             publishers.insert(topic.name.clone(), one);
         }
     }
-    eprintln!("playing {} topics of {} at {speed} times real time, in the run {}", publishers.len(), bag.display(), run.paths().root().display());
+    eprintln!(
+        "playing {} topics of {} at {speed} times real time, in the run {}",
+        publishers.len(),
+        bag.display(),
+        run.paths().root().display()
+    );
     let mut sink = Speaker { publishers };
     let report = play_bag(&reader, &PlayOptions { rate: speed, ..PlayOptions::default() }, &mut sink).map_err(Failure::input);
     drop((sink, transport));

@@ -106,7 +106,10 @@ pub fn run_here(graph: &Graph, hear: &mut dyn FnMut(&str, &Message)) -> Result<D
         return Err(Failure::input(format!("{}: needs a duration_s to run in one process", graph.path.display())));
     };
     if let Some(node) = graph.nodes.iter().find(|n| n.command.is_some()) {
-        return Err(Failure::input(format!("node \"{}\" is a program of its own, which one process cannot hold; run it with --transport iceoryx2", node.name)));
+        return Err(Failure::input(format!(
+            "node \"{}\" is a program of its own, which one process cannot hold; run it with --transport iceoryx2",
+            node.name
+        )));
     }
     let plans = graph.nodes.iter().filter(|n| n.kind != NodeKind::Recorder).map(|n| plan(graph, &n.name));
     let mut sequence = Sequence::new(plans.collect::<Result<_, _>>()?, &graph.timing).map_err(Failure::input)?;
@@ -153,7 +156,15 @@ pub fn run_here(graph: &Graph, hear: &mut dyn FnMut(&str, &Message)) -> Result<D
         Err(e) => return Err(Failure::machine(failed.unwrap_or(e))),
     };
     let summary = Some(traces.summary(graph));
-    Ok(Done { steps, duration_s: started.elapsed().as_secs_f64(), report: None, lost, bag: graph.bag.clone(), complete: lost == 0, summary })
+    Ok(Done {
+        steps,
+        duration_s: started.elapsed().as_secs_f64(),
+        report: None,
+        lost,
+        bag: graph.bag.clone(),
+        complete: lost == 0,
+        summary,
+    })
 }
 
 impl Done {

@@ -6,7 +6,7 @@ use backdrive_bags::{Reader, recording};
 use backdrive_plant::excitation::{Excitation, load_experiments};
 use backdrive_plant::model::{Fragment, Hold, Model, OutputKind};
 use backdrive_plant::recording::{Columns, Piece, Recording, read_csv, signals_of, write_csv};
-use backdrive_plant::set::RecordingSet;
+use backdrive_plant::set::{Condition, RecordingSet};
 use backdrive_plant::stepper::{Options, simulate as simulate_model};
 use serde_json::json;
 use std::path::{Path, PathBuf};
@@ -15,7 +15,8 @@ use std::path::{Path, PathBuf};
 pub fn simulate(options: &cli::Simulate) -> Result<u8, Failure> {
     let model = held_model(&options.model, options.grip.as_deref())?;
     let mut results = Vec::new();
-    for (drive, out) in drives(options, &model)? {
+    for Drive { recording: drive, out, condition } in drives(options, &model)? {
+        let model = under(&model, &condition, &drive.name)?;
         let prediction = predict(&model, &drive, options)?;
         if let Some(folder) = out.parent().filter(|f| !f.as_os_str().is_empty()) {
             std::fs::create_dir_all(folder).map_err(|e| Failure::write(folder, e))?;
@@ -29,12 +30,35 @@ pub fn simulate(options: &cli::Simulate) -> Result<u8, Failure> {
             }
         }
         let fits: serde_json::Map<_, _> = fits.into_iter().map(|(name, nrmse)| (name, json!(nrmse))).collect();
-        results.push(json!({ "recording": drive.name, "out": out, "samples": prediction.len(), "period_s": prediction.period, "nrmse": fits }));
+        results.push(
+            json!({ "recording": drive.name, "out": out, "samples": prediction.len(), "period_s": prediction.period, "nrmse": fits }),
+        );
     }
     if options.json {
         println!("{}", json!({ "model": model.name, "runs": results }));
     }
     Ok(0)
+}
+
+/// What drives the model, where its prediction goes, and what is different in this experiment.
+struct Drive {
+    recording: Recording,
+    out: PathBuf,
+    condition: Vec<(String, Condition)>,
+}
+
+/// The model under the conditions of one experiment. What is to be estimated there keeps its number.
+fn under(model: &Model, condition: &[(String, Condition)], recording: &str) -> Result<Model, Failure> {
+    let mut model = model.clone();
+    for (path, value) in condition {
+        match value {
+            Condition::Value(value) => {
+                model.set_values_at(path, &[*value]).map_err(|e| Failure::input(format!("{recording}: condition {path}: {e}")))?
+            }
+            Condition::Free => eprintln!("note: {recording}: {path} is free in this file; the model's own number is used"),
+        }
+    }
+    Ok(model)
 }
 
 /// A model with a grip or an environment attached where one is given.
@@ -54,7 +78,7 @@ pub fn held_model(path: &Path, grip: Option<&Path>) -> Result<Model, Failure> {
 }
 
 /// What drives the model, and where each prediction goes.
-fn drives(options: &cli::Simulate, model: &Model) -> Result<Vec<(Recording, PathBuf)>, Failure> {
+fn drives(options: &cli::Simulate, model: &Model) -> Result<Vec<Drive>, Failure> {
     let path = Path::new(&options.drive);
     let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
     let columns = match &options.columns {
@@ -67,13 +91,15 @@ fn drives(options: &cli::Simulate, model: &Model) -> Result<Vec<(Recording, Path
         return files
             .into_iter()
             .map(|file| {
-                let recording = read_recording(&set.path_of(file), model, &set.columns, &set.rules_of(file).piece)?;
-                Ok((recording, options.out.join(Path::new(file).with_extension("csv"))))
+                let rules = set.rules_of(file);
+                let recording = read_recording(&set.path_of(file), model, &set.columns, &rules.piece)?;
+                Ok(Drive { recording, out: options.out.join(Path::new(file).with_extension("csv")), condition: rules.condition })
             })
             .collect();
     }
     if extension == "csv" || extension == "mcap" {
-        return Ok(vec![(read_recording(path, model, &columns, &Piece::default())?, options.out.clone())]);
+        let recording = read_recording(path, model, &columns, &Piece::default())?;
+        return Ok(vec![Drive { recording, out: options.out.clone(), condition: Vec::new() }]);
     }
     if extension == "toml" {
         let experiments = load_experiments(path)?;
@@ -82,7 +108,7 @@ fn drives(options: &cli::Simulate, model: &Model) -> Result<Vec<(Recording, Path
             .iter()
             .map(|experiment| {
                 let out = if single { options.out.clone() } else { options.out.join(format!("{}.csv", experiment.name)) };
-                Ok((excited(model, &experiment.name, &experiment.drives, options)?, out))
+                Ok(Drive { recording: excited(model, &experiment.name, &experiment.drives, options)?, out, condition: Vec::new() })
             })
             .collect();
     }
@@ -90,7 +116,7 @@ fn drives(options: &cli::Simulate, model: &Model) -> Result<Vec<(Recording, Path
         Failure::input(format!("{e}; it is no recording either: those end in .csv or .mcap, or are a folder with a set.toml"))
     })?;
     let drive = [(options.input.clone(), excitation)];
-    Ok(vec![(excited(model, &options.drive, &drive, options)?, options.out.clone())])
+    Ok(vec![Drive { recording: excited(model, &options.drive, &drive, options)?, out: options.out.clone(), condition: Vec::new() }])
 }
 
 /// The signals of a model from a recording: all of its inputs, and those of its outputs that were recorded.
@@ -108,7 +134,7 @@ pub fn read_recording(path: &Path, model: &Model, columns: &Columns, piece: &Pie
             )));
         }
     }
-    Ok(recording.regular_for(model).map_err(Failure::input)?)
+    recording.regular_for(model).map_err(Failure::input)
 }
 
 fn from_bag(path: &Path, model: &Model, columns: &Columns, piece: &Piece) -> Result<Recording, Failure> {
@@ -159,9 +185,11 @@ fn excited(model: &Model, name: &str, drives: &[(Option<String>, Excitation)], o
 fn predict(model: &Model, drive: &Recording, options: &cli::Simulate) -> Result<Recording, Failure> {
     let zeros = vec![0.0; drive.len()];
     let inputs: Vec<&[f64]> = model.inputs.iter().map(|i| drive.signal(&i.name).unwrap_or(&zeros)).collect();
-    let how = Options { substeps: options.substeps, add_noise: options.noise, quantise: options.noise.is_some(), ..Options::default() };
-    let outputs = simulate_model(model, &inputs, drive.period, &how).map_err(|e| Failure::input(format!("model \"{}\": {e}", model.name)))?;
-    let mut columns: Vec<(String, Vec<f64>)> = model.inputs.iter().zip(&inputs).map(|(i, samples)| (i.name.clone(), samples.to_vec())).collect();
+    let how = Options { substeps: options.substeps, add_noise: options.noise, quantise: options.noise.is_some() };
+    let outputs =
+        simulate_model(model, &inputs, drive.period, &how).map_err(|e| Failure::input(format!("model \"{}\": {e}", model.name)))?;
+    let mut columns: Vec<(String, Vec<f64>)> =
+        model.inputs.iter().zip(&inputs).map(|(i, samples)| (i.name.clone(), samples.to_vec())).collect();
     columns.extend(model.outputs.iter().map(|o| o.name.clone()).zip(outputs));
     let diverged = columns.iter().any(|(_, samples)| samples.iter().any(|x| !x.is_finite()));
     if diverged {

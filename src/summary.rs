@@ -59,9 +59,8 @@ pub struct Traces {
 impl Traces {
     /// Ready for the messages of a graph.
     pub fn of(graph: &Graph) -> Traces {
-        let topic = |kind: NodeKind, port: &str| {
-            graph.nodes.iter().position(|n| n.kind == kind).map(|index| graph.topic_of(index, port).name)
-        };
+        let topic =
+            |kind: NodeKind, port: &str| graph.nodes.iter().position(|n| n.kind == kind).map(|index| graph.topic_of(index, port).name);
         let master = graph.node_of(NodeKind::Master);
         let model = master.and_then(|node| match &node.settings {
             backdrive_nodes::graph::Settings::Master(files) => files.model.as_ref(),
@@ -112,7 +111,12 @@ impl Traces {
         let steps = self.axes.iter().map(|t| t.intent.len()).min().unwrap_or(0);
         let mut come = 0.0;
         let moved = |step: usize| self.axes.iter().map(|t| (t.intent[step] - t.intent[step.saturating_sub(1)]).abs()).sum::<f64>();
-        (0..steps).map(|step| { come += moved(step); come }).collect()
+        (0..steps)
+            .map(|step| {
+                come += moved(step);
+                come
+            })
+            .collect()
     }
 
     /// The verdict on all that went by.
@@ -121,7 +125,8 @@ impl Traces {
             let values = self.axes.iter().flat_map(|t| pick(t).iter()).filter(|f| !f.is_nan());
             values.fold(None, |m: Option<f64>, f| Some(m.unwrap_or(0.0).max(f.abs())))
         };
-        let touching: Vec<u64> = self.axes.iter().flat_map(|t| t.contact.iter().enumerate().filter(|(_, f)| **f != 0.0).map(|(i, _)| i as u64)).collect();
+        let touching: Vec<u64> =
+            self.axes.iter().flat_map(|t| t.contact.iter().enumerate().filter(|(_, f)| **f != 0.0).map(|(i, _)| i as u64)).collect();
         let path = self.path();
         let judged = self.axes.iter().filter(|t| !t.position.is_empty() && !t.contact.is_empty());
         // On several axes the hand holds still when it does so on all of them: one moves the others.

@@ -72,10 +72,7 @@ fn check_14_three_cancellers_in_the_linear_loop() {
     let base = uncancelled();
     let second = edge(base, 10.0 * base, 1e-3, |lambda| {
         let mut graph = linear(lambda);
-        let reduced = contact(Overrides {
-            canceller: Some(file("plant/models/impulse-engine-second-order.toml")),
-            ..Overrides::default()
-        });
+        let reduced = contact(Overrides { canceller: Some(file("plant/models/impulse-engine-second-order.toml")), ..Overrides::default() });
         let settings = reduced.node_of(NodeKind::Canceller).unwrap().settings.clone();
         graph.nodes.iter_mut().find(|n| n.kind == NodeKind::Canceller).unwrap().settings = settings;
         growth(&run(&graph).contact, PERIOD) > 0.0
@@ -83,7 +80,10 @@ fn check_14_three_cancellers_in_the_linear_loop() {
     let mut exact = linear(50.0);
     cancel_with(&mut exact, |_| {});
     let sixth = growth(&run(&exact).contact, PERIOD);
-    println!("check 14, linear: none {base:.4}; second order {second:.4}, {:.2} times; sixth order at 50: growth {sixth:.2}/s", second / base);
+    println!(
+        "check 14, linear: none {base:.4}; second order {second:.4}, {:.2} times; sixth order at 50: growth {sixth:.2}/s",
+        second / base
+    );
     assert!(second > 1.4 * base);
     assert!(sixth < 0.0, "an exact copy has no finite limit");
 }

@@ -74,7 +74,7 @@ fn on_two_axes() {
 #[test]
 fn over_a_bad_connection() {
     let place = Place::new();
-    let impaired = "to = \"slave.command\"\nimpair = { delay_s = 0.003, jitter_s = 0.002, loss = 0.05, seed = 7 }\n";
+    let impaired = "to = \"slave.command\"\nimpair = { delay_s = 0.003, jitter_s = 0.002, loss = 0.05 }\n";
     let text = graph_text("launch/contact.toml").replace("to = \"slave.command\"\n", impaired);
     let graph = place.write("impaired.toml", &text).display().to_string();
     one_answer(&place, &graph, &["--lambda", "0.1"]);

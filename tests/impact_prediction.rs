@@ -81,10 +81,15 @@ fn play(model: &Model, force: &[f64], quantise: bool) -> Vec<f64> {
 
 /// The identification experiments: slow ramps with reversals, sweeps of two sizes, steps.
 fn experiments() -> Vec<Vec<f64>> {
-    ["triangle:amplitude=1.5,period=1,cycles=2,nested=1", "sweep:amplitude=0.6,from=5,to=200,duration=2,fade_in=0.2", "sweep:amplitude=2.5,from=5,to=200,duration=2,fade_in=0.2", "steps:amplitude=1/3,hold=0.15"]
-        .iter()
-        .map(|spec| spec.parse::<Excitation>().unwrap().samples(RATE_HZ).unwrap())
-        .collect()
+    [
+        "triangle:amplitude=1.5,period=1,cycles=2,nested=1",
+        "sweep:amplitude=0.6,from=5,to=200,duration=2,fade_in=0.2",
+        "sweep:amplitude=2.5,from=5,to=200,duration=2,fade_in=0.2",
+        "steps:amplitude=1/3,hold=0.15",
+    ]
+    .iter()
+    .map(|spec| spec.parse::<Excitation>().unwrap().samples(RATE_HZ).unwrap())
+    .collect()
 }
 
 /// Fits the numbers at `paths` by least squares of the simulated position (Gauss-Newton with Levenberg's damping, in logarithms: no number changes its sign).
@@ -187,7 +192,13 @@ fn check_15_impacts_are_predicted_and_each_left_out_physics_makes_it_worse() {
         device
     };
     let common = ["elements.cable.stiffness", "elements.linkage_damping.damping", "elements.drum_damping.damping"];
-    let hysteresis = ["elements.linkage.stiffness_positive", "elements.linkage.stiffness_negative", "elements.linkage.offset_positive", "elements.linkage.offset_negative", "elements.linkage.bandwidth"];
+    let hysteresis = [
+        "elements.linkage.stiffness_positive",
+        "elements.linkage.stiffness_negative",
+        "elements.linkage.offset_positive",
+        "elements.linkage.offset_negative",
+        "elements.linkage.bandwidth",
+    ];
     let friction = ["elements.motor_friction.force", "elements.drum_friction.force"];
 
     // Fits start from the paper's device, its hysteresis made symmetric: its own f_ln is lost.
@@ -205,7 +216,12 @@ fn check_15_impacts_are_predicted_and_each_left_out_physics_makes_it_worse() {
     let no_hysteresis = fitted(without_hysteresis, &[&common[..], &["elements.linkage.stiffness"], &friction[..]].concat());
     let no_friction = fitted(without_friction, &[&common[..], &hysteresis[..]].concat());
     let (all, no_hysteresis, no_friction) = (quality(&real, &all), quality(&real, &no_hysteresis), quality(&real, &no_friction));
-    println!("check 15: predicted {:.1} % of the induced motion; without hysteresis {:.1} %, without friction {:.1} %", 100.0 * all, 100.0 * no_hysteresis, 100.0 * no_friction);
+    println!(
+        "check 15: predicted {:.1} % of the induced motion; without hysteresis {:.1} %, without friction {:.1} %",
+        100.0 * all,
+        100.0 * no_hysteresis,
+        100.0 * no_friction
+    );
     assert!(all >= 0.90, "{all}");
     assert!(no_hysteresis < all && no_friction < all, "{no_hysteresis} {no_friction} {all}");
 }

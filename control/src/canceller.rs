@@ -76,12 +76,7 @@ struct HighPass {
 impl HighPass {
     fn new(corner_hz: f64, period_s: f64) -> HighPass {
         let warped = (std::f64::consts::PI * corner_hz * period_s).min(1.5).tan();
-        HighPass {
-            feed: 1.0 / (1.0 + warped),
-            keep: (1.0 - warped) / (1.0 + warped),
-            input: [0.0; MAX_AXES],
-            output: [0.0; MAX_AXES],
-        }
+        HighPass { feed: 1.0 / (1.0 + warped), keep: (1.0 - warped) / (1.0 + warped), input: [0.0; MAX_AXES], output: [0.0; MAX_AXES] }
     }
 
     fn apply(&mut self, values: &mut [f64; MAX_AXES]) {

@@ -84,7 +84,13 @@ pub struct DeviceOptions {
 
 impl Device {
     /// Attaches `fragment` (a grip, an environment) to the user's body of every axis and compiles.
-    pub fn new(model: &Model, fragment: Option<&Fragment>, role: Role, period_s: f64, options: &DeviceOptions) -> Result<Device, DeviceError> {
+    pub fn new(
+        model: &Model,
+        fragment: Option<&Fragment>,
+        role: Role,
+        period_s: f64,
+        options: &DeviceOptions,
+    ) -> Result<Device, DeviceError> {
         let mut model = model.clone();
         let name = model.name.clone();
         if model.axes.is_empty() {
@@ -210,14 +216,8 @@ impl Device {
 }
 
 fn attach(model: &mut Model, axis: &Axis, index: usize, fragment: Option<&Fragment>) -> Bound {
-    let mut bound = Bound {
-        feedback: axis.feedback,
-        measured: axis.measured,
-        user: axis.user,
-        hand: None,
-        port_forces: Vec::new(),
-        scale: axis.scale,
-    };
+    let mut bound =
+        Bound { feedback: axis.feedback, measured: axis.measured, user: axis.user, hand: None, port_forces: Vec::new(), scale: axis.scale };
     // A model whose user is part of it (a fitted second-order master) takes no grip.
     if let Some(fragment) = fragment.filter(|_| !axis.holds_user) {
         let several = model.axes.len() > 1;

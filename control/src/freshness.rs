@@ -50,11 +50,8 @@ impl Authority {
 
     /// The share at this step, given the steps since the last new sample.
     pub fn share(&mut self, stale_steps: u64) -> f64 {
-        self.steps_down = if stale_steps > self.hold_steps {
-            (self.steps_down + 1).min(self.hold_steps)
-        } else {
-            self.steps_down.saturating_sub(1)
-        };
+        self.steps_down =
+            if stale_steps > self.hold_steps { (self.steps_down + 1).min(self.hold_steps) } else { self.steps_down.saturating_sub(1) };
         1.0 - self.steps_down as f64 / self.hold_steps as f64
     }
 

@@ -3,7 +3,7 @@
 use crate::core::{Core, Events, Port, Tick};
 use crate::freshness::Freshness;
 use crate::guard::Guard;
-use backdrive_msgs::{Gains, MAX_AXES, NOT_MEASURED, Sample, flag};
+use backdrive_msgs::{Gains, MAX_AXES, Sample, flag};
 
 /// A gain that ramps to what is wanted in a straight line.
 #[derive(Debug, Clone)]
@@ -107,7 +107,7 @@ impl Core for Forward {
 /// Inputs `contact` (effort F_s), `measured` (the master's, one step late: what the guard watches); outputs
 /// `force` (effort F_f = lambda F_s + dither), `dither` (effort: the added excitation alone).
 ///
-/// Without a new contact force the output is not measured: the master then lets go. It does so too where the contact
+/// When contact forces stop coming the output is not measured: the master then lets go. It does so too where the contact
 /// force is that of a slave that holds because no command reaches it.
 pub struct Backward {
     plan: GainPlan,
@@ -154,7 +154,7 @@ impl Core for Backward {
         if guarded < 1.0 {
             force[0].flags |= flag::GUARDED;
         }
-        // Before the first contact force has come there is none: the dither alone is played.
+        // Before the first contact force has come there is none: only the dither is played.
         let contact = self.contact.new_sample(&inputs[0], |s| s.effort[0]).copied();
         if contact.is_none() && self.contact.begun() {
             return;
@@ -168,7 +168,7 @@ impl Core for Backward {
             let added = if dither[0].effort[axis].is_nan() { 0.0 } else { dither[0].effort[axis] };
             let reflected = guarded * lambda * felt;
             self.force[axis] = reflected + added;
-            force[0].effort[axis] = if contact.is_none() && self.dither.is_empty() { NOT_MEASURED } else { reflected + added };
+            force[0].effort[axis] = reflected + added;
         }
     }
 

@@ -3,6 +3,7 @@
 use crate::rundir::RunPaths;
 use backdrive_bags::{BagHeader, Recorder, RecorderOptions, TopicInfo};
 use backdrive_control::core::Core;
+use backdrive_msgs::topic::{Kind, Topic};
 use backdrive_nodes::build::{self, credit_listeners, topics};
 use backdrive_nodes::graph::{Files, Graph, Node, NodeKind, Overrides};
 use backdrive_nodes::process::{ProcessOptions, run_process};
@@ -10,7 +11,6 @@ use backdrive_nodes::protocol::FromNode;
 use backdrive_nodes::recorder::{RecorderPlan, run_recorder};
 use backdrive_nodes::stage::Clock;
 use backdrive_nodes::transport::iceoryx2::Iceoryx2;
-use backdrive_msgs::topic::{Kind, Topic};
 use std::collections::BTreeMap;
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
@@ -25,9 +25,9 @@ where
     let arguments: Vec<String> = std::env::args().collect();
     let after = |flag: &str| arguments.iter().position(|a| a == flag).and_then(|i| arguments.get(i + 1)).cloned();
     match (after("--run"), after("--name")) {
-        (Some(run), Some(name)) => {
-            run_node(Path::new(&run), &name, |graph, node| build::plan_with(graph, &node.name, cores(graph, node)?).map_err(|e| e.to_string()))
-        }
+        (Some(run), Some(name)) => run_node(Path::new(&run), &name, |graph, node| {
+            build::plan_with(graph, &node.name, cores(graph, node)?).map_err(|e| e.to_string())
+        }),
         _ => fail("this program is a node of a graph: name it as `command` of a node, and `backdrive run` starts it".to_string(), 2),
     }
 }

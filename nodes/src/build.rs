@@ -239,4 +239,3 @@ impl Core for Wired {
         self.core.gains()
     }
 }
-

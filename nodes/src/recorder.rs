@@ -2,7 +2,7 @@
 //!
 //! It polls rather than wakes, so a publisher never pays for it. In lockstep it says on its credit topic
 //! up to which step it has everything; sources wait for that, so the graph cannot outrun it and nothing
-//! is ever lost. In real time the buffers cover [`POLL`] many times over, and a hole is counted.
+//! is ever lost. In real time the buffers cover the time between two polls many times over, and a hole is counted.
 
 use crate::clock::now_ns;
 use crate::process::Line;

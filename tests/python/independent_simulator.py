@@ -10,7 +10,6 @@ moves when its step is halved: where that is large, the case is sensitive and ne
 """
 
 import sys
-import time
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +18,7 @@ from runner import Backdrive, Table, columns_of, share_of_range
 
 PERIOD = 5e-4
 FINE = 2.5e-6
+MODELS = Path(__file__).resolve().parents[2] / "plant" / "models"
 CASES = ["001", "002", "003", "004", "005", "008", "009", "012", "015", "020", "025", "030", "035", "043", "045"]
 
 # A mass on presliding friction alone, thrown by impacts: the sliders break loose within 12 to 140 um, and the step is chosen
@@ -235,6 +235,31 @@ def nominal_models(program, core, folder, table):
         table.row(name, [*numbers, own], [1e-4, LOOSER.get(case, 1e-3)])
 
 
+def devices(program, core, table):
+    """The device models of the project, driven by tones of a size that suits each."""
+    size = {"force": 1.5, "motion": 3e-4}
+    special = {"engine-test-bench": 150.0, "ball-screw": 0.5, "steering-compensator": 3e-3}
+    for path in sorted(MODELS.glob("*.toml")):
+        other = core.load_model(path)
+        if {e["kind"] for e in other["elements"]} - set(core.KIND):
+            print(f"{path.stem}: has a kind that the other does not know")
+            continue
+        amplitude = [number for name, number in special.items() if path.stem.startswith(name)]
+        inputs = {}
+        for i, q in enumerate(other["inputs"]):
+            inputs[q["name"]] = tones(*(amplitude or [size[q["kind"]]]), 1.3, 4.1, 9.7, seed=i)
+        count, substeps = len(next(iter(inputs.values()))), round(PERIOD / FINE)
+        drive = program.here / "device.csv"
+        table_of = np.column_stack([PERIOD * np.arange(count), *inputs.values()])
+        np.savetxt(drive, table_of, fmt="%.17g", delimiter=",", header=",".join(["t", *inputs]), comments="")
+        expected, halved = (core.simulate(other, inputs, PERIOD, count, nsub=n)[0] for n in (substeps, 2 * substeps))
+        runs = [program.simulate_files(path, drive, n) for n in (substeps, None)]
+        numbers = [max(error(run[o["name"]], expected[:, i], o) for i, o in enumerate(other["outputs"])) for run in runs]
+        own = max(error(halved[:, i], expected[:, i], o) for i, o in enumerate(other["outputs"]))
+        why = TOUCH if any(e["kind"] == "backlash" for e in other["elements"]) else ""
+        table.row(path.stem, [*numbers, own], [1e-3 if why else 1e-4, 1e-2 if why else 1e-3], why)
+
+
 def error(found, expected, output):
     """Of motions the largest difference; of what may jump between two samples the root mean square."""
     if output["kind"] in ("position", "velocity"):
@@ -259,6 +284,8 @@ def main():
         numbers = [max(error(run[o["name"]], expected[:, i], o) for i, o in enumerate(ours["outputs"])) for run in runs]
         own = max(error(halved[:, i], expected[:, i], o) for i, o in enumerate(ours["outputs"]))
         table.row(name, [*numbers, own], [fine, limit], why)
+    table.head("device models", table.columns)
+    devices(program, core, table)
     if (folder / "dev").is_dir():
         table.head("nominal models on recordings", table.columns)
         nominal_models(program, core, folder / "dev", table)

@@ -146,8 +146,11 @@ fn stage_of(graph: &Graph, end: &(usize, String), direction: Direction) -> (usiz
     (end.0, graph.nodes[end.0].kind.port(&end.1, direction).map_or(0, |(stage, _)| stage))
 }
 
-/// All stages as (node, stage), each after those whose outputs of the same step it needs; or those that wait for each other.
-pub(crate) fn order(graph: &Graph) -> Result<Vec<(usize, usize)>, Vec<(usize, usize)>> {
+/// Indices of a node and of one of its stages.
+type StageOf = (usize, usize);
+
+/// All stages, each after those whose outputs of the same step it needs; or those that wait for each other.
+pub(crate) fn order(graph: &Graph) -> Result<Vec<StageOf>, Vec<StageOf>> {
     let mut waiting: Vec<(usize, usize)> =
         graph.nodes.iter().enumerate().flat_map(|(n, node)| (0..node.kind.stages().len()).map(move |s| (n, s))).collect();
     let mut done = Vec::with_capacity(waiting.len());
