@@ -22,7 +22,9 @@ fn main() -> ExitCode {
     // A file that reaches the size a user is allowed is an error of its writer, with a name, and no end without a word.
     // SAFETY: ignoring a signal runs no code of ours.
     let _ = unsafe { nix::sys::signal::signal(nix::sys::signal::Signal::SIGXFSZ, nix::sys::signal::SigHandler::SigIgn) };
-    let result = match Cli::parse().command {
+    let command = Cli::parse().command;
+    end_with_the_reader(&command);
+    let result = match command {
         Command::Run(options) => run::run(&options),
         Command::Replay(options) => replay::replay(&options),
         Command::Check(options) => graph::check(&options),
@@ -39,5 +41,15 @@ fn main() -> ExitCode {
             eprintln!("error: {}", failure.message);
             ExitCode::from(failure.code)
         }
+    }
+}
+
+/// `backdrive ... | head` ends quietly when the reader has enough. Not where other processes hang on pipes of ours:
+/// there a closed one must not end us.
+fn end_with_the_reader(command: &Command) {
+    use nix::sys::signal::{SigHandler, Signal, signal};
+    if !matches!(command, Command::Run(_) | Command::Node(_) | Command::Bag(cli::Bag::Play { .. })) {
+        // SAFETY: the default action replaces none of ours.
+        let _ = unsafe { signal(Signal::SIGPIPE, SigHandler::SigDfl) };
     }
 }

@@ -58,14 +58,16 @@ pub struct Done {
 
 /// Runs one graph to its end.
 pub fn run_graph(graph: &Graph, transport: Transport) -> Result<Done, Failure> {
-    buildable(graph)?;
-    if let Some(bag) = &graph.bag {
-        writable(bag)?;
-    }
     match transport {
         Transport::Iceoryx2 => run_processes(graph),
         Transport::Inproc => run_here(graph, &mut |_, _| {}),
     }
+}
+
+/// What would stop a run is told before it begins.
+fn ready(graph: &Graph) -> Result<(), Failure> {
+    buildable(graph)?;
+    graph.bag.as_deref().map_or(Ok(()), writable)
 }
 
 /// A run that ends with its last step, for a bag that cannot be written, would be lost whole. A bag that exists is
@@ -88,9 +90,11 @@ fn begins_as_bag(path: &Path) -> bool {
 }
 
 fn run_processes(graph: &Graph) -> Result<Done, Failure> {
+    ready(graph)?;
     let report = backdrive_launch::run(graph, SuperviseOptions::default())?;
     let bag = report.bag.clone().filter(|bag| bag.exists());
-    let summary = bag.as_ref().map(|bag| summarise(bag)).transpose()?;
+    // What is known of the run is told even where its bag cannot be read.
+    let summary = bag.as_ref().and_then(|bag| summarise(bag).map_err(|e| eprintln!("warning: {}", e.message)).ok());
     let whole = |bag| Reader::open(bag).is_ok_and(|r| r.ended_cleanly() && r.completeness().is_some_and(Completeness::is_complete));
     let complete = bag.as_deref().is_some_and(whole);
     let lost = report.lost + report.unrecorded.unwrap_or(0);
@@ -111,6 +115,7 @@ pub fn run_here(graph: &Graph, hear: &mut dyn FnMut(&str, &Message)) -> Result<D
             node.name
         )));
     }
+    ready(graph)?;
     let plans = graph.nodes.iter().filter(|n| n.kind != NodeKind::Recorder).map(|n| plan(graph, &n.name));
     let mut sequence = Sequence::new(plans.collect::<Result<_, _>>()?, &graph.timing).map_err(Failure::input)?;
     let (record, header) = recording(graph, "recorder");
@@ -127,9 +132,7 @@ pub fn run_here(graph: &Graph, hear: &mut dyn FnMut(&str, &Message)) -> Result<D
     while done < steps && failed.is_none() {
         let some = (steps - done).min(512);
         let mut tap = |topic: usize, message: &Message| {
-            if let Message::Sample(sample) = message {
-                traces.take(&names[topic], sample);
-            }
+            traces.take(&names[topic], message);
             if let Message::Event(event) = message
                 && event.severity > 0
             {
@@ -237,6 +240,7 @@ impl Done {
             "bag": self.bag,
             "complete": self.bag.as_ref().map(|_| self.complete),
             "loop_gain": summary.map(|s| s.loop_gain),
+            "last_loop_gain": summary.map(|s| s.last_loop_gain),
             "peak_contact_force_n": summary.and_then(|s| s.peak_contact_force),
             "peak_feedback_force_n": summary.and_then(|s| s.peak_feedback_force),
             "first_contact_s": summary.and_then(|s| s.first_contact_s),

@@ -12,6 +12,8 @@ use std::path::Path;
 pub struct Summary {
     /// Position scale times force scale at the start.
     pub loop_gain: f64,
+    /// The same at the end: a scheduled change or the guard may have moved it.
+    pub last_loop_gain: f64,
     /// What the loop did; `None` where there is no master, slave or contact to judge by.
     pub outcome: Option<Outcome>,
     /// Largest magnitude of the environment's force on the slave, N or N m.
@@ -41,8 +43,8 @@ pub fn summarise(path: &Path) -> Result<Summary, Failure> {
     let mut traces = Traces::of(&graph);
     for entry in reader.messages().map_err(Failure::input)? {
         let entry = entry.map_err(Failure::input)?;
-        if let Some(Message::Sample(sample)) = entry.message(path).map_err(Failure::input)? {
-            traces.take(&entry.topic.name, &sample);
+        if let Some(message) = entry.message(path).map_err(Failure::input)? {
+            traces.take(&entry.topic.name, &message);
         }
     }
     Ok(traces.summary(&graph))
@@ -54,6 +56,7 @@ pub struct Traces {
     measured: Option<String>,
     contact: Option<String>,
     axes: Vec<Trace>,
+    last_loop_gain: Option<f64>,
 }
 
 impl Traces {
@@ -80,11 +83,20 @@ impl Traces {
             measured: topic(NodeKind::Master, "measured"),
             contact: topic(NodeKind::Slave, "measured"),
             axes: axes.collect(),
+            last_loop_gain: None,
         }
     }
 
     /// Hears a message.
-    pub fn take(&mut self, topic: &str, sample: &backdrive_msgs::Sample) {
+    pub fn take(&mut self, topic: &str, message: &Message) {
+        let sample = match message {
+            Message::Sample(sample) => sample,
+            Message::Gains(gains) => {
+                self.last_loop_gain = Some(gains.mu * gains.lambda);
+                return;
+            }
+            _ => return,
+        };
         let is = |name: &Option<String>| name.as_deref() == Some(topic);
         let (intent, measured, contact) = (is(&self.intent), is(&self.measured), is(&self.contact));
         for (index, trace) in self.axes.iter_mut().enumerate() {
@@ -133,6 +145,7 @@ impl Traces {
         let judged = judged.map(|t| if self.axes.len() > 1 { Trace { intent: path.clone(), ..t.clone() } } else { t.clone() });
         Summary {
             loop_gain: graph.gains.mu * graph.gains.lambda,
+            last_loop_gain: self.last_loop_gain.unwrap_or(graph.gains.mu * graph.gains.lambda),
             outcome: Outcome::worst(judged.map(|t| judge(&t))),
             peak_contact_force: peak(|t| &t.contact),
             peak_feedback_force: peak(|t| &t.feedback),
@@ -155,7 +168,9 @@ impl Summary {
             lines.push(format!("master   reflected force up to {peak:.3} N"));
         }
         if let Some(outcome) = &self.outcome {
-            lines.push(format!("loop     {outcome} at mu*lambda = {}", self.loop_gain));
+            let moved = (self.last_loop_gain - self.loop_gain).abs() > 1e-9 * self.loop_gain.abs();
+            let later = if moved { format!(" at the start and {:.4} at the end", self.last_loop_gain) } else { String::new() };
+            lines.push(format!("loop     {outcome} at mu*lambda = {}{later}", self.loop_gain));
         }
         lines.join("\n")
     }

@@ -80,7 +80,7 @@ fn graphs() {
     contact(&place, "topic.toml", "kind = \"operator\"", "kind = \"operator\"\ntopics = { intent = \"/master/measured_js\" }");
     contact(&place, "node.toml", "from = \"operator.intent\"", "from = \"opertor.intent\"");
     contact(&place, "port.toml", "from = \"operator.intent\"", "from = \"operator.intnt\"");
-    contact(&place, "unfed.toml", "to = \"slave.command\"", "to = \"master.force\"");
+    contact(&place, "unfed.toml", "[[connections]]\nfrom = \"scaling.command\"\nto = \"slave.command\"\n", "");
     contact(&place, "name.toml", "name = \"scaling\"", "name = \"slave\"");
     contact(&place, "time.toml", "{ t = 0.60,", "{ t = 0.10,");
     contact(&place, "restart.toml", "kind = \"slave\"", "kind = \"slave\"\nrestart = true");
@@ -238,8 +238,10 @@ fn bags() {
     std::fs::write(place.path("cut.mcap"), &whole[..whole.len() / 2]).unwrap();
     std::fs::write(place.path("stub.mcap"), &whole[..100]).unwrap();
     let mut damaged = whole.clone();
-    let middle = whole.len() / 3;
-    damaged[middle..middle + 64].fill(0x55);
+    // Inside the second compressed chunk.
+    let chunks = whole.windows(4).enumerate().filter(|(_, bytes)| *bytes == [0x04, 0x22, 0x4d, 0x18]);
+    let inside = chunks.map(|(at, _)| at + 1000).nth(1).unwrap();
+    damaged[inside..inside + 64].fill(0x55);
     std::fs::write(place.path("damaged.mcap"), damaged).unwrap();
     std::fs::write(place.path("zero.mcap"), b"").unwrap();
     place.write("table.csv", "t,x\n0,1\n0.001,2\n0.002,3\n");
@@ -297,7 +299,7 @@ fn bags() {
 /// A run whose bag meets the end of the room.
 fn assert_cut_off(place: &Place, what: &str, done: &Ended, bag: &Path, says: &str) {
     assert_told(what, done, 5, &[says, "bag recover"]);
-    let saved = place.path(&format!("{what}.mcap"));
+    let saved = place.path(&format!("{what}-saved.mcap"));
     let told = place.backdrive(&["bag", "recover", &bag.display().to_string(), "--bag", &saved.display().to_string()]);
     assert_eq!(told.code, Some(0), "{told:?}");
     let rows = system::samples(&saved, "/master/measured_js");

@@ -76,7 +76,7 @@ class Table:
     """Rows of measured agreement with their limits; remembers whether one was broken."""
 
     def __init__(self, first, columns):
-        self.broken = []
+        self.broken, self.reasons = [], set()
         self.head(first, columns)
 
     def head(self, first, columns):
@@ -85,13 +85,14 @@ class Table:
         print(f"{first:<46}" + "".join(f"{name:>14}" for name in columns) + "   limits", flush=True)
 
     def row(self, name, numbers, limits, why=""):
-        """The first `len(limits)` numbers must each be at most their limit; `why` says why one is what it is."""
+        """The first `len(limits)` numbers must each be at most their limit; `why` says, once, why one is what it is."""
         above = [i for i, limit in enumerate(limits) if not numbers[i] <= limit]
         self.broken += [f"{name}, {self.columns[i]}: {numbers[i]:.2e} is above {limits[i]:.0e}" for i in above]
         cells = "".join(f"{number:>14.1e}" for number in numbers)
         shown = ", ".join(f"{limit:.0e}" for limit in dict.fromkeys(limits))
         print(f"{name:<46}{cells}   {shown}{'  <-- ABOVE' if above else ''}", flush=True)
-        if why:
+        if why and why not in self.reasons:
+            self.reasons.add(why)
             print(f"    {why}", flush=True)
 
     def verdict(self):

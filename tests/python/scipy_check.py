@@ -124,26 +124,24 @@ class Reference:
         t = period * np.arange(len(next(iter(inputs.values()))))
         self.t = t
         self.spline = {q["name"]: CubicSpline(t, inputs[q["name"]]) for q in self.inputs}
-        self.mode = 0
+        self.mode, self.middle = 0, 0.0
 
     def hold(self, q):
         return q.get("hold", "zero" if q["kind"] == "force" else "cubic")
 
     def signal(self, q, t, order=0):
-        """Gain, saturation and delay of an input; between samples as its hold says, from the left at a sample."""
-        t = t - q.get("delay", 0.0)
+        """Gain, saturation and delay of an input, as it runs in the piece that `self.middle` lies in."""
+        late = q.get("delay", 0.0)
+        t, middle, samples = t - late, self.middle - late, self.samples[q["name"]]
         held = self.hold(q)
-        if t <= 0.0:
-            y = self.samples[q["name"]][0] if order == 0 else 0.0
-            t = 0.0
-        if held == "cubic":
+        if middle <= 0.0:
+            y = samples[0] if order == 0 else 0.0
+        elif held == "cubic":
             y = float(self.spline[q["name"]](t, order))
-        elif t > 0.0:
-            k = max(0, int(np.ceil(t / self.period - 1e-9)) - 1)
-            y0, y1 = self.samples[q["name"]][k : k + 2]
-            y = y0 if held == "zero" else y0 + (y1 - y0) * (t / self.period - k)
-            if order:
-                y = 0.0 if held == "zero" or order > 1 else (y1 - y0) / self.period
+        else:
+            k = min(int(middle / self.period), len(samples) - 2)
+            slope = 0.0 if held == "zero" else (samples[k + 1] - samples[k]) / self.period
+            y = [samples[k] + slope * (t - k * self.period), slope, 0.0][order]
         y *= q.get("gain", 1.0)
         limit = q.get("saturation", np.inf)
         return min(max(y, -limit), limit) if q["kind"] == "force" else y
@@ -221,11 +219,12 @@ class Reference:
         events = self.events() if self.friction else None
         pieces = self.pieces()
         for start, end in zip(pieces[:-1], pieces[1:]):
+            self.middle = 0.5 * (start + end)
             while start < end - 1e-13:
                 done = solve_ivp(self.rate, (start, end), s, "DOP853", rtol=tolerance, atol=1e-4 * tolerance,
                                  max_step=2 * self.period, dense_output=True, events=events)  # fmt: skip
                 assert done.success, done.message
-                spans.append((start, done.t[-1], done.sol, self.mode))
+                spans.append((self.middle, done.t[-1], done.sol, self.mode))
                 start, s = done.t[-1], done.y[:, -1].copy()
                 if done.status == 1:
                     s = self.switch(start, s)
@@ -263,7 +262,7 @@ class Reference:
         return s
 
     def read(self, spans):
-        """The outputs, with gain, delay and offset."""
+        """The outputs, with gain, delay and offset; what jumps at a sample is that before it."""
         names = {e["name"]: k for k, (e, _, _) in enumerate(self.elements)}
         cache, found = {}, {o["name"]: [] for o in self.outputs}
         spans_end = np.array([span[1] for span in spans])
@@ -271,7 +270,7 @@ class Reference:
         def at(t):
             if t not in cache:
                 index = min(int(np.searchsorted(spans_end, t - 1e-12)), len(spans) - 1)
-                self.mode = spans[index][3]
+                self.middle, self.mode = spans[index][0], spans[index][3]
                 cache[t] = self.motion(spans[index][2](t), t)
             return cache[t]
 
@@ -426,6 +425,11 @@ def cases():
     }
     for kind, p in dry.items():
         yield beside(element(kind, *m, **p), name=f"{kind}, with rests")
+    servo = dragged()
+    servo["inputs"][0]["hold"] = "linear"
+    servo["elements"][-1] = element("damper", "n", "ground", name="drag", damping=0.7)
+    servo["outputs"] = outputs(("position", "m"), ("velocity", "n"), ("force", "spring", "damper"))
+    yield "linear motion, force of its spring and damper", servo, smooth(t, 5e-3, 1.1, 6.9), 1e-3, 1e-6, ""
     yield "stribeck on the second of two masses", dragged(), 6.0 * smooth(t, 1e-3, 1.1, 2.9), 1e-3, 1e-6, ""
 
 

@@ -213,5 +213,12 @@ mod tests {
             })
         };
         assert!(work(7e-3) > 0.0 && work(11e-3) < 0.0);
+        // Check 6: where the energy of a cycle changes its sign, the lines cross.
+        let (mut low, mut high) = (7e-3, 11e-3);
+        for _ in 0..20 {
+            let middle = 0.5 * (low + high);
+            if work(middle) > 0.0 { low = middle } else { high = middle }
+        }
+        assert!((low / 9.3e-3 - 1.0).abs() < 0.01, "{low}");
     }
 }
