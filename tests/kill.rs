@@ -246,3 +246,29 @@ fn a_slave_that_is_started_again_brings_the_force_back() {
     assert!(end.effort[0] < -0.3 && end.flags & flag::STALE == 0, "the force is not back: {} N", end.effort[0]);
     place.assert_clean(&runs);
 }
+
+/// Nobody dies, but next to nothing comes through: staleness travels along the loop in lockstep too.
+#[test]
+fn a_connection_that_fails_lets_the_force_go() {
+    let place = Place::new();
+    let text = graph_text("launch/contact.toml");
+    let broken = text.replace("to = \"scaling.motion\"\n", "to = \"scaling.motion\"\nimpair = { loss = 0.97 }\n");
+    assert_ne!(text, broken);
+    let graph = place.write("graph.toml", &broken).display().to_string();
+    let done = place.backdrive(&["run", &graph, "--transport", "inproc", "--rate", RATE, "--bag", "run.mcap"]);
+    assert!(matches!(done.code, Some(0 | 1)), "{done:?}");
+    let bag = place.path("run.mcap");
+    let told = events(&bag, "master");
+    let (gone, back): (Vec<_>, Vec<_>) = told.iter().partition(|(_, kind, _)| kind == "force_outdated");
+    assert!(gone.len() > 10 && back.len() + 1 >= gone.len() && back.iter().all(|(_, kind, _)| kind == "force_back"), "{told:?}");
+    let holds: Vec<u64> = events(&bag, "slave").iter().filter(|(_, kind, _)| kind == "slave_holds").map(|(step, ..)| *step).collect();
+    // The slave's news is a step late, as the contact force is.
+    assert!(gone.iter().all(|(step, ..)| holds.contains(&(step - 1))), "{gone:?} {holds:?}");
+    let (rows, contact) = (samples(&bag, "/master/measured_js"), samples(&bag, "/slave/measured_js"));
+    let mut stale = 0;
+    for k in 1..rows.len() {
+        stale = if contact[k - 1].flags & flag::STALE != 0 { stale + 1 } else { 0 };
+        let most = 0.3 * contact[k - 1].effort[0].abs() * (1.0 - stale as f64 / HOLD as f64).max(0.0);
+        assert!(stale == 0 || rows[k].effort[0].abs() <= most + 1e-9, "step {k}: {} N after {stale} stale steps", rows[k].effort[0]);
+    }
+}

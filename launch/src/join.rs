@@ -8,6 +8,7 @@ use backdrive_nodes::build::{self, credit_listeners, topics};
 use backdrive_nodes::graph::{Files, Graph, Node, NodeKind, Overrides};
 use backdrive_nodes::process::{ProcessOptions, run_process};
 use backdrive_nodes::protocol::FromNode;
+use backdrive_nodes::realtime;
 use backdrive_nodes::recorder::{RecorderPlan, run_recorder};
 use backdrive_nodes::stage::Clock;
 use backdrive_nodes::transport::iceoryx2::Iceoryx2;
@@ -15,6 +16,10 @@ use std::collections::BTreeMap;
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+
+/// Below the nodes of the loop, so that it takes nothing from them; above everything else on the machine, so that nothing
+/// else keeps it from taking samples over in time.
+const RECORDER_PRIORITY: i32 = 40;
 
 /// Joins a run as a node of the user's own, with the arguments that the supervisor gives (`--run DIR --name NAME`),
 /// and runs it to its end. `cores` gets the graph and the node and brings one core per stage of the node's kind.
@@ -55,6 +60,11 @@ where
         Err(e) => return fail(e.to_string(), 5),
     };
     if node.kind == NodeKind::Recorder {
+        if graph.timing.clock == Clock::Realtime {
+            // Before its writer's thread is made, which inherits it. What is refused here is refused to the other nodes
+            // too, and they say so.
+            let _ = realtime::enter(&realtime::Options { priority: Some(RECORDER_PRIORITY), ..realtime::Options::default() });
+        }
         let (plan, header) = recording(&graph, name);
         let path = graph.bag.clone().unwrap_or_else(|| PathBuf::from("run.mcap"));
         return match Recorder::create(&path, &header, &recorder_options(&graph)) {

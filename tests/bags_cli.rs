@@ -1,0 +1,109 @@
+//! Bags and tables through the command line.
+
+mod system;
+
+use nix::sys::signal::Signal;
+use system::{Place, file, kill, samples, until};
+
+#[test]
+fn what_is_in_a_bag() {
+    let place = Place::new();
+    let graph = file("launch/contact.toml");
+    assert_eq!(place.backdrive(&["run", &graph, "--transport", "inproc", "--duration", "0.5", "--bag", "run.mcap"]).code, Some(0));
+    let found = place.backdrive(&["bag", "info", "run.mcap", "--json"]).json();
+    assert_eq!(
+        (&found["clock"], &found["rate_hz"], &found["complete"], &found["lost"]),
+        (&"lockstep".into(), &5000.0.into(), &true.into(), &0.into())
+    );
+    assert_eq!((&found["profile"], &found["ended_cleanly"]), (&"ros2".into(), &true.into()));
+    let files = found["files"].as_array().unwrap();
+    assert!(files.iter().any(|f| f.as_str().unwrap().ends_with("impulse-engine.toml")), "{files:?}");
+    let measured = found["topics"].as_array().unwrap().iter().find(|t| t["name"] == "/master/measured_js").unwrap();
+    assert_eq!((&measured["type_name"], &measured["messages"]), (&"sensor_msgs/msg/JointState".into(), &2500.into()));
+    let told = place.backdrive(&["bag", "info", "run.mcap"]);
+    assert!(told.code == Some(0) && told.stdout.contains("complete") && told.stdout.contains("/slave/measured_js"), "{told:?}");
+}
+
+#[test]
+fn to_a_table_and_back() {
+    let place = Place::new();
+    let graph = file("launch/contact.toml");
+    assert_eq!(place.backdrive(&["run", &graph, "--transport", "inproc", "--duration", "1.2", "--bag", "run.mcap"]).code, Some(0));
+    let topics = ["--topic", "/master/measured_js", "--topic", "/slave/measured_js"];
+    let done = place.backdrive(&[&["bag", "export", "run.mcap", "--csv", "run.csv"], &topics[..]].concat());
+    assert_eq!(done.code, Some(0), "{done:?}");
+    let table = std::fs::read_to_string(place.path("run.csv")).unwrap();
+    let heading = table.lines().next().unwrap();
+    let column =
+        |part: &str| heading.split(',').find(|c| c.contains("/slave") && c.contains(part)).unwrap_or_else(|| panic!("{part}: {heading}"));
+    let map = format!("{}=/slave/measured_js.effort[0]", column("effort"));
+    let done = place.backdrive(&["bag", "import", "run.csv", "--bag", "back.mcap", "--map", &map]);
+    assert_eq!(done.code, Some(0), "{done:?}");
+    let (was, is) = (samples(&place.path("run.mcap"), "/slave/measured_js"), samples(&place.path("back.mcap"), "/slave/measured_js"));
+    assert_eq!(was.len(), is.len());
+    assert!(was.iter().any(|s| s.effort[0] < -1.0));
+    for (a, b) in was.iter().zip(&is) {
+        assert_eq!(a.effort[0].to_bits(), b.effort[0].to_bits(), "step {}", a.step);
+    }
+}
+
+#[test]
+fn several_tables_become_a_folder_of_bags() {
+    let place = Place::new();
+    for name in ["one.csv", "two.csv"] {
+        place.write(name, "t,x\n0,1\n0.001,2\n0.002,3\n");
+    }
+    let done = place.backdrive(&["bag", "import", "one.csv", "two.csv", "--bag", "folder"]);
+    assert_eq!(done.code, Some(0), "{done:?}");
+    for name in ["folder/one.mcap", "folder/two.mcap"] {
+        assert_eq!(samples(&place.path(name), "/recording/x").iter().map(|s| s.position[0]).collect::<Vec<_>>(), [1.0, 2.0, 3.0]);
+    }
+}
+
+#[test]
+fn played_to_its_end_or_until_it_is_stopped() {
+    let place = Place::new();
+    let graph = file("launch/contact.toml");
+    assert_eq!(place.backdrive(&["run", &graph, "--transport", "inproc", "--duration", "0.5", "--bag", "run.mcap"]).code, Some(0));
+    let done = place.backdrive(&["bag", "play", "run.mcap", "--speed", "5"]);
+    assert_eq!(done.code, Some(0), "{done:?}");
+    let sent = place.backdrive(&["bag", "info", "run.mcap", "--json"]).json()["messages"].as_u64().unwrap();
+    assert!(done.stdout.contains(&format!("{sent} messages sent")), "{done:?}");
+    place.assert_clean(&[]);
+
+    let play = place.start(&["bag", "play", "run.mcap", "--speed", "0.01"]);
+    until("the run of the player", || place.runs().len() == 1 && system::shared_memory_of(&place.runs()[0]).len() > 20);
+    let runs = place.runs();
+    kill(play.pid(), Signal::SIGINT);
+    let done = play.end();
+    assert_eq!(done.code, Some(130), "{done:?}");
+    place.assert_clean(&runs);
+}
+
+#[test]
+fn clean_removes_what_dead_runs_left_and_no_more() {
+    let place = Place::new();
+    let graph = file("launch/contact.toml");
+    assert_eq!(place.backdrive(&["clean"]).stdout, "nothing to remove\n");
+    let options = ["--clock", "realtime", "--rate", "200", "--duration", "60"];
+    let start = |bag: &str| place.start(&[&["run", graph.as_str(), "--bag", bag], &options[..]].concat());
+    let alive = start("alive.mcap");
+    system::until_recorded(&place.path("alive.mcap"), "/master/measured_js", 1);
+    let living = place.runs();
+    let mut dead = start("dead.mcap");
+    system::until_recorded(&place.path("dead.mcap"), "/master/measured_js", 1);
+    let died: Vec<String> = place.runs().into_iter().filter(|r| !living.contains(r)).collect();
+    assert_eq!((living.len(), died.len()), (1, 1));
+    dead.child.kill().unwrap();
+    dead.child.wait().unwrap();
+    until("its nodes to be gone", || place.processes().len() == 6);
+    let done = place.backdrive(&["clean"]);
+    assert_eq!(done.code, Some(0), "{done:?}");
+    assert!(done.stdout.contains(&format!("{} is alive and was left alone", living[0])), "{done:?}");
+    assert!(done.stdout.contains("removed ") && done.stdout.contains(&died[0]), "{done:?}");
+    assert_eq!(place.runs(), living);
+    assert!(system::shared_memory_of(&died[0]).is_empty() && !system::shared_memory_of(&living[0]).is_empty());
+    kill(alive.pid(), Signal::SIGINT);
+    assert_eq!(alive.end().code, Some(130));
+    place.assert_clean(&living);
+}
