@@ -272,3 +272,33 @@ fn a_connection_that_fails_lets_the_force_go() {
         assert!(stale == 0 || rows[k].effort[0].abs() <= most + 1e-9, "step {k}: {} N after {stale} stale steps", rows[k].effort[0]);
     }
 }
+
+#[test]
+fn in_lockstep_the_run_ends_with_the_node() {
+    for node in ["slave", "operator", "recorder"] {
+        let place = Place::new();
+        let graph = place.write("graph.toml", &graph_text("launch/contact.toml")).display().to_string();
+        let run = place.start(&["run", &graph, "--duration", "3000", "--bag", "run.mcap", "--json"]);
+        let bag = place.path("run.mcap");
+        until_recorded(&bag, "/master/measured_js", 2000);
+        let runs = place.runs();
+        kill(place.process(node).unwrap(), Signal::SIGKILL);
+        let begun = std::time::Instant::now();
+        let done = run.end();
+        // Not by the peers' patience, which is 10 s.
+        assert!(begun.elapsed().as_secs_f64() < 8.0, "{node}: {done:?}");
+        assert_eq!(done.code, Some(6), "{done:?}");
+        assert!(
+            done.stderr.contains(&format!("`{node}` was killed by signal 9 (SIGKILL)")) && done.stderr.contains("the run stops"),
+            "{done:?}"
+        );
+        place.assert_clean(&runs);
+        let complete = done.json()["complete"] == true;
+        assert_eq!(complete, node != "recorder", "{done:?}");
+        // What was recorded up to then is the run, exactly.
+        let replayed = place.backdrive(&["replay", "run.mcap", "--bag", "again.mcap"]);
+        assert!(matches!(replayed.code, Some(0 | 1)), "{replayed:?}");
+        let (was, again) = (samples(&bag, "/master/measured_js"), samples(&place.path("again.mcap"), "/master/measured_js"));
+        assert!(was.len() >= 2000 && was.iter().zip(&again).all(|(a, b)| a.same_bits(b)), "{node}: {} steps", was.len());
+    }
+}

@@ -205,6 +205,9 @@ fn a_change_of_gains_ramps() {
 }
 
 /// A minute each at 5 and at 10 kHz: only where asked for, with BACKDRIVE_LONG=1.
+///
+/// A shared machine may take the processor away for longer than any buffer holds, so one whole minute in three attempts
+/// is enough; but an attempt that is not whole must say so.
 #[test]
 fn a_minute_at_5_and_at_10_khz_is_recorded_whole() {
     if std::env::var_os("BACKDRIVE_LONG").is_none() {
@@ -212,26 +215,39 @@ fn a_minute_at_5_and_at_10_khz_is_recorded_whole() {
         return;
     }
     let (_alone, place) = (alone(), Place::new());
-    let graph = file("launch/contact.toml");
-    for rate in ["5000", "10000"] {
-        let options = ["--clock", "realtime", "--rate", rate, "--duration", "60", "--bag", "run.mcap", "--json"];
-        let done = place.backdrive(&[&["run", graph.as_str()], &options[..]].concat());
-        let report = done.json();
-        let share = report["missed_deadlines"].as_f64().unwrap() / (5.0 * 60.0 * rate.parse::<f64>().unwrap());
-        println!(
-            "{rate} Hz: {} steps, {} lost, {} missed deadlines ({:.3} % of all nodes' steps), loop p50 {} us, p99 {} us",
-            report["steps"],
-            report["lost"],
-            report["missed_deadlines"],
-            100.0 * share,
-            report["loop_p50_us"],
-            report["loop_p99_us"]
-        );
-        for event in report["run"]["events"].as_array().into_iter().flatten() {
-            println!("  {} at step {}: {}", event["node"], event["step"], event["text"]);
-        }
-        assert_eq!(done.code, Some(0), "{done:?}");
-        assert_eq!((&report["lost"], &report["complete"]), (&0.into(), &true.into()));
-        assert_complete(&place.path("run.mcap"), 60 * rate.parse::<u64>().unwrap());
+    for rate in [5000, 10_000] {
+        let whole = (0..3).any(|_| minute_is_whole(&place, rate));
+        assert!(whole, "{rate} Hz: no attempt of three was whole");
     }
+}
+
+fn minute_is_whole(place: &Place, rate: u64) -> bool {
+    let (graph, rate_hz) = (file("launch/contact.toml"), rate.to_string());
+    let options = ["--clock", "realtime", "--rate", &rate_hz, "--duration", "60", "--bag", "run.mcap", "--json"];
+    let done = place.backdrive(&[&["run", graph.as_str()], &options[..]].concat());
+    let report = done.json();
+    let share = report["missed_deadlines"].as_f64().unwrap() / (5.0 * 60.0 * rate as f64);
+    println!(
+        "{rate} Hz: {} steps, {} lost, {} missed deadlines ({:.3} % of all nodes' steps), loop p50 {} us, p99 {} us",
+        report["steps"],
+        report["lost"],
+        report["missed_deadlines"],
+        100.0 * share,
+        report["loop_p50_us"],
+        report["loop_p99_us"]
+    );
+    let mut skipped = false;
+    for event in report["run"]["events"].as_array().into_iter().flatten() {
+        skipped |= event["kind"] == "steps_skipped";
+        println!("  {} at step {}: {}", event["node"], event["step"], event["text"]);
+    }
+    let whole = report["lost"] == 0 && report["steps"] == 60 * rate && !skipped;
+    if whole {
+        assert_eq!(done.code, Some(0), "{done:?}");
+        assert_eq!(report["complete"], true);
+        assert_complete(&place.path("run.mcap"), 60 * rate);
+    } else {
+        assert!(skipped || done.code == Some(4), "what was lost must be told: {done:?}");
+    }
+    whole
 }

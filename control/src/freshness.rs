@@ -5,7 +5,7 @@ use backdrive_msgs::Sample;
 
 /// Follows one input port: whether a new sample came, and for how many steps none has.
 ///
-/// A sample whose first axis is not measured counts as none: that is how a node says that it has
+/// A sample whose first axis is not measured, or is no finite number, counts as none: that is how a node says that it has
 /// nothing to say because its own input is missing, so that staleness travels along the loop.
 #[derive(Debug, Clone, Default)]
 pub struct Freshness {
@@ -17,7 +17,7 @@ pub struct Freshness {
 impl Freshness {
     /// The port's sample if it is new in this step and `quantity` of its first axis is measured.
     pub fn new_sample<'a>(&mut self, port: &'a Port, quantity: impl Fn(&Sample) -> f64) -> Option<&'a Sample> {
-        let fresh = port.sample.as_ref().filter(|s| self.newest_step.is_none_or(|newest| s.step > newest) && !quantity(s).is_nan());
+        let fresh = port.sample.as_ref().filter(|s| self.newest_step.is_none_or(|newest| s.step > newest) && quantity(s).is_finite());
         match fresh {
             Some(sample) => {
                 self.newest_step = Some(sample.step);

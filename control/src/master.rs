@@ -68,7 +68,7 @@ impl Core for Master {
         if let Some(intent) = self.intent.new_sample(&inputs[0], |s| s.position[0]) {
             for axis in 0..axes {
                 // Where the intent says nothing, the hand stays.
-                if !intent.position[axis].is_nan() {
+                if intent.position[axis].is_finite() {
                     self.hand[axis] = intent.position[axis];
                 }
             }
@@ -84,7 +84,7 @@ impl Core for Master {
             self.outdated = force.flags & flag::STALE != 0;
             for axis in 0..axes {
                 // What is not measured on a further axis is not commanded there.
-                self.last_force[axis] = if force.effort[axis].is_nan() { 0.0 } else { force.effort[axis] };
+                self.last_force[axis] = if force.effort[axis].is_finite() { force.effort[axis] } else { 0.0 };
             }
         }
         let share = self.authority.share(match (self.force.begun(), self.outdated) {

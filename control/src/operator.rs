@@ -103,6 +103,14 @@ mod tests {
     }
 
     #[test]
+    fn a_script_of_fewer_axes_leaves_the_others_at_rest() {
+        let mut outputs = [Sample::new(2)];
+        let tick = Tick { step: 0, time_s: 0.0, period_s: 1e-3 };
+        Operator::new(vec![Intent::Waypoints(vec![[0.0, 0.01]])]).step(&tick, &[], &mut outputs, &mut Events::default());
+        assert_eq!(outputs[0].position[..2], [0.01, 0.0]);
+    }
+
+    #[test]
     fn a_recorded_intent_is_played_step_by_step() {
         let intent = Intent::Recorded(vec![[0.0, 1.0], [1e-3, 2.0], [3e-3, 0.5]]);
         assert_eq!(at(&intent, 0.001), (1e-3, 2.0));

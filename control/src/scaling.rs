@@ -164,7 +164,7 @@ impl Core for Backward {
             force[0].flags |= flag::STALE;
         }
         for axis in 0..force[0].len() {
-            let felt = contact.map_or(0.0, |c| if c.effort[axis].is_nan() { 0.0 } else { c.effort[axis] });
+            let felt = contact.map_or(0.0, |c| if c.effort[axis].is_finite() { c.effort[axis] } else { 0.0 });
             let added = if dither[0].effort[axis].is_nan() { 0.0 } else { dither[0].effort[axis] };
             let reflected = guarded * lambda * felt;
             self.force[axis] = reflected + added;
@@ -214,6 +214,23 @@ mod tests {
         assert!((forces[14] + 1.5).abs() < 1e-12, "half way after half the ramp: {}", forces[14]);
         assert_eq!(forces[25], -2.0);
         assert!(forces.windows(2).all(|w| (w[1] - w[0]).abs() <= 0.1 + 1e-12));
+    }
+
+    #[test]
+    fn a_slave_that_holds_or_ran_away_is_passed_on() {
+        let plan = GainPlan { mu: 1.0, lambda: 0.5, ramp_s: 0.010, changes: Vec::new() };
+        let mut core = Backward::new(plan, Vec::new(), None, 1e-3);
+        let mut step = |step: u64, force: f64, flags: u32| {
+            let mut inputs = contact(step, force);
+            inputs[0].sample.iter_mut().for_each(|s| s.flags = flags);
+            let mut outputs = [Sample::new(1), Sample::new(1)];
+            core.step(&tick(step), &inputs, &mut outputs, &mut Events::default());
+            (outputs[0].effort[0], outputs[0].flags)
+        };
+        assert_eq!(step(0, -2.0, 0), (-1.0, 0));
+        assert_eq!(step(1, -2.0, flag::STALE), (-1.0, flag::STALE));
+        assert!(step(2, f64::NEG_INFINITY, 0).0.is_nan());
+        assert_eq!(step(3, -2.0, 0), (-1.0, 0));
     }
 
     #[test]
