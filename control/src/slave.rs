@@ -47,7 +47,7 @@ impl Core for Slave {
         if let Some(command) = self.command.new_sample(&inputs[0], |s| s.position[0]) {
             for axis in 0..axes {
                 let wanted = command.position[axis];
-                if wanted.is_nan() {
+                if !wanted.is_finite() {
                     continue;
                 }
                 let limits = self.device.axis(axis);
