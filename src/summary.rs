@@ -170,7 +170,8 @@ impl Summary {
         if let Some(outcome) = &self.outcome {
             let moved = (self.last_loop_gain - self.loop_gain).abs() > 1e-9 * self.loop_gain.abs();
             let later = if moved { format!(" at the start and {:.4} at the end", self.last_loop_gain) } else { String::new() };
-            lines.push(format!("loop     {outcome} at mu*lambda = {}{later}", self.loop_gain));
+            let open = if self.contact_s > 0.0 { "" } else { "; nothing was touched, so this says nothing of the closed loop" };
+            lines.push(format!("loop     {outcome} at mu*lambda = {}{later}{open}", self.loop_gain));
         }
         lines.join("\n")
     }
