@@ -1,7 +1,7 @@
 //! From a graph to what each process does.
 
 use crate::graph::{DeviceFiles, Direction, Graph, Node, NodeKind, Settings};
-use crate::stage::{Clock, InputPort, NodePlan, OutputPort, Stage};
+use crate::stage::{Clock, InputPort, NodePlan, OutputPort, PACE_PORT, Stage};
 use backdrive_control::canceller::Canceller;
 use backdrive_control::core::{Core, Events, Port, Tick};
 use backdrive_control::device::{Device, DeviceError, DeviceOptions, Role};
@@ -155,7 +155,7 @@ pub fn plan_with(graph: &Graph, name: &str, cores: Vec<Box<dyn Core>>) -> Result
         let core = if wiring.iter().all(Option::is_some) { core } else { Box::new(Wired::new(core, wiring)) };
         if kind.inputs.is_empty() {
             inputs.extend(pace(graph).into_iter().map(|(topic, delay)| InputPort {
-                name: "pace".to_string(),
+                name: PACE_PORT.to_string(),
                 topic,
                 delay,
                 impairment: None,
