@@ -2,3 +2,4 @@
 
 pub mod oscillation;
 pub mod outcome;
+pub mod session;

@@ -1,0 +1,67 @@
+//! The signals of a recorded loop, one value per step: what every answer is drawn from.
+
+/// A recorded force-reflecting session.
+///
+/// All columns have the same length, one row per step. Row k of [`AxisSignals::force`] holds from k to k+1, so the first
+/// position it can move is that of row k+1. A value that was not measured, or whose message is missing, is NaN.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Session {
+    /// For messages: the bag's path.
+    pub name: String,
+    /// Time of one row, s.
+    pub period_s: f64,
+    /// The axes, in the order of the device.
+    pub axes: Vec<AxisSignals>,
+    /// Position scale mu in force at each row; NaN where nobody recorded it.
+    pub mu: Vec<f64>,
+    /// Force scale lambda in force at each row; NaN where nobody recorded it.
+    pub lambda: Vec<f64>,
+    /// What a reader of the answers has to know: lost samples, resampled topics, gains estimated from data. One sentence each.
+    pub notes: Vec<String>,
+}
+
+/// One axis of a session.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct AxisSignals {
+    /// Name of the axis.
+    pub name: String,
+    /// x_u, what the hand wants, m or rad; `None` where nobody recorded it.
+    pub intent: Option<Vec<f64>>,
+    /// x_m, the master's measured position, m or rad.
+    pub master: Vec<f64>,
+    /// F_f, the force applied to the master, N or N m, dither included.
+    pub force: Vec<f64>,
+    /// The exogenous part of F_f that was added on purpose, N or N m; `None` where there was none.
+    pub dither: Option<Vec<f64>>,
+    /// The predicted induced motion that was subtracted, m or rad; `None` where nothing was cancelled or nobody recorded it.
+    pub induced: Option<Vec<f64>>,
+    /// x_c, where the slave shall be, m or rad.
+    pub command: Vec<f64>,
+    /// F_s, force of the environment on the slave, N or N m; 0 in free motion.
+    pub contact: Vec<f64>,
+    /// x_s, where the slave is, m or rad; `None` where nobody recorded it.
+    pub slave: Option<Vec<f64>>,
+    /// Whether a clamp or rate limit acted, or an input was stale.
+    pub clamped: Vec<bool>,
+    /// The master's limits of motion, m or rad.
+    pub travel: Option<[f64; 2]>,
+    /// Step of the master's position sensor, m or rad; 0 for an ideal one.
+    pub resolution: f64,
+}
+
+impl Session {
+    /// Number of rows.
+    pub fn len(&self) -> usize {
+        self.axes.first().map_or(0, |a| a.master.len())
+    }
+
+    /// Whether it holds no row.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// mu*lambda at a row.
+    pub fn gain(&self, row: usize) -> f64 {
+        self.mu[row] * self.lambda[row]
+    }
+}
