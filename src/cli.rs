@@ -9,7 +9,7 @@ use std::path::PathBuf;
 /// Results go to standard output, everything else to standard error.
 /// Exit codes: 0 fine; 1 the finding is negative (not stable, bags differ); 2 usage; 3 bad input;
 /// 4 data was lost; 5 this machine does not let it (shared memory, disk, permission); 6 a node failed;
-/// 130 interrupted.
+/// 7 it cannot be told; 130 interrupted.
 #[derive(Debug, Parser)]
 #[command(name = "backdrive", version, propagate_version = true, arg_required_else_help = true)]
 pub struct Cli {
@@ -17,6 +17,15 @@ pub struct Cli {
     #[command(subcommand)]
     pub command: Command,
 }
+
+const STABILITY_HELP: &str = "Examples:
+  backdrive run launch/push-and-hold.toml
+  backdrive stability push-and-hold.mcap --gain 1
+  backdrive stability push-and-hold.mcap --sweep 0.1:50:200 --html stability.html
+  backdrive stability push-and-hold.mcap --gain 1 --canceller plant/models/impulse-engine.toml --canceller-grip plant/grips/normal.toml
+  backdrive stability session/ --roles roles.toml --gain 1
+
+Exit codes: 0 stable, 1 not, 7 it cannot be told.";
 
 /// The verbs.
 #[derive(Debug, Subcommand)]
@@ -27,6 +36,9 @@ pub enum Command {
     /// Run a bag's graph again from its recorded operator, with what you change, and say whether it was stable.
     #[command(after_help = "Example:\n  backdrive replay contact.mcap --mu 1 --lambda 0.6 --bag again.mcap")]
     Replay(Replay),
+    /// Ask a bag whether its loop would be stable at another gain, and how far away the edge is.
+    #[command(after_help = STABILITY_HELP)]
+    Stability(Stability),
     /// Check a graph file; errors point at the line.
     #[command(after_help = "Example:\n  backdrive check launch/contact.toml")]
     Check(Graph),
@@ -52,10 +64,10 @@ pub enum Command {
     Node(Node),
 }
 
-/// Changes to a graph file.
+/// Parts of a graph that are swapped.
 #[derive(Debug, Args)]
-#[command(next_help_heading = "Changes to the graph")]
-pub struct Changes {
+#[command(next_help_heading = "Swapped parts")]
+pub struct Parts {
     /// Model of the master.
     #[arg(long, value_name = "FILE")]
     pub master: Option<PathBuf>,
@@ -77,6 +89,39 @@ pub struct Changes {
     /// Corner of a high-pass on the canceller's estimate; 0 for none.
     #[arg(long, value_name = "HZ", value_parser = not_negative, allow_negative_numbers = true)]
     pub high_pass: Option<f64>,
+    /// Whether sensors round and are noisy as the model files say.
+    #[arg(long, value_enum)]
+    pub sensors: Option<Sensors>,
+    /// Whether the device's limits of force, rate and speed act; `ignored` asks what the loop would do with stronger motors.
+    #[arg(long, value_enum)]
+    pub limits: Option<Limits>,
+}
+
+impl Parts {
+    /// As the graph's reader takes them.
+    pub fn overrides(&self) -> Overrides {
+        Overrides {
+            master: self.master.clone(),
+            grip: self.grip.clone(),
+            slave: self.slave.clone(),
+            environment: self.environment.clone(),
+            canceller: self.canceller.clone(),
+            canceller_grip: self.canceller_grip.clone(),
+            high_pass_hz: self.high_pass,
+            sensors: self.sensors.map(|s| if matches!(s, Sensors::Ideal) { "ideal" } else { "as_modelled" }.to_string()),
+            limits: self.limits.map(|l| if matches!(l, Limits::Ignored) { "ignored" } else { "enforced" }.to_string()),
+            ..Overrides::default()
+        }
+    }
+}
+
+/// Changes to a graph file.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Changes to the graph")]
+pub struct Changes {
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub parts: Parts,
     /// Position scale from master to slave.
     #[arg(long, value_parser = not_negative, allow_negative_numbers = true)]
     pub mu: Option<f64>,
@@ -89,12 +134,6 @@ pub struct Changes {
     /// Watch the loop and back the force gain off when it begins to oscillate.
     #[arg(long)]
     pub guard: bool,
-    /// Whether sensors round and are noisy as the model files say.
-    #[arg(long, value_enum)]
-    pub sensors: Option<Sensors>,
-    /// Whether the device's limits of force, rate and speed act; `ignored` asks what the loop would do with stronger motors.
-    #[arg(long, value_enum)]
-    pub limits: Option<Limits>,
     /// Length of the run.
     #[arg(long, value_name = "S", value_parser = positive, allow_negative_numbers = true)]
     pub duration: Option<f64>,
@@ -150,13 +189,6 @@ impl Changes {
     /// As the graph's reader takes them.
     pub fn overrides(&self, clock: Option<Clock>) -> Overrides {
         Overrides {
-            master: self.master.clone(),
-            grip: self.grip.clone(),
-            slave: self.slave.clone(),
-            environment: self.environment.clone(),
-            canceller: self.canceller.clone(),
-            canceller_grip: self.canceller_grip.clone(),
-            high_pass_hz: self.high_pass,
             mu: self.mu,
             lambda: self.lambda,
             dither: self.dither.clone(),
@@ -166,8 +198,7 @@ impl Changes {
             rate_hz: self.rate,
             duration_s: self.duration,
             seed: self.seed,
-            sensors: self.sensors.map(|s| if matches!(s, Sensors::Ideal) { "ideal" } else { "as_modelled" }.to_string()),
-            limits: self.limits.map(|l| if matches!(l, Limits::Ignored) { "ignored" } else { "enforced" }.to_string()),
+            ..self.parts.overrides()
         }
     }
 }
@@ -223,6 +254,62 @@ pub struct Replay {
     #[command(flatten)]
     #[allow(missing_docs)]
     pub changes: Changes,
+}
+
+/// `backdrive stability`
+#[derive(Debug, Args)]
+pub struct Stability {
+    /// The bag of a run; with --roles any MCAP file, or a rosbag2 folder.
+    pub recording: PathBuf,
+    /// The gain product mu*lambda asked about, reached by lambda; without it the bag's own.
+    #[arg(long, value_name = "X", value_parser = positive, allow_negative_numbers = true, conflicts_with_all = ["mu", "lambda"])]
+    pub gain: Option<f64>,
+    /// Position scale asked about; the bag's own if not given.
+    #[arg(long, value_parser = positive, allow_negative_numbers = true)]
+    pub mu: Option<f64>,
+    /// Force scale asked about; the bag's own if not given.
+    #[arg(long, value_parser = positive, allow_negative_numbers = true)]
+    pub lambda: Option<f64>,
+    /// Draw the whole curve: this many gains from one to another, evenly spaced in their logarithm.
+    #[arg(long, value_name = "FROM:TO:COUNT", value_parser = gains)]
+    pub sweep: Option<Gains>,
+    /// Factors on the stiffness and damping of the grip, over which the answer is given.
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = positive, default_values_t = [0.7, 0.85, 1.0, 1.15, 1.3])]
+    pub grips: Vec<f64>,
+    /// A graph file whose operator's hand is played, in place of the hand in the bag.
+    #[arg(long, value_name = "GRAPH")]
+    pub script: Option<PathBuf>,
+    /// Which topic is which, for a bag that we did not record; see docs/roles.toml.
+    #[arg(long, value_name = "FILE")]
+    pub roles: Option<PathBuf>,
+    /// Write the report as one HTML file.
+    #[arg(long, value_name = "FILE")]
+    pub html: Option<PathBuf>,
+    /// Print the result as JSON.
+    #[arg(long)]
+    pub json: bool,
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub parts: Parts,
+}
+
+/// Gains of a sweep.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Gains(pub Vec<f64>);
+
+/// Most gains in a sweep.
+const MOST_GAINS: usize = 100_000;
+
+fn gains(text: &str) -> Result<Gains, String> {
+    let parts: Vec<&str> = text.split(':').collect();
+    let [from, to, count] = parts.as_slice() else { return Err("must be FROM:TO:COUNT, such as 0.1:50:200".to_string()) };
+    let (from, to) = (positive(from)?, positive(to)?);
+    let count: usize = count.parse().ok().filter(|n| (1..=MOST_GAINS).contains(n)).ok_or(format!("COUNT must be 1 to {MOST_GAINS}"))?;
+    if to < from {
+        return Err("FROM must not be above TO".to_string());
+    }
+    let at = |i: usize| if count == 1 { from } else { from * (to / from).powf(i as f64 / (count - 1) as f64) };
+    Ok(Gains((0..count).map(at).collect()))
 }
 
 /// `backdrive check`, `backdrive graph`

@@ -26,6 +26,8 @@ pub mod code {
     pub const MACHINE: u8 = 5;
     /// A node failed or died.
     pub const NODE: u8 = 6;
+    /// The recording does not tell.
+    pub const CANNOT_TELL: u8 = 7;
     /// Interrupted by the user.
     pub const INTERRUPTED: u8 = 130;
 }

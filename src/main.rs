@@ -12,6 +12,8 @@ mod progress;
 mod replay;
 mod run;
 mod simulate;
+mod stability;
+mod stability_page;
 mod summary;
 
 use clap::Parser;
@@ -27,6 +29,7 @@ fn main() -> ExitCode {
     let result = match command {
         Command::Run(options) => run::run(&options),
         Command::Replay(options) => replay::replay(&options),
+        Command::Stability(options) => stability::stability(&options),
         Command::Check(options) => graph::check(&options),
         Command::Graph(options) => graph::draw(&options),
         Command::Simulate(options) => simulate::simulate(&options),

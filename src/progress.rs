@@ -15,3 +15,12 @@ pub fn steps(total: u64, title: &str) -> ProgressBar {
     bar.set_message(title.to_string());
     bar
 }
+
+/// A bar that says what is being done, and how much of it is done.
+pub fn work() -> ProgressBar {
+    let bar = ProgressBar::new(1);
+    if let Ok(style) = ProgressStyle::with_template("{msg:28!} {wide_bar} {pos} of {len}, {eta} left") {
+        bar.set_style(style);
+    }
+    bar
+}

@@ -2,9 +2,10 @@
 
 use crate::failure::Failure;
 use backdrive_bags::Reader;
-use backdrive_msgs::{Message, flag};
-use backdrive_nodes::graph::{Files, Graph, NodeKind, Overrides};
-use backdrive_stability::outcome::{Outcome, Trace, judge};
+use backdrive_msgs::Message;
+use backdrive_nodes::graph::{Files, Graph, Overrides};
+use backdrive_stability::collect::Collector;
+use backdrive_stability::outcome::{Outcome, Trace};
 use std::path::Path;
 
 /// What happened in a run.
@@ -51,102 +52,32 @@ pub fn summarise(path: &Path) -> Result<Summary, Failure> {
 }
 
 /// Collects what a verdict needs while messages go by, from a bag or from a run.
-pub struct Traces {
-    intent: Option<String>,
-    measured: Option<String>,
-    contact: Option<String>,
-    axes: Vec<Trace>,
-    last_loop_gain: Option<f64>,
-}
+pub struct Traces(Collector);
 
 impl Traces {
     /// Ready for the messages of a graph.
     pub fn of(graph: &Graph) -> Traces {
-        let topic =
-            |kind: NodeKind, port: &str| graph.nodes.iter().position(|n| n.kind == kind).map(|index| graph.topic_of(index, port).name);
-        let master = graph.node_of(NodeKind::Master);
-        let model = master.and_then(|node| match &node.settings {
-            backdrive_nodes::graph::Settings::Master(files) => files.model.as_ref(),
-            _ => None,
-        });
-        let axes = (0..master.map_or(0, |n| n.axes)).map(|axis| {
-            let known = model.map(|m| (&m.axes[axis], &m.outputs[m.axes[axis].measured]));
-            Trace {
-                period_s: graph.period_s(),
-                travel: known.and_then(|(axis, _)| axis.travel),
-                resolution: known.map_or(0.0, |(axis, output)| axis.scale * output.resolution),
-                ..Trace::default()
-            }
-        });
-        Traces {
-            intent: topic(NodeKind::Operator, "intent"),
-            measured: topic(NodeKind::Master, "measured"),
-            contact: topic(NodeKind::Slave, "measured"),
-            axes: axes.collect(),
-            last_loop_gain: None,
-        }
+        Traces(Collector::of(graph, &graph.path.display().to_string()))
     }
 
     /// Hears a message.
     pub fn take(&mut self, topic: &str, message: &Message) {
-        let sample = match message {
-            Message::Sample(sample) => sample,
-            Message::Gains(gains) => {
-                self.last_loop_gain = Some(gains.mu * gains.lambda);
-                return;
-            }
-            _ => return,
-        };
-        let is = |name: &Option<String>| name.as_deref() == Some(topic);
-        let (intent, measured, contact) = (is(&self.intent), is(&self.measured), is(&self.contact));
-        for (index, trace) in self.axes.iter_mut().enumerate() {
-            if intent {
-                trace.intent.push(sample.position[index]);
-            } else if measured {
-                trace.position.push(sample.position[index]);
-                trace.feedback.push(sample.effort[index]);
-                trace.clamped.push(sample.flags & flag::LIMITED != 0);
-            } else if contact {
-                trace.contact.push(sample.effort[index]);
-                // The slave's limits count as the master's do.
-                if sample.flags & flag::LIMITED != 0
-                    && let Some(last) = trace.clamped.last_mut()
-                {
-                    *last = true;
-                }
-            }
-        }
-    }
-
-    /// How far the hand has come by each step, summed over its axes.
-    fn path(&self) -> Vec<f64> {
-        let steps = self.axes.iter().map(|t| t.intent.len()).min().unwrap_or(0);
-        let mut come = 0.0;
-        let moved = |step: usize| self.axes.iter().map(|t| (t.intent[step] - t.intent[step.saturating_sub(1)]).abs()).sum::<f64>();
-        (0..steps)
-            .map(|step| {
-                come += moved(step);
-                come
-            })
-            .collect()
+        self.0.take(topic, message);
     }
 
     /// The verdict on all that went by.
     pub fn summary(&self, graph: &Graph) -> Summary {
+        let traces = self.0.traces();
         let peak = |pick: fn(&Trace) -> &Vec<f64>| {
-            let values = self.axes.iter().flat_map(|t| pick(t).iter()).filter(|f| !f.is_nan());
+            let values = traces.iter().flat_map(|t| pick(t).iter()).filter(|f| !f.is_nan());
             values.fold(None, |m: Option<f64>, f| Some(m.unwrap_or(0.0).max(f.abs())))
         };
-        let touching: Vec<u64> =
-            self.axes.iter().flat_map(|t| t.contact.iter().enumerate().filter(|(_, f)| **f != 0.0).map(|(i, _)| i as u64)).collect();
-        let path = self.path();
-        let judged = self.axes.iter().filter(|t| !t.position.is_empty() && !t.contact.is_empty());
-        // On several axes the hand holds still when it does so on all of them: one moves the others.
-        let judged = judged.map(|t| if self.axes.len() > 1 { Trace { intent: path.clone(), ..t.clone() } } else { t.clone() });
+        let touching: Vec<usize> =
+            traces.iter().flat_map(|t| t.contact.iter().enumerate().filter(|(_, f)| **f != 0.0).map(|(i, _)| i)).collect();
         Summary {
             loop_gain: graph.gains.mu * graph.gains.lambda,
-            last_loop_gain: self.last_loop_gain.unwrap_or(graph.gains.mu * graph.gains.lambda),
-            outcome: Outcome::worst(judged.map(|t| judge(&t))),
+            last_loop_gain: self.0.last_loop_gain(),
+            outcome: self.0.outcome(),
             peak_contact_force: peak(|t| &t.contact),
             peak_feedback_force: peak(|t| &t.feedback),
             first_contact_s: touching.iter().min().map(|i| *i as f64 * graph.period_s()),

@@ -267,6 +267,12 @@ fn differs(a: &Item, b: &Item, tolerance: Option<f64>, stamps_ignored: bool, lar
             whole("lost", a.lost.to_string(), b.lost.to_string());
             numbers.extend([("loop_p50_s", a.loop_p50_s, b.loop_p50_s), ("loop_p99_s", a.loop_p99_s, b.loop_p99_s)].map(named));
         }
+        (Message::Margin(a), Message::Margin(b)) => {
+            whole("axis", a.axis.to_string(), b.axis.to_string());
+            whole("known", a.known.to_string(), b.known.to_string());
+            numbers.extend([("gain", a.gain, b.gain), ("factor", a.factor, b.factor), ("deviation", a.deviation, b.deviation)].map(named));
+            numbers.extend([("frequency_hz", a.frequency_hz, b.frequency_hz), ("decay_per_s", a.decay_per_s, b.decay_per_s)].map(named));
+        }
         _ => whole("type", format!("{:?}", a.kind()), format!("{:?}", b.kind())),
     }
     for (field, a, b) in numbers {

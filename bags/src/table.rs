@@ -67,7 +67,7 @@ pub(crate) fn columns_of(reader: &Reader, topics: Option<&[String]>) -> Result<V
                 }
             }
             Some(Message::Gains(_)) => gains[index] = true,
-            Some(Message::Event(_) | Message::Status(_)) => {}
+            Some(Message::Event(_) | Message::Status(_) | Message::Margin(_)) => {}
             // A topic whose fields cannot be read has no columns.
             None if foreign[index].is_none() => {
                 let numbers = entry.topic.parse_schema().ok().and_then(|schema| schema.numbers(&entry.payload).ok());

@@ -1,5 +1,6 @@
 //! What every core is: a function of (time, inputs, its state).
 
+use crate::live_margin::Told;
 use backdrive_msgs::{Gains, Sample};
 
 /// The step that is being done.
@@ -75,6 +76,11 @@ pub trait Core: Send {
 
     /// The gains now in force, if the core has any: (mu, lambda).
     fn gains(&self) -> Option<(f64, f64)> {
+        None
+    }
+
+    /// How far the loop is from its edge, if the core can tell.
+    fn margin(&self) -> Option<Told> {
         None
     }
 }

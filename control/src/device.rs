@@ -135,6 +135,11 @@ impl Device {
         &self.model
     }
 
+    /// Counts energies from the next start on: [`Plant::track_energy`].
+    pub fn track_energy(&mut self) {
+        self.plant.track_energy();
+    }
+
     /// Number of axes.
     pub fn axes(&self) -> usize {
         self.axes.len()

@@ -1,19 +1,66 @@
-//! The guard: backs the force gain off when the loop begins to oscillate by its own energy.
+//! The guard: backs the force gain off when the loop is, or is about to be, beyond its edge.
 //!
-//! Two facts must meet in a window of 50 ms: the reflected force oscillates (its part above 8 Hz grows, or stays large),
-//! and the force channel puts net energy into the master's port, W = sum F_f(k) (x_m(k+1) - x_m(k)) > 0. A hand that
-//! pushes against a passive wall takes energy out of that port, so work done by the operator does not trip it.
+//! It watches the reflected force and the master's motion; what they do must be the loop's doing and not the hand's. The
+//! measure of that is the net energy which the force channel puts into the master's port, `W = sum F_f(k) (x_m(k+1) -
+//! x_m(k))`: a hand that pushes against a passive wall takes energy out of that port, so `W > 0` is needed for a trip.
+//!
+//! - **Growing**: in windows of 50 ms the part of the force above 8 Hz grows by half over four windows, with `W > 0`.
+//! - **Persistent**: that part stays large, with `W > 0`, over six windows.
+//! - **Runaway**, a canceller that takes out too much at rest: over five windows the force grows by increments of which each
+//!   is more than 1.15 times the one before, at a ratio that does not fall, while the master gives way along the force
+//!   (`W > 0`). That is an exponential. A passive wall without a canceller pushes harder only while the hand goes into it,
+//!   against the force; on release the master goes along the force while the force falls; behind a good canceller a
+//!   hand that pushes (as `t`, `t^2`, `t^3`) has ratios that fall; and below its edge an over-cancelling loop creeps, but
+//!   slower and slower. Windows of 5 to 160 ms are watched at once, so that fast and slow ones are seen after about as many
+//!   e-foldings. A thing that itself pushes the slave ever harder is taken for a run-away.
+//! - **Thin margin**, where there is a dither: [`crate::live_margin`] sees the edge nearer than 1.25 times the gain, also at
+//!   the upper end of its standard deviation.
+//!
+//! What was taken back stays back until new gains are asked for: it does not creep up again to find the edge anew.
 
+use crate::live_margin::CORNER_HZ;
 use backdrive_msgs::{MAX_AXES, Sample};
 
 const WINDOW_S: f64 = 0.05;
-const CORNER_HZ: f64 = 8.0;
 /// Growth of the oscillating part over three windows that counts as growing.
 const GROWTH: f64 = 1.5;
+/// Growth over three windows beyond which more is taken back at once.
+const FAST_GROWTH: f64 = 3.0;
 /// Windows in which a large oscillation must persist.
 const PERSISTENT: u32 = 6;
+/// The same soon after a back-off.
+const STILL_PERSISTENT: u32 = 4;
+/// Changes of sign of the part above 8 Hz over four windows, at least: a force that slides away has none.
+const CROSSINGS: u32 = 3;
+/// Time after a back-off within which the next one takes more, s.
+const AGAIN_S: f64 = 1.0;
 /// What is left of the gain after a back-off.
 const BACK_OFF: f64 = 0.8;
+/// The same where it grows fast, runs away, or has next to no margin.
+const FAST_BACK_OFF: f64 = 0.6;
+/// The same where the last back-off did not end it.
+const AGAIN_BACK_OFF: f64 = 0.5;
+/// A hand's time constant, damping over stiffness, s, rather long: an over-cancelling loop at `c` times its edge runs away at
+/// about `(c - 1)` over it, so that a rate tells how far beyond the edge it is.
+const HAND_S: f64 = 0.1;
+/// What is left of the edge that the rate of a run-away tells.
+const OF_EDGE: f64 = 0.7;
+/// Least that is left after one back-off.
+const LEAST_LEFT: f64 = 0.1;
+/// Shortest window of the watch for a run-away, s; each further one is twice as long.
+const SHORTEST_S: f64 = 0.005;
+/// Window lengths of the watch for a run-away: up to 160 ms.
+const LENGTHS: usize = 6;
+/// Ratio of successive increments of a force that runs away, at least.
+const RATIO: f64 = 1.15;
+/// What may be lost of that ratio over two windows.
+const STEADY: f64 = 0.98;
+/// A force that runs away is at least this many times as large as an oscillation that is left alone.
+const LARGE: f64 = 5.0;
+/// A margin below this is thin.
+pub const THIN_MARGIN: f64 = 1.25;
+/// The margin that a back-off from a thin one aims at.
+const ROOM: f64 = 1.5;
 
 /// Why the gain was backed off.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -22,6 +69,10 @@ pub enum Reason {
     Growing,
     /// The oscillation neither grew nor died.
     Persistent,
+    /// Force and master ran away together, ever faster.
+    Runaway,
+    /// The edge that the dither shows is near.
+    ThinMargin,
 }
 
 impl Reason {
@@ -30,6 +81,8 @@ impl Reason {
         match self {
             Reason::Growing => "guard_growing",
             Reason::Persistent => "guard_persistent",
+            Reason::Runaway => "guard_runaway",
+            Reason::ThinMargin => "guard_thin_margin",
         }
     }
 }
@@ -38,13 +91,96 @@ impl Reason {
 struct Axis {
     low: f64,
     position: f64,
-    force: f64,
+    low_position: f64,
+    fast_position: f64,
+    low_effort: f64,
+    fast_effort: f64,
     begun: bool,
     square_sum: f64,
     total_sum: f64,
-    work: f64,
+    /// Work of the force above 8 Hz in the window at hand and the last three, J.
+    work: [f64; 4],
     history: [f64; 3],
+    /// Changes of sign in the window at hand and the last three, and the sign now.
+    crossings: [u32; 4],
+    is_above: bool,
     large_windows: u32,
+    /// Sums of the shortest window at hand.
+    force_sum: f64,
+    position_sum: f64,
+    drift: Drift,
+}
+
+/// Means of force and position over windows of one length.
+#[derive(Debug, Clone, Copy, Default)]
+struct Means {
+    /// Sums of the window at hand, and halves of it that are in them.
+    sums: [f64; 2],
+    halves: u32,
+    /// Of the last five windows, the newest last.
+    force: [f64; 5],
+    position: [f64; 5],
+    filled: usize,
+}
+
+impl Means {
+    /// A window is over.
+    fn push(&mut self, force: f64, position: f64) {
+        self.force.rotate_left(1);
+        self.position.rotate_left(1);
+        (self.force[4], self.position[4]) = (force, position);
+        self.filled = (self.filled + 1).min(5);
+    }
+
+    /// Ratio of the newest increments of a force that runs away.
+    fn runaway(&self, least: f64) -> Option<f64> {
+        let side = self.force[4].signum();
+        let size = |i: usize| side * self.force[i];
+        let grown = |i: usize| size(i + 1) - size(i);
+        let along = |i: usize| side * (self.position[i + 1] - self.position[i]);
+        let [first, second, third] = [grown(1) / grown(0), grown(2) / grown(1), grown(3) / grown(2)];
+        let is_one = self.filled == 5
+            && size(0) >= 0.0
+            && size(4) > least
+            // A creep that is lost in the force is none.
+            && size(4) - size(0) > (0.25 * size(4)).max(least)
+            && grown(0) > 0.0
+            && first.min(second).min(third) > RATIO
+            && third > STEADY * first
+            && (1..4).all(|i| along(i) > 0.0);
+        is_one.then_some(third)
+    }
+}
+
+/// The watch for a run-away, over windows of all lengths.
+#[derive(Debug, Clone, Copy, Default)]
+struct Drift {
+    lengths: [Means; LENGTHS],
+}
+
+impl Drift {
+    /// A shortest window is over; the growth in such a window, as an exponent, of what runs away.
+    fn push(&mut self, force: f64, position: f64, least: f64) -> Option<f64> {
+        let (mut force, mut position, mut found) = (force, position, None);
+        for (length, means) in self.lengths.iter_mut().enumerate() {
+            means.push(force, position);
+            if found.is_none() {
+                found = means.runaway(least).map(|ratio| ratio.ln() / f64::from(1u32 << length));
+            }
+            // The next length takes this one's windows in pairs.
+            means.sums = [means.sums[0] + 0.5 * force, means.sums[1] + 0.5 * position];
+            means.halves += 1;
+            if means.halves < 2 {
+                break;
+            }
+            [force, position] = std::mem::take(&mut means.sums);
+            means.halves = 0;
+        }
+        if found.is_some() {
+            *self = Drift::default();
+        }
+        found
+    }
 }
 
 /// Watches the reflected force and the master's motion.
@@ -53,10 +189,15 @@ pub struct Guard {
     axes: Vec<Axis>,
     window: u32,
     filled: u32,
+    shortest: u32,
+    short_filled: u32,
     smoothing: f64,
     share: f64,
     target: f64,
     least_force: f64,
+    /// Steps since the last back-off.
+    since_last: u32,
+    period_s: f64,
 }
 
 impl Guard {
@@ -66,10 +207,14 @@ impl Guard {
             axes: vec![Axis::default(); axes.min(MAX_AXES)],
             window: ((WINDOW_S / period_s).round() as u32).max(4),
             filled: 0,
+            shortest: ((SHORTEST_S / period_s).round() as u32).max(1),
+            short_filled: 0,
             smoothing: 1.0 - (-2.0 * std::f64::consts::PI * CORNER_HZ * period_s).exp(),
             share: 1.0,
             target: 1.0,
             least_force,
+            since_last: u32::MAX,
+            period_s,
         }
     }
 
@@ -88,6 +233,16 @@ impl Guard {
         self.target = 1.0;
     }
 
+    /// The margin at [`Guard::target`], as a factor on the gain, and its standard deviation as a share of it.
+    pub fn margin(&mut self, factor: f64, deviation: f64) -> Option<Reason> {
+        // What is not a number is no margin.
+        let is_thin = factor > 0.0 && factor * (1.0 + deviation) < THIN_MARGIN;
+        if is_thin {
+            self.target *= (factor / ROOM).clamp(FAST_BACK_OFF, BACK_OFF);
+        }
+        is_thin.then_some(Reason::ThinMargin)
+    }
+
     /// One step, with the force now reflected and the master's newest measurement. Says when it backs off.
     pub fn step(&mut self, force: &[f64; MAX_AXES], master: Option<&Sample>) -> Option<Reason> {
         // The share follows its target within a window, so that a back-off is no jolt.
@@ -99,42 +254,96 @@ impl Guard {
             let now = force[index];
             axis.low += self.smoothing * (now - axis.low);
             axis.square_sum += (now - axis.low).powi(2);
+            // What is below the least force has no sign of its own.
+            if (now - axis.low).abs() > 0.5 * self.least_force && (now > axis.low) != axis.is_above {
+                axis.is_above = now > axis.low;
+                axis.crossings[3] += 1;
+            }
             axis.total_sum += now * now;
+            axis.force_sum += now;
             if let Some(position) = master.map(|m| m.position[index]).filter(|x| !x.is_nan()) {
-                if axis.begun {
-                    axis.work += axis.force * (position - axis.position);
+                let effort = master.map_or(0.0, |m| if m.effort[index].is_nan() { 0.0 } else { m.effort[index] });
+                if !axis.begun {
+                    (axis.low_position, axis.low_effort, axis.begun) = (position, effort, true);
                 }
-                (axis.position, axis.begun) = (position, true);
-                axis.force = master.map_or(0.0, |m| if m.effort[index].is_nan() { 0.0 } else { m.effort[index] });
+                // The same filter for both, so that their product keeps its phase.
+                axis.low_position += self.smoothing * (position - axis.low_position);
+                let fast_position = position - axis.low_position;
+                axis.work[3] += axis.fast_effort * (fast_position - axis.fast_position);
+                axis.low_effort += self.smoothing * (effort - axis.low_effort);
+                (axis.position, axis.fast_position, axis.fast_effort) = (position, fast_position, effort - axis.low_effort);
+            }
+            axis.position_sum += axis.position;
+        }
+        self.since_last = self.since_last.saturating_add(1);
+        let runaway = self.drift();
+        let oscillation = self.oscillation();
+        let (reason, left) = runaway.or(oscillation)?;
+        // What one back-off did not end is further beyond the edge than that.
+        let left = if self.is_again() { left.min(AGAIN_BACK_OFF) } else { left };
+        self.since_last = 0;
+        self.target *= left;
+        Some(reason)
+    }
+
+    fn is_again(&self) -> bool {
+        f64::from(self.since_last) * self.period_s < AGAIN_S
+    }
+
+    /// Why and how much to back off for a force that runs away.
+    fn drift(&mut self) -> Option<(Reason, f64)> {
+        self.short_filled += 1;
+        if self.short_filled < self.shortest {
+            return None;
+        }
+        let count = f64::from(std::mem::take(&mut self.short_filled));
+        let seconds = count * self.period_s;
+        let mut fastest: Option<f64> = None;
+        for axis in &mut self.axes {
+            let (force, position) = (axis.force_sum / count, axis.position_sum / count);
+            (axis.force_sum, axis.position_sum) = (0.0, 0.0);
+            if let Some(growth) = axis.drift.push(force, position, LARGE * self.least_force) {
+                fastest = Some(fastest.unwrap_or(0.0).max(growth / seconds));
             }
         }
+        let rate = fastest?;
+        Some((Reason::Runaway, (OF_EDGE / (1.0 + rate * HAND_S)).clamp(LEAST_LEFT, FAST_BACK_OFF)))
+    }
+
+    /// Why and how much to back off for an oscillation.
+    fn oscillation(&mut self) -> Option<(Reason, f64)> {
         self.filled += 1;
         if self.filled < self.window {
             return None;
         }
         let count = std::mem::take(&mut self.filled) as f64;
-        let mut verdict = None;
+        let patience = if self.is_again() { STILL_PERSISTENT } else { PERSISTENT };
+        let (mut verdict, mut left) = (None, BACK_OFF);
         for axis in &mut self.axes {
             let (rms, total) = ((axis.square_sum / count).sqrt(), (axis.total_sum / count).sqrt());
-            let active = axis.work > 0.0;
-            let counts = rms > self.least_force && rms > 0.05 * total;
+            let active = axis.work.iter().sum::<f64>() > 0.0;
+            axis.work.rotate_left(1);
+            axis.work[3] = 0.0;
+            let oscillates = axis.crossings.iter().sum::<u32>() >= CROSSINGS;
+            let counts = oscillates && rms > self.least_force && rms > 0.05 * total;
             let [first, second, third] = axis.history;
             let growing = counts && active && first > 0.0 && second > first && third > second && rms > third && rms > GROWTH * first;
             axis.large_windows = if counts && active && rms > 0.3 * total && rms > 0.9 * third { axis.large_windows + 1 } else { 0 };
             axis.history = [second, third, rms];
-            (axis.square_sum, axis.total_sum, axis.work) = (0.0, 0.0, 0.0);
+            axis.crossings.rotate_left(1);
+            axis.crossings[3] = 0;
+            (axis.square_sum, axis.total_sum) = (0.0, 0.0);
             if growing {
                 verdict = Some(Reason::Growing);
-            } else if axis.large_windows >= PERSISTENT {
+                if rms > FAST_GROWTH * first {
+                    left = FAST_BACK_OFF;
+                }
+            } else if axis.large_windows >= patience {
                 axis.large_windows = 0;
                 verdict = verdict.or(Some(Reason::Persistent));
             }
         }
-        if verdict.is_some() {
-            self.target *= BACK_OFF;
-            self.axes.iter_mut().for_each(|a| a.history = [0.0; 3]);
-        }
-        verdict
+        verdict.map(|reason| (reason, left))
     }
 }
 

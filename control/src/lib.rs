@@ -6,6 +6,8 @@ pub mod device;
 pub mod exciter;
 pub mod freshness;
 pub mod guard;
+pub mod live_margin;
+pub mod margins;
 pub mod master;
 pub mod operator;
 pub mod scaling;

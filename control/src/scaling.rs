@@ -3,6 +3,7 @@
 use crate::core::{Core, Events, Port, Tick};
 use crate::freshness::Freshness;
 use crate::guard::Guard;
+use crate::live_margin::{Edge, LiveMargin, RingDown, Told};
 use backdrive_msgs::{Gains, MAX_AXES, Sample, flag};
 
 /// A gain that ramps to what is wanted in a straight line.
@@ -30,6 +31,12 @@ impl Ramp {
         self.now
     }
 }
+
+/// A contact force below this RMS is none, N or N m.
+const LEAST_FORCE: f64 = 0.01;
+
+/// A ring-down below this RMS is not looked at, N or N m.
+const LEAST_RING: f64 = 0.004;
 
 /// A change of gains that the graph file asks for.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -118,14 +125,49 @@ pub struct Backward {
     contact: Freshness,
     dither: Vec<Vec<f64>>,
     guard: Option<Guard>,
-    force: [f64; MAX_AXES],
+    /// F_f without the dither, of the step before.
+    reflected: [f64; MAX_AXES],
+    /// Per axis; `None` without a dither.
+    live: Vec<Option<LiveMargin>>,
+    ring: Vec<RingDown>,
+    axes: usize,
 }
 
 impl Backward {
     /// Starts at the plan's first gains. `dither` has one list of forces per axis, N or N m, one value per step, repeated from the start when they end; it may be empty.
     pub fn new(plan: GainPlan, dither: Vec<Vec<f64>>, guard: Option<Guard>, period_s: f64) -> Backward {
         let (mu, lambda) = (Ramp::new(plan.mu), Ramp::new(plan.lambda));
-        Backward { plan, changes_done: 0, mu, lambda, period_s, contact: Freshness::default(), dither, guard, force: [0.0; MAX_AXES] }
+        let of = |axis: usize| dither.get(axis).and_then(|d| LiveMargin::new(d, LEAST_FORCE, period_s));
+        let live = (0..MAX_AXES).map(of).collect();
+        let ring = vec![RingDown::new(LEAST_RING, period_s); MAX_AXES];
+        let (contact, reflected) = (Freshness::default(), [0.0; MAX_AXES]);
+        Backward { plan, changes_done: 0, mu, lambda, period_s, contact, dither, guard, reflected, live, ring, axes: 1 }
+    }
+}
+
+impl Backward {
+    /// The dither of an axis at a step. It is periodic: it lasts as long as the run.
+    fn dither_at(&self, axis: usize, step: u64) -> Option<f64> {
+        self.dither.get(axis).filter(|d| !d.is_empty()).map(|d| d[step as usize % d.len()])
+    }
+
+    /// Shows the guard what the loop does by itself, without the dither; the share of the gain that it allows.
+    fn watch(&mut self, lambda: f64, master: Option<Sample>, events: &mut Events) -> f64 {
+        let master = master.map(|mut sample| {
+            for axis in 0..sample.len() {
+                sample.effort[axis] -= self.dither_at(axis, sample.step).unwrap_or(0.0);
+            }
+            sample
+        });
+        let Some(guard) = &mut self.guard else { return 1.0 };
+        if let Some(reason) = guard.step(&self.reflected, master.as_ref()) {
+            events.push(reason.event(), lambda * guard.target(), 1);
+        }
+        guard.share()
+    }
+
+    fn lambda_in_force(&self) -> f64 {
+        self.lambda.now * self.guard.as_ref().map_or(1.0, Guard::share)
     }
 }
 
@@ -135,28 +177,28 @@ impl Core for Backward {
             self.mu.aim(change.mu, self.plan.ramp_s, self.period_s);
             self.lambda.aim(change.lambda, self.plan.ramp_s, self.period_s);
         }
-        self.mu.step();
+        let mu = self.mu.step();
         let lambda = self.lambda.step();
-        let guarded = self.guard.as_mut().map_or(1.0, |guard| {
-            let verdict = guard.step(&self.force, inputs.get(1).and_then(|p| p.sample.as_ref()));
-            if let Some(reason) = verdict {
-                events.push(reason.event(), lambda * guard.target(), 1);
-            }
-            guard.share()
-        });
+        let guarded = self.watch(lambda, inputs.get(1).and_then(|p| p.sample), events);
         let (force, dither) = outputs.split_at_mut(1);
         for axis in 0..force[0].len() {
-            // A dither is periodic: it lasts as long as the run.
-            if let Some(samples) = self.dither.get(axis).filter(|d| !d.is_empty()) {
-                dither[0].effort[axis] = samples[tick.step as usize % samples.len()];
+            if let Some(added) = self.dither_at(axis, tick.step) {
+                dither[0].effort[axis] = added;
             }
         }
         if guarded < 1.0 {
             force[0].flags |= flag::GUARDED;
         }
+        self.axes = force[0].len();
         // Before the first contact force has come there is none: only the dither is played.
         let contact = self.contact.new_sample(&inputs[0], |s| s.effort[0]).copied();
         if contact.is_none() && self.contact.begun() {
+            for axis in 0..self.axes {
+                self.ring[axis].step(f64::NAN);
+                if let Some(live) = &mut self.live[axis] {
+                    live.step(f64::NAN, f64::NAN, None, mu);
+                }
+            }
             return;
         }
         // A slave that holds for want of commands no longer feels what the hand does.
@@ -167,8 +209,16 @@ impl Core for Backward {
             let felt = contact.map_or(0.0, |c| if c.effort[axis].is_finite() { c.effort[axis] } else { 0.0 });
             let added = if dither[0].effort[axis].is_nan() { 0.0 } else { dither[0].effort[axis] };
             let reflected = guarded * lambda * felt;
-            self.force[axis] = reflected + added;
+            self.reflected[axis] = reflected;
             force[0].effort[axis] = reflected + added;
+            self.ring[axis].step(reflected);
+            if let Some(live) = &mut self.live[axis]
+                && live.step(added, reflected + added, Some(felt), mu)
+                && let (Edge::At { lambda: edge, deviation, .. }, Some(guard)) = (live.edge(), &mut self.guard)
+                && let Some(reason) = guard.margin(edge / (lambda * guard.target()), deviation)
+            {
+                events.push(reason.event(), lambda * guard.target(), 1);
+            }
         }
     }
 
@@ -181,7 +231,13 @@ impl Core for Backward {
     }
 
     fn gains(&self) -> Option<(f64, f64)> {
-        Some((self.mu.now, self.lambda.now * self.guard.as_ref().map_or(1.0, Guard::share)))
+        Some((self.mu.now, self.lambda_in_force()))
+    }
+
+    fn margin(&self) -> Option<Told> {
+        let (mu, lambda) = (self.mu.now, self.lambda_in_force());
+        let of = |axis: usize| Told::of(axis, self.live[axis].as_ref().map(LiveMargin::edge), mu, lambda, self.ring[axis].decay_per_s());
+        (0..self.axes.min(MAX_AXES)).map(of).reduce(|a, b| if b.is_tighter_than(&a) { b } else { a })
     }
 }
 

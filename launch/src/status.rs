@@ -29,6 +29,8 @@ pub struct Summary {
     pub missed_deadlines: u64,
     /// Largest magnitude of effort in the last second, N.
     pub peak_effort: Option<f64>,
+    /// How far the loop is from its edge, such as `margin 2.4x at 71 Hz`.
+    pub margin: Option<String>,
     /// Bytes of the bag.
     pub bag_bytes: Option<u64>,
     /// Nodes that died and are not back.
@@ -69,6 +71,7 @@ impl Summary {
         if let Some(peak) = self.peak_effort {
             parts.push(format!("peak {peak:.2} N"));
         }
+        parts.extend(self.margin.clone());
         if let Some(bytes) = self.bag_bytes {
             parts.push(format!("bag {}", bytes_of(bytes)));
         }
@@ -150,6 +153,7 @@ mod tests {
             loop_p50_us: Some(43.2),
             loop_p99_us: Some(1210.0),
             peak_effort: Some(4.126),
+            margin: Some("margin 2.4x at 71 Hz".to_string()),
             bag_bytes: Some(1_240_000),
             missed_deadlines: 3,
             ..Summary::default()
@@ -159,7 +163,7 @@ mod tests {
     #[test]
     fn says_how_it_does() {
         let mut summary = running();
-        assert_eq!(summary.line(), "1000 of 1000 Hz, loop p50 43 µs p99 1.2 ms, lost 0, late 3, peak 4.13 N, bag 1.2 MB");
+        assert_eq!(summary.line(), "1000 of 1000 Hz, loop p50 43 µs p99 1.2 ms, lost 0, late 3, peak 4.13 N, margin 2.4x at 71 Hz, bag 1.2 MB");
         assert_eq!(summary.plain(), format!("4.2 s, 42 %, 5.8 s left: {}", summary.line()));
         summary.dead.push("slave".to_string());
         assert!(summary.line().starts_with("DEAD: slave, "));

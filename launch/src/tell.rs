@@ -126,6 +126,7 @@ impl Supervisor {
             lost: self.slots.iter().flat_map(|s| &s.status).map(|s| s.lost).sum(),
             missed_deadlines: self.slots.iter().flat_map(|s| &s.status).map(|s| s.missed_deadlines).sum(),
             peak_effort: self.slots.iter().filter(|s| !s.plan.records).filter_map(|s| s.recent_peak(now)).reduce(f64::max),
+            margin: self.slots.iter().flat_map(|s| &s.status).find_map(|s| s.margin).map(|m| m.to_string()),
             bag_bytes: self.slots.iter().flat_map(|s| &s.status).find_map(|s| s.recorded).map(|(_, bytes)| bytes),
             dead: self.slots.iter().filter(|s| lost(s)).map(|s| s.plan.name.clone()).collect(),
         }

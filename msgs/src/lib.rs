@@ -2,8 +2,8 @@
 //!
 //! Everything is a fixed-layout `#[repr(C)]` value, so that it can cross shared memory without
 //! being copied or parsed, and has one ROS 2 form, so that bags and other machines see ordinary
-//! messages: [`Sample`] is a `sensor_msgs/msg/JointState`; [`Gains`], [`Event`] and [`Status`]
-//! have twins in `msg/*.msg`. SI units; a rotational axis uses rad and N m.
+//! messages: [`Sample`] is a `sensor_msgs/msg/JointState`; [`Gains`], [`Event`], [`Status`] and
+//! [`Margin`] have twins in `msg/*.msg`. SI units; a rotational axis uses rad and N m.
 
 pub mod ros;
 pub mod text;
@@ -184,6 +184,55 @@ pub struct Status {
     pub loop_p99_s: f64,
 }
 
+/// How far the running loop is from its edge, of the axis that is nearest to it; sent about ten times a second as
+/// [`Status`] is.
+///
+/// A message of its own, so that what was recorded before there was one reads as it did.
+#[derive(Debug, Clone, Copy, PartialEq, ZeroCopySend)]
+#[type_name("backdrive/Margin/1")]
+#[repr(C)]
+pub struct Margin {
+    /// [`LAYOUT`] of the sender.
+    pub layout: u32,
+    /// [`source_id`] of the sender.
+    pub source: u32,
+    /// Step at which it was taken.
+    pub step: u64,
+    /// Count on this topic, from 0.
+    pub sequence: u64,
+    /// As [`Sample::stamp_ns`].
+    pub stamp_ns: i64,
+    /// The axis, from 0.
+    pub axis: u32,
+    /// What is known: one of [`margin`].
+    pub known: u32,
+    /// The gain now in force, mu*lambda, no unit.
+    pub gain: f64,
+    /// Times which the gain may rise until the loop is on its edge, no unit; with [`margin::ABOVE`] at least that many
+    /// times; else [`NOT_MEASURED`].
+    pub factor: f64,
+    /// Standard deviation of `factor`, as a share of it, or [`NOT_MEASURED`].
+    pub deviation: f64,
+    /// What it would oscillate at on its edge, Hz; 0 for a loop that runs away without oscillating; or [`NOT_MEASURED`].
+    pub frequency_hz: f64,
+    /// How fast the reflected force above 8 Hz dies now, 1/s; negative where it grows; [`NOT_MEASURED`] where nothing rings.
+    pub decay_per_s: f64,
+}
+
+/// What [`Margin::known`] says.
+pub mod margin {
+    /// Nothing: there is no dither to tell it from.
+    pub const NO_DITHER: u32 = 0;
+    /// Nothing: the slave touches nothing, or not yet for long enough.
+    pub const FREE: u32 = 1;
+    /// Nothing: the dither is lost in what else moves.
+    pub const NOISY: u32 = 2;
+    /// The margin is at least this.
+    pub const ABOVE: u32 = 3;
+    /// The margin is this.
+    pub const KNOWN: u32 = 4;
+}
+
 /// The 32-bit FNV-1a hash of a node's name: how a sample says who sent it without carrying a string.
 pub const fn source_id(name: &str) -> u32 {
     let (bytes, mut hash, mut i) = (name.as_bytes(), 0x811c_9dc5_u32, 0);
@@ -205,6 +254,8 @@ pub enum Message {
     Event(Event),
     /// A node's health.
     Status(Status),
+    /// How far the loop is from its edge.
+    Margin(Margin),
 }
 
 /// A message of a layout that this program does not speak.
@@ -228,6 +279,7 @@ impl Message {
             Message::Gains(_) => topic::Kind::Gains,
             Message::Event(_) => topic::Kind::Event,
             Message::Status(_) => topic::Kind::Status,
+            Message::Margin(_) => topic::Kind::Margin,
         }
     }
 
@@ -265,6 +317,7 @@ macro_rules! each {
             Message::Gains($message) => $value,
             Message::Event($message) => $value,
             Message::Status($message) => $value,
+            Message::Margin($message) => $value,
         }
     };
 }

@@ -12,7 +12,7 @@ mod twins;
 use crate::topic::Kind;
 use crate::{Message, Sample};
 use byteorder::{BigEndian, LittleEndian};
-use twins::{EventTwin, GainsTwin, JointState, JointStateIn, StatusTwin};
+use twins::{EventTwin, GainsTwin, JointState, JointStateIn, MarginTwin, StatusTwin};
 
 /// The encapsulation header of little-endian CDR.
 pub const ENCAPSULATION: [u8; 4] = [0, 1, 0, 0];
@@ -70,12 +70,13 @@ pub fn schema(kind: Kind) -> (&'static str, &'static str) {
         Kind::Gains => ("backdrive_msgs/msg/Gains", with_header!(include_str!("../msg/Gains.msg"))),
         Kind::Event => ("backdrive_msgs/msg/Event", with_header!(include_str!("../msg/Event.msg"))),
         Kind::Status => ("backdrive_msgs/msg/Status", with_header!(include_str!("../msg/Status.msg"))),
+        Kind::Margin => ("backdrive_msgs/msg/Margin", with_header!(include_str!("../msg/Margin.msg"))),
     }
 }
 
 /// The kind of message that a ROS type name stands for.
 pub fn kind_of(type_name: &str) -> Option<Kind> {
-    [Kind::Sample, Kind::Gains, Kind::Event, Kind::Status].into_iter().find(|kind| schema(*kind).0 == type_name)
+    [Kind::Sample, Kind::Gains, Kind::Event, Kind::Status, Kind::Margin].into_iter().find(|kind| schema(*kind).0 == type_name)
 }
 
 /// Writes the payload of `message` into `payload`, replacing what was there (its memory is reused).
@@ -92,6 +93,7 @@ pub fn encode(message: &Message, axis_names: &[String], payload: &mut Vec<u8>) -
         Message::Gains(gains) => cdr_encoding::to_writer::<_, LittleEndian, _>(payload, &GainsTwin::from(gains)),
         Message::Event(event) => cdr_encoding::to_writer::<_, LittleEndian, _>(payload, &EventTwin::from(event)),
         Message::Status(status) => cdr_encoding::to_writer::<_, LittleEndian, _>(payload, &StatusTwin::from(status)),
+        Message::Margin(margin) => cdr_encoding::to_writer::<_, LittleEndian, _>(payload, &MarginTwin::from(margin)),
     }
     .map_err(|source| RosError::Cdr { type_name: schema(message.kind()).0, source })
 }
@@ -120,5 +122,6 @@ pub fn decode(kind: Kind, payload: &[u8]) -> Result<Message, RosError> {
         Kind::Gains => Message::Gains(read::<GainsTwin>(kind, cdr, little_endian)?.into()),
         Kind::Event => Message::Event(read::<EventTwin>(kind, cdr, little_endian)?.into()),
         Kind::Status => Message::Status(read::<StatusTwin>(kind, cdr, little_endian)?.into()),
+        Kind::Margin => Message::Margin(read::<MarginTwin>(kind, cdr, little_endian)?.into()),
     })
 }

@@ -12,6 +12,8 @@ pub enum Kind {
     Event,
     /// [`crate::Status`]
     Status,
+    /// [`crate::Margin`]
+    Margin,
 }
 
 /// A topic: an absolute ROS name such as `/master/measured_js`, and what it carries.

@@ -1,6 +1,6 @@
 //! What two processes must agree on: where every field of a shared-memory message stands.
 
-use backdrive_msgs::{Event, Gains, LAYOUT, MAX_AXES, Sample, Status, WrongLayout, check_layout, source_id, text::Text};
+use backdrive_msgs::{Event, Gains, LAYOUT, MAX_AXES, Margin, Sample, Status, WrongLayout, check_layout, source_id, text::Text};
 use std::mem::{align_of, offset_of, size_of};
 
 macro_rules! layout {
@@ -22,6 +22,8 @@ fn fields_stand_where_other_processes_expect_them() {
         value at 40, kind at 48, text at 80);
     layout!(Status, size 72, layout at 0, source at 4, step at 8, sequence at 16, stamp_ns at 24, steps at 32, missed_deadlines at 40,
         lost at 48, loop_p50_s at 56, loop_p99_s at 64);
+    layout!(Margin, size 80, layout at 0, source at 4, step at 8, sequence at 16, stamp_ns at 24, axis at 32, known at 36, gain at 40,
+        factor at 48, deviation at 56, frequency_hz at 64, decay_per_s at 72);
     assert_eq!((size_of::<Text<32>>(), align_of::<Text<32>>()), (32, 1));
 }
 

@@ -3,7 +3,7 @@
 use backdrive_msgs::ros::{self, RosError};
 use backdrive_msgs::text::Text;
 use backdrive_msgs::topic::Kind;
-use backdrive_msgs::{Event, Gains, LAYOUT, MAX_AXES, Message, NOT_MEASURED, Sample, Status};
+use backdrive_msgs::{Event, Gains, LAYOUT, MAX_AXES, Margin, Message, NOT_MEASURED, Sample, Status};
 
 /// SplitMix64: enough randomness for test data, the same on every machine.
 struct Random(u64);
@@ -124,6 +124,20 @@ fn the_other_kinds_come_back_bit_for_bit() {
                 loop_p50_s: mu,
                 loop_p99_s: lambda,
             }),
+            Message::Margin(Margin {
+                layout,
+                source,
+                step,
+                sequence,
+                stamp_ns,
+                axis: severity,
+                known: source,
+                gain: mu,
+                factor: lambda,
+                deviation: ramp_s,
+                frequency_hz: value,
+                decay_per_s: lambda,
+            }),
         ] {
             assert_eq!(debug(&there_and_back(&sent, &mut payload)), debug(&sent));
         }
@@ -159,7 +173,7 @@ fn a_joint_state_is_laid_out_as_ros_expects() {
 
 #[test]
 fn schemas_name_their_type_and_carry_their_dependencies() {
-    for kind in [Kind::Sample, Kind::Gains, Kind::Event, Kind::Status] {
+    for kind in [Kind::Sample, Kind::Gains, Kind::Event, Kind::Status, Kind::Margin] {
         let (name, text) = ros::schema(kind);
         assert_eq!(ros::kind_of(name), Some(kind));
         let separator = format!("\n{}\nMSG: ", "=".repeat(80));

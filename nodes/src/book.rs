@@ -5,8 +5,9 @@
 use crate::sentences::sentence;
 use crate::stage::{Clock, Timing};
 use backdrive_control::core::Events;
+use backdrive_control::live_margin::Told;
 use backdrive_msgs::text::Text;
-use backdrive_msgs::{Event, Gains, LAYOUT, NOT_MEASURED, Status, source_id};
+use backdrive_msgs::{Event, Gains, LAYOUT, Margin, NOT_MEASURED, Status, source_id};
 
 /// What a node keeps for its events, gains and status.
 #[derive(Debug)]
@@ -20,6 +21,8 @@ pub(crate) struct Book {
     gains_told: Option<(f64, f64)>,
     status_every: u64,
     status_due: u64,
+    margins: u64,
+    margin_due: u64,
 }
 
 /// What a status says that the node must look up.
@@ -44,6 +47,8 @@ impl Book {
             gains_told: None,
             status_every,
             status_due: status_every,
+            margins: 0,
+            margin_due: status_every,
         }
     }
 
@@ -81,6 +86,20 @@ impl Book {
         let sequence = self.gains;
         self.gains += 1;
         Some(Gains { layout: LAYOUT, source: self.source, step, sequence, stamp_ns, mu: now.0, lambda: now.1, ramp_s: 0.0 })
+    }
+
+    /// The margin after `step`, every 0.1 s of the graph's time.
+    pub fn margin(&mut self, step: u64, stamp_ns: i64, now: impl FnOnce() -> Option<Told>) -> Option<Margin> {
+        let steps = step + 1;
+        if steps < self.margin_due {
+            return None;
+        }
+        let Told { axis, known, gain, factor, deviation, frequency_hz, decay_per_s } = now()?;
+        self.margin_due = (steps / self.status_every + 1) * self.status_every;
+        let sequence = self.margins;
+        self.margins += 1;
+        let source = self.source;
+        Some(Margin { layout: LAYOUT, source, step, sequence, stamp_ns, axis, known, gain, factor, deviation, frequency_hz, decay_per_s })
     }
 
     /// The status after `step`, every 0.1 s of the graph's time. A lockstep one holds nothing that the machine decides.

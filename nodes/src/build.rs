@@ -7,6 +7,7 @@ use backdrive_control::core::{Core, Events, Port, Tick};
 use backdrive_control::device::{Device, DeviceError, DeviceOptions, Role};
 use backdrive_control::exciter::Exciter;
 use backdrive_control::guard::Guard;
+use backdrive_control::live_margin::Told;
 use backdrive_control::master::Master;
 use backdrive_control::operator::Operator;
 use backdrive_control::scaling::{Backward, Forward};
@@ -88,6 +89,7 @@ pub fn topics(graph: &Graph) -> Vec<GraphTopic> {
         };
         if node.kind == NodeKind::Scaling {
             side("gains", Kind::Gains);
+            side("margin", Kind::Margin);
         }
         side("events", Kind::Event);
         side("status", Kind::Status);
@@ -173,6 +175,7 @@ pub fn plan_with(graph: &Graph, name: &str, cores: Vec<Box<dyn Core>>) -> Result
         status: side("status", Kind::Status),
         gains_in: None,
         gains_out: (node.kind == NodeKind::Scaling).then(|| side("gains", Kind::Gains)),
+        margin_out: (node.kind == NodeKind::Scaling).then(|| side("margin", Kind::Margin)),
     })
 }
 
@@ -195,7 +198,9 @@ fn cores(graph: &Graph, node: &Node) -> Result<Vec<Box<dyn Core>>, DeviceError> 
             vec![Box::new(Canceller::new(simulated(files, Role::Master)?, *high_pass_hz, period_s))]
         }
         Settings::Scaling { dither, guard } => {
-            let guard = guard.then(|| Guard::new(node.axes, GUARD_LEAST_FORCE, period_s));
+            // What a dither shakes is no oscillation of the loop's own.
+            let peak = dither.iter().flatten().fold(0.0_f64, |peak, d| peak.max(d.abs()));
+            let guard = guard.then(|| Guard::new(node.axes, GUARD_LEAST_FORCE.max(peak), period_s));
             vec![
                 Box::new(Forward::new(graph.gains.clone(), period_s)),
                 Box::new(Backward::new(graph.gains.clone(), dither.clone(), guard, period_s)),
@@ -237,5 +242,9 @@ impl Core for Wired {
 
     fn gains(&self) -> Option<(f64, f64)> {
         self.core.gains()
+    }
+
+    fn margin(&self) -> Option<Told> {
+        self.core.margin()
     }
 }

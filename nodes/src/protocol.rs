@@ -2,7 +2,9 @@
 //! on the node's standard input, the node's on its standard output. The end of standard input means
 //! that the supervisor is gone, and the node ends.
 
+use backdrive_msgs::{Margin, margin, measured};
 use serde::{Deserialize, Serialize};
+use std::fmt;
 
 /// From the supervisor to a node.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -85,4 +87,90 @@ pub struct NodeStatus {
     pub peak_effort: f64,
     /// Only the recorder: messages written and bytes of the bag so far.
     pub recorded: Option<(u64, u64)>,
+    /// Only the scaling: how far the loop is from its edge.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub margin: Option<MarginStatus>,
+}
+
+/// How far the loop is from its edge, as [`Margin`] tells it.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+pub struct MarginStatus {
+    /// One of [`margin`].
+    pub known: u32,
+    /// mu*lambda now in force.
+    pub gain: f64,
+    /// Times which it may rise until the loop is on its edge; with [`margin::ABOVE`] at least that many.
+    pub factor: Option<f64>,
+    /// Standard deviation of the factor, as a share of it.
+    pub deviation: Option<f64>,
+    /// What the loop would oscillate at there, Hz; 0 for running away.
+    pub frequency_hz: Option<f64>,
+    /// How fast the reflected force above 8 Hz dies now, 1/s; negative where it grows.
+    pub decay_per_s: Option<f64>,
+}
+
+impl From<&Margin> for MarginStatus {
+    fn from(m: &Margin) -> MarginStatus {
+        MarginStatus {
+            known: m.known,
+            gain: m.gain,
+            factor: measured(m.factor),
+            deviation: measured(m.deviation),
+            frequency_hz: measured(m.frequency_hz),
+            decay_per_s: measured(m.decay_per_s),
+        }
+    }
+}
+
+impl fmt::Display for MarginStatus {
+    /// Such as `margin 2.4x at 71 Hz`, `margin over 8x`, `margin unknown (free)`; then what a ring-down did.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match (self.known, self.factor) {
+            (margin::KNOWN, Some(factor)) => match self.frequency_hz.filter(|hz| *hz > 0.0) {
+                Some(hz) => write!(f, "margin {}x at {hz:.0} Hz", Times(factor))?,
+                None => write!(f, "margin {}x to running away", Times(factor))?,
+            },
+            (margin::ABOVE, Some(factor)) => write!(f, "margin over {}x", Times(factor))?,
+            (margin::NO_DITHER, _) => write!(f, "margin unknown (no dither)")?,
+            (margin::FREE, _) => write!(f, "margin unknown (free)")?,
+            _ => write!(f, "margin unknown (noisy)")?,
+        }
+        match self.decay_per_s {
+            Some(decay) if decay >= 0.0 => write!(f, ", decays at {decay:.0} /s"),
+            Some(decay) => write!(f, ", grows at {:.0} /s", -decay),
+            None => Ok(()),
+        }
+    }
+}
+
+/// Two digits.
+struct Times(f64);
+
+impl fmt::Display for Times {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.0 {
+            x if x >= 100.0 => write!(f, "100"),
+            x if x >= 9.95 => write!(f, "{x:.0}"),
+            x if x >= 1.095 => write!(f, "{x:.1}"),
+            x => write!(f, "{x:.2}"),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_margin_reads_as_a_person_says_it() {
+        let known = MarginStatus { known: margin::KNOWN, gain: 0.3, factor: Some(2.43), frequency_hz: Some(70.8), ..Default::default() };
+        assert_eq!(known.to_string(), "margin 2.4x at 71 Hz");
+        assert_eq!(MarginStatus { frequency_hz: Some(0.0), ..known }.to_string(), "margin 2.4x to running away");
+        assert_eq!(MarginStatus { known: margin::ABOVE, factor: Some(8.1), ..known }.to_string(), "margin over 8.1x");
+        assert_eq!(MarginStatus { known: margin::FREE, factor: None, ..known }.to_string(), "margin unknown (free)");
+        let none = MarginStatus { known: margin::NO_DITHER, factor: None, decay_per_s: Some(-4.6), ..known };
+        assert_eq!(none.to_string(), "margin unknown (no dither), grows at 5 /s");
+        assert_eq!(MarginStatus { decay_per_s: Some(12.3), ..none }.to_string(), "margin unknown (no dither), decays at 12 /s");
+        assert_eq!(MarginStatus { known: 99, ..none }.to_string(), "margin unknown (noisy), grows at 5 /s");
+    }
 }

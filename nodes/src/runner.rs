@@ -10,7 +10,7 @@ use crate::book::{Book, Health, NO_VALUE, Wanted, gains_are_valid};
 use crate::clock::{Start, now_ns, sleep_until_ns};
 use crate::histogram::Histogram;
 use crate::input::Input;
-use crate::protocol::NodeStatus;
+use crate::protocol::{MarginStatus, NodeStatus};
 use crate::sentences::sentence;
 use crate::stage::{Clock, NodePlan, PACE_PORT, Timing};
 use crate::transport::{Publisher, Subscriber, Transport, TransportError};
@@ -149,12 +149,14 @@ pub struct Report {
     pub peak_effort: f64,
     /// As in [`NodeStatus`].
     pub recorded: Option<(u64, u64)>,
+    /// As in [`NodeStatus`].
+    pub margin: Option<MarginStatus>,
 }
 
 impl From<Report> for NodeStatus {
     fn from(r: Report) -> NodeStatus {
-        let Report { steps, missed_deadlines, lost, loop_p50_us, loop_p99_us, peak_effort, recorded } = r;
-        NodeStatus { steps, missed_deadlines, lost, loop_p50_us, loop_p99_us, peak_effort, recorded }
+        let Report { steps, missed_deadlines, lost, loop_p50_us, loop_p99_us, peak_effort, recorded, margin } = r;
+        NodeStatus { steps, missed_deadlines, lost, loop_p50_us, loop_p99_us, peak_effort, recorded, margin }
     }
 }
 
@@ -191,6 +193,7 @@ pub struct Runner {
     teller: Teller,
     gains_in: Option<Box<dyn Subscriber>>,
     gains_out: Option<Output>,
+    margin_out: Option<Output>,
     loop_time: Histogram,
     loop_time_recent: Histogram,
     skipped: u64,
@@ -234,6 +237,7 @@ impl Runner {
         }
         let (events, status) = (output(&plan.events, 0)?, output(&plan.status, 0)?);
         let gains_out = plan.gains_out.as_ref().map(|t| output(t, 0)).transpose()?;
+        let margin_out = plan.margin_out.as_ref().map(|t| output(t, 0)).transpose()?;
         let stages = stages
             .into_iter()
             .map(|(stage, outputs)| {
@@ -265,6 +269,7 @@ impl Runner {
             teller: Teller { book, events, status, noted: Events::default(), report: Report::default(), broken_told_at: i64::MIN },
             gains_in,
             gains_out,
+            margin_out,
             loop_time: Histogram::default(),
             loop_time_recent: Histogram::default(),
             skipped: 0,
@@ -282,7 +287,8 @@ impl Runner {
     pub fn missing(&self) -> Vec<String> {
         let inputs = self.stages.iter().flat_map(|s| &s.inputs);
         let mut lines: Vec<String> = inputs.filter(|i| !i.has_publisher()).map(|i| format!("{}: no publisher", i.topic)).collect();
-        let outputs = self.stages.iter().flat_map(|s| &s.outputs).chain([&self.teller.events, &self.teller.status]).chain(&self.gains_out);
+        let told = [&self.teller.events, &self.teller.status].into_iter().chain(&self.gains_out).chain(&self.margin_out);
+        let outputs = self.stages.iter().flat_map(|s| &s.outputs).chain(told);
         for output in outputs {
             let (has, expected) = (output.publisher.listeners(), self.options.listeners.get(&output.topic.name).copied().unwrap_or(0));
             if has < expected {
@@ -461,6 +467,12 @@ impl Runner {
             && let Some(gains) = self.teller.book.gains(step, stamp_ns, now)
         {
             first_error = first_error.and(output.publisher.send(&Message::Gains(gains)));
+        }
+        if let Some(output) = &mut self.margin_out
+            && let Some(margin) = self.teller.book.margin(step, stamp_ns, || stage.core.margin())
+        {
+            self.teller.report.margin = Some(MarginStatus::from(&margin));
+            first_error = first_error.and(output.publisher.send(&Message::Margin(margin)));
         }
         for (sample, output) in stage.samples.iter_mut().zip(&mut stage.outputs) {
             (sample.layout, sample.source) = (LAYOUT, self.teller.book.source);

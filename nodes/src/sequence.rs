@@ -74,6 +74,7 @@ struct Node {
     events: usize,
     status: usize,
     gains: Option<usize>,
+    margin: Option<usize>,
 }
 
 /// A graph that runs in the calling thread.
@@ -122,7 +123,8 @@ impl Sequence {
             };
             let (events, status) = (number(&plan.events), number(&plan.status));
             let gains = plan.gains_out.as_ref().map(&mut number);
-            nodes.push(Node { book: Book::new(&plan.name, &lockstep), events, status, gains });
+            let margin = plan.margin_out.as_ref().map(&mut number);
+            nodes.push(Node { book: Book::new(&plan.name, &lockstep), events, status, gains, margin });
         }
         let slot_of = |topic: &Topic| topics[..axes.len()].iter().position(|t| t.name == topic.name);
 
@@ -297,6 +299,11 @@ impl Node {
             && let Some(gains) = self.book.gains(step, stamp_ns, now)
         {
             tap(topic, &Message::Gains(gains));
+        }
+        if let Some(topic) = self.margin
+            && let Some(margin) = self.book.margin(step, stamp_ns, || stage.core.margin())
+        {
+            tap(topic, &Message::Margin(margin));
         }
     }
 }

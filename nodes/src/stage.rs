@@ -85,6 +85,8 @@ pub struct NodePlan {
     pub gains_in: Option<Topic>,
     /// Where the gains in force are told, if a stage has gains: at step 0 and whenever they change.
     pub gains_out: Option<Topic>,
+    /// Where the loop's margin is told ten times a second, if a stage knows of it.
+    pub margin_out: Option<Topic>,
 }
 
 /// What all nodes of a graph share.

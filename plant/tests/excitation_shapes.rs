@@ -57,6 +57,23 @@ fn a_multisine_has_its_lines_and_no_others() {
 }
 
 #[test]
+fn a_multisine_is_repeated_at_each_level() {
+    let one = ex("multisine:peak=0.3,from=1,to=50,period=0.5,periods=2,seed=7").samples(1000.0).unwrap();
+    let e = ex("multisine:peak=0.3,from=1,to=50,period=0.5,periods=2,levels=0.1/-0.3/1,seed=7");
+    let x = e.samples(1000.0).unwrap();
+    assert_eq!((x.len(), e.duration()), (3000, 3.0));
+    let signal = e.signal();
+    for (level, factor) in [0.1, -0.3, 1.0].into_iter().enumerate() {
+        for i in 0..1000 {
+            let (value, k) = (factor * one[i], 1000 * level + i);
+            assert!((x[k] - value).abs() < 1e-12, "sample {k}");
+            assert!((signal.at(k as f64 / 1000.0) - value).abs() < 1e-9, "sample {k}");
+        }
+    }
+    assert!("multisine:peak=1,from=1,to=50,period=1,levels=x".parse::<Excitation>().is_err());
+}
+
+#[test]
 fn crest_rounds_lower_the_peak_at_the_same_power() {
     let crest = |rounds: u32| {
         let x = ex(&format!("multisine:peak=2,from=1,to=50,period=2,seed=3,crest={rounds}")).samples(2000.0).unwrap();
@@ -112,6 +129,7 @@ fn what_is_shown_reads_back_the_same() {
     for text in [
         "sweep:amplitude=2,from=1,to=200,duration=10,spacing=linear,tilt=-1,limit=8.9",
         "multisine:peak=2,from=0,to=50,period=2,periods=2,grid=odd,seed=3,crest=4,fade_in=0.1",
+        "multisine:rms=2,from=1,to=50,period=2,periods=2,levels=0.1/0.3/1",
         "triangle:amplitude=3,period=4/0.25,cycles=3,nested=2,inner=0.5",
         "steps:amplitude=1/-2,hold=0.5,rise=0.001,count=2,quiet=1",
         "impacts:amplitude=-4/0.3,width=0.01,interval=1,count=2,bounces=1",

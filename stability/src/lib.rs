@@ -1,5 +1,19 @@
 //! Is the loop stable at this gain? Answers from what a run or a replay did.
 
+pub mod collect;
+pub mod energy;
+pub mod frequency;
+pub mod from_bag;
+mod grid;
+mod master_run;
+pub mod model_check;
 pub mod oscillation;
 pub mod outcome;
+mod phases;
+pub mod resimulate;
+pub mod roles;
+mod rosbag;
 pub mod session;
+pub mod spectra;
+pub mod transparency;
+pub mod verdict;

@@ -1,6 +1,20 @@
 //! What a run did: stable, a limit cycle, unstable, or limited.
+//!
+//! One function, [`judge`], decides for a live run, a replay and a prediction alike. What it goes by:
+//!
+//! | fact | threshold |
+//! |---|---|
+//! | where it looks | the hand holds still and the slave touches something, for 0.3 s beyond a transient of 0.15 s |
+//! | an oscillation | above 8 Hz; half its peak-to-peak in the last quarter above 2 um and two encoder steps |
+//! | it dies | its last quarter below 0.7 of its first, its envelope falling by more than 0.2 per second |
+//! | it grows | its last quarter above 1.5 of its first, its envelope rising by more than 0.2 per second: unstable |
+//! | otherwise | a limit cycle |
+//! | slow wandering | the last quarter spans more than 20 um and four encoder steps, and does not settle |
+//! | limited | a clamp acted in more than 1 % of the contact, or the master left its travel |
+//! | a dither plays | what it explains (coherence) does not count: less than half of the motion unexplained is no oscillation |
 
 use crate::oscillation::{Oscillation, oscillation};
+use crate::spectra::welch;
 use serde::Serialize;
 
 /// One axis of a run, one value per step.
@@ -16,6 +30,8 @@ pub struct Trace {
     pub contact: Vec<f64>,
     /// Force applied to the master, N or N m.
     pub feedback: Vec<f64>,
+    /// What was added to that force on purpose, N or N m; empty where nothing was.
+    pub dither: Vec<f64>,
     /// Whether a clamp acted.
     pub clamped: Vec<bool>,
     /// The device's limits of motion, m or rad.
@@ -98,6 +114,8 @@ impl std::fmt::Display for Outcome {
 const LOWEST_HZ: f64 = 8.0;
 /// The first part of a hold is the transient of getting there, s.
 const TRANSIENT_S: f64 = 0.15;
+/// Of the spectra that tell a dither's share, s.
+const SEGMENT_S: f64 = 0.5;
 /// A hold must last this long beyond its transient to be judged, s.
 const LEAST_HOLD_S: f64 = 0.3;
 /// An oscillation below this is not felt and not counted, m or rad.
@@ -125,11 +143,44 @@ pub fn judge(trace: &Trace) -> Outcome {
 }
 
 fn judge_hold(trace: &Trace, from: usize, to: usize) -> Option<Outcome> {
+    if dithered(trace, from, to).is_some_and(|unexplained| unexplained < 0.5) {
+        return Some(judge_drift(trace, from, to));
+    }
     let found = oscillation(&trace.position[from..to], trace.period_s, LOWEST_HZ)?;
     let (fast, slow) = (judge_fast(&found, trace.resolution), judge_slow(trace, from, to));
     // The edges of a slow wandering have lines at every frequency, the strongest of them at the lowest.
     let spills_over = found.frequency_hz < 1.5 * LOWEST_HZ && slow != Outcome::Stable;
     Some(if fast == Outcome::Stable || spills_over { slow } else { fast })
+}
+
+/// Where a dither plays: the share of the motion's power that it does not explain, 0 to 1.
+fn dithered(trace: &Trace, from: usize, to: usize) -> Option<f64> {
+    let dither = trace.dither.get(from..to).filter(|d| d.iter().any(|f| *f != 0.0))?;
+    let columns = [dither, &trace.position[from..to]];
+    let segment = (to - from).div_ceil(4).min((SEGMENT_S / trace.period_s) as usize);
+    let spectra = welch(&columns, std::slice::from_ref(&(0..to - from)), segment, trace.period_s, 0.5 / trace.period_s)?;
+    let averages = spectra.averaging.averages.max(1.5);
+    let (mut all, mut unexplained) = (0.0, 0.0);
+    for (line, matrix) in spectra.lines.iter().enumerate().filter(|(line, _)| spectra.hz[*line] >= LOWEST_HZ) {
+        let power = matrix[(1, 1)].re;
+        all += power;
+        // Few averages make chance look like coherence.
+        unexplained += power * ((1.0 - spectra.coherence(line, 0, 1)) * averages / (averages - 1.0)).min(1.0);
+    }
+    (all > 0.0).then(|| unexplained / all)
+}
+
+/// Whether a master that a dither shakes runs away underneath: the mean of each quarter lies farther from the one before.
+fn judge_drift(trace: &Trace, from: usize, to: usize) -> Outcome {
+    let piece = &trace.position[from..to];
+    let quarter = piece.len() / 4;
+    let mean = |i: usize| piece[i * quarter..(i + 1) * quarter].iter().sum::<f64>() / quarter as f64;
+    let (second, third) = ((mean(2) - mean(1)).abs(), (mean(3) - mean(2)).abs());
+    if third > WANDER.max(4.0 * trace.resolution) && third > 1.5 * second && (mean(3) > mean(2)) == (mean(2) > mean(1)) {
+        let time = quarter as f64 * trace.period_s;
+        return Outcome::Unstable { growth_per_s: (third / second.max(WANDER)).ln() / time };
+    }
+    Outcome::Stable
 }
 
 /// Whether the master comes to rest while the hand holds still: a loop whose canceller takes out too much at DC, or

@@ -98,8 +98,7 @@ impl Signals {
             contact: self.contact.clone(),
             feedback: self.force.clone(),
             clamped: self.clamped.clone(),
-            travel: None,
-            resolution: 0.0,
+            ..Trace::default()
         })
     }
 }

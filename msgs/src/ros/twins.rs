@@ -2,7 +2,7 @@
 
 use super::RosError;
 use crate::text::Text;
-use crate::{Event, Gains, MAX_AXES, NOT_MEASURED, Sample, Status};
+use crate::{Event, Gains, MAX_AXES, Margin, NOT_MEASURED, Sample, Status};
 use serde::de::{SeqAccess, Visitor};
 use serde::ser::{SerializeSeq, SerializeStruct};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
@@ -396,5 +396,42 @@ impl From<StatusTwin> for Status {
         let Common { layout, source, step, sequence, stamp_ns, .. } = common;
         let (loop_p50_s, loop_p99_s) = (canonical(loop_p50_s), canonical(loop_p99_s));
         Status { layout, source, step, sequence, stamp_ns, steps, missed_deadlines, lost, loop_p50_s, loop_p99_s }
+    }
+}
+
+/// `backdrive_msgs/Margin`.
+#[derive(Serialize, Deserialize)]
+pub(super) struct MarginTwin {
+    common: Common,
+    axis: u32,
+    known: u32,
+    gain: f64,
+    factor: f64,
+    deviation: f64,
+    frequency_hz: f64,
+    decay_per_s: f64,
+}
+
+impl From<&Margin> for MarginTwin {
+    fn from(margin: &Margin) -> Self {
+        MarginTwin {
+            common: Common::new(margin.layout, margin.source, margin.step, margin.sequence, margin.stamp_ns),
+            axis: margin.axis,
+            known: margin.known,
+            gain: canonical(margin.gain),
+            factor: canonical(margin.factor),
+            deviation: canonical(margin.deviation),
+            frequency_hz: canonical(margin.frequency_hz),
+            decay_per_s: canonical(margin.decay_per_s),
+        }
+    }
+}
+
+impl From<MarginTwin> for Margin {
+    fn from(twin: MarginTwin) -> Margin {
+        let MarginTwin { common, axis, known, gain, factor, deviation, frequency_hz, decay_per_s } = twin;
+        let Common { layout, source, step, sequence, stamp_ns, .. } = common;
+        let [gain, factor, deviation, frequency_hz, decay_per_s] = [gain, factor, deviation, frequency_hz, decay_per_s].map(canonical);
+        Margin { layout, source, step, sequence, stamp_ns, axis, known, gain, factor, deviation, frequency_hz, decay_per_s }
     }
 }

@@ -5,7 +5,7 @@ use super::bell::{Spin, Tones};
 use super::board::Board;
 use super::{Location, MAX_LISTENERS, Publisher, Subscriber, Transport, TransportError, capacity, check_layout, wrong_kind};
 use backdrive_msgs::topic::{Kind, Topic};
-use backdrive_msgs::{Event, Gains, Message, Sample, Status};
+use backdrive_msgs::{Event, Gains, Margin, Message, Sample, Status};
 use iceoryx2::port::publisher::Publisher as IoxPublisher;
 use iceoryx2::port::subscriber::Subscriber as IoxSubscriber;
 use iceoryx2::port::update_connections::UpdateConnections;
@@ -121,6 +121,7 @@ impl Transport for Iceoryx2 {
             Kind::Gains => self.publish::<Gains>(topic),
             Kind::Event => self.publish::<Event>(topic),
             Kind::Status => self.publish::<Status>(topic),
+            Kind::Margin => self.publish::<Margin>(topic),
         }
     }
 
@@ -130,6 +131,7 @@ impl Transport for Iceoryx2 {
             Kind::Gains => self.subscribe::<Gains>(topic, depth, wakes),
             Kind::Event => self.subscribe::<Event>(topic, depth, wakes),
             Kind::Status => self.subscribe::<Status>(topic, depth, wakes),
+            Kind::Margin => self.subscribe::<Margin>(topic, depth, wakes),
         }
     }
 
@@ -164,7 +166,7 @@ macro_rules! payload {
         }
     )*};
 }
-payload!(Sample, Gains, Event, Status);
+payload!(Sample, Gains, Event, Status, Margin);
 
 struct Sending<T: Payload> {
     topic: Topic,

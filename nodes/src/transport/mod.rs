@@ -138,7 +138,7 @@ pub(crate) const fn capacity(kind: Kind) -> (usize, usize) {
         Kind::Sample => (4096, 0),
         Kind::Gains => (4096, 4),
         Kind::Event => (4096, 32),
-        Kind::Status => (512, 2),
+        Kind::Status | Kind::Margin => (512, 2),
     }
 }
 

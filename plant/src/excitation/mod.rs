@@ -61,8 +61,10 @@ pub enum Shape {
         to: f64,
         /// s; the lines are multiples of its inverse.
         period: f64,
-        /// How many periods.
+        /// How many periods of each level.
         periods: u32,
+        /// The whole, all its periods, is repeated once for each of these, multiplied by it: one record of several amplitudes.
+        levels: Vec<f64>,
         /// Which lines.
         grid: Grid,
         /// Of the phases.
@@ -193,11 +195,11 @@ impl Excitation {
         self.fits(rate_hz)?;
         let count = (self.duration() * rate_hz).round().max(1.0) as usize;
         let signal = self.signal();
-        if let (Core::Lines(lines), Some(rest)) = (&signal.core, whole(self.quiet * rate_hz))
+        if let (Core::Lines(lines, levels), Some(rest)) = (&signal.core, whole(self.quiet * rate_hz))
             && let Some(period) = lines.one_period(rate_hz)
         {
             let value = |i: usize| match i.checked_sub(rest) {
-                Some(k) => signal.framed(k as f64 / rate_hz, period[k % period.len()]),
+                Some(k) => signal.framed(k as f64 / rate_hz, levels.at(k as f64 / rate_hz) * period[k % period.len()]),
                 None => 0.0,
             };
             return Ok((0..count).map(value).collect());
@@ -208,8 +210,9 @@ impl Excitation {
     /// The excitation ready to be asked for values: phases are drawn and turning points laid out once.
     pub fn signal(&self) -> Signal {
         let core = match &self.shape {
-            Shape::Multisine { rms, peak, from, to, period, grid, seed, crest, .. } => {
-                Core::Lines(Lines::new([*from, *to], *period, *grid, *seed, *crest, *rms, *peak))
+            Shape::Multisine { rms, peak, from, to, period, periods, levels, grid, seed, crest } => {
+                let lines = Lines::new([*from, *to], *period, *grid, *seed, *crest, *rms, *peak);
+                Core::Lines(lines, Levels { length: period * f64::from(*periods), factors: levels.clone() })
             }
             Shape::Sweep { amplitude, from, to, duration, spacing, tilt } => {
                 Core::Sweep { amplitude: *amplitude, from: *from, to: *to, duration: *duration, spacing: *spacing, tilt: *tilt }
@@ -230,9 +233,26 @@ pub struct Signal {
 
 #[derive(Debug, Clone)]
 enum Core {
-    Lines(Lines),
+    Lines(Lines, Levels),
     Pieces(Vec<shapes::Piece>),
     Sweep { amplitude: f64, from: f64, to: f64, duration: f64, spacing: Spacing, tilt: f64 },
+}
+
+/// Factors that follow each other, each for the same time.
+#[derive(Debug, Clone)]
+struct Levels {
+    /// s of each.
+    length: f64,
+    factors: Vec<f64>,
+}
+
+impl Levels {
+    /// The factor in force at `t`, s; that of the last one beyond its end.
+    fn at(&self, t: f64) -> f64 {
+        // Rounding must not let a level begin a sample late.
+        let index = ((t / self.length + 1e-9).max(0.0) as usize).min(self.factors.len().saturating_sub(1));
+        self.factors.get(index).copied().unwrap_or(1.0)
+    }
 }
 
 impl Signal {
@@ -243,7 +263,7 @@ impl Signal {
             return 0.0;
         }
         let core = match &self.core {
-            Core::Lines(lines) => lines.at(t),
+            Core::Lines(lines, levels) => levels.at(t) * lines.at(t),
             Core::Pieces(pieces) => shapes::at(pieces, t),
             Core::Sweep { amplitude, from, to, duration, spacing, tilt } => {
                 let (phase, frequency) = spacing.phase(*from, *to, *duration, t);

@@ -186,6 +186,7 @@ fn multisine(table: &mut Table) -> Result<Shape, FileError> {
         to,
         period,
         periods: count(table, "periods", 1, 1)?,
+        levels: if table.contains("levels") { list(table, "levels", Range::Any)? } else { vec![1.0] },
         grid,
         seed: table.integer("seed", 0, i64::MAX)?.map_or(1, i64::unsigned_abs),
         crest: count(table, "crest", 0, 0)?.min(10_000),
@@ -264,10 +265,13 @@ impl fmt::Display for Excitation {
                 }
                 keys
             }
-            Shape::Multisine { rms, peak, from, to, period, periods, grid, seed, crest } => {
+            Shape::Multisine { rms, peak, from, to, period, periods, levels, grid, seed, crest } => {
                 let size = rms.map(|x| format!("rms={x}")).or_else(|| peak.map(|x| format!("peak={x}")));
                 let mut keys: Vec<String> = size.into_iter().collect();
                 keys.extend([format!("from={from}"), format!("to={to}"), format!("period={period}"), format!("periods={periods}")]);
+                if *levels != [1.0] {
+                    keys.push(format!("levels={}", list(levels)));
+                }
                 if *grid == Grid::Odd {
                     keys.push("grid=odd".to_string());
                 }

@@ -41,7 +41,7 @@ impl Shape {
     pub fn duration(&self) -> f64 {
         match self {
             Shape::Sweep { duration, .. } => *duration,
-            Shape::Multisine { period, periods, .. } => period * f64::from(*periods),
+            Shape::Multisine { period, periods, levels, .. } => period * f64::from(*periods) * levels.len() as f64,
             other => pieces(other).last().map_or(0.0, |p| p.end),
         }
     }

@@ -1,6 +1,6 @@
 //! Where the energy went.
 
-use super::compile::Compiled;
+use super::compile::{Compiled, Share};
 use super::drive::Drive;
 use super::{FrictionContact, GROUND, PathElement, Plant, Slots};
 use crate::elements::Mechanics;
@@ -20,11 +20,15 @@ pub struct Energy {
 }
 
 /// What has been counted since the start.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Default)]
 pub(super) struct Account {
     work_in: f64,
     dissipated: f64,
     stored_in_paths_first: f64,
+    /// Taken by each element of the model; of those along a path the plant keeps its own count.
+    taken: Vec<f64>,
+    /// Stored in each path element at the start.
+    stored_first: Vec<f64>,
 }
 
 /// A substep that has been done.
@@ -53,6 +57,16 @@ impl Account {
         done: &Done,
     ) {
         let h = done.length;
+        let apart = |first: usize, second: usize| done.mean_velocity[first] - done.mean_velocity[second];
+        for (share, taken) in fixed.elements.iter().zip(&mut self.taken) {
+            *taken += match *share {
+                Share::Linear(linear, first, second) => linear.damping * apart(first, second).powi(2) * h,
+                Share::Friction(index) => {
+                    frictions.get(index).map_or(0.0, |contact| contact.force * apart(contact.first, contact.second) * h)
+                }
+                Share::Path(_) => 0.0,
+            };
+        }
         // What friction and path elements do to the prescribed bodies.
         let mut pull = *done.pushed;
         for i in 0..pull.len() {
@@ -119,14 +133,36 @@ impl Plant {
         Energy { kinetic, stored, work_in, dissipated }
     }
 
+    /// Taken by one element of the model since the start (of hysteresis: what went in less what it still holds), J; not a number
+    /// until [`Plant::track_energy`] is called, and where there is no such element.
+    ///
+    /// What back-EMF takes belongs to an input, so the elements' sum may be less than [`Energy::dissipated`].
+    pub fn dissipated_by(&self, element: usize) -> f64 {
+        let (Some(account), Some(share)) = (&self.energy, self.fixed.elements.get(element)) else { return f64::NAN };
+        match *share {
+            Share::Linear(..) | Share::Friction(_) => account.taken.get(element).copied().unwrap_or(f64::NAN),
+            Share::Path(index) => {
+                let first = account.stored_first.get(index).copied().unwrap_or(0.0);
+                self.paths.get(index).map_or(f64::NAN, |path| path.absorbed - (self.stored_in(path) - first))
+            }
+        }
+    }
+
+    fn stored_in(&self, path: &PathElement) -> f64 {
+        path.law.stored(&path.memory, self.x[path.first] - self.x[path.second])
+    }
+
     fn stored_in_paths(&self) -> f64 {
-        self.paths.iter().map(|path| path.law.stored(&path.memory, self.x[path.first] - self.x[path.second])).sum()
+        self.paths.iter().map(|path| self.stored_in(path)).sum()
     }
 
     pub(super) fn restart_energy(&mut self) {
-        let stored_in_paths_first = self.stored_in_paths();
-        if let Some(account) = &mut self.energy {
-            *account = Account { stored_in_paths_first, ..Account::default() };
+        if self.energy.is_none() {
+            return;
         }
+        let stored_first: Vec<f64> = self.paths.iter().map(|path| self.stored_in(path)).collect();
+        let stored_in_paths_first = stored_first.iter().sum();
+        let taken = vec![0.0; self.fixed.elements.len()];
+        self.energy = Some(Account { stored_in_paths_first, stored_first, taken, ..Account::default() });
     }
 }

@@ -323,6 +323,15 @@ impl Table {
         self.entries.iter().any(|e| e.key == key && matches!(e.node.value, Value::Array(_)))
     }
 
+    /// Whether a key that was not taken yet holds a list that begins with a table.
+    pub fn is_list_of_tables(&self, key: &str) -> bool {
+        let begins = |value: &Value| match value {
+            Value::Array(items) => items.first().is_some_and(|item| matches!(item.value, Value::Table(_))),
+            _ => false,
+        };
+        self.entries.iter().any(|e| e.key == key && begins(&e.node.value))
+    }
+
     /// Takes a key without looking at it: for keys that another reader of the same file owns.
     pub fn skip(&mut self, key: &str) {
         self.take(key);

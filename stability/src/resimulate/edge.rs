@@ -1,0 +1,161 @@
+//! The gain at which a loop stops being stable.
+
+use super::sweep::{log_grid, sweep};
+use super::{ResimulateError, Run, RunOptions, Scenario};
+use crate::outcome::Outcome;
+use rayon::prelude::*;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+
+/// Over which gains an edge is looked for, and how exactly.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Search {
+    /// Lowest mu*lambda.
+    pub lowest: f64,
+    /// Highest mu*lambda.
+    pub highest: f64,
+    /// Width of the bracket at the end, as a share of the gain.
+    pub tolerance: f64,
+    /// Grid points per factor of 10.
+    pub per_decade: usize,
+    /// Whether the grid is run beyond its first gain that is not stable: only then it is seen whether the loop is stable again
+    /// above, and from where on a clamp acts.
+    pub whole_grid: bool,
+}
+
+impl Default for Search {
+    fn default() -> Search {
+        Search { lowest: 0.05, highest: 50.0, tolerance: 0.005, per_decade: 20, whole_grid: true }
+    }
+}
+
+/// Gains that are run at a time where the grid ends at the first that is not stable.
+const AT_ONCE: usize = 6;
+
+impl Search {
+    fn grid(&self) -> Result<Vec<f64>, ResimulateError> {
+        let Search { lowest, highest, tolerance, per_decade, .. } = *self;
+        let good = |x: f64| x.is_finite() && x > 0.0;
+        if !(good(lowest) && good(highest) && good(tolerance) && lowest < highest && per_decade > 0) {
+            return Err(ResimulateError::Search { lowest, highest, tolerance });
+        }
+        Ok(log_grid(lowest, highest, ((highest / lowest).log10() * per_decade as f64).ceil() as usize + 1))
+    }
+}
+
+/// Where a loop stops being stable, for the scenario's script.
+#[derive(Debug, Clone)]
+pub struct Edge {
+    /// The lowest mu*lambda at which it oscillates or runs away; `None` where there is none in the range, or where a clamp or
+    /// the travel comes first.
+    pub critical_gain: Option<f64>,
+    /// The highest gain below the edge that was found stable; 0 where not even the lowest was.
+    pub at_least: f64,
+    /// The verdict just beyond: at the upper end of the last bracket.
+    pub outcome_beyond: Option<Outcome>,
+    /// The lowest gain at which a clamp acts or the travel is left: exact to the tolerance where this comes before any
+    /// oscillation, else to the grid. `None` where there is none.
+    pub limited_from: Option<f64>,
+    /// The lowest gain of the grid above the edge at which it is stable again.
+    pub returns_to_stable: Option<f64>,
+    /// Runs that were needed.
+    pub evaluations: usize,
+    /// One sentence: what ends the stable range, or that nothing does.
+    pub reason: String,
+    /// The grid: mu*lambda and verdict.
+    pub grid: Vec<(f64, Outcome)>,
+}
+
+/// Finds the edge: a grid first, then its first bracket is narrowed. `done` hears (runs done, runs in the grid).
+///
+/// # Errors
+/// A search over no range; a run that cannot be done; `cancel` was set.
+pub fn edge(
+    scenario: &Scenario,
+    search: &Search,
+    options: &RunOptions,
+    done: &(dyn Fn(usize, usize) + Sync),
+    cancel: &AtomicBool,
+) -> Result<Edge, ResimulateError> {
+    let options = RunOptions { keep_signals: false, ..*options };
+    let gains = search.grid()?;
+    let mut grid: Vec<(f64, Run)> = Vec::new();
+    let at_once = if search.whole_grid { gains.len() } else { AT_ONCE };
+    for some in gains.chunks(at_once) {
+        let before = grid.len();
+        for run in sweep(scenario, some, &options, &|n| done(before + n, gains.len()), cancel)? {
+            grid.push(run.ok_or(ResimulateError::Cancelled)?);
+        }
+        if grid.iter().any(|(_, run)| run.outcome != Outcome::Stable) {
+            break;
+        }
+    }
+    let evaluations = AtomicUsize::new(grid.len());
+    let verdicts: Vec<(f64, Outcome)> = grid.iter().map(|(gain, run)| (*gain, run.outcome)).collect();
+    let limited = verdicts.iter().find(|(_, o)| matches!(o, Outcome::Limited { .. })).map(|(gain, _)| *gain);
+
+    let Some(first) = grid.iter().position(|(_, run)| run.outcome != Outcome::Stable) else {
+        let untouched = grid.iter().all(|(_, run)| run.judged_s == 0.0);
+        let reason = if untouched {
+            "the slave never touches anything while the hand holds still, so this script says nothing of the closed loop".to_string()
+        } else {
+            format!("stable at every gain up to {}", search.highest)
+        };
+        return Ok(Edge {
+            critical_gain: None,
+            at_least: search.highest,
+            outcome_beyond: None,
+            limited_from: None,
+            returns_to_stable: None,
+            evaluations: grid.len(),
+            reason,
+            grid: verdicts,
+        });
+    };
+    let returns_to_stable = verdicts[first..].iter().find(|(_, o)| *o == Outcome::Stable).map(|(gain, _)| *gain);
+    let (mut high, mut beyond) = (grid[first].0, grid[first].1.clone());
+    let mut low = if first > 0 { grid[first - 1].0 } else { 0.0 };
+    while low > 0.0 && high > (1.0 + search.tolerance) * low {
+        // Two gains at a time: one for each core at least.
+        let third = (high / low).powf(1.0 / 3.0);
+        let between = [low * third, low * third * third];
+        let runs = between.par_iter().map(|gain| scenario.run(scenario.gain(*gain), &options, cancel)).collect::<Result<Vec<_>, _>>()?;
+        evaluations.fetch_add(runs.len(), Ordering::Relaxed);
+        for (gain, run) in between.into_iter().zip(runs) {
+            if run.outcome != Outcome::Stable {
+                (high, beyond) = (gain, run);
+                break;
+            }
+            low = gain;
+        }
+    }
+    let below = if low > 0.0 { (low * high).sqrt() } else { high };
+    let (mut critical_gain, mut limited_from) = (None, limited);
+    let reason = if low == 0.0 {
+        if !beyond.is_unstable() {
+            limited_from = Some(high);
+        }
+        format!("{} already at {high}, the lowest gain searched", beyond.outcome)
+    } else if beyond.is_unstable() {
+        critical_gain = Some(below);
+        match beyond.outcome {
+            Outcome::Limited { .. } => format!("{} beyond {below:.4}, so large that a clamp or the travel ends it", beyond.beneath),
+            other => format!("{other} beyond {below:.4}"),
+        }
+    } else {
+        limited_from = Some(below);
+        let later = grid[first..].iter().find(|(_, run)| run.is_unstable()).map(|(gain, _)| *gain);
+        let later = later
+            .map_or("; no oscillation was seen up to the highest gain".to_string(), |gain| format!("; it oscillates from {gain:.3} on"));
+        format!("a clamp or the travel comes first, from {below:.4} on{later}")
+    };
+    Ok(Edge {
+        critical_gain,
+        at_least: low,
+        outcome_beyond: Some(beyond.outcome),
+        limited_from,
+        returns_to_stable,
+        evaluations: evaluations.into_inner(),
+        reason,
+        grid: verdicts,
+    })
+}

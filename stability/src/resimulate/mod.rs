@@ -1,0 +1,353 @@
+//! The loop run again at another gain, with the models of a bag or swapped ones, moved by the hand that was recorded.
+//!
+//! Friction and hysteresis give limit cycles that no linear test sees; with them the edge depends on what the hand does, so
+//! every answer is that of a stated script: the bag's own intent, or another graph's operator.
+
+pub mod edge;
+pub mod grips;
+pub mod over_cancelling;
+pub mod recover;
+pub mod script;
+pub mod sweep;
+
+use crate::collect::{Collector, Signal};
+use crate::outcome::{Outcome, Trace, judge};
+use crate::session::Session;
+use backdrive_control::operator::Intent;
+use backdrive_nodes::build::{BuildError, plan};
+use backdrive_nodes::graph::{Graph, NodeKind, Settings};
+use backdrive_nodes::sequence::{Sequence, SequenceError};
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Why a loop cannot be run again.
+#[derive(Debug, thiserror::Error)]
+pub enum ResimulateError {
+    /// A part of the loop is missing.
+    #[error("{graph}: has no {kind} node, so there is no loop to run again")]
+    NoLoop {
+        /// Path of the graph or bag.
+        graph: String,
+        /// Name of the node kind.
+        kind: &'static str,
+    },
+    /// Nothing would move.
+    #[error("{graph}: has no operator, so no hand would move the master; record one, or add it to the graph")]
+    NoOperator {
+        /// Path of the graph or bag.
+        graph: String,
+    },
+    /// A part of the loop is a program of the user's own.
+    #[error("node \"{node}\" is a program of its own, which cannot be run again here; say what it does with {option} FILE")]
+    OwnProgram {
+        /// The node.
+        node: String,
+        /// The option that puts a model in its place.
+        option: &'static str,
+    },
+    /// The length of the run is not known.
+    #[error("{graph}: has no duration_s, so the length of the run must be given with --duration")]
+    NoLength {
+        /// Path of the graph or bag.
+        graph: String,
+    },
+    /// A gain that is none.
+    #[error("mu = {mu}, lambda = {lambda}: gains must be finite, and a product is reached by lambda only where mu is not 0")]
+    Gain {
+        /// Position scale.
+        mu: f64,
+        /// Force scale.
+        lambda: f64,
+    },
+    /// A search over no range.
+    #[error("a search from {lowest} to {highest} with a tolerance of {tolerance}: bounds and tolerance must be above 0 and in order")]
+    Search {
+        /// Lowest gain.
+        lowest: f64,
+        /// Highest gain.
+        highest: f64,
+        /// Relative width of the bracket at the end.
+        tolerance: f64,
+    },
+    /// A node cannot be built.
+    #[error(transparent)]
+    Build(#[from] BuildError),
+    /// The nodes cannot be joined.
+    #[error(transparent)]
+    Sequence(#[from] SequenceError),
+    /// The master cannot be looked at as a linear system.
+    #[error("{what}: {error}")]
+    Linear {
+        /// Which device.
+        what: &'static str,
+        /// Why.
+        error: backdrive_plant::linear::LinearError,
+    },
+    /// A device cannot be simulated.
+    #[error("{what}: {error}")]
+    Device {
+        /// Which device.
+        what: &'static str,
+        /// Why.
+        error: backdrive_control::device::DeviceError,
+    },
+    /// The intent cannot be recovered.
+    #[error("{name}: the operator's intent cannot be recovered: {why}")]
+    Intent {
+        /// The session.
+        name: String,
+        /// Why, and what to do.
+        why: String,
+    },
+    /// It was stopped before it was done.
+    #[error("stopped before it was done")]
+    Cancelled,
+}
+
+/// Position and force scale of a run.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Gain {
+    /// Position scale, master to slave.
+    pub mu: f64,
+    /// Force scale, slave to master.
+    pub lambda: f64,
+}
+
+impl Gain {
+    /// mu*lambda.
+    pub fn product(&self) -> f64 {
+        self.mu * self.lambda
+    }
+}
+
+/// How a run differs from the recording.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RunOptions {
+    /// Factor on every force of the master's grip: its stiffness and damping.
+    pub grip_scale: f64,
+    /// Whether the recorded dither is played. It is what the recording needed, not what a user runs.
+    pub keep_dither: bool,
+    /// Seed of noise and impairments; the graph's own where `None`.
+    pub seed: Option<u64>,
+    /// Whether the run's signals are kept.
+    pub keep_signals: bool,
+}
+
+impl Default for RunOptions {
+    fn default() -> RunOptions {
+        RunOptions { grip_scale: 1.0, keep_dither: false, seed: None, keep_signals: false }
+    }
+}
+
+/// What a run did.
+#[derive(Debug, Clone)]
+pub struct Run {
+    /// The gain it ran at.
+    pub gain: Gain,
+    /// The verdict.
+    pub outcome: Outcome,
+    /// The verdict as it would be if clamps and travel did not count: whether a limited run oscillates as well.
+    pub beneath: Outcome,
+    /// Time in contact, s.
+    pub contact_s: f64,
+    /// Time in contact while the hand held still, s: the verdict is drawn from its longer pieces. Where it is 0 the verdict says nothing.
+    pub judged_s: f64,
+    /// Steps done; fewer than the scenario has where the master left all bounds.
+    pub steps: u64,
+    /// The signals, where they were asked for.
+    pub signals: Option<Session>,
+}
+
+impl Run {
+    /// Whether the loop oscillated or ran away, be it against a clamp.
+    pub fn is_unstable(&self) -> bool {
+        match self.outcome {
+            Outcome::Stable => false,
+            Outcome::LimitCycle { .. } | Outcome::Unstable { .. } => true,
+            Outcome::Limited { .. } => self.beneath != Outcome::Stable,
+        }
+    }
+}
+
+/// Steps between looks at whether to end early.
+const CHUNK: u64 = 256;
+
+/// A loop with a script, ready to be run at any gain.
+#[derive(Debug, Clone)]
+pub struct Scenario {
+    graph: Graph,
+    steps: u64,
+    script: String,
+}
+
+impl Scenario {
+    /// Of a graph with the command line's changes already in it, moved by `intents` (one per axis) for `steps` steps; by the
+    /// graph's own operator where there are no intents, for as long as it says where there are no steps.
+    ///
+    /// Scheduled changes of the gains are removed, and the guard is off.
+    ///
+    /// # Errors
+    /// A graph without a closed loop or an operator, or with a node that only the user's own program knows; no length.
+    pub fn new(mut graph: Graph, intents: Option<Vec<Intent>>, steps: Option<u64>) -> Result<Scenario, ResimulateError> {
+        let name = graph.path.display().to_string();
+        for kind in [NodeKind::Master, NodeKind::Scaling, NodeKind::Slave] {
+            if graph.node_of(kind).is_none() {
+                return Err(ResimulateError::NoLoop { graph: name, kind: kind.name() });
+            }
+        }
+        let Some(operator) = graph.nodes.iter().position(|n| n.kind == NodeKind::Operator) else {
+            return Err(ResimulateError::NoOperator { graph: name });
+        };
+        for node in graph.nodes.iter().filter(|n| n.command.is_some()) {
+            let option = match &node.settings {
+                Settings::Master(files) if files.model.is_none() => "--master",
+                Settings::Slave(files) if files.model.is_none() => "--slave",
+                Settings::Canceller(..) => "--canceller",
+                Settings::Scaling { .. } => continue,
+                Settings::Operator(_) if intents.is_none() => "--script",
+                _ => continue,
+            };
+            return Err(ResimulateError::OwnProgram { node: node.name.clone(), option });
+        }
+        let steps = steps.or(graph.timing.steps).ok_or(ResimulateError::NoLength { graph: name })?;
+        let script = if intents.is_some() { "the bag's own intent" } else { "the graph's own operator" };
+        if let Some(intents) = intents {
+            graph.nodes[operator].settings = Settings::Operator(intents);
+        }
+        graph.gains.changes.clear();
+        graph.timing.steps = Some(steps);
+        graph.bag = None;
+        for node in &mut graph.nodes {
+            if let Settings::Scaling { guard, .. } = &mut node.settings {
+                *guard = false;
+            }
+        }
+        let scenario = Scenario { graph, steps, script: script.to_string() };
+        // What cannot be built is told now, not in the middle of a sweep.
+        scenario.sequence(&scenario.graph)?;
+        Ok(scenario)
+    }
+
+    /// The graph that is run.
+    pub fn graph(&self) -> &Graph {
+        &self.graph
+    }
+
+    /// What the hand does, for the report: the edge holds for this script.
+    pub fn script(&self) -> &str {
+        &self.script
+    }
+
+    /// Length of a run, s.
+    pub fn duration_s(&self) -> f64 {
+        self.steps as f64 * self.graph.period_s()
+    }
+
+    /// The gain in the graph.
+    pub fn own_gain(&self) -> Gain {
+        Gain { mu: self.graph.gains.mu, lambda: self.graph.gains.lambda }
+    }
+
+    /// The gain whose product is `product`, reached by lambda at the graph's mu.
+    pub fn gain(&self, product: f64) -> Gain {
+        Gain { mu: self.graph.gains.mu, lambda: product / self.graph.gains.mu }
+    }
+
+    /// The same without a canceller.
+    pub fn without_canceller(&self) -> Scenario {
+        let mut scenario = self.clone();
+        for node in &mut scenario.graph.nodes {
+            if let Settings::Canceller(files, _) = &mut node.settings {
+                files.model = None;
+            }
+        }
+        scenario
+    }
+
+    /// Runs it. The gain is constant from the start; the run ends early where the master leaves all bounds.
+    ///
+    /// # Errors
+    /// A gain that is none; a model that cannot be stepped; `cancel` was set.
+    pub fn run(&self, gain: Gain, options: &RunOptions, cancel: &AtomicBool) -> Result<Run, ResimulateError> {
+        if !(gain.mu.is_finite() && gain.lambda.is_finite()) {
+            return Err(ResimulateError::Gain { mu: gain.mu, lambda: gain.lambda });
+        }
+        let mut graph = self.graph.clone();
+        (graph.gains.mu, graph.gains.lambda) = (gain.mu, gain.lambda);
+        graph.seed = options.seed.unwrap_or(graph.seed);
+        for node in &mut graph.nodes {
+            match &mut node.settings {
+                Settings::Scaling { dither, .. } if !options.keep_dither => dither.clear(),
+                Settings::Master(files) if options.grip_scale != 1.0 => {
+                    if let Some(grip) = &mut files.fragment {
+                        grips::scale(grip, options.grip_scale);
+                    }
+                }
+                _ => {}
+            }
+        }
+        let mut sequence = self.sequence(&graph)?;
+        let mut collector = Collector::of(&graph, &self.graph.path.display().to_string());
+        collector.reserve(self.steps as usize);
+        let needed = |signal: Signal| match signal {
+            Signal::Intent | Signal::Master | Signal::Slave => true,
+            Signal::Dither => options.keep_signals || options.keep_dither,
+            Signal::Induced | Signal::Command => options.keep_signals,
+        };
+        let topics: Vec<(usize, Signal)> = collector
+            .topics()
+            .iter()
+            .filter(|(_, signal)| needed(*signal))
+            .filter_map(|(name, signal)| Some((sequence.sample_topic(name)?, *signal)))
+            .collect();
+        while sequence.steps() < self.steps {
+            if cancel.load(Ordering::Relaxed) {
+                return Err(ResimulateError::Cancelled);
+            }
+            for _ in 0..CHUNK.min(self.steps - sequence.steps()) {
+                sequence.step(None);
+                for (topic, signal) in &topics {
+                    if let Some(sample) = sequence.sample(*topic) {
+                        collector.hear(*signal, sample);
+                    }
+                }
+            }
+            // Beyond all bounds the verdict is unstable whatever follows.
+            if collector.ran_away() {
+                break;
+            }
+        }
+        let traces = collector.traces();
+        let outcome = Outcome::worst(traces.iter().map(judge)).unwrap_or(Outcome::Stable);
+        let unclamped = |t: Trace| Trace { clamped: Vec::new(), travel: None, ..t };
+        let (contact_s, judged_s) = contact(&traces);
+        let beneath = match outcome {
+            Outcome::Limited { .. } => Outcome::worst(traces.into_iter().map(|t| judge(&unclamped(t)))).unwrap_or(outcome),
+            other => other,
+        };
+        let signals = options.keep_signals.then(|| collector.session());
+        Ok(Run { gain, outcome, beneath, contact_s, judged_s, steps: sequence.steps(), signals })
+    }
+
+    fn sequence(&self, graph: &Graph) -> Result<Sequence, ResimulateError> {
+        let nodes = graph.nodes.iter().filter(|n| n.kind != NodeKind::Recorder);
+        let plans = nodes.map(|n| plan(graph, &n.name)).collect::<Result<Vec<_>, _>>()?;
+        Ok(Sequence::new(plans, &graph.timing)?)
+    }
+}
+
+/// Time in contact, and of it the time in which the hand held still, s.
+fn contact(traces: &[Trace]) -> (f64, f64) {
+    let steps = traces.iter().map(|t| t.contact.len()).max().unwrap_or(0);
+    let period_s = traces.first().map_or(0.0, |t| t.period_s);
+    let touches = |step: usize| traces.iter().any(|t| t.contact.get(step).is_some_and(|f| *f != 0.0));
+    let still = |step: usize| traces.iter().all(|t| step == 0 || t.intent.get(step).is_none_or(|x| *x == t.intent[step - 1]));
+    let (mut touching, mut judged) = (0, 0);
+    for step in (0..steps).filter(|s| touches(*s)) {
+        touching += 1;
+        judged += usize::from(still(step));
+    }
+    (touching as f64 * period_s, judged as f64 * period_s)
+}
+
+#[cfg(test)]
+mod tests;
