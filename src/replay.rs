@@ -50,7 +50,7 @@ pub fn replay(options: &cli::Replay) -> Result<u8, Failure> {
 }
 
 /// The hand's motion per axis, one value per step, and how many steps the bag holds.
-pub(crate) fn recorded_intents(reader: &Reader, topic: &str, axes: usize) -> Result<(Vec<Intent>, u64), Failure> {
+fn recorded_intents(reader: &Reader, topic: &str, axes: usize) -> Result<(Vec<Intent>, u64), Failure> {
     let path = reader.path();
     reader.topic(topic).map_err(Failure::input)?;
     let mut samples: Vec<(u64, Vec<[f64; 2]>)> = Vec::new();

@@ -3,14 +3,13 @@
 use crate::cli;
 use crate::failure::{Failure, code};
 use crate::progress;
-use crate::replay::recorded_intents;
 use crate::summary::graph_of;
 use backdrive_bags::Reader;
 use backdrive_control::operator::Intent;
 use backdrive_nodes::graph::{Graph, NodeKind, Overrides};
 use backdrive_stability::outcome::Outcome;
 use backdrive_stability::resimulate::edge::Search;
-use backdrive_stability::resimulate::recover::recover_intent;
+use backdrive_stability::resimulate::recover::{recorded_intents, recover_intent};
 use backdrive_stability::resimulate::script::Script;
 use backdrive_stability::resimulate::sweep::sweep;
 use backdrive_stability::resimulate::{Gain, ResimulateError, Run, RunOptions, Scenario};
@@ -124,19 +123,16 @@ impl Loaded {
         if !reader.ended_cleanly() {
             session.notes.push("the bag was not closed: what it holds is used, and `backdrive bag recover` makes a clean copy".to_string());
         }
-        let operator = recorded.nodes.iter().position(|n| n.kind == NodeKind::Operator);
-        let known = session.axes.iter().all(|a| a.intent.is_some());
-        let mut intents = None;
-        if let Some(operator) = operator.filter(|_| known) {
-            let topic = recorded.topic_of(operator, "intent").name;
-            intents = Some(recorded_intents(&reader, &topic, recorded.nodes[operator].axes)?.0);
-        } else if options.script.is_none() {
+        let mut intents = recorded_intents(&session);
+        if intents.is_none() && options.script.is_none() {
             match recover_intent(&session, &recorded) {
                 Ok(found) => {
-                    let worst = found.residual.iter().fold(0.0_f64, |a, b| a.max(*b));
+                    let worst = |values: &[f64]| values.iter().fold(0.0_f64, |a, b| a.max(*b));
                     session.notes.push(format!(
-                        "the hand was not recorded: it was recovered from x_m and F_f by the master's model, which leaves {:.2} % of x_m's range",
-                        100.0 * worst
+                        "the hand was not recorded: it was recovered from x_m and F_f by the master's model, which leaves {:.2} % of x_m's range; \
+                         dry friction hides where it was within {:.2} mm",
+                        100.0 * worst(&found.residual),
+                        1e3 * worst(&found.ambiguity)
                     ));
                     intents = Some(found.intents);
                 }

@@ -118,6 +118,7 @@ impl Guarded {
             position: self.trace.position[from..].to_vec(),
             contact: self.trace.contact[from..].to_vec(),
             feedback: self.trace.feedback[from..].to_vec(),
+            dither: Vec::new(),
             clamped: self.trace.clamped[from..].to_vec(),
             travel: None,
             resolution: 0.0,

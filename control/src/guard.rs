@@ -376,4 +376,59 @@ mod tests {
         assert!(drive(5.0, -0.8).is_empty());
         assert!(drive(-5.0, 0.8).is_empty());
     }
+
+    /// Drives the guard with a force `-size(t)` and a master that gives way by `gives` m/N of it.
+    fn slide(size: impl Fn(f64) -> f64, gives: f64, seconds: f64) -> Vec<(f64, Reason)> {
+        let mut guard = Guard::new(1, 0.02, 1e-3);
+        let mut reasons = Vec::new();
+        for step in 0..(seconds * 1e3) as usize {
+            let t = step as f64 * 1e-3;
+            let mut force = [0.0; MAX_AXES];
+            force[0] = -size(t);
+            let mut master = Sample::new(1);
+            (master.position[0], master.effort[0]) = (0.005 + gives * force[0], force[0]);
+            reasons.extend(guard.step(&force, Some(&master)).map(|reason| (t, reason)));
+        }
+        reasons
+    }
+
+    #[test]
+    fn a_run_away_trips_it_at_any_rate() {
+        for rate in [1.2, 3.0, 15.0, 90.0] {
+            let found = slide(|t| 0.5 + 0.1 * (rate * t).exp(), 1e-3, 5.0 / rate + 1.0);
+            let Some((t, Reason::Runaway)) = found.first() else { panic!("{rate}: {found:?}") };
+            assert!(rate * t < 5.0, "{rate}/s: after {} e-foldings", rate * t);
+            // The same force from a hand that goes into the wall.
+            assert!(slide(|t| 0.5 + 0.1 * (rate * t).exp(), -1e-3, 5.0 / rate + 1.0).is_empty());
+        }
+    }
+
+    #[test]
+    fn pushing_and_creeping_behind_a_canceller_is_no_run_away() {
+        for power in 1..=3 {
+            for duration in [0.1, 0.3, 1.0, 3.0] {
+                let push = |t: f64| 3.0 * ((t - 0.2) / duration).clamp(0.0, 1.0).powi(power);
+                assert!(slide(push, 1e-3, duration + 0.5).is_empty(), "t^{power} over {duration} s");
+            }
+        }
+        // Below its edge the loop creeps to where it rests.
+        for rate in [0.5, 5.0, 50.0] {
+            assert!(slide(|t| 4.0 * (1.0 - (-rate * t).exp()), 1e-3, 4.0).is_empty(), "{rate}");
+            // And a release.
+            assert!(slide(|t| 4.0 * (-rate * t).exp(), 1e-3, 4.0).is_empty(), "{rate}");
+        }
+    }
+
+    #[test]
+    fn a_thin_margin_counts_only_where_it_is_sure_and_is_widened_once() {
+        let mut guard = Guard::new(1, 0.02, 1e-3);
+        assert_eq!(guard.margin(1.3, 0.01), None);
+        assert_eq!(guard.margin(1.2, 0.1), None);
+        assert_eq!(guard.margin(f64::NAN, 0.1), None);
+        assert_eq!(guard.margin(1.1, 0.05), Some(Reason::ThinMargin));
+        assert!((guard.target() - 1.1 / 1.5).abs() < 1e-12);
+        assert_eq!(guard.margin(1.5, 0.05), None);
+        guard.restore();
+        assert_eq!(guard.target(), 1.0);
+    }
 }

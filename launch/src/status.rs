@@ -163,7 +163,10 @@ mod tests {
     #[test]
     fn says_how_it_does() {
         let mut summary = running();
-        assert_eq!(summary.line(), "1000 of 1000 Hz, loop p50 43 µs p99 1.2 ms, lost 0, late 3, peak 4.13 N, margin 2.4x at 71 Hz, bag 1.2 MB");
+        assert_eq!(
+            summary.line(),
+            "1000 of 1000 Hz, loop p50 43 µs p99 1.2 ms, lost 0, late 3, peak 4.13 N, margin 2.4x at 71 Hz, bag 1.2 MB"
+        );
         assert_eq!(summary.plain(), format!("4.2 s, 42 %, 5.8 s left: {}", summary.line()));
         summary.dead.push("slave".to_string());
         assert!(summary.line().starts_with("DEAD: slave, "));

@@ -92,10 +92,16 @@ fn energy_balances_with_everything_at_once() {
     let moves = backdrive_plant::stepper::segments(backdrive_plant::model::Hold::Cubic, &x, period);
     plant.start_at(&[0.0, x[0]]);
     let first = plant.energy();
+    let mut back_emf_took = 0.0;
     for i in 0..u.len() - 1 {
+        let before = plant.velocity(0);
         plant.step(&[Segment::line(u[i], u[i + 1], period), moves[i]]);
+        back_emf_took += 0.4 * 0.5 * (before.powi(2) + plant.velocity(0).powi(2)) * period;
     }
     let e = plant.energy();
+    let elements: f64 = (0..model.elements.len()).map(|index| plant.dissipated_by(index)).sum();
+    assert!(((elements + back_emf_took) / e.dissipated - 1.0).abs() < 1e-4, "{elements} and {back_emf_took} of {e:?}");
+    assert!(plant.dissipated_by(model.elements.len()).is_nan());
     let gap = e.work_in - (e.kinetic + e.stored - first.stored) - e.dissipated;
     assert!(e.work_in > 0.05 && e.dissipated > 0.03, "{e:?}");
     assert!(gap.abs() / e.work_in < 3e-4, "{gap} of {e:?}");

@@ -202,6 +202,12 @@ impl Plot {
         }
     }
 
+    /// Sets the title.
+    pub fn titled(mut self, title: &str) -> Self {
+        self.title = title.into();
+        self
+    }
+
     /// Names the x axis and the unit of its values, `""` for none.
     pub fn x_axis(mut self, label: &str, unit: &str) -> Self {
         self.x.label = label.into();

@@ -87,7 +87,7 @@ background:var(--soft);color:var(--ct)}\n\
 .caption{color:var(--muted);font-size:.92rem;margin-top:-4px}\
 th,td{padding:4px 14px 4px 0;text-align:left;vertical-align:top;border-bottom:1px solid var(--fainter)}\
 thead th{border-bottom:1px solid var(--muted);vertical-align:bottom;font-weight:600}tbody th{font-weight:400}\
-.num{text-align:right;white-space:nowrap}.mid{text-align:center}td.tone{color:var(--ct);font-weight:600;white-space:nowrap}\n\
+.some{min-width:8rem}.long{min-width:17rem}.num{text-align:right;white-space:nowrap}.mid{text-align:center}td.tone{color:var(--ct);font-weight:600;white-space:nowrap}\n\
 figure{margin:20px 0;position:relative}figcaption{color:var(--muted);font-size:.92rem;max-width:85ch;margin-top:4px}\
 .plots{display:flex;flex-wrap:wrap;gap:16px 24px;justify-content:center}.plots>div{flex:1 1 340px;min-width:0}\
 .plot{width:100%;height:auto;margin:0 auto}.small{display:none}.readout{position:absolute;top:0;right:0;padding:0 6px;font-size:.8rem;color:var(--muted);background:var(--paper);pointer-events:none}\n\

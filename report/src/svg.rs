@@ -106,14 +106,16 @@ pub fn stroke(d: &mut String, points: &[(f64, f64)]) {
     }
 }
 
-/// Advance widths of a sans-serif face in thousandths of its size, for U+0020 to U+007E (Helvetica's metrics; faces that replace it are
-/// drawn to the same widths or are at most some percent wider, for which `text_width` allows).
+/// Advance widths of a sans-serif face in thousandths of its size, for U+0020 to U+007E (Helvetica's metrics).
 const WIDTHS: [u16; 95] = [
     278, 278, 355, 556, 556, 889, 667, 191, 333, 333, 389, 584, 278, 333, 278, 278, 556, 556, 556, 556, 556, 556, 556, 556, 556, 556, 278,
     278, 584, 584, 584, 556, 1015, 667, 667, 722, 722, 667, 611, 778, 722, 278, 500, 667, 556, 833, 722, 778, 667, 778, 722, 667, 611, 722,
     667, 944, 667, 667, 611, 278, 278, 278, 469, 556, 333, 556, 556, 500, 556, 556, 278, 556, 556, 222, 222, 500, 222, 833, 556, 556, 556,
     556, 333, 500, 278, 556, 500, 722, 500, 500, 500, 334, 260, 334, 584,
 ];
+
+/// How much wider than Helvetica's the usual sans-serif faces are at most (DejaVu Sans, Verdana).
+const WIDEST: f64 = 1.17;
 
 /// The width that a text will take at most, px, for a font of `size` px.
 pub fn text_width(text: &str, size: f64) -> f64 {
@@ -127,7 +129,7 @@ pub fn text_width(text: &str, size: f64) -> f64 {
             _ => 1000.0,
         })
         .sum();
-    thousandths / 1000.0 * size * 1.07
+    thousandths / 1000.0 * size * WIDEST
 }
 
 /// A text cut into lines of at most `width` px at spaces; a word that is longer by itself is cut with an ellipsis.

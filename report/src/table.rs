@@ -110,7 +110,14 @@ impl Table {
             let cells = classes.iter().enumerate().map(|(i, class)| {
                 let cell = row.get(i).cloned().unwrap_or_default();
                 let tone = if cell.tone == Tone::Neutral { String::new() } else { format!("tone {}", cell.tone.class()) };
-                format!("<td{}>{}</td>", attribute(format!("{class} {tone}").trim()), escape(&cell.text))
+                // Sentences need room, or a narrow screen makes them towers of words.
+                let room = match cell.text.chars().count() {
+                    0..16 => "",
+                    16..48 => "some",
+                    _ => "long",
+                };
+                let classes: Vec<&str> = [*class, tone.as_str(), room].into_iter().filter(|c| !c.is_empty()).collect();
+                format!("<td{}>{}</td>", attribute(&classes.join(" ")), escape(&cell.text))
             });
             out += &format!("<tr>{}</tr>\n", cells.collect::<String>());
         }

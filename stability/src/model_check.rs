@@ -15,11 +15,11 @@ use serde::Serialize;
 /// How well a device's model tells what was recorded of the device.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PartCheck {
-    /// `master` or `slave`.
+    /// `master`, `slave`, or `force path`: the way from F_s to the reflected part of F_f, with its gain and delay.
     pub part: &'static str,
     /// Number of the axis.
     pub axis: usize,
-    /// What is compared: the master's position, or the force on the slave.
+    /// What is compared: the master's position, the force on the slave, or the reflected force.
     pub quantity: &'static str,
     /// Root mean square of recorded less predicted, in contact; m, rad, N or N m.
     pub error_rms: f64,
@@ -37,11 +37,11 @@ pub const AGREES_WITHIN: f64 = 0.02;
 impl std::fmt::Display for PartCheck {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let share = 100.0 * self.error_rms / self.effect_rms.max(f64::MIN_POSITIVE);
-        let what = match self.part {
-            "master" => "the motion that the reflected force makes",
-            _ => "the contact force",
-        };
-        write!(f, "the {}'s model misses {share:.1} % of {what}", self.part)
+        match self.part {
+            "master" => write!(f, "the master's model misses {share:.1} % of the motion that the reflected force makes"),
+            "slave" => write!(f, "the slave's model misses {share:.1} % of the contact force"),
+            _ => write!(f, "{share:.1} % of the reflected force is not lambda times the contact force as late as the graph says"),
+        }
     }
 }
 
@@ -101,7 +101,37 @@ pub fn check(graph: &Graph, session: &Session) -> Result<Vec<PartCheck>, BuildEr
             }
         }
     }
+    checks.extend(force_path(graph, session));
     Ok(checks)
+}
+
+/// Whether the reflected force is lambda times the contact force, as late as the graph says.
+fn force_path(graph: &Graph, session: &Session) -> Vec<PartCheck> {
+    let Some(scaling) = graph.nodes.iter().position(|n| n.kind == NodeKind::Scaling) else { return Vec::new() };
+    let way = |to: &str| graph.connections.iter().find(|c| c.to.1 == to && (c.to.0 == scaling || c.from.0 == scaling));
+    let ways = [way("contact"), way("force")];
+    if ways.iter().flatten().filter_map(|c| c.impairment).any(|i| i.jitter_s > 0.0 || i.loss > 0.0) {
+        return Vec::new();
+    }
+    let steps = |c: &backdrive_nodes::graph::Connection| c.delay + c.impairment.map_or(0, |i| (i.delay_s / session.period_s).round() as u64);
+    let late: u64 = ways.iter().flatten().map(|c| steps(c)).sum();
+    let mut checks = Vec::new();
+    for (index, axis) in session.axes.iter().enumerate() {
+        let felt = delayed(&axis.contact, late as usize);
+        let dither = |row: usize| axis.dither.as_ref().and_then(|d| d.get(row)).copied().filter(|d| d.is_finite()).unwrap_or(0.0);
+        let reflected: Vec<f64> = (0..axis.force.len()).map(|row| axis.force[row] - dither(row)).collect();
+        let predicted: Vec<f64> = (0..felt.len()).map(|row| session.lambda.get(row).copied().unwrap_or(f64::NAN) * felt[row]).collect();
+        let nothing = vec![0.0; predicted.len()];
+        let counts = |row: usize| {
+            let clamped = axis.clamped.get(row).copied().unwrap_or(false);
+            // Gains are told now and then, so that a ramp is not known exactly.
+            let ramps = session.lambda.get(row) != session.lambda.get(row.saturating_sub(1000));
+            felt.get(row).is_some_and(|f| *f != 0.0) && !clamped && !ramps && predicted[row].is_finite()
+        };
+        let what = Compared { part: "force path", axis: index, quantity: "reflected force", floor: 0.0 };
+        checks.extend(compare(what, counts, &reflected, &predicted, &nothing));
+    }
+    checks
 }
 
 /// Standard deviation of the difference of two signals that are each rounded and noisy.

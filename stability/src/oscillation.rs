@@ -23,23 +23,32 @@ pub fn oscillation(signal: &[f64], period_s: f64, lowest_hz: f64) -> Option<Osci
     if signal.len() < 64 || (signal.len() as f64) * period_s * lowest_hz < 2.0 || signal.iter().any(|x| !x.is_finite()) {
         return None;
     }
-    let fast = without_slow(signal, period_s, lowest_hz);
+    let half = half_window(signal.len(), period_s, lowest_hz);
+    let fast = without_slow(signal, half);
     let quarter = fast.len() / 4;
+    let frequency_hz = strongest_line(&fast, period_s, lowest_hz);
+    // The moving average keeps sin(wW/2)/(wW/2) of the line, which was taken off it.
+    let turned = std::f64::consts::PI * frequency_hz * (2 * half + 1) as f64 * period_s;
+    let kept = if turned > 0.0 { 1.0 - turned.sin() / turned } else { 1.0 };
     let half_range = |piece: &[f64]| {
         let (low, high) = piece.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(*x), h.max(*x)));
-        0.5 * (high - low)
+        0.5 * (high - low) / kept
     };
     Some(Oscillation {
         amplitude: half_range(&fast[fast.len() - quarter..]),
-        frequency_hz: strongest_line(&fast, period_s, lowest_hz),
+        frequency_hz,
         growth_per_s: growth(&fast, period_s, lowest_hz),
         amplitude_before: half_range(&fast[..quarter]),
     })
 }
 
-/// The signal less its moving average over one period of `lowest_hz`, cut to where that average is whole.
-fn without_slow(signal: &[f64], period_s: f64, lowest_hz: f64) -> Vec<f64> {
-    let half = ((0.5 / (lowest_hz * period_s)).round() as usize).clamp(1, (signal.len() - 1) / 4);
+/// Half the window of the moving average: one period of `lowest_hz` in all.
+fn half_window(rows: usize, period_s: f64, lowest_hz: f64) -> usize {
+    ((0.5 / (lowest_hz * period_s)).round() as usize).clamp(1, (rows - 1) / 4)
+}
+
+/// The signal less its moving average, cut to where that average is whole.
+fn without_slow(signal: &[f64], half: usize) -> Vec<f64> {
     let window = 2 * half + 1;
     let mut sum: f64 = signal[..window].iter().sum();
     let mut fast = Vec::with_capacity(signal.len() - 2 * half);

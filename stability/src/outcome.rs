@@ -281,6 +281,7 @@ mod tests {
             position: times.map(position).collect(),
             contact: vec![-1.0; 10_000],
             feedback: vec![-0.3; 10_000],
+            dither: Vec::new(),
             clamped: vec![false; 10_000],
             travel: Some([-0.05, 0.05]),
             resolution: 2e-6,

@@ -91,7 +91,8 @@ pub fn by_periods(columns: &[&[f64]], stretches: &[Range<usize>], period: usize,
     }
     let mut sum = Sum::new(columns.len(), period, period_s, highest_hz);
     for stretch in stretches {
-        let count = stretch.len() / period;
+        let whole = stretch.len() / period;
+        let count = whole - unsettled(columns, stretch.end - whole * period, period, whole);
         let first = stretch.end - count * period;
         // The periodic part is the same in every period: what changes from the first to the last is drift.
         let drift: Vec<f64> = columns
@@ -112,6 +113,31 @@ pub fn by_periods(columns: &[&[f64]], stretches: &[Range<usize>], period: usize,
     }
     let count = sum.count;
     sum.finish(Window::Periods, count as f64, 0.0)
+}
+
+/// How many periods at the beginning have not settled: their difference from the last is four times what it is later on.
+fn unsettled(columns: &[&[f64]], first: usize, period: usize, count: usize) -> usize {
+    let mut most = 0;
+    for column in columns {
+        let Some(rows) = column.get(first..first + count * period) else { continue };
+        let of = |p: usize| rows[p * period..(p + 1) * period].iter();
+        let last: f64 = if count > 0 { of(count - 1).sum::<f64>() / period as f64 } else { 0.0 };
+        let size: f64 = if count > 0 { of(count - 1).map(|x| (x - last).powi(2)).sum() } else { 0.0 };
+        // Drift is no transient: the mean of the difference does not count.
+        let differences: Vec<f64> = (0..count.saturating_sub(1))
+            .map(|p| {
+                let mean = of(p).zip(of(count - 1)).map(|(a, b)| a - b).sum::<f64>() / period as f64;
+                of(p).zip(of(count - 1)).map(|(a, b)| (a - b - mean).powi(2)).sum()
+            })
+            .collect();
+        let mut sorted = differences.clone();
+        sorted.sort_by(f64::total_cmp);
+        let usual = sorted.get(sorted.len() / 2).copied().unwrap_or(0.0).max(1e-8 * size);
+        // Two periods at least must be left.
+        let early = differences.iter().take(count.saturating_sub(2)).take_while(|d| **d > 4.0 * usual).count();
+        most = most.max(early);
+    }
+    most
 }
 
 struct Sum {

@@ -278,9 +278,11 @@ fn impedance(session: &Session, axis: &AxisSignals) -> Result<Impedance, String>
     }
     let (Some(low), Some(high)) = (found.frequency_hz.first().copied(), found.frequency_hz.last().copied()) else {
         let [force, master, contact, tip] = best.1;
+        // A canceller that is right keeps the dither from the slave.
+        let why = if against == "dither" && contact < master { "; what is cancelled never reaches the slave" } else { "" };
         return Err(format!(
             "at no frequency do forces and motions all cohere with the {against} to {LEAST_COHERENCE}; at the best F_f {force:.2}, x_m \
-             {master:.2}, F_s {contact:.2}, x_s {tip:.2} (a canceller that is right keeps the {against} from the slave)"
+             {master:.2}, F_s {contact:.2}, x_s {tip:.2}{why}"
         ));
     };
     found.band_hz = [low, high];

@@ -9,7 +9,7 @@
 //! Energy never leads: passivity is enough for stability, and not needed for it.
 
 use crate::energy::{EnergyAnswer, EnergyVerdict, energy};
-use crate::frequency::{self, Frequency, FrequencyAnswer, FrequencyError, Parts};
+use crate::frequency::{self, CannotTell, Frequency, FrequencyAnswer, FrequencyError, Parts};
 use crate::model_check::{PartCheck, check};
 use crate::outcome::{Outcome, Trace, judge};
 use crate::resimulate::edge::{Edge, Search, edge};
@@ -241,7 +241,7 @@ pub fn answer(question: &Question, progress: Progress, cancel: &AtomicBool) -> R
     let mut answer = Answer::of(question, frequency, checks);
     match scenario(question) {
         Ok(scenario) => {
-            if !swapped.any() && answer.frequency.as_ref().is_some_and(|f| f.cannot_tell.is_none()) {
+            if !swapped.any() && !answer.runs_away() && answer.frequency.as_ref().is_some_and(|f| f.cannot_tell.is_none()) {
                 answer.loop_check = loop_check(&scenario, question, &answer, cancel)?;
             }
             answer.resimulated = Some(resimulate(question, &scenario, progress, cancel)?);
@@ -388,6 +388,15 @@ impl Answer {
         if frequency.relative {
             warnings.push("the gains of the recording are not known: every gain is in multiples of the recorded one".to_string());
         }
+        let recorded_outcome = recorded_outcome(session);
+        let mut frequency = frequency;
+        if let Some(Outcome::Unstable { growth_per_s }) = recorded_outcome {
+            warnings.push(format!("with its dither and at its own gain the recording grows, by {growth_per_s:.2} per second"));
+            frequency.cannot_tell = Some(CannotTell {
+                reason: "the recording itself runs away, so it holds no steady response".to_string(),
+                advice: Some("record at a lower gain, or with a smaller dither".to_string()),
+            });
+        }
         let frequency_answer = frequency.at(question.gain.product());
         Answer {
             bag: session.name.clone(),
@@ -406,7 +415,7 @@ impl Answer {
             frequency: Some(frequency),
             resimulated: None,
             no_resimulation: None,
-            recorded_outcome: recorded_outcome(session),
+            recorded_outcome,
             recorded_energy: energy(session, question.recorded, None),
             transparency: transparency(session, question.recorded),
             checks,
@@ -414,6 +423,11 @@ impl Answer {
             disagreements: Vec::new(),
             warnings,
         }
+    }
+
+    /// Whether the recording itself runs away: then it is no record of a steady loop.
+    fn runs_away(&self) -> bool {
+        matches!(self.recorded_outcome, Some(Outcome::Unstable { .. }))
     }
 
     /// Whether the models that are not exchanged do what was recorded.

@@ -10,6 +10,8 @@ use crate::ticks::{self, Scale, Ticks, drawable};
 pub const FONT: f64 = 12.0;
 pub const SMALL: f64 = 11.0;
 const TITLE: f64 = 14.0;
+/// How much wider bold letters are.
+const BOLD: f64 = 1.12;
 
 /// How a series looks: its colour's class, its dash, its mark.
 #[derive(Clone, Debug)]
@@ -150,7 +152,7 @@ pub fn layout(plots: &[Plot], width: f64) -> Layout {
     let mut remarks = Vec::new();
     for (plot, (_, y, height)) in plots.iter().zip(scales) {
         let looks = looks(&plot.series);
-        let title = wrap(&plot.title, TITLE * 1.06, width - left);
+        let title = wrap(&plot.title, TITLE * BOLD, width - left - 6.0);
         let regions = joined(&plot.regions);
         let mut at = top + 18.0 * title.len() as f64;
         let probe = Rect { x: left, y: 0.0, w, h: height };

@@ -106,7 +106,8 @@ fn level_verdict(level: &LevelEstimate, gain: f64) -> (Verdict, String) {
     let Edge { gain: critical, ci95, frequency_hz, at_least, told_to } = level.edge;
     if told_to.is_some_and(|most| gain > most) {
         let most = told_to.unwrap_or(0.0);
-        let reason = format!("lines that are lost in noise may hide an edge beyond a gain of {most:.3}");
+        let reason =
+            format!("beyond a gain of {most:.3} lines that are lost in noise, or what lies above the highest line, may hide an edge");
         // An edge that is told lies below: then the noise does not matter.
         if !ci95.and_then(|c| c.1).is_some_and(|high| gain > high) {
             return (Verdict::CannotTell, reason);

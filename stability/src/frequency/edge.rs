@@ -5,6 +5,7 @@ use backdrive_control::margins::{Crossing, at_the_bottom, between};
 use nalgebra::{Complex, DMatrix, Schur};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
 use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
@@ -32,7 +33,8 @@ pub struct Edge {
     pub frequency_hz: Option<f64>,
     /// Where no edge was found: below this gain there is none within the lines, by their discs of 95 %; at most 10000.
     pub at_least: Option<f64>,
-    /// Up to this gain no line at which the loop is lost in noise can hide an edge; `None`: up to any.
+    /// Up to this gain neither a line at which the loop is lost in noise nor what lies above the highest line can hide an edge;
+    /// `None`: up to any.
     pub told_to: Option<f64>,
 }
 
@@ -57,8 +59,13 @@ pub(super) struct Loop {
 impl Loop {
     /// A loop that was estimated in one piece.
     pub(super) fn measured(fit: &LocalFit, draws: usize, seed: u64) -> Loop {
-        let mut rng = ChaCha8Rng::seed_from_u64(seed);
-        let draws = (0..draws).map(|_| fit.draw(&mut rng)).collect();
+        // Each draw has its own stream: the answer does not depend on how many threads there are.
+        let draw = |index: usize| {
+            let mut rng = ChaCha8Rng::seed_from_u64(seed);
+            rng.set_stream(index as u64);
+            fit.draw(&mut rng)
+        };
+        let draws = (0..draws).into_par_iter().map(draw).collect();
         Loop { hz: fit.hz.clone(), nominal: fit.value.clone(), sigma: fit.sigma(), draws, freedom: fit.freedom.clone() }
     }
 
@@ -126,7 +133,7 @@ impl Loop {
     /// The edge; `other` is the same loop estimated with another resolution: what differs is bias.
     pub(super) fn edge(&self, other: Option<&Loop>) -> Edge {
         let told = self.told();
-        let told_to = self.bound(|line| !told[line]);
+        let told_to = [self.bound(|line| !told[line]), self.above_the_band()].into_iter().flatten().min_by(f64::total_cmp);
         let Some(nominal) = crossing(&self.hz, &self.nominal, &told) else {
             let least = self.bound(|_| true);
             return Edge { at_least: Some(least.unwrap_or(LARGEST).min(LARGEST)), told_to, ..Edge::default() };
@@ -153,6 +160,17 @@ impl Loop {
             at_least: None,
             told_to,
         }
+    }
+
+    /// The gain at which the loop is down to a half at its highest lines: above them it is taken to fall further.
+    fn above_the_band(&self) -> Option<f64> {
+        let from = self.hz.len() - (self.hz.len() / 20).clamp(1, 10).min(self.hz.len());
+        let size = |line: usize| {
+            let largest = eigenvalues(&self.nominal[line]).iter().map(|e| e.norm()).fold(0.0, f64::max);
+            largest + self.spread(line)
+        };
+        let mean = (from..self.hz.len()).map(size).sum::<f64>() / (self.hz.len() - from).max(1) as f64;
+        (mean > 0.0).then(|| 0.5 / mean)
     }
 
     /// The smallest gain at which the disc of one of these lines reaches the critical point; `None` where none does.

@@ -18,8 +18,12 @@ type Matrix = DMatrix<Complex<f64>>;
 const WIDEST: usize = 20;
 /// Lines over which noise is pooled, on each side.
 const POOLED: usize = 6;
-/// Lines of less than this share of the largest excitation do not count: 40 dB down.
-const LEAST_POWER: f64 = 1e-4;
+/// Of a dither lines of less than this share of its largest do not count: 40 dB down.
+pub(super) const DITHERED: f64 = 1e-4;
+/// The same of a hand, or of a command, whose power falls steeply with frequency: 100 dB.
+pub(super) const MOVED: f64 = 1e-10;
+/// Estimates lie no closer than this share of their frequency: what is smooth need not be told more often.
+const SPACING: f64 = 0.005;
 /// Of the noise of one line with the next, Hann window: `(2/3)^2`; as a moving average of two.
 const NEXT_LINE: f64 = 0.61;
 
@@ -34,6 +38,8 @@ pub(super) struct Columns<'a> {
     pub outputs: &'a [usize],
     pub inputs: &'a [usize],
     pub instruments: &'a [usize],
+    /// Lines of less than this share of the instruments' largest power do not count.
+    pub least_power: f64,
 }
 
 /// A transfer matrix over frequency with its uncertainty.
@@ -62,13 +68,13 @@ struct Member {
 }
 
 /// Lines at which something exogenous acts, as indices of the spectra.
-pub(super) fn shaken(spectra: &CrossSpectra, instruments: &[usize]) -> Vec<usize> {
+pub(super) fn shaken(spectra: &CrossSpectra, instruments: &[usize], least_power: f64) -> Vec<usize> {
     let power = |k: usize, d: usize| spectra.lines[k][(d, d)].re;
     let largest: Vec<f64> = instruments.iter().map(|d| (0..spectra.hz.len()).map(|k| power(k, *d)).fold(0.0, f64::max)).collect();
     // With trends removed and a Hann window the two lowest lines hold what leaks from DC.
     let first = if spectra.averaging.window == Window::Hann { 2 } else { 0 };
     (first..spectra.hz.len())
-        .filter(|k| instruments.iter().zip(&largest).any(|(d, most)| power(*k, *d) > LEAST_POWER * most && *most > 0.0))
+        .filter(|k| instruments.iter().zip(&largest).any(|(d, most)| power(*k, *d) > least_power * most && *most > 0.0))
         .collect()
 }
 
@@ -76,9 +82,9 @@ pub(super) fn shaken(spectra: &CrossSpectra, instruments: &[usize]) -> Vec<usize
 ///
 /// `None` where too few lines are shaken, or the inputs cannot be told apart.
 pub(super) fn fit(spectra: &CrossSpectra, columns: Columns, narrow: f64) -> Option<LocalFit> {
-    let Columns { outputs, inputs, instruments } = columns;
+    let Columns { outputs, inputs, instruments, least_power } = columns;
     let (ny, nu) = (outputs.len(), inputs.len());
-    let used = shaken(spectra, instruments);
+    let used = shaken(spectra, instruments, least_power);
     if used.len() < 4 || nu == 0 || nu != instruments.len() {
         return None;
     }
@@ -89,24 +95,25 @@ pub(super) fn fit(spectra: &CrossSpectra, columns: Columns, narrow: f64) -> Opti
     let s_dd: Vec<Matrix> = used.iter().map(|k| part(*k, instruments, instruments)).collect();
     let hz: Vec<f64> = used.iter().map(|k| spectra.hz[*k]).collect();
     let least = (3 * nu + 4).div_ceil(2);
-    let (mut value, mut windows, mut spent, mut kept) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+    let (mut solved, mut windows, mut kept) = (Vec::new(), Vec::new(), Vec::<usize>::new());
     for at in 0..hz.len() {
-        let members = members(&hz, at, least, narrow);
-        let Some((r, members, share)) = solve(&members, &s_ud, &s_yd) else { continue };
-        value.push(r);
-        windows.push(members);
-        spent.push(share);
-        kept.push(at);
+        let found = solve(&members(&hz, at, least, narrow), &s_ud, &s_yd);
+        let far = kept.last().is_none_or(|last| hz[at] - hz[*last] >= SPACING * hz[at] - 1e-9);
+        solved.push(found.map(|(value, members, spent)| {
+            if far {
+                windows.push(members);
+                kept.push(at);
+            }
+            (value, spent)
+        }));
     }
     if kept.len() < 4 {
         return None;
     }
-    // A line of its own may have no estimate; its neighbour's serves for the noise.
-    let nearest: Vec<usize> = (0..hz.len()).map(|at| kept.partition_point(|k| *k < at).min(kept.len() - 1)).collect();
     let averages = spectra.averaging.averages;
     let (mut misfit, mut scatter) = (vec![vec![0.0; ny]; hz.len()], vec![vec![0.0; ny]; hz.len()]);
     for at in 0..hz.len() {
-        let (r, k) = (&value[nearest[at]], used[at]);
+        let (Some((r, spent)), k) = (&solved[at], used[at]) else { continue };
         let s_ed = &s_yd[at] - r * &s_ud[at];
         let (s_yy, s_uy, s_uu) = (part(k, outputs, outputs), part(k, inputs, outputs), part(k, inputs, inputs));
         let cross = r * s_uy;
@@ -114,7 +121,7 @@ pub(super) fn fit(spectra: &CrossSpectra, columns: Columns, narrow: f64) -> Opti
         let power = s_dd[at].trace().re.max(f64::MIN_POSITIVE);
         for i in 0..ny {
             let fixed = s_ed.row(i).iter().map(|x| x.norm_sqr()).sum::<f64>() / power;
-            misfit[at][i] = fixed / (1.0 - spent[nearest[at]]).max(0.2);
+            misfit[at][i] = fixed / (1.0 - spent).max(0.2);
             scatter[at][i] = if averages > 1.5 { (s_ee[(i, i)].re - fixed).max(0.0) / (averages - 1.0) } else { 0.0 };
         }
     }
@@ -125,13 +132,15 @@ pub(super) fn fit(spectra: &CrossSpectra, columns: Columns, narrow: f64) -> Opti
             let (from, to) = (at.saturating_sub(POOLED), (at + POOLED + 1).min(hz.len()));
             // Neighbouring lines of a Hann window share half of what they say.
             let lines = (to - from) as f64 / if correlated { 1.9 } else { 1.0 };
-            freedom.push((2.0 * lines * (averages - 1.0).max(1.0 - spent[nearest[at]])).max(1.0));
+            let spent = solved[at].as_ref().map_or(1.0, |(_, spent)| *spent);
+            freedom.push((2.0 * lines * (averages - 1.0).max(1.0 - spent)).max(1.0));
             let pooled = |of: &[Vec<f64>], i: usize| of[from..to].iter().map(|v| v[i]).sum::<f64>() / (to - from) as f64;
             (0..ny).map(|i| pooled(&misfit, i).max(pooled(&scatter, i))).collect()
         })
         .collect();
     let root = s_dd.iter().map(root).collect::<Option<Vec<_>>>()?;
     let pick = |of: &[f64]| kept.iter().map(|k| of[*k]).collect::<Vec<f64>>();
+    let value = kept.iter().filter_map(|k| solved[*k].as_ref().map(|(value, _)| value.clone())).collect();
     Some(LocalFit { value, freedom: pick(&freedom), noise, root, windows, correlated, hz: pick(&hz) })
 }
 
@@ -232,7 +241,14 @@ impl LocalFit {
                 let mut drawn = value.clone();
                 for m in members {
                     let error = &errors[m.line];
-                    if m.mirrored { drawn += error.conjugate() * &m.weight } else { drawn += error * &m.weight }
+                    for i in 0..drawn.nrows() {
+                        for j in 0..drawn.ncols() {
+                            for k in 0..error.ncols() {
+                                let e = if m.mirrored { error[(i, k)].conj() } else { error[(i, k)] };
+                                drawn[(i, j)] += e * m.weight[(k, j)];
+                            }
+                        }
+                    }
                 }
                 drawn
             })

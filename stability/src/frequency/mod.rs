@@ -25,7 +25,7 @@ pub use swap::{PartError, Parts};
 use crate::session::Session;
 use crate::spectra::{Averaging, CrossSpectra, Window, by_periods, repeats_after, welch};
 use edge::Loop;
-use local::{Columns, LocalFit, fit};
+use local::{Columns, DITHERED, LocalFit, MOVED, fit};
 use nalgebra::{Complex, DMatrix};
 use rows::{Rows, State, Stretch};
 use serde::Serialize;
@@ -324,16 +324,19 @@ fn proportional(
 ) -> Option<(f64, usize)> {
     let mut best: Option<(f64, f64, usize)> = None;
     for lag in 0..=((0.02 / session.period_s) as usize).min(200) {
-        let (mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0);
+        let (mut n, mut sx, mut sy, mut sxx, mut sxy, mut syy) = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
         for axis in &session.axes {
             for row in lag..session.len() {
                 let (x, y) = (from(axis, row - lag), to(axis, row));
                 // Rows without contact say nothing.
-                if x.is_finite() && y.is_finite() && x != 0.0 {
-                    (xx, xy, yy) = (xx + x * x, xy + x * y, yy + y * y);
+                if x.is_finite() && y.is_finite() && x != 0.0 && axis.contact[row] != 0.0 {
+                    (n, sx, sy) = (n + 1.0, sx + x, sy + y);
+                    (sxx, sxy, syy) = (sxx + x * x, sxy + x * y, syy + y * y);
                 }
             }
         }
+        // With a constant: somebody else's frames need not have their zeros in one place.
+        let (xx, xy, yy) = (sxx - sx * sx / n, sxy - sx * sy / n, syy - sy * sy / n);
         if xx > 0.0 && yy > 0.0 {
             let explained = xy * xy / (xx * yy);
             if best.is_none_or(|b| explained > b.0) {
@@ -523,7 +526,8 @@ fn estimate(
         let (alone, alone_other) = (measured.single(axis), other.as_ref().map(|o| o.single(axis)));
         let pair = |l: &DMatrix<Complex<f64>>| [l[(0, 0)].re, l[(0, 0)].im];
         let response = |from: Column, to: Column, instrument: Column| {
-            let columns = Columns { outputs: &[column(axis, to)], inputs: &[column(axis, from)], instruments: &[column(axis, instrument)] };
+            let (outputs, inputs, instruments) = (&[column(axis, to)], &[column(axis, from)], &[column(axis, instrument)]);
+            let columns = Columns { outputs, inputs, instruments, least_power: DITHERED };
             let found = fit(&full, columns, 1.0);
             on_lines(&measured.hz, found.as_ref())
         };
@@ -584,10 +588,11 @@ fn loop_of(
 ) -> Result<Option<Loop>, FrequencyError> {
     let axes = prepared.session.axes.len();
     let instruments = columns(axes, Column::Dither);
-    let of = |outputs: Column, inputs: Column, instruments: &[usize]| {
+    let by = |outputs: Column, inputs: Column, instruments: &[usize], least_power: f64| {
         let (outputs, inputs) = (columns(axes, outputs), columns(axes, inputs));
-        fit(spectra, Columns { outputs: &outputs, inputs: &inputs, instruments }, narrow)
+        fit(spectra, Columns { outputs: &outputs, inputs: &inputs, instruments, least_power }, narrow)
     };
+    let of = |outputs: Column, inputs: Column, instruments: &[usize]| by(outputs, inputs, instruments, DITHERED);
     if !options.parts.any() {
         let found = of(Column::Reflected, Column::Force, &instruments);
         return Ok(found.map(|f| Loop::measured(&f, options.draws, options.seed)));
@@ -599,7 +604,7 @@ fn loop_of(
     let slave = match options.parts.slave {
         Some(files) => Some(Loop::known(&motion.hz, swap::slave_response(files, &tips(prepared, stretches), &motion.hz)?)),
         // The slave side is driven by its command alone, so whatever moves the command tells it.
-        None => of(Column::Contact, Column::Command, &columns(axes, Column::Command))
+        None => by(Column::Contact, Column::Command, &columns(axes, Column::Command), MOVED)
             .map(|f| Loop::measured(&f, options.draws, options.seed + 1)),
     };
     let Some(slave) = slave else { return Ok(None) };

@@ -116,7 +116,8 @@ pub(super) fn usable(session: &Session) -> Rows {
     let knows_intent = session.axes.iter().any(|a| a.intent.is_some());
     rows.hand_moves = knows_intent && !known_rest;
     let settle = (SETTLE_S / session.period_s).round() as usize;
-    let mut settled_from = 0;
+    // Nobody knows what was before the first row.
+    let mut settled_from = settle;
     let mut open: Option<Stretch> = None;
     for row in 0..n {
         let state = (|count: &mut RowCount, gains: &mut Vec<(f64, f64)>| {

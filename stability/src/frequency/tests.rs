@@ -177,17 +177,19 @@ impl Setup {
 
 /// Errors of the edge and how often its interval holds the truth, over seeds.
 fn coverage(setups: impl Iterator<Item = Setup>) -> (f64, f64, f64) {
-    let (mut worst, mut inside, mut count, mut widths) = (0.0_f64, 0.0, 0.0, Vec::new());
+    let (mut worst, mut inside, mut count, mut squares, mut widths) = (0.0_f64, 0.0, 0.0, 0.0, Vec::new());
     for s in setups {
         let (truth, _) = s.edge();
         let found = s.answer().edge;
         let (gain, (low, high)) = (found.gain.unwrap(), found.ci95.unwrap());
         worst = worst.max((gain / truth - 1.0).abs());
+        squares += (gain / truth - 1.0).powi(2);
         inside += f64::from(u8::from(low <= truth && high.is_none_or(|h| truth <= h)));
         widths.push(0.5 * (high.unwrap_or(f64::INFINITY) - low) / gain);
         count += 1.0;
     }
     widths.sort_by(f64::total_cmp);
+    println!("rms error {:.3} %", 100.0 * (squares / count).sqrt());
     (worst, inside / count, widths[widths.len() / 2])
 }
 
@@ -225,7 +227,7 @@ fn the_edge_of_a_second_order_loop_is_found() {
 fn intervals_hold_the_truth_with_a_periodic_dither() {
     let base = setup();
     let truth = base.edge().0;
-    let setups = (0..40).map(|seed| Setup { seed, noise: 2e-5, lambda: 0.4 * truth, seconds: 6.0, ..base.clone() });
+    let setups = (0..40).map(|seed| Setup { seed, noise: 3e-6, lambda: 0.4 * truth, seconds: 6.0, ..base.clone() });
     let (worst, inside, width) = coverage(setups);
     println!("periodic: worst error {:.2} %, coverage {:.0} %, half-width {:.2} %", worst * 100.0, inside * 100.0, width * 100.0);
     assert!(worst < 0.02, "{worst}");
@@ -328,22 +330,20 @@ fn amplitudes_are_told_apart_and_friction_is_flagged() {
     let rough = Setup { lambda: 0.4 * truth, step: 0.0, friction: 0.2, ..base }.answer();
     let edges: Vec<_> = rough.levels.iter().map(|l| l.edge).collect();
     assert!(rough.amplitude_dependent, "{edges:?}");
+    // Friction takes the less from the loop the more it moves.
+    assert!(edges.windows(2).all(|w| w[0].gain.unwrap_or(f64::INFINITY) > w[1].gain.unwrap_or(f64::INFINITY)), "{edges:?}");
     let (low, high) = rough.edge.ci95.unwrap();
-    assert!(low < 1.1 * truth && high.is_none_or(|h| h > 1.3 * truth), "{edges:?} {truth}");
+    assert!(low < edges[2].gain.unwrap() && high.is_none_or(|h| h > edges[0].gain.unwrap()), "{:?}", rough.edge);
 }
 
 /// Smooth motion of a hand, or one that shakes up to 150 Hz.
 fn hand(rows: usize, broad: bool) -> Vec<f64> {
-    let noise = random(1.0, rows, 77);
-    let mut slow = [0.0; 2];
-    noise
-        .iter()
-        .map(|x| {
-            slow[0] += 2e-3 * (x - slow[0]);
-            slow[1] += 2e-3 * (slow[0] - slow[1]);
-            1e-2 * slow[1] + if broad { 3e-5 * x } else { 0.0 }
-        })
-        .collect()
+    let noise = random(3e-5, rows, 77);
+    let slow = |row: usize| {
+        let t = row as f64 * PERIOD;
+        1e-3 * ((TAU * 0.3 * t).sin() + 0.5 * (TAU * 0.71 * t).cos())
+    };
+    (0..rows).map(|row| slow(row) + if broad { noise[row] } else { 0.0 }).collect()
 }
 
 #[test]

@@ -6,7 +6,7 @@
 
 use super::AxisEstimate;
 use super::edge::Loop;
-use super::local::{Columns, LocalFit, fit, shaken};
+use super::local::{Columns, LocalFit, MOVED, fit, shaken};
 use super::{
     CannotTell, Column, Frequency, FrequencyError, LevelEstimate, Options, Prepared, Response, column, columns, delays, edge, on_lines,
 };
@@ -55,7 +55,7 @@ pub(super) fn analyse(prepared: &Prepared, options: &Options, result: &mut Frequ
     let Some((all, touching)) = spectra_of(segment) else {
         return cannot("the slave never touches anything for long enough", result);
     };
-    let shaken = shaken(&all, &[intent_column]);
+    let shaken = shaken(&all, &[intent_column], MOVED);
     let top_hz = shaken.last().map_or(0.0, |k| all.hz[*k]);
     let apart: Vec<usize> = shaken.into_iter().filter(|k| told_apart(&all, &touching, *k, intent_column, force_column)).collect();
     let broad = apart.last().map_or(0.0, |k| all.hz[*k]);
@@ -74,12 +74,11 @@ pub(super) fn analyse(prepared: &Prepared, options: &Options, result: &mut Frequ
         two_inputs(&a, &t, &Options { draws: 0, ..*options }, intent_column, &lines, 1.0)
     });
     let (measured, parts) = found;
-    let mut edge = measured.edge(half.as_ref().map(|h| &h.0));
+    let edge = measured.edge(half.as_ref().map(|h| &h.0));
     // Nothing is known above the band of the operator.
     if edge.gain.is_none() {
         result.notes.push(format!("the operator shakes the loop up to {broad:.0} Hz only; an edge above that is not seen"));
     }
-    edge.told_to = edge.told_to.or(edge.at_least);
     result.notes.push("no dither was recorded: the operator's intent, in free motion and in contact, took its place".to_string());
     result.delays = delays(&touching, &[true]);
     let told = measured.told();
@@ -119,7 +118,7 @@ struct Found {
 }
 
 fn shaken_lines(spectra: &CrossSpectra, intent: usize, broad: f64) -> Vec<usize> {
-    shaken(spectra, &[intent]).into_iter().filter(|k| spectra.hz[*k] <= broad).collect()
+    shaken(spectra, &[intent], MOVED).into_iter().filter(|k| spectra.hz[*k] <= broad).collect()
 }
 
 /// `L` from `x_c/mu = C_u x_u + C F_f` over all rows, and `F_s = H_se x_c` over those in contact.
@@ -141,14 +140,24 @@ fn two_inputs(
     };
     let (all, touching) = (keep(all), keep(touching));
     let inputs = [intent, column(0, Column::Force)];
-    let of = |output: Column| fit(&all, Columns { outputs: &[column(0, output)], inputs: &inputs, instruments: &inputs }, narrow);
+    let of = |output: Column| {
+        fit(&all, Columns { outputs: &[column(0, output)], inputs: &inputs, instruments: &inputs, least_power: MOVED }, narrow)
+    };
     let motion = of(Column::Motion)?;
     let commands = columns(1, Column::Command);
     // Reflected force per unit gain on command over mu: H_se with what lies behind it.
-    let back =
-        Columns { outputs: &columns(1, Column::Reflected), inputs: &columns(1, Column::Motion), instruments: &columns(1, Column::Motion) };
+    let back = Columns {
+        outputs: &columns(1, Column::Reflected),
+        inputs: &columns(1, Column::Motion),
+        instruments: &columns(1, Column::Motion),
+        least_power: MOVED,
+    };
     let back = fit(&touching, back, narrow)?;
-    let slave = fit(&touching, Columns { outputs: &columns(1, Column::Contact), inputs: &commands, instruments: &commands }, narrow)?;
+    let slave = fit(
+        &touching,
+        Columns { outputs: &columns(1, Column::Contact), inputs: &commands, instruments: &commands, least_power: MOVED },
+        narrow,
+    )?;
     let whole = Loop::measured(&motion, options.draws, options.seed);
     let back = Loop::measured(&back, options.draws, options.seed + 1);
     // Of the two inputs only the force belongs to the loop.

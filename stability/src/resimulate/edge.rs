@@ -144,8 +144,11 @@ pub fn edge(
     } else {
         limited_from = Some(below);
         let later = grid[first..].iter().find(|(_, run)| run.is_unstable()).map(|(gain, _)| *gain);
-        let later = later
-            .map_or("; no oscillation was seen up to the highest gain".to_string(), |gain| format!("; it oscillates from {gain:.3} on"));
+        let later = match later {
+            Some(gain) => format!("; it oscillates from {gain:.3} on"),
+            None if search.whole_grid => "; no oscillation was seen up to the highest gain".to_string(),
+            None => String::new(),
+        };
         format!("a clamp or the travel comes first, from {below:.4} on{later}")
     };
     Ok(Edge {
