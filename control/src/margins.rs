@@ -50,25 +50,30 @@ fn spans<'a>(hz: &'a [f64], l: &'a [Complex<f64>]) -> impl Iterator<Item = ((f64
     lines(hz, l).zip(lines(hz, l).skip(1))
 }
 
-/// `L(0)`, which is real, continued from the two lowest lines (its real part is even in frequency); `None` without lines.
+/// `L(0)`, which is real, continued from the two lowest lines; `None` without lines.
 ///
 /// A lowest line far from the real axis continues an integrator, `L = -K/s` above it and `L = K/s` below: then of the sign that
 /// the way round the pole has, and of the size of the lowest line.
 fn at_dc(hz: &[f64], l: &[Complex<f64>]) -> Option<f64> {
     let mut lowest = lines(hz, l);
     let (f0, l0) = lowest.next()?;
+    if l0.norm_sqr() == 0.0 {
+        return Some(0.0);
+    }
     if l0.im.abs() > l0.re.abs() {
         return Some(-l0.norm().copysign(l0.im));
     }
     Some(continued((f0, l0), lowest.next()))
 }
 
-/// The real part of `L` at 0 Hz, from the two lowest lines.
+/// `L(0)` from the two lowest lines: by `Re 1/L`, which is even in frequency, and of a single lag the same at all of them.
 fn continued((f0, l0): (f64, Complex<f64>), next: Option<(f64, Complex<f64>)>) -> f64 {
-    let Some((f1, l1)) = next.filter(|(f1, _)| f0 > 0.0 && *f1 > f0) else { return l0.re };
-    let change = (l0.re - l1.re) * f0 * f0 / (f1 * f1 - f0 * f0);
+    let inverse = |l: Complex<f64>| l.re / l.norm_sqr();
+    let lowest = inverse(l0);
+    let Some((f1, l1)) = next.filter(|(f1, l1)| f0 > 0.0 && *f1 > f0 && l1.norm_sqr() > 0.0) else { return 1.0 / lowest };
+    let change = (lowest - inverse(l1)) * f0 * f0 / (f1 * f1 - f0 * f0);
     // No more than half of the value itself: two lines far from DC do not tell more.
-    l0.re + change.clamp(-0.5 * l0.re.abs(), 0.5 * l0.re.abs())
+    1.0 / (lowest + change.clamp(-0.5 * lowest.abs(), 0.5 * lowest.abs()))
 }
 
 /// The crossing at DC that the lowest line, (Hz, L), and the one above it tell of: where `L(0)` is positive the loop runs away
@@ -246,6 +251,9 @@ mod tests {
         let at = |k: f64| is_stable(&hz, &l.iter().map(|l| l * k).collect::<Vec<_>>());
         assert!(at(3.9) && !at(4.1));
         assert!((margins(&hz, &l).modulus - 0.75).abs() < 0.01);
+        // A single lag of 2.5 Hz, of which two lines below the corner tell all.
+        let l = response(&hz, |s| 0.25 / (Complex::new(1.0, 0.0) + s / (TAU * 2.5)));
+        assert!((critical_factor(&hz, &l).unwrap().factor - 4.0).abs() < 1e-9);
     }
 
     /// `-K (s + 30)^2 / s^3`, stable only above `K = 15` (Routh: `2 K 30 > 900`, that is `K > 15`).

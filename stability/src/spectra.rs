@@ -270,6 +270,11 @@ mod tests {
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
 
+    /// One stretch.
+    fn from(start: usize, end: usize) -> Vec<Range<usize>> {
+        std::iter::once(start..end).collect()
+    }
+
     fn noise(n: usize, seed: u64) -> Vec<f64> {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         (0..n).map(|_| rng.random_range(-1.0..1.0)).collect()
@@ -280,7 +285,7 @@ mod tests {
         let (x, n) = (noise(64_000, 1), noise(64_000, 2));
         // Half the power of y is that of x.
         let y: Vec<f64> = x.iter().zip(&n).map(|(x, n)| 2.0 * x + 2.0 * n).collect();
-        let s = welch(&[&x, &y], &[0..64_000], 1000, 1e-3, 500.0).unwrap();
+        let s = welch(&[&x, &y], &from(0, 64_000), 1000, 1e-3, 500.0).unwrap();
         let mean = |f: &dyn Fn(usize) -> f64| (0..s.hz.len()).map(f).sum::<f64>() / s.hz.len() as f64;
         assert!((mean(&|k| s.coherence(k, 0, 1)) - 0.5).abs() < 0.02);
         // 50 % overlap of Hann windows is worth 0.947 segments each.
@@ -300,7 +305,7 @@ mod tests {
         assert_eq!(repeats_after(&x), Some(500));
         assert_eq!(repeats_after(&noise(2200, 4)), None);
         let y: Vec<f64> = (0..2200).map(|i| one[(i + 499) % 500] + 1e-2 * i as f64).collect();
-        let s = by_periods(&[&x, &y], &[100..2200], 500, 1e-3, 400.0).unwrap();
+        let s = by_periods(&[&x, &y], &from(100, 2200), 500, 1e-3, 400.0).unwrap();
         assert_eq!(s.averaging.segments, 4);
         for k in 0..s.hz.len() {
             let h = s.lines[k][(1, 0)] / s.lines[k][(0, 0)];
@@ -312,9 +317,9 @@ mod tests {
     #[test]
     fn stretches_that_are_too_short_give_nothing() {
         let x = noise(300, 5);
-        assert!(welch(&[&x], &[0..300], 400, 1e-3, 500.0).is_none());
+        assert!(welch(&[&x], &from(0, 300), 400, 1e-3, 500.0).is_none());
         assert!(welch(&[&x], &[], 100, 1e-3, 500.0).is_none());
-        assert!(welch(&[&x], &[250..600], 100, 1e-3, 500.0).is_none(), "a stretch beyond the record");
-        assert!(by_periods(&[&x], &[0..300], 301, 1e-3, 500.0).is_none());
+        assert!(welch(&[&x], &from(250, 600), 100, 1e-3, 500.0).is_none(), "a stretch beyond the record");
+        assert!(by_periods(&[&x], &from(0, 300), 301, 1e-3, 500.0).is_none());
     }
 }

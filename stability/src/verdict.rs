@@ -453,10 +453,10 @@ impl Answer {
             (Some(_), false) => self.untold("the models in the bag do not do what was recorded, and it holds no excitation that tells the loop"),
             _ => self.untold("there is no loop to run again, and the recording holds no excitation that tells the loop"),
         }
-        if told {
+        self.by_the_recording();
+        if told || self.verdict != Word::CannotTell {
             self.advice = None;
         }
-        self.by_the_recording();
         self.warn();
     }
 
@@ -492,7 +492,10 @@ impl Answer {
         };
         let difference = self.loop_check.map(|c| (1.0 - 2.0 * c.difference.max(0.005), Some(1.0 + 2.0 * c.difference.max(0.005))));
         let (low, high) = measured.or(difference)?;
-        Some((critical * low.max(0.0), high.map(|h| critical * h)))
+        let (low, high) = (critical * low.max(0.0), high.map(|h| critical * h));
+        // Where the verdict flickers the edge is no point.
+        let highest = self.resimulated.as_ref().and_then(|r| r.edge.flickers).map_or(0.0, |[_, highest]| highest * 1.01);
+        Some((low, high.map(|h| h.max(highest))))
     }
 
     fn by_frequency(&mut self) {
@@ -592,7 +595,10 @@ impl Answer {
                 self.warnings.push(format!("stable with this grip, but not with every grip at mu*lambda = {asked:.3}: {}", fails.join("; ")));
             }
             self.warnings.extend(again.over_cancelling.as_ref().and_then(|o| o.warning.clone()));
-            if let Some(gain) = again.edge.returns_to_stable {
+            if let Some([lowest, highest]) = again.edge.flickers {
+                self.warnings.push(format!("from mu*lambda = {lowest:.3} to {highest:.3} the verdict changes with the gain more than once"));
+            }
+            if let Some(gain) = again.edge.returns_to_stable.filter(|g| again.edge.flickers.is_none_or(|[_, h]| *g > h)) {
                 self.warnings.push(format!("beyond its edge the loop is stable again at mu*lambda = {gain:.3}: do not rely on it"));
             }
         }

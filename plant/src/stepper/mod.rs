@@ -284,6 +284,19 @@ impl Plant {
         self.restart_sense();
     }
 
+    /// Sets a free body moving, with the elements' memories as they are; a body on a motion input, or one that is not there, is left
+    /// alone. Meant for the start of a record that did not begin at rest. Position in m, velocity in m/s.
+    pub fn set_motion(&mut self, body: usize, position: f64, velocity: f64) {
+        let Some(slot) = self.fixed.slots.get(body).copied().filter(|slot| *slot < self.fixed.free) else { return };
+        self.x[slot] = position;
+        self.v[slot] = velocity;
+        for path in self.paths.iter_mut().filter(|path| path.first == slot || path.second == slot) {
+            path.reached = self.x[path.first] - self.x[path.second];
+        }
+        self.restart_energy();
+        self.restart_sense();
+    }
+
     /// Advances by one period. `inputs` are in the order of the model; a missing one stays at 0.
     pub fn step(&mut self, inputs: &[Segment]) {
         for (index, drive) in self.drives.iter_mut().enumerate() {

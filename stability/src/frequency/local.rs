@@ -29,7 +29,7 @@ const NEXT_LINE: f64 = 0.61;
 
 /// Bandwidth of a window to each side of a line, Hz: modes of a held device are wider.
 pub(super) fn half_width_hz(hz: f64) -> f64 {
-    (0.06 * hz).max(2.0)
+    (0.06 * hz).max(1.0)
 }
 
 /// Which columns of the spectra are what.
@@ -94,7 +94,8 @@ pub(super) fn fit(spectra: &CrossSpectra, columns: Columns, narrow: f64) -> Opti
     let s_yd: Vec<Matrix> = used.iter().map(|k| part(*k, outputs, instruments)).collect();
     let s_dd: Vec<Matrix> = used.iter().map(|k| part(*k, instruments, instruments)).collect();
     let hz: Vec<f64> = used.iter().map(|k| spectra.hz[*k]).collect();
-    let least = (3 * nu + 4).div_ceil(2);
+    // Of lines of a Hann window every other one is new.
+    let least = 3 * nu + if spectra.averaging.window == Window::Hann { 4 } else { 2 };
     let (mut solved, mut windows, mut kept) = (Vec::new(), Vec::new(), Vec::<usize>::new());
     for at in 0..hz.len() {
         let found = solve(&members(&hz, at, least, narrow), &s_ud, &s_yd);
@@ -156,7 +157,7 @@ fn members(hz: &[f64], at: usize, least: usize, narrow: f64) -> Vec<(usize, bool
         let (below, above) = (distance(low - 1), distance(high + 1));
         let next = below.min(above);
         let count = (high - low + 1) as usize;
-        if !next.is_finite() || (count > 2 * least && next > wanted) || count > 2 * WIDEST {
+        if !next.is_finite() || (count >= least && next > wanted) || count > 2 * WIDEST {
             break;
         }
         if below <= above { low -= 1 } else { high += 1 }

@@ -142,7 +142,7 @@ pub struct AxisEstimate {
     pub l: Vec<[f64; 2]>,
     /// Standard deviation of each component of `l`.
     pub sigma: Vec<f64>,
-    /// Whether `l` stands out of its uncertainty: `|l|` at least 3 sigma.
+    /// Whether `l` stands out of its uncertainty: `|l|` at least 4 sigma.
     pub told: Vec<bool>,
     /// Coherence of the dither with the reflected force.
     pub coherence: Vec<f64>,

@@ -31,6 +31,9 @@ impl Default for Search {
 /// Gains that are run at a time where the grid ends at the first that is not stable.
 const AT_ONCE: usize = 6;
 
+/// Where the verdict is looked at again about an edge that was found.
+const AROUND: [f64; 10] = [0.88, 0.91, 0.94, 0.96, 0.98, 1.02, 1.04, 1.06, 1.09, 1.12];
+
 impl Search {
     fn grid(&self) -> Result<Vec<f64>, ResimulateError> {
         let Search { lowest, highest, tolerance, per_decade, .. } = *self;
@@ -50,6 +53,9 @@ pub struct Edge {
     pub critical_gain: Option<f64>,
     /// The highest gain below the edge that was found stable; 0 where not even the lowest was.
     pub at_least: f64,
+    /// Lowest gain that is not stable and highest that is, where the verdict changes more than once within 12 % of the edge: a
+    /// slow growth from next to nothing, a sensor's steps and dry friction make it flicker.
+    pub flickers: Option<[f64; 2]>,
     /// The verdict just beyond: at the upper end of the last bracket.
     pub outcome_beyond: Option<Outcome>,
     /// The lowest gain at which a clamp acts or the travel is left: exact to the tolerance where this comes before any
@@ -103,6 +109,7 @@ pub fn edge(
         return Ok(Edge {
             critical_gain: None,
             at_least: search.highest,
+            flickers: None,
             outcome_beyond: None,
             limited_from: None,
             returns_to_stable: None,
@@ -128,7 +135,29 @@ pub fn edge(
             low = gain;
         }
     }
-    let below = if low > 0.0 { (low * high).sqrt() } else { high };
+    let mut flickers = None;
+    if low > 0.0 && beyond.is_unstable() {
+        let middle = (low * high).sqrt();
+        let probe = |factor: &f64| Ok((middle * factor, scenario.run(scenario.gain(middle * factor), &options, cancel)?));
+        let probes = AROUND.par_iter().map(probe).collect::<Result<Vec<(f64, Run)>, ResimulateError>>()?;
+        evaluations.fetch_add(probes.len(), Ordering::Relaxed);
+        let highest_stable = probes.iter().filter(|(_, run)| run.outcome == Outcome::Stable).map(|(gain, _)| *gain).fold(low, f64::max);
+        let lowest = probes.iter().find(|(gain, run)| *gain < middle && run.is_unstable());
+        if lowest.is_some() || highest_stable > middle {
+            let first = lowest.map_or(middle, |(gain, _)| *gain);
+            flickers = Some([first, highest_stable]);
+        }
+        if let Some((gain, run)) = lowest {
+            let below = probes.iter().filter(|(g, run)| g < gain && run.outcome == Outcome::Stable).map(|(g, _)| *g);
+            low = below.fold(grid.get(first.wrapping_sub(1)).map_or(low, |(g, _)| *g), f64::max).min(*gain);
+            (high, beyond) = (*gain, run.clone());
+        }
+    }
+    let below = match flickers {
+        Some([lowest, _]) => lowest,
+        None if low > 0.0 => (low * high).sqrt(),
+        None => high,
+    };
     let (mut critical_gain, mut limited_from) = (None, limited);
     let reason = if low == 0.0 {
         if !beyond.is_unstable() {
@@ -154,6 +183,7 @@ pub fn edge(
     Ok(Edge {
         critical_gain,
         at_least: low,
+        flickers,
         outcome_beyond: Some(beyond.outcome),
         limited_from,
         returns_to_stable,

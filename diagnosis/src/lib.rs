@@ -1,0 +1,15 @@
+//! Where model and recording part, and which physics was left out.
+//!
+//! [`problem::Problem`] is a nominal model and its recordings; [`fit`] refits a structure by simulation error; a
+//! [`hypothesis::Hypothesis`] is a physics at a place; [`search`] finds which of them the recordings ask for, and
+//! [`verdict`] says what follows, as a file and a model.
+
+pub mod audit;
+pub mod fit;
+pub mod floor;
+pub mod hypothesis;
+pub mod problem;
+pub mod search;
+pub mod simulate;
+pub mod structure;
+pub mod verdict;
