@@ -198,7 +198,7 @@ fn record_excited(real: &Configuration, told: &Configuration, gain: f64, folder:
         let graph = Graph::from_text(&header.graph_toml, &bag, &Overrides::default(), &Files::Bag(&header.files)).expect("whole");
         let session = Session::from_bag(&reader, &graph).expect("its topics are there");
         let rows = |s: f64| (s / session.period_s) as usize;
-        if session.axes[0].contact[rows(1.5)..rows(12.4)].iter().all(|f| *f != 0.0) {
+        if session.axes[0].contact[rows(1.5)..rows(11.0)].iter().all(|f| *f != 0.0) {
             return (bag, peak);
         }
     }

@@ -103,7 +103,8 @@ impl Problem {
         let model = Model::load(&model_path)?;
         set.check_conditions(&model)?;
         let read = |files: &[String]| files.iter().map(|file| record(&set, file, &model)).collect::<Result<Vec<_>, _>>();
-        Problem::new(text, model_path, model, read(&set.fit)?, read(&set.held_out)?, set.initial)
+        let (fit, held_out) = (read(&set.fit)?, read(&set.held_out)?);
+        Problem::new(text, model_path, model, fit, held_out, set.initial)
     }
 
     /// The same from recordings at hand.

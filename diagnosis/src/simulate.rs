@@ -9,8 +9,8 @@ use backdrive_plant::stepper::{Options, Plant, Segment};
 pub type Start = (usize, f64, f64);
 
 /// Predictions of a record's measured outputs, one column after the other in the order of the model, `record.len` samples each.
-/// `None` where the model cannot be simulated or its motion leaves all bounds.
-pub fn predict(model: &Model, record: &Record, starts: &[Start]) -> Option<Vec<f64>> {
+/// At most `substeps` per sample. `None` where the model cannot be simulated or its motion leaves all bounds.
+pub fn predict(model: &Model, record: &Record, starts: &[Start], substeps: usize) -> Option<Vec<f64>> {
     let conditioned;
     let model = if record.conditions.iter().any(|(_, c)| matches!(c, Condition::Value(_))) {
         let mut changed = model.clone();
@@ -25,6 +25,9 @@ pub fn predict(model: &Model, record: &Record, starts: &[Start]) -> Option<Vec<f
         model
     };
     let mut plant = Plant::new(model, record.period, &Options::default()).ok()?;
+    if plant.substeps() > substeps {
+        plant = Plant::new(model, record.period, &Options { substeps: Some(substeps), ..Options::default() }).ok()?;
+    }
     let first: Vec<f64> = record.inputs.iter().map(|samples| samples.first().copied().unwrap_or(0.0)).collect();
     plant.start_at(&first);
     for (body, position, velocity) in starts {

@@ -1,1 +1,238 @@
-//! To come.
+//! A nominal model with some physics added, and every number of it that a fit may move.
+
+use crate::hypothesis::Hypothesis;
+use crate::problem::{Problem, Record, Stated};
+use crate::simulate::{Start, predict};
+use backdrive_plant::model::Model;
+use backdrive_plant::set::{Condition, Initial};
+
+/// What a number of a fit is.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Role {
+    /// A number that the nominal file states: its place among [`Problem::stated`].
+    Stated(usize),
+    /// A parameter of an added physics: which hypothesis, which of its parameters.
+    Added(usize, usize),
+    /// A number that differs in one record: path and record.
+    Condition(String, usize),
+    /// Position with which a body starts in a record, m.
+    Position(usize, usize),
+    /// Velocity with which a body starts in a record, m/s.
+    Velocity(usize, usize),
+}
+
+/// A number that a fit may move.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Number {
+    /// What it is.
+    pub role: Role,
+    /// Lowest and highest value, as it stands in the model.
+    pub range: (f64, f64),
+    /// Whether the fit steps in its logarithm.
+    pub log: bool,
+    /// Step for differences, in the fit's own unit (the logarithm where `log`).
+    pub step: f64,
+    /// The record that alone depends on it, if there is one.
+    pub record: Option<usize>,
+    /// What it would be without data, and how sure that is, in the fit's own unit: holds what the recordings say nothing of.
+    pub prior: Option<(f64, f64)>,
+}
+
+/// How far, as a factor e^2, a stated number may be off without surprise: only numbers that the recordings do not determine feel it.
+const PRIOR_SPREAD: f64 = 2.0;
+
+impl Number {
+    /// From the value in the model to the fit's own unit.
+    pub fn inward(&self, value: f64) -> f64 {
+        let inside = value.clamp(self.range.0, self.range.1);
+        if self.log { inside.max(f64::MIN_POSITIVE).ln() } else { inside }
+    }
+
+    /// Back.
+    pub fn outward(&self, own: f64) -> f64 {
+        let value = if self.log { own.exp() } else { own };
+        value.clamp(self.range.0, self.range.1)
+    }
+
+    /// Bounds in the fit's own unit.
+    pub fn bounds(&self) -> (f64, f64) {
+        if self.log { (self.range.0.max(f64::MIN_POSITIVE).ln(), self.range.1.ln()) } else { self.range }
+    }
+}
+
+/// A nominal model with physics added.
+#[derive(Debug, Clone)]
+pub struct Structure {
+    /// What is added, in the order in which it is applied.
+    pub added: Vec<Hypothesis>,
+    /// What a fit may move.
+    pub numbers: Vec<Number>,
+}
+
+impl Structure {
+    /// The nominal model with `added`. Numbers of elements that it replaces, and numbers that it stands for, are no longer free.
+    pub fn new(problem: &Problem, records: &[Record], added: Vec<Hypothesis>) -> Structure {
+        let mut numbers = Vec::new();
+        for (index, stated) in problem.stated.iter().enumerate() {
+            let element = stated.path.strip_prefix("elements.").and_then(|p| p.rsplit_once('.')).map(|p| p.0);
+            let conditioned = |r: &Record| r.conditions.iter().any(|(path, c)| *path == stated.path && *c == Condition::Free);
+            let replaced = added.iter().any(|h| element.is_some_and(|name| h.replaces.iter().any(|r| r == name)));
+            let all_conditioned = !records.is_empty() && records.iter().all(conditioned);
+            if replaced || all_conditioned {
+                continue;
+            }
+            numbers.push(stated_number(index, stated));
+        }
+        for (h, hypothesis) in added.iter().enumerate() {
+            for (p, parameter) in hypothesis.parameters.iter().enumerate() {
+                let period = problem.fit.first().map_or(1e-3, |r| r.period);
+                let width = (parameter.range.1 - parameter.range.0).abs();
+                let size = hypothesis.starts.iter().filter_map(|s| s.get(p)).fold(0.0f64, |a, x| a.max(x.abs())).min(width);
+                let step = match () {
+                    // Behind a zero hold less than a sample has no gradient.
+                    () if parameter.key == "delay" => 0.7 * period,
+                    () if parameter.log => 1e-3,
+                    () if size > 0.0 && size.is_finite() => 1e-3 * size,
+                    () => 1e-5 * width,
+                };
+                // A delay is searched as it is: it may well be none.
+                let log = parameter.log && parameter.key != "delay";
+                numbers.push(Number { role: Role::Added(h, p), range: parameter.range, log, step, record: None, prior: None });
+            }
+        }
+        for (r, record) in records.iter().enumerate() {
+            for (path, condition) in &record.conditions {
+                if *condition != Condition::Free {
+                    continue;
+                }
+                let given = problem.model.values_at(path).ok().and_then(|v| v.first().copied()).unwrap_or(0.0);
+                let (range, log) = if given > 0.0 { ((given / 1e3, given * 1e3), true) } else { ((-1e6, 1e6), false) };
+                let step = if log { 1e-3 } else { 1e-6 };
+                numbers.push(Number { role: Role::Condition(path.clone(), r), range, log, step, record: Some(r), prior: None });
+            }
+            if problem.initial == Initial::Free {
+                numbers.extend(start_numbers(problem, record, r));
+            }
+        }
+        Structure { added, numbers }
+    }
+
+    /// Values to start from, as they stand in the model: the stated numbers as given, and for each hypothesis the values given.
+    pub fn values(&self, problem: &Problem, stated: &[f64], added: &[Vec<f64>]) -> Vec<f64> {
+        let value = |number: &Number| match &number.role {
+            Role::Stated(i) => stated.get(*i).copied().or_else(|| problem.stated.get(*i).map(|s| s.given)),
+            Role::Added(h, p) => added.get(*h).and_then(|values| values.get(*p)).copied(),
+            Role::Condition(path, _) => problem.model.values_at(path).ok().and_then(|v| v.first().copied()),
+            Role::Position(..) | Role::Velocity(..) => Some(0.0),
+        };
+        self.numbers.iter().map(|n| value(n).unwrap_or(0.0).clamp(n.range.0, n.range.1)).collect()
+    }
+
+    /// The stated numbers among `values`, in the order of [`Problem::stated`]; those that are not free as given.
+    pub fn stated_of(&self, problem: &Problem, values: &[f64]) -> Vec<f64> {
+        let mut all: Vec<f64> = problem.stated.iter().map(|s| s.given).collect();
+        for (number, value) in self.numbers.iter().zip(values) {
+            if let Role::Stated(i) = number.role {
+                all[i] = *value;
+            }
+        }
+        all
+    }
+
+    /// The parameters of each hypothesis among `values`.
+    pub fn added_of(&self, values: &[f64]) -> Vec<Vec<f64>> {
+        let mut all: Vec<Vec<f64>> = self.added.iter().map(|h| vec![0.0; h.parameters.len()]).collect();
+        for (number, value) in self.numbers.iter().zip(values) {
+            if let Role::Added(h, p) = number.role
+                && let Some(slot) = all.get_mut(h).and_then(|v| v.get_mut(p))
+            {
+                *slot = *value;
+            }
+        }
+        all
+    }
+
+    /// The model with these values; `None` where they contradict each other.
+    pub fn model(&self, problem: &Problem, values: &[f64]) -> Option<Model> {
+        let mut model = problem.model.clone();
+        for (stated, value) in problem.stated.iter().zip(self.stated_of(problem, values)) {
+            if value != stated.given {
+                set(&mut model, &stated.path, stated.index, value)?;
+            }
+        }
+        for (hypothesis, values) in self.added.iter().zip(self.added_of(values)) {
+            model = hypothesis.apply(&model, &values).ok()?;
+        }
+        Some(model)
+    }
+
+    /// Predictions of one of `records`; see [`predict`].
+    pub fn predict(&self, model: &Model, values: &[f64], record: &Record, index: usize, substeps: usize) -> Option<Vec<f64>> {
+        let mut starts: Vec<Start> = Vec::new();
+        let mut changed: Option<Model> = None;
+        for (number, value) in self.numbers.iter().zip(values).filter(|(n, _)| n.record == Some(index)) {
+            match &number.role {
+                Role::Condition(path, _) => changed.get_or_insert_with(|| model.clone()).set_values_at(path, &[*value]).ok()?,
+                Role::Position(body, _) => starts.push((*body, *value, 0.0)),
+                Role::Velocity(body, _) => match starts.iter_mut().find(|s| s.0 == *body) {
+                    Some(start) => start.2 = *value,
+                    None => starts.push((*body, 0.0, *value)),
+                },
+                Role::Stated(_) | Role::Added(..) => {}
+            }
+        }
+        predict(changed.as_ref().unwrap_or(model), record, &starts, substeps)
+    }
+
+    /// What the structure adds, such as `coulomb@drum-ground`; `nominal` where it adds nothing.
+    pub fn name(&self) -> String {
+        if self.added.is_empty() {
+            return "nominal".to_string();
+        }
+        self.added.iter().map(|h| h.id.as_str()).collect::<Vec<_>>().join(" + ")
+    }
+}
+
+fn stated_number(index: usize, stated: &Stated) -> Number {
+    let (range, log) = (stated.range, stated.log);
+    let centre = if log { stated.given.ln() } else { stated.given };
+    let spread = if log { PRIOR_SPREAD } else { 2.0 * stated.given.abs() };
+    let step = if log { 1e-3 } else { 1e-3 * stated.given.abs() };
+    Number { role: Role::Stated(index), range, log, step, record: None, prior: Some((centre, spread)) }
+}
+
+/// Positions and velocities of the free bodies at a record's start, in the range of what the record shows.
+fn start_numbers(problem: &Problem, record: &Record, r: usize) -> Vec<Number> {
+    use backdrive_plant::model::{InputKind, OutputKind};
+    let model = &problem.model;
+    let mut size: f64 = 0.0;
+    for (output, spread) in model.outputs.iter().zip(&record.spread) {
+        if matches!(output.kind, OutputKind::Position(_)) {
+            size = size.max(*spread);
+        }
+    }
+    for (input, samples) in model.inputs.iter().zip(&record.inputs).filter(|(i, _)| i.kind == InputKind::Motion) {
+        size = samples.iter().fold(size, |a, x| a.max((input.gain * x).abs()));
+    }
+    let size = if size > 0.0 { size } else { 1.0 };
+    let free = (0..model.bodies.len()).filter(|b| !model.inputs.iter().any(|i| i.kind == InputKind::Motion && i.on == *b));
+    free.flat_map(|body| {
+        let number = |role, width: f64| Number {
+            role,
+            range: (-width, width),
+            log: false,
+            step: 1e-5 * width,
+            record: Some(r),
+            prior: Some((0.0, 0.3 * width)),
+        };
+        let speed = size / (20.0 * record.period);
+        [number(Role::Position(body, r), 20.0 * size), number(Role::Velocity(body, r), speed)]
+    })
+    .collect()
+}
+
+fn set(model: &mut Model, path: &str, index: usize, value: f64) -> Option<()> {
+    let mut values = model.values_at(path).ok()?;
+    *values.get_mut(index)? = value;
+    model.set_values_at(path, &values).ok()
+}

@@ -1,1 +1,337 @@
-//! To come.
+//! What a search says: the verdict file, and the nominal model's file with what was found.
+
+use crate::hypothesis::{Hypothesis, PHYSICS, Place};
+use crate::intervals::Spread;
+use crate::problem::Problem;
+use crate::search::{AT_FLOOR, Candidate, Search, advantage_over, nrmse};
+use crate::statistics::advantage;
+use crate::structure::Role;
+use backdrive_plant::write::{Edit, Value, patch, round_significant};
+use serde_json::{Value as Json, json};
+
+/// A verdict, ready to be written.
+#[derive(Debug)]
+pub struct Verdict {
+    /// The verdict file.
+    pub json: Json,
+    /// The model file with what was found.
+    pub model: String,
+    /// In one sentence.
+    pub sentence: String,
+}
+
+/// Why a verdict cannot be written.
+#[derive(Debug, thiserror::Error)]
+pub enum VerdictError {
+    /// The model's text cannot be edited.
+    #[error(transparent)]
+    Patch(#[from] backdrive_plant::write::PatchError),
+    /// A physics that was found cannot be put into the model.
+    #[error(transparent)]
+    Hypothesis(#[from] crate::hypothesis::HypothesisError),
+}
+
+/// Improvements below this advantage (difference of information criteria) are not claimed.
+const LEAST_ADVANTAGE: f64 = 30.0;
+/// Nor those that take less than this share of the cost.
+const LEAST_SHARE: f64 = 0.02;
+/// Structures of an advantage below this over a simpler one are ties, which the simpler one wins.
+const TIE: f64 = 8.0;
+/// Level above which what is left over is no measuring error.
+const LEFT_OVER: f64 = 1.15;
+
+/// Which of the structures is claimed.
+pub fn chosen(search: &Search) -> &Candidate {
+    let mut best = &search.nominal;
+    for effects in 1..=search.found.iter().map(|c| c.structure.added.len()).max().unwrap_or(0) {
+        let next = search.found.iter().filter(|c| c.structure.added.len() == effects).min_by(|a, b| a.fit.cost.total_cmp(&b.fit.cost));
+        let Some(next) = next else { continue };
+        // Ties go to the fewest numbers, then to the physics that is named first.
+        let simplest = search
+            .found
+            .iter()
+            .filter(|c| c.structure.added.len() == effects && advantage_over(c, next, search.samples) < TIE)
+            .min_by_key(|c| (c.structure.numbers.len(), c.structure.added.iter().map(order).sum::<usize>()))
+            .unwrap_or(next);
+        if worth(best, simplest, search.samples) {
+            best = simplest;
+        }
+    }
+    best
+}
+
+fn order(h: &Hypothesis) -> usize {
+    PHYSICS.iter().position(|p| p.name == h.physics).unwrap_or(usize::MAX)
+}
+
+fn worth(base: &Candidate, better: &Candidate, samples: usize) -> bool {
+    advantage_over(base, better, samples) > LEAST_ADVANTAGE && better.fit.cost < (1.0 - LEAST_SHARE) * base.fit.cost
+}
+
+/// Says what a search found. `model_name` is the name under which the model will be written.
+///
+/// # Errors
+/// When what was found cannot be written into the model's text.
+pub fn verdict(problem: &Problem, search: &Search, model_name: &str) -> Result<Verdict, VerdictError> {
+    let best = chosen(search);
+    let spread = Spread::of(best);
+    let at_floor = best.levels.iter().all(|l| *l < LEFT_OVER);
+    let nominal_cost = search.nominal.fit.cost;
+    let excess = |c: f64| (c / search.samples as f64 - 1.0).max(0.0);
+    let explained = 1.0 - excess(best.fit.cost) / excess(nominal_cost).max(1e-12);
+    let added = !best.structure.added.is_empty();
+    let off = given_is_off(problem, search);
+    let word = match () {
+        () if added && (at_floor || explained > 0.99) => "missing",
+        () if added => "unexplained",
+        () if !at_floor && search.nominal.correlation_time > 3.0 => "unexplained",
+        () if off => "parameters",
+        () => "nothing_missing",
+    };
+    let findings = findings(search, best, &spread);
+    let held = held_out(problem, search, best, off || added);
+    let model = model_text(problem, best, &spread, off || added)?;
+    let parameters = if off || added { moved(problem, best, &spread) } else { json!({}) };
+    let sentence = sentence(word, best);
+    let json = json!({
+        "schema": 1,
+        "verdict": word,
+        "findings": findings,
+        "where": place_in_signals(problem, search),
+        "parameters": parameters,
+        "held_out": held,
+        "model_after": model_name,
+        "next_experiment": Json::Null,
+    });
+    Ok(Verdict { json, model, sentence })
+}
+
+/// Whether the refitted numbers explain more than the given ones do.
+fn given_is_off(problem: &Problem, search: &Search) -> bool {
+    let each: Vec<f64> = search.levels_given.clone();
+    let total: usize = problem.fit.iter().map(|r| crate::fit::measured(r).map(|_| r.len).sum::<usize>()).sum();
+    let mut cost = 0.0;
+    for record in &problem.fit {
+        for output in crate::fit::measured(record) {
+            cost += each.get(output).map_or(0.0, |l| l * l) * record.len as f64;
+        }
+    }
+    let refit = &search.nominal;
+    let numbers = refit.structure.numbers.len();
+    advantage(cost, 0, refit.fit.cost, numbers, total, refit.correlation_time) > 0.0 && refit.fit.cost < 0.99 * cost
+}
+
+fn findings(search: &Search, best: &Candidate, spread: &Spread) -> Vec<Json> {
+    let total = best.structure.added.len();
+    let mut all: Vec<(f64, Json)> = Vec::new();
+    for (h, hypothesis) in best.structure.added.iter().enumerate() {
+        let rivals = rivals(search, best, h);
+        // The weight of each, softened: a simulator is never the device.
+        let weights: Vec<f64> = rivals.iter().map(|(_, behind)| (-behind.max(0.0) / 20.0).exp()).collect();
+        let sum = 1.0 + weights.iter().sum::<f64>();
+        let alternatives: Vec<Json> = rivals
+            .iter()
+            .zip(&weights)
+            .take(6)
+            .map(|((rival, _), weight)| {
+                let mut entry = place(&rival.place);
+                entry["physics"] = json!(rival.physics);
+                entry["confidence"] = json!(round_significant(weight / sum, 3));
+                entry
+            })
+            .collect();
+        let mut entry = place(&hypothesis.place);
+        entry["physics"] = json!(hypothesis.physics);
+        entry["parameters"] = parameters_of(best, spread, h);
+        entry["replaces"] = json!(hypothesis.replaces);
+        entry["confidence"] = json!(round_significant(1.0 / sum, 3));
+        entry["alternatives"] = json!(alternatives);
+        // What the cost would be without it tells how important it is.
+        let without = search
+            .found
+            .iter()
+            .filter(|c| c.structure.added.len() + 1 == total && c.structure.added.iter().all(|o| o.id != hypothesis.id && best.structure.added.iter().any(|b| b.id == o.id)))
+            .map(|c| c.fit.cost)
+            .fold(search.nominal.fit.cost, f64::min);
+        all.push((without, entry));
+    }
+    all.sort_by(|a, b| b.0.total_cmp(&a.0));
+    all.into_iter().map(|(_, entry)| entry).collect()
+}
+
+/// What stands in the place of one hypothesis in structures that are else the same, and how far it is behind.
+fn rivals(search: &Search, best: &Candidate, which: usize) -> Vec<(Hypothesis, f64)> {
+    let own = &best.structure.added[which];
+    let others: Vec<&str> = best.structure.added.iter().filter(|h| h.id != own.id).map(|h| h.id.as_str()).collect();
+    let mut found: Vec<(Hypothesis, f64)> = Vec::new();
+    for candidate in search.found.iter().filter(|c| c.structure.added.len() == best.structure.added.len()) {
+        let added = &candidate.structure.added;
+        let rest: Vec<&Hypothesis> = added.iter().filter(|h| !others.contains(&h.id.as_str())).collect();
+        let [rival] = rest.as_slice() else { continue };
+        if rival.id != own.id && added.len() - 1 == others.len() {
+            found.push(((*rival).clone(), advantage_over(candidate, best, search.samples)));
+        }
+    }
+    found.sort_by(|a, b| a.1.total_cmp(&b.1));
+    found
+}
+
+fn place(place: &Place) -> Json {
+    match place {
+        Place::Between(a, b) => json!({ "between": [a, b] }),
+        Place::Signal(name) => json!({ "signal": name }),
+    }
+}
+
+fn parameters_of(best: &Candidate, spread: &Spread, which: usize) -> Json {
+    let hypothesis = &best.structure.added[which];
+    let mut all = serde_json::Map::new();
+    for (index, number) in best.structure.numbers.iter().enumerate() {
+        let Role::Added(h, p) = number.role else { continue };
+        let Some(parameter) = hypothesis.parameters.get(p).filter(|_| h == which) else { continue };
+        let (value, [low, high]) = (best.fit.values[index], spread.interval(best, index));
+        let r = |x: f64| json!(round_significant(x, 5));
+        if parameter.index.is_some() {
+            let entry = all.entry(parameter.key.clone()).or_insert_with(|| json!({ "value": [], "ci95": [], "unit": parameter.unit }));
+            for (key, x) in [("value", r(value)), ("ci95", json!([r(low), r(high)]))] {
+                if let Some(list) = entry.get_mut(key).and_then(Json::as_array_mut) {
+                    list.push(x);
+                }
+            }
+        } else {
+            all.insert(parameter.key.clone(), json!({ "value": r(value), "ci95": [r(low), r(high)], "unit": parameter.unit }));
+        }
+    }
+    Json::Object(all)
+}
+
+fn moved(problem: &Problem, best: &Candidate, spread: &Spread) -> Json {
+    let mut all = serde_json::Map::new();
+    for (index, number) in best.structure.numbers.iter().enumerate() {
+        let Role::Stated(i) = number.role else { continue };
+        let (stated, value, [low, high]) = (&problem.stated[i], best.fit.values[index], spread.interval(best, index));
+        let r = |x: f64| json!(round_significant(x, 5));
+        let list = problem.stated.iter().filter(|s| s.path == stated.path).count() > 1;
+        let key = if list { format!("{}[{}]", stated.path, stated.index) } else { stated.path.clone() };
+        let deviation = spread.deviation[index];
+        let away = (number.inward(value) - number.inward(stated.given)) / deviation;
+        all.insert(key, json!({ "value": r(value), "ci95": [r(low), r(high)], "nominal": stated.given, "moved_sd": round_significant(away, 3) }));
+    }
+    Json::Object(all)
+}
+
+fn held_out(problem: &Problem, search: &Search, best: &Candidate, use_best: bool) -> Json {
+    let records = if problem.held_out.is_empty() { &problem.fit } else { &problem.held_out };
+    let structure = &search.nominal.structure;
+    let given: Vec<f64> = problem.stated.iter().map(|s| s.given).collect();
+    let before = nrmse(problem, records, structure, &structure.values(problem, &given, &[]));
+    let refit = nrmse(problem, records, structure, &search.nominal.fit.values);
+    let after = if use_best { nrmse(problem, records, &best.structure, &best.fit.values) } else { before };
+    let (mut sum, mut count) = (0.0, 0usize);
+    for record in records {
+        for output in crate::fit::measured(record) {
+            sum += search.floor[output] / record.spread[output];
+            count += 1;
+        }
+    }
+    let r = |x: Option<f64>| x.map_or(Json::Null, |x| json!(round_significant(x, 6)));
+    json!({ "nrmse_before": r(before), "nrmse_refit": r(refit), "nrmse_after": r(after), "noise_floor": r(Some(sum / count.max(1) as f64)) })
+}
+
+/// The nominal model's text with the fitted numbers and what was found.
+fn model_text(problem: &Problem, best: &Candidate, spread: &Spread, use_best: bool) -> Result<String, VerdictError> {
+    if !use_best {
+        return Ok(problem.text.clone());
+    }
+    let mut edits = Vec::new();
+    let values = best.structure.stated_of(problem, &best.fit.values);
+    let mut model = problem.model.clone();
+    let mut paths: Vec<&str> = Vec::new();
+    for stated in &problem.stated {
+        if paths.contains(&stated.path.as_str()) {
+            continue;
+        }
+        paths.push(&stated.path);
+        let own: Vec<(usize, f64)> =
+            problem.stated.iter().zip(&values).filter(|(s, _)| s.path == stated.path).map(|(s, v)| (s.index, round_significant(*v, 7))).collect();
+        let Ok(mut list) = model.values_at(&stated.path) else { continue };
+        for (index, value) in &own {
+            if let Some(slot) = list.get_mut(*index) {
+                *slot = *value;
+            }
+        }
+        if model.values_at(&stated.path).is_ok_and(|before| before == list) || model.set_values_at(&stated.path, &list).is_err() {
+            continue;
+        }
+        let number = best.structure.numbers.iter().position(|n| matches!(n.role, Role::Stated(i) if problem.stated[i].path == stated.path));
+        let comment = number.map(|index| {
+            let [low, high] = spread.interval(best, index);
+            format!("was {}, 95 %: {} to {}", stated.given, round_significant(low, 4), round_significant(high, 4))
+        });
+        let value = match list.as_slice() {
+            [one] => Value::Number(*one),
+            _ => Value::Numbers(list),
+        };
+        edits.push(Edit::Set { path: stated.path.clone(), value, comment });
+    }
+    for (hypothesis, values) in best.structure.added.iter().zip(best.structure.added_of(&best.fit.values)) {
+        let rounded: Vec<f64> = values.iter().map(|v| round_significant(*v, 7)).collect();
+        edits.extend(hypothesis.edits(&model, &rounded)?);
+        model = hypothesis.apply(&model, &rounded)?;
+    }
+    Ok(patch(&problem.text, &edits)?)
+}
+
+/// When and at which frequencies the refitted nominal model leaves most over.
+fn place_in_signals(problem: &Problem, search: &Search) -> Json {
+    let residuals = &search.nominal.fit.residuals;
+    let evaluator = crate::fit::Evaluator::new(problem);
+    let mut strongest: Option<(f64, [f64; 2], [f64; 2])> = None;
+    for (r, _, range) in evaluator.layout() {
+        let Some(part) = residuals.get(range) else { continue };
+        let period = problem.fit[r].period;
+        let window = (part.len() / 20).max(1);
+        let sums: Vec<f64> = part.chunks(window).map(|c| c.iter().map(|x| x * x).sum::<f64>()).collect();
+        let Some((at, most)) = sums.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1)) else { continue };
+        if strongest.as_ref().is_none_or(|s| *most > s.0) {
+            let time = [at as f64 * window as f64 * period, ((at + 1) * window).min(part.len()) as f64 * period];
+            strongest = Some((*most, time, band(part, period)));
+        }
+    }
+    let Some((_, time, band)) = strongest else { return Json::Null };
+    let r = |x: f64| round_significant(x, 4);
+    json!({ "time": [[r(time[0]), r(time[1])]], "band_hz": [r(band[0]), r(band[1])], "state": Json::Null })
+}
+
+/// Frequencies between which the middle eight tenths of a signal's energy lie, Hz.
+fn band(samples: &[f64], period: f64) -> [f64; 2] {
+    let mut planner = realfft::RealFftPlanner::<f64>::new();
+    let transform = planner.plan_fft_forward(samples.len());
+    let (mut input, mut output) = (samples.to_vec(), transform.make_output_vec());
+    if transform.process(&mut input, &mut output).is_err() {
+        return [0.0, 0.5 / period];
+    }
+    let energy: Vec<f64> = output.iter().map(|c| c.norm_sqr()).collect();
+    let total: f64 = energy.iter().sum();
+    let hz = |index: usize| index as f64 / (samples.len() as f64 * period);
+    let at = |share: f64| {
+        let mut sum = 0.0;
+        hz(energy.iter().position(|e| {
+            sum += e;
+            sum >= share * total
+        })
+        .unwrap_or(0))
+    };
+    [at(0.1), at(0.9)]
+}
+
+fn sentence(word: &str, best: &Candidate) -> String {
+    let level = best.levels.iter().fold(0.0f64, |a, b| a.max(*b));
+    let end = if level < AT_FLOOR { "down to the noise".to_string() } else { format!("to {level:.2} floors") };
+    match word {
+        "missing" => format!("the model leaves out {}; with it the recordings are explained {end}", best.structure.name()),
+        "unexplained" => format!("something is missing that no known physics explains; the nearest is {}, {end}", best.structure.name()),
+        "parameters" => format!("nothing is missing, but the model's numbers are off; refitted they explain the recordings {end}"),
+        _ => format!("the model explains the recordings {end}"),
+    }
+}

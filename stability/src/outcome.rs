@@ -5,7 +5,7 @@
 //! | fact | threshold |
 //! |---|---|
 //! | where it looks | the hand holds still and the slave touches something, for 0.3 s beyond a transient of 0.15 s |
-//! | an oscillation | above 8 Hz; half its peak-to-peak in the last quarter above 2 um and two encoder steps |
+//! | an oscillation | above 8 Hz; half its peak-to-peak in the last quarter above 2 um and four encoder steps |
 //! | it dies | its last quarter below 0.7 of its first, its envelope falling by more than 0.2 per second |
 //! | it grows | its last quarter above 1.5 of its first, its envelope rising by more than 0.2 per second: unstable |
 //! | otherwise | a limit cycle |
@@ -223,7 +223,7 @@ fn turns(signal: &[f64], least: f64) -> usize {
 }
 
 fn judge_fast(found: &Oscillation, resolution: f64) -> Outcome {
-    let floor = LEAST_AMPLITUDE.max(2.0 * resolution);
+    let floor = LEAST_AMPLITUDE.max(4.0 * resolution);
     let grows = found.amplitude > 1.5 * found.amplitude_before && found.growth_per_s > 0.2;
     let dies = found.amplitude < 0.7 * found.amplitude_before && found.growth_per_s < -0.2;
     if found.amplitude <= floor || dies {

@@ -454,7 +454,8 @@ impl Answer {
             _ => self.untold("there is no loop to run again, and the recording holds no excitation that tells the loop"),
         }
         self.by_the_recording();
-        if told || self.verdict != Word::CannotTell {
+        // Where the loop was not measured at all, how to measure it is worth saying even beside a verdict.
+        if told || (measured && self.verdict != Word::CannotTell) {
             self.advice = None;
         }
         self.warn();
@@ -584,6 +585,10 @@ impl Answer {
     }
 
     fn warn(&mut self) {
+        if self.from == Method::Resimulation && self.frequency.as_ref().is_some_and(|f| f.cannot_tell.is_some()) {
+            let why = "the loop itself was not measured: this is what the models in the bag say, which do what was recorded";
+            self.warnings.push(why.to_string());
+        }
         if let Some(again) = &self.resimulated {
             let asked = self.gain.product();
             let fails: Vec<String> = again

@@ -51,10 +51,10 @@ fn put(form: &ElementForm, model: &Model, values: &[f64]) -> Result<Vec<Edit>, P
                 .collect()
         })
         .collect();
-    (form.tidy)(&mut numbers);
     if let Some((p, x)) = form.kind.parameters.iter().zip(&numbers).find_map(|(p, list)| Some((p, list.iter().find(|x| !x.is_finite())?))) {
         return Err(Problem::Reason(format!("{} must be a finite number, is {x}", p.key)));
     }
+    (form.tidy)(&mut numbers);
     for (p, list) in form.kind.parameters.iter().zip(&numbers) {
         for x in list {
             backdrive_plant::tomlfile::check_range(*x, p.range).map_err(|e| Problem::Reason(format!("{} {e}", p.key)))?;

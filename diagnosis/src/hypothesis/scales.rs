@@ -68,14 +68,14 @@ impl Scales {
             let mut plant = Plant::new(model, *period, &Options::default())?;
             shortest = shortest.min(*period);
             longest = longest.max(samples as f64 * period);
-            let driven: Vec<Vec<Segment>> = model.inputs.iter().zip(columns).map(|(i, c)| segments(i.hold, &c[..samples], *period)).collect();
+            let driven: Vec<Vec<Segment>> =
+                model.inputs.iter().zip(columns).map(|(i, c)| segments(i.hold, &c[..samples], *period)).collect();
             plant.start_at(&columns.iter().map(|c| c.first().copied().unwrap_or(0.0)).collect::<Vec<_>>());
             let mut now = vec![Segment::default(); columns.len()];
             let mut read = vec![0.0; model.outputs.len()];
             for k in 0..samples {
-                let at: Vec<[f64; 3]> = (0..=n)
-                    .map(|b| if b < n { [plant.position(b), plant.velocity(b), plant.acceleration(b)] } else { [0.0; 3] })
-                    .collect();
+                let at: Vec<[f64; 3]> =
+                    (0..=n).map(|b| if b < n { [plant.position(b), plant.velocity(b), plant.acceleration(b)] } else { [0.0; 3] }).collect();
                 if at.iter().flatten().any(|x| x.is_nan() || x.abs() > RUNAWAY) {
                     break;
                 }
@@ -158,4 +158,3 @@ impl Scales {
         self.elements.iter().map(|s| s.rms).chain(driven).fold(0.0, f64::max)
     }
 }
-

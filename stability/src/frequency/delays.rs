@@ -21,11 +21,11 @@ pub struct Hop {
 /// The delays of a loop.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct Delays {
-    /// From F_s to the reflected part of F_f, of the first axis that touches.
+    /// From F_s to the reflected part of F_f, of the first axis that touches; its gain is 1/mu, for lambda and mu are divided out.
     pub force: Option<Hop>,
-    /// From x_m (less what was cancelled) to x_c.
+    /// From x_m to x_c; `None` where something is cancelled between them.
     pub motion: Option<Hop>,
-    /// Both together, s: what the loop holds beside its devices.
+    /// Both together, s, as far as they are known: what the loop holds beside its devices.
     pub loop_s: Option<f64>,
 }
 

@@ -11,7 +11,7 @@ use statrs::distribution::{ContinuousCDF, StudentsT};
 
 type Matrix = DMatrix<Complex<f64>>;
 
-/// A line tells where the loop is if `|L|` is this many times its sigma: of a thousand lines of noise one in three has such a line.
+/// A line tells where the loop is if `|L|` is this many times its sigma; noise is so large on 3 lines in 10000.
 pub(super) const TOLD: f64 = 4.0;
 /// Radius, in sigmas of one component, of the disc that holds 95 %.
 const DISC: f64 = 2.448;

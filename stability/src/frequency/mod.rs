@@ -409,7 +409,7 @@ fn dithered(prepared: &Prepared, options: &Options, result: &mut Frequency) -> R
             Some((mut level, spectra)) => {
                 (level.contact, level.amplitude_rms) = (contact, amplitude);
                 if result.delays == Delays::default() {
-                    result.delays = delays(&spectra, &level.contact);
+                    result.delays = delays(prepared, &spectra, &level.contact);
                 }
                 result.levels.push(level);
             }
@@ -455,11 +455,13 @@ fn rows_of(rows: &Rows, of: impl Fn(&State) -> bool) -> usize {
     select(rows, of).iter().map(|s| s.len()).sum()
 }
 
-fn delays(spectra: &CrossSpectra, contact: &[bool]) -> Delays {
+fn delays(prepared: &Prepared, spectra: &CrossSpectra, contact: &[bool]) -> Delays {
     let Some(axis) = contact.iter().position(|c| *c) else { return Delays::default() };
     let force = delays::hop(spectra, column(axis, Column::Contact), column(axis, Column::Reflected));
-    // What was cancelled is compared with what would have been without: x_c over mu and what was taken out.
-    let motion = delays::hop(spectra, column(axis, Column::Command), column(axis, Column::Motion));
+    // Where something is cancelled the command is not the measured motion, scaled and late.
+    let cancelled = prepared.session.axes[axis].induced.is_some();
+    let motion =
+        delays::hop(spectra, column(axis, Column::Master), column(axis, Column::Command)).filter(|m| !cancelled && m.coherence > 0.99);
     let loop_s = force.map(|f| f.delay_s + motion.map_or(0.0, |m| m.delay_s));
     Delays { force, motion, loop_s }
 }
@@ -615,7 +617,7 @@ fn loop_of(
         motion = master.combine(&cancelled, |g, estimate| g - estimate);
     }
     let contact: Vec<bool> = (0..axes).map(|i| stretches.iter().any(|s| prepared.session.axes[i].contact[s.start] != 0.0)).collect();
-    let delay = delays(spectra, &contact).force.map_or(0.0, |hop| hop.delay_s);
+    let delay = delays(prepared, spectra, &contact).force.map_or(0.0, |hop| hop.delay_s);
     let mut all = slave.combine(&motion, |h, c| h * c);
     for (line, hz) in all.hz.clone().into_iter().enumerate() {
         let turn = Complex::from_polar(1.0, -std::f64::consts::TAU * hz * delay);

@@ -206,7 +206,8 @@ fn the_edge_of_a_second_order_loop_is_found() {
     assert_eq!(found.levels[0].averaging.window, Window::Periods);
     let delay = found.delays.force.unwrap();
     assert!((delay.delay_s / PERIOD - 3.0).abs() < 1e-3 && (delay.gain - 1.0).abs() < 1e-3, "{delay:?}");
-    assert!(found.delays.motion.unwrap().delay_s.abs() < 1e-6);
+    let motion = found.delays.motion.unwrap();
+    assert!(motion.delay_s.abs() < 1e-6 && (motion.gain - 1.0).abs() < 1e-6, "{motion:?}");
     assert_eq!(found.at(0.9 * truth).verdict, Verdict::Stable);
     assert_eq!(found.at(1.1 * truth).verdict, Verdict::Unstable);
     let close = found.at(edge.gain.unwrap());
@@ -231,7 +232,7 @@ fn intervals_hold_the_truth_with_a_periodic_dither() {
     let (worst, inside, width) = coverage(setups);
     println!("periodic: worst error {:.2} %, coverage {:.0} %, half-width {:.2} %", worst * 100.0, inside * 100.0, width * 100.0);
     assert!(worst < 0.02, "{worst}");
-    assert!((0.85..=1.0).contains(&inside), "{inside}");
+    assert!(inside >= 0.85, "{inside}");
     assert!(width < 0.02, "{width}");
 }
 
@@ -250,7 +251,7 @@ fn intervals_hold_the_truth_with_a_random_dither() {
     let (worst, inside, width) = coverage(setups);
     println!("random: worst error {:.2} %, coverage {:.0} %, half-width {:.2} %", worst * 100.0, inside * 100.0, width * 100.0);
     assert!(worst < 0.02, "{worst}");
-    assert!((0.85..=1.0).contains(&inside), "{inside}");
+    assert!(inside >= 0.85, "{inside}");
     assert!(width < 0.02, "{width}");
 }
 

@@ -80,7 +80,7 @@ pub(super) fn analyse(prepared: &Prepared, options: &Options, result: &mut Frequ
         result.notes.push(format!("the operator shakes the loop up to {broad:.0} Hz only; an edge above that is not seen"));
     }
     result.notes.push("no dither was recorded: the operator's intent, in free motion and in contact, took its place".to_string());
-    result.delays = delays(&touching, &[true]);
+    result.delays = delays(prepared, &touching, &[true]);
     let told = measured.told();
     let pair = |l: Complex<f64>| [l.re, l.im];
     let l: Vec<[f64; 2]> = measured.nominal.iter().map(|m| pair(m[(0, 0)])).collect();

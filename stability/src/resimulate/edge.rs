@@ -24,7 +24,7 @@ pub struct Search {
 
 impl Default for Search {
     fn default() -> Search {
-        Search { lowest: 0.05, highest: 50.0, tolerance: 0.005, per_decade: 20, whole_grid: true }
+        Search { lowest: 0.05, highest: 50.0, tolerance: 0.005, per_decade: 40, whole_grid: true }
     }
 }
 

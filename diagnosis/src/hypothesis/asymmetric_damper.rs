@@ -1,0 +1,26 @@
+//! Viscous friction of another slope in each direction: a valve that opens one way.
+
+use super::Physics;
+use super::builder::{ElementBuilder, even, first_value};
+
+pub(super) const PHYSICS: Physics = Physics {
+    name: "asymmetric_damper",
+    family: "damping",
+    contains: &["damper"],
+    propose: |sites| {
+        let places = sites.near().filter(|site| !sites.has(site, &["asymmetric_damper", "backlash"]));
+        let one = |site| {
+            let new = ElementBuilder::new(sites, &PHYSICS, site)?;
+            let typical = site.force / site.speed;
+            let (new, stated) = match sites.first_of(site, &["damper"]) {
+                None => (new, None),
+                Some((index, e)) => (new.replacing(index), Some(first_value(&e.law))),
+            };
+            let neutral = stated.unwrap_or(0.0);
+            let room = even(0.0, 1000.0 * typical.max(neutral), neutral);
+            let b = if neutral > 0.0 { neutral } else { 0.1 * typical };
+            Some(new.number("positive", room).number("negative", room).starts(vec![vec![1.3 * b, 0.7 * b], vec![0.7 * b, 1.3 * b]]))
+        };
+        places.filter_map(one).collect()
+    },
+};

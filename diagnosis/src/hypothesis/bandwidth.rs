@@ -1,0 +1,17 @@
+//! An actuator that follows its command with a first-order lag.
+
+use super::Physics;
+use super::builder::{Freedom, key};
+use backdrive_plant::model::InputKind;
+
+pub(super) const PHYSICS: Physics = Physics {
+    name: "bandwidth",
+    family: "lag",
+    contains: &[],
+    propose: |sites| {
+        let inputs = sites.model.inputs.iter().filter(|i| i.kind == InputKind::Force && i.bandwidth == f64::INFINITY);
+        let rate = 1.0 / sites.scales.period;
+        let room = Freedom { range: (1.0 / sites.scales.duration, 20.0 * rate), neutral: Some(f64::INFINITY), log: true };
+        inputs.map(|i| key(sites, &PHYSICS, "inputs", &i.name, "Hz", room, &[0.1 * rate, 0.02 * rate, 0.5 * rate, 0.004 * rate])).collect()
+    },
+};

@@ -1,0 +1,31 @@
+//! Stiffness that rises or falls with deflection.
+
+use super::Physics;
+use super::builder::{ElementBuilder, even, first_value};
+use super::sites::ELASTIC;
+
+pub(super) const PHYSICS: Physics = Physics {
+    name: "cubic_spring",
+    family: "stiffness",
+    contains: &["spring"],
+    propose: |sites| {
+        let one = |site| {
+            let new = ElementBuilder::new(sites, &PHYSICS, site)?;
+            let (typical, x) = (site.force / site.displacement, site.displacement);
+            let (new, stated) = match sites.first_of(site, &ELASTIC) {
+                None => (new, None),
+                Some((index, e)) if e.law.kind().name == "spring" => (new.replacing(index), Some(first_value(&e.law))),
+                Some(_) => return None,
+            };
+            let neutral = stated.unwrap_or(0.0);
+            let most = typical.max(neutral.abs());
+            let cubic = 1000.0 * most / (x * x);
+            let new = new.number("stiffness", even(-most, 1000.0 * most, neutral)).number("cubic", even(-cubic, cubic, 0.0));
+            // A quarter of the force at full deflection; less where it softens, which at twice that lets go.
+            let k = if neutral > 0.0 { neutral } else { 0.2 * typical };
+            let softer = -0.1 * k / (site.displacement_peak * site.displacement_peak);
+            Some(new.starts(vec![vec![neutral, 0.25 * k / (x * x)], vec![neutral, softer]]))
+        };
+        sites.near().filter_map(one).collect()
+    },
+};

@@ -1,0 +1,19 @@
+//! Viscous friction.
+
+use super::Physics;
+use super::builder::{ElementBuilder, even};
+
+pub(super) const PHYSICS: Physics = Physics {
+    name: "damper",
+    family: "damping",
+    contains: &["back_emf"],
+    propose: |sites| {
+        let places = sites.pairs.iter().filter(|site| !sites.has(site, &["damper", "asymmetric_damper", "backlash"]));
+        let one = |site| {
+            let new = ElementBuilder::new(sites, &PHYSICS, site)?;
+            let b = site.force / site.speed;
+            Some(new.number("damping", even(0.0, 1000.0 * b, 0.0)).starts(vec![vec![0.05 * b], vec![0.5 * b]]))
+        };
+        places.filter_map(one).collect()
+    },
+};

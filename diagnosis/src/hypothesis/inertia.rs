@@ -1,0 +1,24 @@
+//! Inertia that a body has beyond what the model says.
+
+use super::Physics;
+use super::builder::{even, inertia, stated};
+use super::sites::Reach;
+
+pub(super) const PHYSICS: Physics = Physics {
+    name: "inertia",
+    family: "inertia",
+    contains: &["inerter"],
+    propose: |sites| {
+        let bodies = sites.pairs.iter().filter(|s| s.reach == Reach::Ground);
+        let one = |site: &super::sites::Site| {
+            let body = site.ends[0]?;
+            let own = sites.model.bodies[body].inertia;
+            let typical = site.force / site.acceleration;
+            let name = &site.between[0];
+            let same = (own > 0.0).then(|| format!("bodies.{name}")).or_else(|| stated(sites.model, body, "inerter", "inertance"));
+            let room = even(0.0, 100.0 * typical.max(own), 0.0);
+            Some(inertia(sites, &PHYSICS, name, room, &[0.1 * typical, typical]).same_as(same))
+        };
+        bodies.filter_map(one).collect()
+    },
+};

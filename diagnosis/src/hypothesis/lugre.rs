@@ -1,0 +1,34 @@
+//! Bristle friction: presliding, a level that falls with speed, and lag between them.
+
+use super::Physics;
+use super::builder::{ElementBuilder, Freedom, any, log, replaced_friction};
+use super::sites::FRICTION;
+
+pub(super) const PHYSICS: Physics = Physics {
+    name: "lugre",
+    family: "friction",
+    contains: &["dahl", "stribeck", "coulomb"],
+    propose: |sites| {
+        let one = |site| {
+            let new = ElementBuilder::new(sites, &PHYSICS, site)?;
+            let (f, x, v) = (site.force, site.displacement, site.speed);
+            let (new, stated) = match sites.first_of(site, &FRICTION) {
+                None => (new, (0.1 * f, Some(1e-6 * f))),
+                Some((_, e)) if e.law.kind().name == "lugre" => return None,
+                Some((index, e)) => (new.replacing(index), replaced_friction(&e.law)),
+            };
+            let (c, neutral) = stated;
+            let level = Freedom { range: (1e-6 * f, 20.0 * f.max(c)), neutral: neutral.map(|n| n.max(1e-6 * f)), log: false };
+            let new = new
+                .number("stiffness", log(0.01 * f / x, 1e6 * f / x))
+                .number("damping", any(0.0, 100.0 * f / v))
+                .number("coulomb", level)
+                .number("static", level)
+                .number("velocity", log(1e-4 * v, 3.0 * site.speed_peak))
+                .tidy(|values| values[3][0] = values[3][0].max(values[2][0]));
+            let start = |x_slip: f64, v_slip: f64| vec![c / (x_slip * x), 0.05 * c / v, c, 1.5 * c, v_slip * v];
+            Some(new.starts(vec![start(0.05, 0.1), start(0.005, 0.1), start(0.05, 0.5), start(0.005, 0.02)]))
+        };
+        sites.near().filter_map(one).collect()
+    },
+};

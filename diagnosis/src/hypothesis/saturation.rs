@@ -1,0 +1,21 @@
+//! The largest force that an actuator gives.
+
+use super::Physics;
+use super::builder::{even, key};
+use backdrive_plant::model::InputKind;
+
+pub(super) const PHYSICS: Physics = Physics {
+    name: "saturation",
+    family: "limit",
+    contains: &[],
+    propose: |sites| {
+        let inputs = sites.model.inputs.iter().enumerate();
+        let limitless = inputs.filter(|(_, i)| i.kind == InputKind::Force && i.saturation == f64::INFINITY);
+        let one = |(index, input): (usize, &backdrive_plant::model::Input)| {
+            let peak = sites.scales.input(index).peak;
+            let starts = [0.9, 0.75, 0.5, 0.3].map(|share| share * peak);
+            (peak > 0.0).then(|| key(sites, &PHYSICS, "inputs", &input.name, "N", even(0.01 * peak, peak, peak), &starts))
+        };
+        limitless.filter_map(one).collect()
+    },
+};

@@ -1,0 +1,89 @@
+//! Correlated residuals: how many independent samples they are worth, and what an improvement among them says.
+
+use crate::fit::Evaluator;
+
+/// Correlation time of residuals in samples, at least 1: one residual in so many counts. Lags up to the first correlation that is
+/// not positive, over each recording's output apart, weighed by what they cost.
+pub fn correlation_time(evaluator: &Evaluator, residuals: &[f64]) -> f64 {
+    let (mut total, mut weight) = (0.0, 0.0);
+    for (_, _, range) in evaluator.layout() {
+        let Some(part) = residuals.get(range) else { continue };
+        let energy: f64 = part.iter().map(|x| x * x).sum();
+        if energy <= 0.0 {
+            continue;
+        }
+        total += energy * time_of(part, energy);
+        weight += energy;
+    }
+    if weight > 0.0 { (total / weight).max(1.0) } else { 1.0 }
+}
+
+fn time_of(part: &[f64], energy: f64) -> f64 {
+    let longest = part.len() / 4;
+    let noise = 2.0 / (part.len() as f64).sqrt();
+    let (mut sum, mut lag) = (0.0, 1);
+    while lag < longest {
+        let product: f64 = part[lag..].iter().zip(part).map(|(a, b)| a * b).sum();
+        let correlation = product / energy;
+        if correlation < noise {
+            break;
+        }
+        // Long tails by strides: their sum does not need every lag.
+        let stride = (lag / 16).max(1);
+        sum += correlation * stride as f64;
+        lag += stride;
+    }
+    1.0 + 2.0 * sum
+}
+
+/// Root mean square of the residuals of each output, in floors; 0 where none was measured.
+pub fn levels(evaluator: &Evaluator, residuals: &[f64]) -> Vec<f64> {
+    let outputs = evaluator.problem.model.outputs.len();
+    let (mut sums, mut counts) = (vec![0.0; outputs], vec![0usize; outputs]);
+    for (_, output, range) in evaluator.layout() {
+        if let Some(part) = residuals.get(range) {
+            sums[output] += part.iter().map(|x| x * x).sum::<f64>();
+            counts[output] += part.len();
+        }
+    }
+    sums.iter().zip(&counts).map(|(s, n)| if *n > 0 { (s / *n as f64).sqrt() } else { 0.0 }).collect()
+}
+
+/// How much better the second of two fits is, as a difference of the information criterion with effective samples: positive where
+/// its lower cost is worth its additional numbers.
+pub fn advantage(cost: f64, numbers: usize, better_cost: f64, better_numbers: usize, samples: usize, correlation_time: f64) -> f64 {
+    let effective = (samples as f64 / correlation_time).max(2.0);
+    effective * (cost / better_cost).ln() - (better_numbers as f64 - numbers as f64) * effective.ln()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::SeedableRng;
+    use rand_distr::{Distribution, StandardNormal};
+
+    #[test]
+    fn a_first_order_process_has_the_correlation_time_of_its_formula() {
+        let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(1);
+        for a in [0.0, 0.5, 0.9] {
+            let mut x = 0.0;
+            let y: Vec<f64> = (0..40_000)
+                .map(|_| {
+                    let e: f64 = StandardNormal.sample(&mut random);
+                    x = a * x + e;
+                    x
+                })
+                .collect();
+            let found = time_of(&y, y.iter().map(|x| x * x).sum());
+            let exact = (1.0 + a) / (1.0 - a);
+            assert!((found / exact - 1.0).abs() < 0.15, "{a}: {found} {exact}");
+        }
+    }
+
+    #[test]
+    fn an_advantage_needs_more_than_chance() {
+        assert!(advantage(1000.0, 3, 999.0, 4, 1000, 1.0) < 0.0);
+        assert!(advantage(1000.0, 3, 950.0, 4, 1000, 1.0) > 0.0);
+        assert!(advantage(1000.0, 3, 950.0, 4, 1000, 20.0) < 0.0);
+    }
+}
