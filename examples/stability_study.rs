@@ -177,7 +177,7 @@ fn ask(bag: &Path, gain: f64) -> (Answer, Session) {
         script: None,
         gain: Gain { mu: graph.gains.mu, lambda: gain / graph.gains.mu },
         grips: Vec::new(),
-        search: Search { lowest: LOWEST, ..Search::default() },
+        search: Search { lowest: LOWEST, whole_grid: false, ..Search::default() },
     };
     let found = answer(&question, &|_, _, _| {}, &AtomicBool::new(false)).expect("there is an answer");
     (found, session)
@@ -198,7 +198,7 @@ fn record_excited(real: &Configuration, told: &Configuration, gain: f64, folder:
         let graph = Graph::from_text(&header.graph_toml, &bag, &Overrides::default(), &Files::Bag(&header.files)).expect("whole");
         let session = Session::from_bag(&reader, &graph).expect("its topics are there");
         let rows = |s: f64| (s / session.period_s) as usize;
-        if session.axes[0].contact[rows(1.5)..rows(11.0)].iter().all(|f| *f != 0.0) {
+        if session.axes[0].contact[rows(1.5)..rows(10.0)].iter().all(|f| *f != 0.0) {
             return (bag, peak);
         }
     }
@@ -337,7 +337,9 @@ fn concealed_configurations(folder: &Path) -> Vec<Concealed> {
     conceal(plain("normal", "bilateral-wall", "impulse-engine-linear", 1.0), "drum 2.5 times as heavy", true, &|c| c.master = drum.clone());
     let soft = changed(folder, base, "soft-linkage", &[("elements.linkage.stiffness", 0.6)], "");
     conceal(plain("normal", "stiff-wall", "none", 2.0), "linkage 0.6 times as stiff", true, &|c| c.master = soft.clone());
-    conceal(plain("normal", "bilateral-wall", "impulse-engine-linear", 0.0), "linkage 0.6 times as stiff", true, &|c| c.master = soft.clone());
+    conceal(plain("normal", "bilateral-wall", "impulse-engine-linear", 0.0), "linkage 0.6 times as stiff", true, &|c| {
+        c.master = soft.clone()
+    });
     let cable = changed(folder, base, "soft-cable", &[("elements.cable.stiffness", 0.3)], "");
     conceal(plain("light", "bilateral-wall", "none", 0.0), "cable 0.3 times as stiff", true, &|c| c.master = cable.clone());
 
@@ -356,7 +358,9 @@ fn concealed_configurations(folder: &Path) -> Vec<Concealed> {
     conceal(plain("normal", "stiff-wall", "none", 0.0), "friction and hysteresis", false, &|c| c.master = whole.clone());
     conceal(plain("normal", "bilateral-wall", "none", 1.0), "friction and hysteresis", false, &|c| c.master = whole.clone());
     conceal(plain("light", "hunt-crossley-wall", "none", 2.0), "friction and hysteresis", false, &|c| c.master = whole.clone());
-    conceal(plain("normal", "stiff-wall", "impulse-engine-linear", 0.0), "0.15 N of friction at the drum", false, &|c| c.master = much.clone());
+    conceal(plain("normal", "stiff-wall", "impulse-engine-linear", 0.0), "0.15 N of friction at the drum", false, &|c| {
+        c.master = much.clone()
+    });
     conceal(plain("normal", "stiff-wall", "impulse-engine-linear", 1.0), "friction and hysteresis", false, &|c| c.master = whole.clone());
     all
 }

@@ -281,7 +281,7 @@ pub struct Stability {
     /// A graph file whose operator's hand is played, in place of the hand in the bag.
     #[arg(long, value_name = "GRAPH")]
     pub script: Option<PathBuf>,
-    /// Which topic is which, for a bag that we did not record; see docs/roles.toml.
+    /// Which topic is which, for a bag that we did not record; see docs/roles-example.toml.
     #[arg(long, value_name = "FILE")]
     pub roles: Option<PathBuf>,
     /// Write the report as one HTML file.

@@ -29,7 +29,11 @@ pub fn stability(options: &cli::Stability) -> Result<u8, Failure> {
     let cancel = Arc::new(AtomicBool::new(false));
     let heard = cancel.clone();
     // A second Ctrl-C ends at once.
-    let handler = move || if heard.swap(true, Ordering::SeqCst) { std::process::exit(i32::from(code::INTERRUPTED)) };
+    let handler = move || {
+        if heard.swap(true, Ordering::SeqCst) {
+            std::process::exit(i32::from(code::INTERRUPTED))
+        }
+    };
     ctrlc::set_handler(handler).map_err(Failure::machine)?;
 
     let loaded = Loaded::read(options)?;
@@ -256,7 +260,10 @@ fn text(found: &Answer) -> String {
         let _ = writeln!(out, "{name:<8} {text}");
     };
     let gain = found.gain;
-    line("verdict", format!("{} at mu*lambda = {:.4} (mu {}, lambda {:.4})", found.verdict.text().to_uppercase(), gain.product(), gain.mu, gain.lambda));
+    line(
+        "verdict",
+        format!("{} at mu*lambda = {:.4} (mu {}, lambda {:.4})", found.verdict.text().to_uppercase(), gain.product(), gain.mu, gain.lambda),
+    );
     line("why", found.reason.clone());
     let recorded = found.recorded_gain.map_or(String::new(), |[low, high]| match high - low < 1e-9 {
         true => format!("; recorded at {low:.4}"),
@@ -277,7 +284,16 @@ fn text(found: &Answer) -> String {
     }
     if let Some(m) = &found.margins {
         let of = |value: Option<f64>, unit: &str| value.map_or("unlimited".to_string(), |v| format!("{v:.2} {unit}"));
-        line("margins", format!("gain {}, phase {}, delay {}, modulus {:.3} (measured)", of(m.gain_db, "dB"), of(m.phase_deg, "deg"), of(m.delay_ms, "ms"), m.modulus));
+        line(
+            "margins",
+            format!(
+                "gain {}, phase {}, delay {}, modulus {:.3} (measured)",
+                of(m.gain_db, "dB"),
+                of(m.phase_deg, "deg"),
+                of(m.delay_ms, "ms"),
+                m.modulus
+            ),
+        );
     }
     if let Some(f) = &found.frequency_answer {
         line("measured", f.reason.clone());

@@ -59,8 +59,17 @@ fn below_and_beyond_the_edge() {
     let (code, low) = ask(&place, "run.mcap", &["--gain", "0.3"]);
     assert_eq!((code, low["verdict"].as_str()), (Some(0), Some("stable")), "{low}");
     for key in [
-        "/gain", "/verdict", "/critical_gain", "/critical_gain_ci95/0", "/margins/gain_db", "/margins/phase_deg", "/margins/delay_ms",
-        "/margins/modulus", "/methods/frequency/verdict", "/methods/resimulation/verdict", "/methods/energy/verdict",
+        "/gain",
+        "/verdict",
+        "/critical_gain",
+        "/critical_gain_ci95/0",
+        "/margins/gain_db",
+        "/margins/phase_deg",
+        "/margins/delay_ms",
+        "/margins/modulus",
+        "/methods/frequency/verdict",
+        "/methods/resimulation/verdict",
+        "/methods/energy/verdict",
     ] {
         assert!(low.pointer(key).is_some_and(|v| !v.is_null()), "{key} is missing in {low}");
     }
@@ -90,7 +99,8 @@ fn a_swapped_part_and_a_named_script() {
     record(&place, "run.mcap", &["--lambda", "0.2"]);
     let (model, grip) = (file("plant/models/impulse-engine-linear.toml"), file("plant/grips/normal.toml"));
     let (_, plain) = ask(&place, "run.mcap", &["--gain", "0.3"]);
-    let (code, cancelled) = ask(&place, "run.mcap", &["--gain", "3", "--canceller", &model, "--canceller-grip", &grip, "--sensors", "ideal"]);
+    let (code, cancelled) =
+        ask(&place, "run.mcap", &["--gain", "3", "--canceller", &model, "--canceller-grip", &grip, "--sensors", "ideal"]);
     assert_eq!(code, Some(0), "an exact copy cancels all: {cancelled}");
     assert!(cancelled["critical_gain"].is_null() && number(&cancelled, "/at_least") >= 50.0, "{cancelled}");
     let firm = file("plant/grips/firm.toml");
@@ -177,7 +187,8 @@ fn two_gains_in_one_file() {
     let graph = graph.replace("ramp_s = 0.05", "change = [{ at_s = 6.0, mu = 1.0, lambda = 0.1 }]\nramp_s = 0.05");
     place.write("two.toml", &graph);
     let master = file("plant/models/impulse-engine-linear.toml");
-    let run = ["run", "two.toml", "--transport", "inproc", "--lambda", "0.2", "--bag", "two.mcap", "--limits", "ignored", "--master", &master];
+    let run =
+        ["run", "two.toml", "--transport", "inproc", "--lambda", "0.2", "--bag", "two.mcap", "--limits", "ignored", "--master", &master];
     let done = place.backdrive(&[&run[..], &["--dither", "multisine:peak=0.3,from=1,to=400,period=1,crest=50"]].concat());
     assert_eq!(done.code, Some(0), "{done:?}");
     let (code, found) = ask(&place, "two.mcap", &["--gain", "0.3"]);
@@ -191,10 +202,12 @@ fn two_gains_in_one_file() {
 fn a_force_that_is_clipped() {
     let place = Place::new();
     let model = std::fs::read_to_string(file("plant/models/impulse-engine-linear.toml")).unwrap();
-    let clipped: Vec<&str> = model.lines().filter(|l| !l.starts_with("force  ") && !l.starts_with("force ") || !l.contains("8.9")).collect();
+    let clipped: Vec<&str> =
+        model.lines().filter(|l| !l.starts_with("force  ") && !l.starts_with("force ") || !l.contains("8.9")).collect();
     place.write("clipped.toml", &(clipped.join("\n") + "\nforce = 0.5\n"));
     let graph = file("launch/push-and-hold.toml");
-    let run = ["run", &graph, "--transport", "inproc", "--duration", "6", "--lambda", "0.3", "--master", "clipped.toml", "--bag", "run.mcap"];
+    let run =
+        ["run", &graph, "--transport", "inproc", "--duration", "6", "--lambda", "0.3", "--master", "clipped.toml", "--bag", "run.mcap"];
     let done = place.backdrive(&run);
     assert_eq!(done.code, Some(1), "a clipped run is limited: {done:?}");
     let (code, found) = ask(&place, "run.mcap", &["--gain", "0.3"]);

@@ -13,6 +13,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let began = Instant::now();
     let problem = Problem::open(Path::new(set), after("--model").as_deref().map(Path::new))?;
     let settings = search::Settings { without: after("--without").into_iter().collect(), ..Default::default() };
+    let settings = match after("--patience").and_then(|p| p.parse().ok()) {
+        Some(seconds) => search::Settings { patience: std::time::Duration::from_secs_f64(seconds), ..settings },
+        None => settings,
+    };
     let found = search::search(&problem, &settings, None, &|what| {
         if talk {
             eprintln!("{:.2} s {what}", began.elapsed().as_secs_f64());
@@ -27,7 +31,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     println!("{set}: {} ({seconds:.1} s)", said.sentence);
     if talk {
         let n = found.samples as f64;
-        eprintln!("{} hypotheses, {} simulations; floor {:.3?}, as given {:.3?}", found.hypotheses, found.simulations, found.floor, found.levels_given);
+        eprintln!(
+            "{} hypotheses, {} simulations; floor {:.3?}, as given {:.3?}",
+            found.hypotheses, found.simulations, found.floor, found.levels_given
+        );
         let nominal = &found.nominal;
         eprintln!("nominal: {:.4} {:.3?} correlation {:.1}", nominal.fit.cost / n, nominal.levels, nominal.correlation_time);
         for t in found.tried.iter().take(10) {

@@ -20,6 +20,8 @@ pub struct Evaluator<'a> {
     pub robust: f64,
     /// Set from outside to end every fit after its present step.
     pub stop: Option<&'a AtomicBool>,
+    /// When every fit ends after its present step.
+    pub until: Option<std::time::Instant>,
     /// Simulations of a record so far.
     pub simulations: Arc<AtomicUsize>,
     /// Substeps per sample, at most: fewer are faster, and blur what is very stiff.
@@ -65,7 +67,16 @@ impl<'a> Evaluator<'a> {
 
     /// Holds fits against other recordings of the same problem.
     pub fn on(problem: &'a Problem, records: &'a [Record]) -> Evaluator<'a> {
-        Evaluator { problem, records, floor: problem.floor.clone(), robust: f64::INFINITY, stop: None, simulations: Arc::default(), substeps: 64 }
+        Evaluator {
+            problem,
+            records,
+            floor: problem.floor.clone(),
+            robust: f64::INFINITY,
+            stop: None,
+            until: None,
+            simulations: Arc::default(),
+            substeps: 64,
+        }
     }
 
     /// Number of residuals.
@@ -100,7 +111,13 @@ impl<'a> Evaluator<'a> {
     }
 
     /// Residuals of one record.
-    fn record_residuals(&self, structure: &Structure, model: &backdrive_plant::model::Model, values: &[f64], r: usize) -> Option<Vec<f64>> {
+    pub fn record_residuals(
+        &self,
+        structure: &Structure,
+        model: &backdrive_plant::model::Model,
+        values: &[f64],
+        r: usize,
+    ) -> Option<Vec<f64>> {
         let record = self.records.get(r)?;
         self.simulations.fetch_add(1, Ordering::Relaxed);
         let mut columns = structure.predict(model, values, record, r, self.substeps)?;
@@ -131,6 +148,11 @@ impl<'a> Evaluator<'a> {
 
     /// Derivatives of the residuals by each number in the fit's own unit.
     pub fn jacobian(&self, structure: &Structure, own: &[f64], residuals: &[f64]) -> Vec<Vec<f64>> {
+        self.columns(structure, own, residuals, &(0..own.len()).collect::<Vec<_>>())
+    }
+
+    /// The same by some of the numbers.
+    fn columns(&self, structure: &Structure, own: &[f64], residuals: &[f64], which: &[usize]) -> Vec<Vec<f64>> {
         let spans: Vec<std::ops::Range<usize>> = self
             .records
             .iter()
@@ -140,21 +162,18 @@ impl<'a> Evaluator<'a> {
                 Some(from..*at)
             })
             .collect();
-        let jobs: Vec<(usize, usize)> = structure
-            .numbers
+        let jobs: Vec<(usize, usize)> = which
             .iter()
             .enumerate()
-            .flat_map(|(j, n)| match n.record {
-                Some(r) => vec![(j, r)],
-                None => (0..self.records.len()).map(|r| (j, r)).collect(),
+            .flat_map(|(at, j)| match structure.numbers[*j].record {
+                Some(r) => vec![(at, r)],
+                None => (0..self.records.len()).map(|r| (at, r)).collect(),
             })
             .collect();
-        let moved: Vec<Option<(Vec<f64>, backdrive_plant::model::Model, f64)>> = structure
-            .numbers
+        let moved: Vec<Option<(Vec<f64>, backdrive_plant::model::Model, f64)>> = which
             .iter()
-            .enumerate()
-            .map(|(j, number)| {
-                let (values, step) = moved_values(structure, own, j, number);
+            .map(|j| {
+                let (values, step) = moved_values(structure, own, *j, &structure.numbers[*j]);
                 Some((values.clone(), structure.model(self.problem, &values)?, step))
             })
             .collect();
@@ -168,7 +187,7 @@ impl<'a> Evaluator<'a> {
                 Some(part)
             })
             .collect();
-        let mut jacobian = vec![vec![0.0; residuals.len()]; structure.numbers.len()];
+        let mut jacobian = vec![vec![0.0; residuals.len()]; which.len()];
         for ((j, r), part) in jobs.iter().zip(parts) {
             if let Some(part) = part {
                 jacobian[*j][spans[*r].clone()].copy_from_slice(&part);
@@ -179,64 +198,111 @@ impl<'a> Evaluator<'a> {
 
     /// Fits a structure from `start` on; `None` where it cannot be simulated there.
     pub fn fit(&self, structure: &Structure, start: &[f64], effort: Effort) -> Option<Fit> {
-        let mut own: Vec<f64> = structure.numbers.iter().zip(start).map(|(n, v)| n.inward(*v)).collect();
-        let outward = |own: &[f64]| structure.numbers.iter().zip(own).map(|(n, x)| n.outward(*x)).collect::<Vec<f64>>();
+        self.fit_knowing(structure, start, effort, None)
+    }
+
+    /// The same with derivatives that another fit found, of this structure or of one that shares its first numbers: good enough for the first steps.
+    ///
+    /// Derivatives are carried along by the secant of each step (Broyden 1965) and computed anew when a step disappoints, every few
+    /// steps, and before the fit says that it is at its end.
+    pub fn fit_knowing(&self, structure: &Structure, start: &[f64], effort: Effort, known: Option<(&Structure, &Fit)>) -> Option<Fit> {
+        let numbers = &structure.numbers;
+        let mut own: Vec<f64> = numbers.iter().zip(start).map(|(n, v)| n.inward(*v)).collect();
+        let outward = |own: &[f64]| numbers.iter().zip(own).map(|(n, x)| n.outward(*x)).collect::<Vec<f64>>();
         let prior = |own: &[f64]| -> f64 {
             let one = |(n, x): (&Number, &f64)| n.prior.map_or(0.0, |(centre, spread)| ((x - centre) / spread).powi(2));
-            structure.numbers.iter().zip(own).map(one).sum()
+            numbers.iter().zip(own).map(one).sum()
         };
         let mut residuals = self.residuals(structure, &outward(&own))?;
         let mut cost = self.cost(&residuals) + prior(&own);
-        let mut lambda = 1e-3;
-        let mut jacobian;
+        let mut jacobian = self.first_jacobian(structure, &own, &residuals, known);
+        // Steps since the derivatives were computed.
+        let mut age = if known.is_some() { 1 } else { 0 };
+        let (mut lambda, mut steps, mut weak) = (1e-3, 0, 0);
         let mut foreseen;
-        let mut steps = 0;
         loop {
-            jacobian = self.jacobian(structure, &own, &residuals);
             let weights = self.weights(&residuals);
             let (mut matrix, mut slope) = normal_equations(&jacobian, &residuals, weights.as_deref());
-            for (j, number) in structure.numbers.iter().enumerate() {
+            for (j, number) in numbers.iter().enumerate() {
                 if let Some((centre, spread)) = number.prior {
                     matrix[(j, j)] += 1.0 / (spread * spread);
                     slope[j] += (own[j] - centre) / (spread * spread);
                 }
             }
-            let free: Vec<usize> = (0..own.len()).filter(|j| may_move(&structure.numbers[*j], own[*j], slope[*j], matrix[(*j, *j)])).collect();
+            let free: Vec<usize> = (0..own.len()).filter(|j| may_move(&numbers[*j], own[*j], slope[*j], matrix[(*j, *j)])).collect();
             foreseen = step_of(&matrix, &slope, &free, 1e-9).map_or(0.0, |step| free.iter().zip(&step).map(|(j, s)| -slope[*j] * s).sum());
             let unit = cost / residuals.len().max(1) as f64;
-            let stopped = self.stop.is_some_and(|s| s.load(Ordering::Relaxed));
-            if steps >= effort.steps || foreseen < effort.tolerance * unit || stopped {
+            let ended = self.is_late() || steps >= effort.steps || weak >= 3;
+            if ended {
                 break;
             }
-            let mut accepted = false;
-            for _ in 0..7 {
+            if foreseen < effort.tolerance * unit {
+                if age == 0 || effort.tolerance > 1.0 {
+                    break;
+                }
+                (jacobian, age) = (self.jacobian(structure, &own, &residuals), 0);
+                continue;
+            }
+            let tries = if age > 0 { 2 } else { 6 };
+            let mut accepted = None;
+            for _ in 0..tries {
                 let Some(step) = step_of(&matrix, &slope, &free, lambda) else { break };
                 let mut next = own.clone();
                 for (j, s) in free.iter().zip(&step) {
-                    let number = &structure.numbers[*j];
-                    let (low, high) = number.bounds();
-                    let longest = if number.log { 1.5 } else { 0.5 * (high - low) };
+                    let (low, high) = numbers[*j].bounds();
+                    let longest = if numbers[*j].log { 1.5 } else { 0.5 * (high - low) };
                     next[*j] = (own[*j] + s.clamp(-longest, longest)).clamp(low, high);
                 }
                 let tried = self.residuals(structure, &outward(&next)).map(|r| (self.cost(&r) + prior(&next), r));
                 match tried {
                     Some((c, r)) if c < cost => {
-                        let gained = cost - c;
-                        let hoped: f64 = foreseen.max(1e-300);
-                        lambda = if gained > 0.5 * hoped { lambda * 0.1 } else { lambda * 0.4 }.max(1e-9);
-                        (own, residuals, cost) = (next, r, c);
-                        accepted = true;
+                        accepted = Some((next, r, c));
                         break;
                     }
                     _ => lambda = (lambda * 8.0).min(1e9),
                 }
             }
+            let Some((next, r, c)) = accepted else {
+                if age == 0 {
+                    break;
+                }
+                (jacobian, age, lambda) = (self.jacobian(structure, &own, &residuals), 0, lambda.min(1e-1));
+                continue;
+            };
+            let ratio = (cost - c) / foreseen.max(1e-300);
+            lambda = if ratio > 0.5 { lambda * 0.1 } else { lambda * 0.4 }.max(1e-9);
+            // Far from any end and hardly moving: other structures deserve the time.
+            weak = if cost - c < 2e-3 * cost && unit > 2.0 { weak + 1 } else { 0 };
+            let fresh = ratio < 0.3 || age >= 4;
+            if !fresh {
+                secant(&mut jacobian, &residuals, &r, &own, &next, &matrix);
+            }
+            (own, residuals, cost) = (next, r, c);
             steps += 1;
-            if !accepted {
-                break;
+            if fresh && steps < effort.steps {
+                (jacobian, age) = (self.jacobian(structure, &own, &residuals), 0);
+            } else {
+                age += 1;
             }
         }
         Some(Fit { values: outward(&own), cost, residuals, jacobian, foreseen, steps })
+    }
+
+    /// Derivatives at the start, those by stated numbers from another fit where there is one.
+    fn first_jacobian(&self, structure: &Structure, own: &[f64], residuals: &[f64], known: Option<(&Structure, &Fit)>) -> Vec<Vec<f64>> {
+        let Some((other, fit)) = known else { return self.jacobian(structure, own, residuals) };
+        let column = |number: &Number| {
+            let place = other.numbers.iter().position(|n| n.role == number.role);
+            place.and_then(|p| fit.jacobian.get(p)).filter(|c| c.len() == residuals.len())
+        };
+        let missing: Vec<usize> = (0..own.len()).filter(|j| column(&structure.numbers[*j]).is_none()).collect();
+        let mut new = self.columns(structure, own, residuals, &missing).into_iter();
+        structure.numbers.iter().map(|n| column(n).cloned().or_else(|| new.next()).unwrap_or_else(|| vec![0.0; residuals.len()])).collect()
+    }
+
+    /// Whether fits should come to an end.
+    fn is_late(&self) -> bool {
+        self.stop.is_some_and(|s| s.load(Ordering::Relaxed)) || self.until.is_some_and(|t| std::time::Instant::now() > t)
     }
 
     /// The best of fits from several starts.
@@ -303,6 +369,23 @@ pub fn dot(a: &[f64], b: &[f64]) -> f64 {
         }
     }
     sums.iter().sum::<f64>() + tail
+}
+
+/// Brings derivatives in line with what a step did: the smallest change, in units of each number's own curvature, that explains it.
+fn secant(jacobian: &mut [Vec<f64>], before: &[f64], after: &[f64], from: &[f64], to: &[f64], matrix: &DMatrix<f64>) {
+    let step: Vec<f64> = to.iter().zip(from).map(|(a, b)| a - b).collect();
+    let scaled: Vec<f64> = step.iter().enumerate().map(|(j, s)| s * matrix[(j, j)]).collect();
+    let size: f64 = step.iter().zip(&scaled).map(|(a, b)| a * b).sum();
+    if !(size > 0.0 && size.is_finite()) {
+        return;
+    }
+    let mut missed: Vec<f64> = after.iter().zip(before).map(|(a, b)| a - b).collect();
+    for (column, s) in jacobian.iter().zip(&step).filter(|(_, s)| **s != 0.0) {
+        missed.iter_mut().zip(column).for_each(|(m, c)| *m -= c * s);
+    }
+    for (column, s) in jacobian.iter_mut().zip(&scaled).filter(|(_, s)| **s != 0.0) {
+        column.iter_mut().zip(&missed).for_each(|(c, m)| *c += m * s / size);
+    }
 }
 
 /// Damped step of the free numbers, scaled by their own curvature.

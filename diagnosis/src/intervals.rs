@@ -35,7 +35,8 @@ impl Spread {
         });
         let mut deviation = vec![f64::INFINITY; n];
         let mut correlation = DMatrix::identity(n, n);
-        let unit = (fit.residuals.iter().map(|r| r * r).sum::<f64>() / fit.residuals.len().max(1) as f64).max(1.0) * candidate.correlation_time;
+        let unit =
+            (fit.residuals.iter().map(|r| r * r).sum::<f64>() / fit.residuals.len().max(1) as f64).max(1.0) * candidate.correlation_time;
         if let Some(inverse) = scaled.cholesky().map(|c| c.inverse()) {
             for (a, j) in live.iter().enumerate() {
                 deviation[*j] = (inverse[(a, a)] * unit).sqrt() / scale[*j];
@@ -49,7 +50,9 @@ impl Spread {
 
     /// 95 % interval of a number, as it stands in the model.
     pub fn interval(&self, candidate: &Candidate, number: usize) -> [f64; 2] {
-        let (Some(n), Some(value)) = (candidate.structure.numbers.get(number), candidate.fit.values.get(number)) else { return [f64::NAN; 2] };
+        let (Some(n), Some(value)) = (candidate.structure.numbers.get(number), candidate.fit.values.get(number)) else {
+            return [f64::NAN; 2];
+        };
         let (low, high) = n.bounds();
         let own = n.inward(*value);
         let half = NORMAL_975 * self.deviation.get(number).copied().unwrap_or(f64::INFINITY);

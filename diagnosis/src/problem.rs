@@ -97,7 +97,8 @@ impl Problem {
     /// When a file is missing or wrong, a signal is not recorded, or the nominal model cannot be simulated.
     pub fn open(set: &Path, model: Option<&Path>) -> Result<Problem, ProblemError> {
         let set = RecordingSet::open(set)?;
-        let no_model = || ProblemError::Set(format!("{}: no model is named; say model = \"...\" in set.toml or give one", set.folder.display()));
+        let no_model =
+            || ProblemError::Set(format!("{}: no model is named; say model = \"...\" in set.toml or give one", set.folder.display()));
         let model_path = model.map(Path::to_path_buf).or_else(|| set.model.clone()).ok_or_else(no_model)?;
         let text = read_text(&model_path)?;
         let model = Model::load(&model_path)?;
@@ -123,7 +124,10 @@ impl Problem {
         Plant::new(&model, first.period, &Options::default())?;
         let measured = |output: usize| fit.iter().any(|r| r.outputs.get(output).is_some_and(Option::is_some));
         if !(0..model.outputs.len()).any(measured) {
-            return Err(ProblemError::Set(format!("none of the model's outputs ({}) was recorded", names(model.outputs.iter().map(|o| o.name.as_str())))));
+            return Err(ProblemError::Set(format!(
+                "none of the model's outputs ({}) was recorded",
+                names(model.outputs.iter().map(|o| o.name.as_str()))
+            )));
         }
         let stated = stated_numbers(&model, &text);
         let floor = (0..model.outputs.len()).map(|output| floor::of_signal(&model, &fit, output)).collect();
@@ -141,7 +145,8 @@ fn record(set: &RecordingSet, file: &str, model: &Model) -> Result<Record, Probl
     let path = set.path_of(file);
     let rules = set.rules_of(file);
     let is_bag = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("mcap"));
-    let recording = if is_bag { from_bag(&path, model, &set.columns, &rules.piece)? } else { from_csv(&path, model, &set.columns, &rules.piece)? };
+    let recording =
+        if is_bag { from_bag(&path, model, &set.columns, &rules.piece)? } else { from_csv(&path, model, &set.columns, &rules.piece)? };
     Record::new(&recording, model, rules.condition)
 }
 
@@ -176,7 +181,10 @@ impl Record {
         let recording = recording.regular_for(model)?;
         if recording.len() < FEWEST_SAMPLES {
             let count = recording.len();
-            return Err(ProblemError::Set(format!("{}: has {count} samples; a diagnosis needs at least {FEWEST_SAMPLES} per recording", recording.name)));
+            return Err(ProblemError::Set(format!(
+                "{}: has {count} samples; a diagnosis needs at least {FEWEST_SAMPLES} per recording",
+                recording.name
+            )));
         }
         let inputs: Vec<Vec<f64>> = recording.inputs_of(model)?.into_iter().map(<[f64]>::to_vec).collect();
         let outputs: Vec<Option<Vec<f64>>> = model.outputs.iter().map(|o| recording.signal(&o.name).map(<[f64]>::to_vec)).collect();

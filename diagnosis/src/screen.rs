@@ -32,7 +32,10 @@ struct Projector {
 
 impl Projector {
     fn new(jacobian: &[Vec<f64>], stride: usize) -> Projector {
-        let mut columns: Vec<Vec<f64>> = jacobian.iter().map(|c| c.iter().step_by(stride).copied().collect()).collect();
+        Projector::of(jacobian.iter().map(|c| c.iter().step_by(stride).copied().collect()).collect())
+    }
+
+    fn of(mut columns: Vec<Vec<f64>>) -> Projector {
         columns.retain_mut(|column| {
             let size = dot(column, column).sqrt();
             column.iter_mut().for_each(|x| *x /= size);
@@ -62,6 +65,19 @@ fn weakened(hypothesis: &Hypothesis, values: &[f64]) -> Vec<f64> {
     hypothesis.parameters.iter().zip(values).map(one).collect()
 }
 
+/// The recordings that a fit explains worst, in their order.
+pub fn worst_records(evaluator: &Evaluator, fit: &Fit, count: usize) -> Vec<usize> {
+    let mut costs = vec![0.0; evaluator.records.len()];
+    for (r, _, range) in evaluator.layout() {
+        costs[r] += fit.residuals.get(range).map_or(0.0, |part| dot(part, part));
+    }
+    let mut order: Vec<usize> = (0..costs.len()).collect();
+    order.sort_by(|a, b| costs[*b].total_cmp(&costs[*a]));
+    order.truncate(count);
+    order.sort_unstable();
+    order
+}
+
 /// Every hypothesis's best start with what it promises, most promising first.
 pub fn screen(evaluator: &Evaluator, base: &Structure, fit: &Fit, hypotheses: &[Hypothesis]) -> Vec<Promise> {
     let stride = fit.residuals.len().div_ceil(KEPT).max(1);
@@ -71,12 +87,52 @@ pub fn screen(evaluator: &Evaluator, base: &Structure, fit: &Fit, hypotheses: &[
     projector.apply(&mut left);
     let problem = evaluator.problem;
     let (stated, added) = (base.stated_of(problem, &fit.values), base.added_of(&fit.values));
-    let jobs: Vec<(usize, &Vec<f64>)> = hypotheses
+    // First all starts on the two recordings that are explained worst, then the best ones on all.
+    let few = worst_records(evaluator, fit, 2);
+    let all: Vec<(usize, &Vec<f64>)> = hypotheses
         .iter()
         .enumerate()
         .filter(|(_, h)| base.added.iter().all(|b| b.compatible(h)))
         .flat_map(|(index, h)| h.starts.iter().map(move |start| (index, start)))
         .collect();
+    let mut jobs = all;
+    if evaluator.records.len() > few.len() && problem.initial == backdrive_plant::set::Initial::Rest {
+        let layout = evaluator.layout();
+        let kept: Vec<usize> = layout.iter().filter(|l| few.contains(&l.0)).flat_map(|l| l.2.clone()).step_by(stride).collect();
+        let pick = |all: &[f64]| kept.iter().filter_map(|i| all.get(*i).copied()).collect::<Vec<f64>>();
+        let small = Projector::of(fit.jacobian.iter().map(|c| pick(c)).collect());
+        let mut left = pick(&fit.residuals);
+        small.apply(&mut left);
+        let total = dot(&left, &left);
+        let mut scores: Vec<(f64, (usize, &Vec<f64>))> = jobs
+            .par_iter()
+            .filter_map(|(index, start)| {
+                let mut with = base.added.clone();
+                with.push(hypotheses[*index].clone());
+                let structure = Structure::new(problem, evaluator.records, with);
+                let values = structure.values(problem, &stated, &[added.clone(), vec![start.to_vec()]].concat());
+                let model = structure.model(problem, &values)?;
+                let parts: Option<Vec<Vec<f64>>> =
+                    few.iter().map(|r| evaluator.record_residuals(&structure, &model, &values, *r)).collect();
+                let joined = parts?.concat();
+                let mut column: Vec<f64> = joined.into_iter().step_by(stride).zip(pick(&fit.residuals)).map(|(a, b)| a - b).collect();
+                let size = dot(&column, &column).sqrt();
+                if !(size > 0.0 && size.is_finite()) {
+                    return None;
+                }
+                column.iter_mut().for_each(|x| *x /= size);
+                small.apply(&mut column);
+                Some((share(&[&column], &left, total), (*index, *start)))
+            })
+            .collect();
+        scores.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let mut seen = vec![0; hypotheses.len()];
+        scores.retain(|s| {
+            seen[s.1.0] += 1;
+            seen[s.1.0] <= 2
+        });
+        jobs = scores.into_iter().take(60).map(|s| s.1).collect();
+    }
     let mut promises: Vec<Promise> = jobs
         .par_iter()
         .filter_map(|(index, start)| {
@@ -137,7 +193,13 @@ fn share(columns: &[&Vec<f64>], left: &[f64], total: f64) -> f64 {
 }
 
 /// Pairs of hypotheses by what they promise together, most promising first: places in `promises`.
-pub fn pairs(promises: &[Promise], fit: &Fit, jacobian: &[Vec<f64>], count: usize, compatible: impl Fn(usize, usize) -> bool) -> Vec<(usize, usize, f64)> {
+pub fn pairs(
+    promises: &[Promise],
+    fit: &Fit,
+    jacobian: &[Vec<f64>],
+    count: usize,
+    compatible: impl Fn(usize, usize) -> bool,
+) -> Vec<(usize, usize, f64)> {
     let stride = fit.residuals.len().div_ceil(KEPT).max(1);
     let mut left: Vec<f64> = fit.residuals.iter().step_by(stride).copied().collect();
     let total = dot(&left, &left);

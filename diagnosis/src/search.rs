@@ -4,9 +4,10 @@ use crate::fit::{Effort, Evaluator, Fit, measured};
 use crate::floor;
 use crate::hypothesis::{self, Hypothesis, Scales};
 use crate::problem::{Problem, Record};
-use crate::screen::{Promise, pairs, screen};
+use crate::screen::{Promise, pairs, screen, worst_records};
 use crate::statistics::{advantage, correlation_time, levels};
-use crate::structure::{Role, Structure};
+use crate::structure::Structure;
+use backdrive_plant::set::Initial;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -92,6 +93,8 @@ pub fn price(candidate: &Candidate, samples: usize, correlation_time: f64) -> f6
     effective * (candidate.fit.cost.max(1e-300) / samples.max(1) as f64).ln() + candidate.structure.numbers.len() as f64 * effective.ln()
 }
 
+/// Numbers of a physics that is tried first, at most.
+const SIMPLE: usize = 4;
 /// A residual at its floor has this level, up to chance and rounding.
 pub const AT_FLOOR: f64 = 1.04;
 
@@ -99,11 +102,17 @@ pub const AT_FLOOR: f64 = 1.04;
 ///
 /// # Errors
 /// When the nominal model cannot be simulated on the recordings.
-pub fn search(problem: &Problem, settings: &Settings, stop: Option<&AtomicBool>, report: &(dyn Fn(&str) + Sync)) -> Result<Search, SearchError> {
+pub fn search(
+    problem: &Problem,
+    settings: &Settings,
+    stop: Option<&AtomicBool>,
+    report: &(dyn Fn(&str) + Sync),
+) -> Result<Search, SearchError> {
     let began = Instant::now();
     let late = |share: f64| began.elapsed() > settings.patience.mul_f64(share) || stop.is_some_and(|s| s.load(Ordering::Relaxed));
     let mut evaluator = Evaluator::new(problem);
     evaluator.stop = stop;
+    evaluator.until = Some(began + settings.patience);
     if friction_on_prescribed(problem) {
         evaluator.robust = 6.0;
     }
@@ -116,14 +125,19 @@ pub fn search(problem: &Problem, settings: &Settings, stop: Option<&AtomicBool>,
     // What a fit leaves over shows the measuring error better than the signal does.
     let before = evaluator.floor.clone();
     evaluator.floor = floors(&evaluator, &quick.residuals);
-    let rescaled: Vec<f64> = levels(&evaluator, &first).iter().zip(before.iter().zip(&evaluator.floor)).map(|(l, (b, f))| l * b / f).collect();
+    let rescaled: Vec<f64> =
+        levels(&evaluator, &first).iter().zip(before.iter().zip(&evaluator.floor)).map(|(l, (b, f))| l * b / f).collect();
     let levels_given = rescaled;
     let mut nominal = evaluator.fit(&structure, &quick.values, Effort::FULL).ok_or(SearchError::RunsAway)?;
     let samples = nominal.residuals.len();
     if nominal.cost > AT_FLOOR * AT_FLOOR * samples as f64 {
         for shift in [0.35, -0.35] {
             // Inertias one way, the rest the other: what a wrong structure trades most easily.
-            let moved: Vec<f64> = problem.stated.iter().map(|s| if s.path.starts_with("bodies") { s.given * f64::exp(shift) } else { s.given * f64::exp(-shift) }).collect();
+            let moved: Vec<f64> = problem
+                .stated
+                .iter()
+                .map(|s| if s.path.starts_with("bodies") { s.given * f64::exp(shift) } else { s.given * f64::exp(-shift) })
+                .collect();
             let from = structure.values(problem, &moved, &[]);
             if let Some(other) = evaluator.fit(&structure, &from, Effort { steps: 15, tolerance: 3.0 })
                 && other.cost < 0.999 * nominal.cost
@@ -149,18 +163,26 @@ pub fn search(problem: &Problem, settings: &Settings, stop: Option<&AtomicBool>,
     report("screening");
     let coarse = Evaluator { substeps: 8, ..evaluator.clone() };
     let promises = screen(&coarse, &nominal.structure, &nominal.fit, &hypotheses);
+    // Physics of many numbers come in where simpler relatives do not suffice.
+    let (simple, rich): (Vec<Promise>, Vec<Promise>) = promises.into_iter().partition(|p| hypotheses[p.hypothesis].parameters.len() <= SIMPLE);
+    let promises = simple;
     let mut found: Vec<Candidate> = Vec::new();
     let mut tried: Vec<Tried> = Vec::new();
-    for promise in &promises {
+    for promise in promises.iter().chain(&rich) {
         let id = &hypotheses[promise.hypothesis].id;
         if !tried.iter().any(|t| t.id == *id) {
             tried.push(Tried { id: id.clone(), promised: promise.share, taken: None });
         }
     }
     report("fitting single effects");
-    let singles = race(&evaluator, problem, &nominal, &hypotheses, single_seeds(&promises, 22), [12, 6], &given);
+    let singles = race(&evaluator, problem, &nominal, &hypotheses, single_seeds(&promises, 18), [8, 5], &given);
     found.extend(singles);
     sort(&mut found, samples);
+    if !late(0.5) && !done(&found, &nominal, samples) {
+        let richer = race(&evaluator, problem, &nominal, &hypotheses, single_seeds(&rich, 5), [3, 2], &given);
+        found.extend(richer);
+        sort(&mut found, samples);
+    }
 
     let mut stopped = late(1.0);
     for effects in 2..=settings.effects {
@@ -175,15 +197,16 @@ pub fn search(problem: &Problem, settings: &Settings, stop: Option<&AtomicBool>,
             seeds.extend(pair_seeds(&promises, &together, 12));
         }
         // From the best that have one effect less, and what each of them promises.
-        let bases: Vec<&Candidate> = found.iter().filter(|c| c.structure.added.len() == effects - 1).take(if effects == 2 { 4 } else { 3 }).collect();
+        let bases: Vec<&Candidate> =
+            found.iter().filter(|c| c.structure.added.len() == effects - 1).take(if effects == 2 { 4 } else { 3 }).collect();
         for base in bases {
             if late(0.75) {
                 break;
             }
             let next = screen(&coarse, &base.structure, &base.fit, &hypotheses);
             let mut used = std::collections::HashSet::new();
-            for promise in next.iter().filter(|p| used.insert(p.hypothesis)).take(6) {
-                seeds.push(extended(base, &hypotheses, promise));
+            for promise in next.iter().filter(|p| hypotheses[p.hypothesis].parameters.len() <= SIMPLE && used.insert(p.hypothesis)).take(6) {
+                seeds.push(extended(base, base.structure.stated_of(problem, &base.fit.values), &hypotheses, promise));
             }
         }
         seeds.retain(|s| s.effects.len() == effects);
@@ -204,9 +227,11 @@ pub fn search(problem: &Problem, settings: &Settings, stop: Option<&AtomicBool>,
 /// Whether dry friction acts on a body whose motion is prescribed: its force then jumps with the sign of a measured motion.
 fn friction_on_prescribed(problem: &Problem) -> bool {
     use backdrive_plant::model::{InputKind, OutputKind};
-    problem.model.inputs.iter().any(|i| {
-        i.kind == InputKind::Motion && problem.model.outputs.iter().any(|o| o.kind == OutputKind::Reaction(i.on))
-    })
+    problem
+        .model
+        .inputs
+        .iter()
+        .any(|i| i.kind == InputKind::Motion && problem.model.outputs.iter().any(|o| o.kind == OutputKind::Reaction(i.on)))
 }
 
 /// Measuring errors by what a fit leaves over, never above what the signals showed.
@@ -253,11 +278,10 @@ pub fn advantage_over(base: &Candidate, better: &Candidate, samples: usize) -> f
 struct Seed {
     effects: Vec<(usize, Vec<f64>)>,
     stated: Option<Vec<f64>>,
-    hope: f64,
 }
 
 fn single_seeds(promises: &[Promise], count: usize) -> Vec<Seed> {
-    promises.iter().take(count).map(|p| Seed { effects: vec![(p.hypothesis, p.values.clone())], stated: None, hope: p.share }).collect()
+    promises.iter().take(count).map(|p| Seed { effects: vec![(p.hypothesis, p.values.clone())], stated: None }).collect()
 }
 
 fn pair_seeds(promises: &[Promise], together: &[(usize, usize, f64)], count: usize) -> Vec<Seed> {
@@ -266,22 +290,19 @@ fn pair_seeds(promises: &[Promise], together: &[(usize, usize, f64)], count: usi
         .iter()
         .filter(|(a, b, _)| seen.insert((promises[*a].hypothesis, promises[*b].hypothesis)))
         .take(count)
-        .map(|(a, b, share)| Seed {
+        .map(|(a, b, _)| Seed {
             effects: [a, b].iter().map(|p| (promises[**p].hypothesis, promises[**p].values.clone())).collect(),
             stated: None,
-            hope: *share,
         })
         .collect()
 }
 
-fn extended(base: &Candidate, hypotheses: &[Hypothesis], promise: &Promise) -> Seed {
+fn extended(base: &Candidate, stated: Vec<f64>, hypotheses: &[Hypothesis], promise: &Promise) -> Seed {
     let values = base.structure.added_of(&base.fit.values);
     let place = |h: &Hypothesis| hypotheses.iter().position(|other| other.id == h.id);
     let mut effects: Vec<(usize, Vec<f64>)> = base.structure.added.iter().zip(values).filter_map(|(h, v)| Some((place(h)?, v))).collect();
     effects.push((promise.hypothesis, promise.values.clone()));
-    let stated: Vec<f64> = base.structure.numbers.iter().zip(&base.fit.values).filter(|(n, _)| matches!(n.role, Role::Stated(_))).map(|(_, v)| *v).collect();
-    let _ = stated;
-    Seed { effects, stated: None, hope: promise.share }
+    Seed { effects, stated: Some(stated) }
 }
 
 /// Fits many structures a little, the better half more, the best to the end.
@@ -295,23 +316,34 @@ fn race(
     given: &[f64],
 ) -> Vec<Candidate> {
     let refitted = nominal.structure.stated_of(problem, &nominal.fit.values);
+    // The first steps on the recordings that are explained worst, with few substeps.
+    let few = worst_records(evaluator, &nominal.fit, 2);
+    let whole = few.len() == evaluator.records.len() || problem.initial == Initial::Free || problem.fit.iter().any(|r| !r.conditions.is_empty());
+    let some: Vec<Record> = if whole { problem.fit.clone() } else { few.iter().map(|r| problem.fit[*r].clone()).collect() };
+    let coarse = Evaluator { substeps: 16, records: &some, ..evaluator.clone() };
+    let nominal_there = if whole { nominal.fit.clone() } else { restricted(evaluator, &nominal.fit, &few) };
+    let structure_of = |seed: &Seed| Structure::new(problem, &some, seed.effects.iter().map(|(h, _)| hypotheses[*h].clone()).collect());
     let mut running: Vec<(Structure, Fit)> = seeds
         .par_iter()
         .filter_map(|seed| {
-            let _ = seed.hope;
-            let added: Vec<Hypothesis> = seed.effects.iter().map(|(h, _)| hypotheses[*h].clone()).collect();
             let values: Vec<Vec<f64>> = seed.effects.iter().map(|(_, v)| v.clone()).collect();
-            let structure = Structure::new(problem, &problem.fit, added);
+            let structure = structure_of(seed);
             let from_refit = structure.values(problem, seed.stated.as_deref().unwrap_or(&refitted), &values);
             let from_given = structure.values(problem, given, &values);
-            let effort = Effort { steps: 3, tolerance: 3.0 };
-            let coarse = Evaluator { substeps: 16, ..evaluator.clone() };
-            let fits = [from_refit, from_given].into_iter().filter_map(|start| coarse.fit(&structure, &start, effort));
+            let effort = Effort { steps: 2, tolerance: 3.0 };
+            let known = Some((&nominal.structure, &nominal_there));
+            let fits = [from_refit, from_given].into_iter().filter_map(|start| coarse.fit_knowing(&structure, &start, effort, known));
             let best = fits.min_by(|a, b| hopeful(a).total_cmp(&hopeful(b)))?;
             Some((structure, best))
         })
         .collect();
-    for (count, effort) in [(keep[0], Effort { steps: 6, tolerance: 1.0 }), (keep[1], Effort::FULL)] {
+    let last = Evaluator { until: evaluator.until.map(|t| t + Duration::from_secs(2)), ..evaluator.clone() };
+    let stages = [
+        (keep[0] + 6, &coarse, Effort { steps: 3, tolerance: 2.0 }),
+        (keep[0], evaluator, Effort { steps: 5, tolerance: 1.0 }),
+        (keep[1], &last, Effort::FULL),
+    ];
+    for (count, held_against, effort) in stages {
         running.sort_by(|a, b| hopeful(&a.1).total_cmp(&hopeful(&b.1)));
         let mut names = std::collections::HashSet::new();
         running.retain(|(s, _)| {
@@ -326,12 +358,22 @@ fn race(
         running = running
             .into_par_iter()
             .map(|(structure, fit)| {
-                let next = evaluator.fit(&structure, &fit.values, effort).unwrap_or(fit);
+                let next = held_against.fit_knowing(&structure, &fit.values, effort, Some((&structure, &fit))).unwrap_or(fit);
                 (structure, next)
             })
             .collect();
     }
-    running.into_iter().map(|(s, f)| candidate(evaluator, s, f)).collect()
+    let size = evaluator.len();
+    running.into_iter().filter(|(_, f)| f.residuals.len() == size).map(|(s, f)| candidate(evaluator, s, f)).collect()
+}
+
+/// A fit's residuals and derivatives on some of its recordings.
+fn restricted(evaluator: &Evaluator, fit: &Fit, records: &[usize]) -> Fit {
+    let layout = evaluator.layout();
+    let pick = |all: &Vec<f64>| -> Vec<f64> {
+        layout.iter().filter(|l| records.contains(&l.0)).filter_map(|l| all.get(l.2.clone())).flatten().copied().collect()
+    };
+    Fit { residuals: pick(&fit.residuals), jacobian: fit.jacobian.iter().map(pick).collect(), ..fit.clone() }
 }
 
 /// What a fit would cost if most of what its next step foresees came true.

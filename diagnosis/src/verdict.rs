@@ -150,7 +150,10 @@ fn findings(search: &Search, best: &Candidate, spread: &Spread) -> Vec<Json> {
         let without = search
             .found
             .iter()
-            .filter(|c| c.structure.added.len() + 1 == total && c.structure.added.iter().all(|o| o.id != hypothesis.id && best.structure.added.iter().any(|b| b.id == o.id)))
+            .filter(|c| {
+                c.structure.added.len() + 1 == total
+                    && c.structure.added.iter().all(|o| o.id != hypothesis.id && best.structure.added.iter().any(|b| b.id == o.id))
+            })
             .map(|c| c.fit.cost)
             .fold(search.nominal.fit.cost, f64::min);
         all.push((without, entry));
@@ -215,7 +218,10 @@ fn moved(problem: &Problem, best: &Candidate, spread: &Spread) -> Json {
         let key = if list { format!("{}[{}]", stated.path, stated.index) } else { stated.path.clone() };
         let deviation = spread.deviation[index];
         let away = (number.inward(value) - number.inward(stated.given)) / deviation;
-        all.insert(key, json!({ "value": r(value), "ci95": [r(low), r(high)], "nominal": stated.given, "moved_sd": round_significant(away, 3) }));
+        all.insert(
+            key,
+            json!({ "value": r(value), "ci95": [r(low), r(high)], "nominal": stated.given, "moved_sd": round_significant(away, 3) }),
+        );
     }
     Json::Object(all)
 }
@@ -252,8 +258,13 @@ fn model_text(problem: &Problem, best: &Candidate, spread: &Spread, use_best: bo
             continue;
         }
         paths.push(&stated.path);
-        let own: Vec<(usize, f64)> =
-            problem.stated.iter().zip(&values).filter(|(s, _)| s.path == stated.path).map(|(s, v)| (s.index, round_significant(*v, 7))).collect();
+        let own: Vec<(usize, f64)> = problem
+            .stated
+            .iter()
+            .zip(&values)
+            .filter(|(s, _)| s.path == stated.path)
+            .map(|(s, v)| (s.index, round_significant(*v, 7)))
+            .collect();
         let Ok(mut list) = model.values_at(&stated.path) else { continue };
         for (index, value) in &own {
             if let Some(slot) = list.get_mut(*index) {
@@ -316,11 +327,13 @@ fn band(samples: &[f64], period: f64) -> [f64; 2] {
     let hz = |index: usize| index as f64 / (samples.len() as f64 * period);
     let at = |share: f64| {
         let mut sum = 0.0;
-        hz(energy.iter().position(|e| {
-            sum += e;
-            sum >= share * total
-        })
-        .unwrap_or(0))
+        hz(energy
+            .iter()
+            .position(|e| {
+                sum += e;
+                sum >= share * total
+            })
+            .unwrap_or(0))
     };
     [at(0.1), at(0.9)]
 }

@@ -66,7 +66,8 @@ pub fn check(graph: &Graph, session: &Session) -> Result<Vec<PartCheck>, BuildEr
         let without = answer(graph, &master.name, &[hand, Given::Effort(&none)], session)?;
         for (index, axis) in session.axes.iter().enumerate() {
             let output = &model.outputs[model.axes[index].measured];
-            let floor = if *real_sensors { model.axes[index].scale.abs() * rounding_and_noise(output.resolution, output.noise) } else { 0.0 };
+            let floor =
+                if *real_sensors { model.axes[index].scale.abs() * rounding_and_noise(output.resolution, output.noise) } else { 0.0 };
             let (predicted, free): (Vec<f64>, Vec<f64>) =
                 (with.iter().map(|s| s.position[index]).collect(), without.iter().map(|s| s.position[index]).collect());
             checks.extend(compare(
@@ -113,7 +114,8 @@ fn force_path(graph: &Graph, session: &Session) -> Vec<PartCheck> {
     if ways.iter().flatten().filter_map(|c| c.impairment).any(|i| i.jitter_s > 0.0 || i.loss > 0.0) {
         return Vec::new();
     }
-    let steps = |c: &backdrive_nodes::graph::Connection| c.delay + c.impairment.map_or(0, |i| (i.delay_s / session.period_s).round() as u64);
+    let steps =
+        |c: &backdrive_nodes::graph::Connection| c.delay + c.impairment.map_or(0, |i| (i.delay_s / session.period_s).round() as u64);
     let late: u64 = ways.iter().flatten().map(|c| steps(c)).sum();
     let mut checks = Vec::new();
     for (index, axis) in session.axes.iter().enumerate() {

@@ -290,7 +290,8 @@ fn scenario(question: &Question) -> Result<Scenario, String> {
     if question.intents.is_none() && question.script.is_none() {
         return Err("the hand's motion was not recorded and could not be recovered; name one with --script".to_string());
     }
-    let scenario = Scenario::new(graph.clone(), question.intents.clone(), Some(question.session.len() as u64)).map_err(|e| e.to_string())?;
+    let scenario =
+        Scenario::new(graph.clone(), question.intents.clone(), Some(question.session.len() as u64)).map_err(|e| e.to_string())?;
     Ok(match &question.script {
         Some(script) => scenario.with_script(script),
         None => scenario,
@@ -307,7 +308,7 @@ fn resimulate(question: &Question, scenario: &Scenario, progress: Progress, canc
     let asked = Some(question.gain.product());
     let others: Vec<f64> = question.grips.iter().copied().filter(|s| *s != 1.0).collect();
     // For other grips the edge need not be as exact.
-    let coarse = Search { tolerance: 0.02, per_decade: 10, ..question.search };
+    let coarse = Search { tolerance: 0.02, per_decade: 20, whole_grid: false, ..question.search };
     let grips = grips(scenario, &others, asked, &coarse, &options, &|done, all| progress("other grips", done, all), cancel)?;
     let over_cancelling = over_cancelling(scenario, &question.grips, asked, &options, cancel).ok();
     let energy = energy(&signals, Some(scenario.graph()), None);
@@ -384,7 +385,10 @@ impl Answer {
         let gains = (0..session.len()).map(|row| session.gain(row)).filter(|g| g.is_finite());
         let range = gains.fold(None, |r: Option<[f64; 2]>, g| Some(r.map_or([g, g], |[a, b]| [a.min(g), b.max(g)])));
         let mut warnings = session.notes.clone();
-        warnings.extend(frequency.notes.iter().cloned());
+        // That the edge depends on the amplitude is told below, with the numbers.
+        warnings.extend(frequency.notes.iter().filter(|n| !n.starts_with("the edge depends on the amplitude")).cloned());
+        let mut told = std::collections::HashSet::new();
+        warnings.retain(|w| told.insert(w.clone()));
         if frequency.relative {
             warnings.push("the gains of the recording are not known: every gain is in multiples of the recorded one".to_string());
         }
@@ -449,8 +453,12 @@ impl Answer {
         match (&self.resimulated, agree && self.models_are_checked()) {
             (Some(_), true) => self.by_resimulation(),
             _ if measured => self.by_frequency(),
-            (Some(_), false) if agree => self.untold("nothing in the recording says whether its models are right, and it holds no excitation that tells the loop"),
-            (Some(_), false) => self.untold("the models in the bag do not do what was recorded, and it holds no excitation that tells the loop"),
+            (Some(_), false) if agree => {
+                self.untold("nothing in the recording says whether its models are right, and it holds no excitation that tells the loop")
+            }
+            (Some(_), false) => {
+                self.untold("the models in the bag do not do what was recorded, and it holds no excitation that tells the loop")
+            }
             _ => self.untold("there is no loop to run again, and the recording holds no excitation that tells the loop"),
         }
         self.by_the_recording();
@@ -492,7 +500,10 @@ impl Answer {
             _ => None,
         };
         let difference = self.loop_check.map(|c| (1.0 - 2.0 * c.difference.max(0.005), Some(1.0 + 2.0 * c.difference.max(0.005))));
-        let (low, high) = measured.or(difference)?;
+        let Some((low, high)) = measured.or(difference) else {
+            // Nothing of the loop stands out of the noise: then the recording gives a lower end only.
+            return frequency.edge.at_least.map(|least| (least.min(critical), None));
+        };
         let (low, high) = (critical * low.max(0.0), high.map(|h| critical * h));
         // Where the verdict flickers the edge is no point.
         let highest = self.resimulated.as_ref().and_then(|r| r.edge.flickers).map_or(0.0, |[_, highest]| highest * 1.01);
@@ -545,7 +556,8 @@ impl Answer {
         }
         if let Some(check) = self.loop_check.filter(|c| !c.agrees) {
             let (is, explained) = (100.0 * check.difference, 100.0 * check.noise);
-            let text = format!("near the edge the measured loop is {is:.1} % off the loop that the models make ({explained:.1} % would be noise)");
+            let text =
+                format!("near the edge the measured loop is {is:.1} % off the loop that the models make ({explained:.1} % would be noise)");
             found.push(Disagreement { kind: "model", text });
         }
         if let (Some(answer), Some(again)) = (&self.frequency_answer, &self.resimulated) {
@@ -557,7 +569,8 @@ impl Answer {
             };
             if differ {
                 let says = if answer.verdict == frequency::Verdict::Stable { "stable" } else { "unstable" };
-                let text = format!("at mu*lambda = {:.3} the frequency response says {says}, the re-simulation {}", answer.gain, again.outcome);
+                let text =
+                    format!("at mu*lambda = {:.3} the frequency response says {says}, the re-simulation {}", answer.gain, again.outcome);
                 found.push(Disagreement { kind: "methods", text });
             }
             let apart = match (answer.critical_gain_ci95, again.edge.critical_gain) {
@@ -576,7 +589,11 @@ impl Answer {
                     "the edge is {} by the frequency response and {} by the re-simulation{}",
                     edge(answer.critical_gain, answer.at_least),
                     edge(again.edge.critical_gain, Some(again.edge.at_least)),
-                    if swapped.any() || answer.amplitude_dependent { ": a loop that is not linear has an edge for each motion" } else { "" }
+                    if swapped.any() || answer.amplitude_dependent {
+                        ": a loop that is not linear has an edge for each motion"
+                    } else {
+                        ""
+                    }
                 );
                 found.push(Disagreement { kind: "methods", text });
             }
@@ -597,11 +614,13 @@ impl Answer {
                 .filter_map(|g| g.at_asked.filter(|o| *o != Outcome::Stable).map(|o| format!("{} of the grip: {o}", g.scale)))
                 .collect();
             if self.verdict == Word::Stable && !fails.is_empty() {
-                self.warnings.push(format!("stable with this grip, but not with every grip at mu*lambda = {asked:.3}: {}", fails.join("; ")));
+                self.warnings
+                    .push(format!("stable with this grip, but not with every grip at mu*lambda = {asked:.3}: {}", fails.join("; ")));
             }
             self.warnings.extend(again.over_cancelling.as_ref().and_then(|o| o.warning.clone()));
             if let Some([lowest, highest]) = again.edge.flickers {
-                self.warnings.push(format!("from mu*lambda = {lowest:.3} to {highest:.3} the verdict changes with the gain more than once"));
+                self.warnings
+                    .push(format!("from mu*lambda = {lowest:.3} to {highest:.3} the verdict changes with the gain more than once"));
             }
             if let Some(gain) = again.edge.returns_to_stable.filter(|g| again.edge.flickers.is_none_or(|[_, h]| *g > h)) {
                 self.warnings.push(format!("beyond its edge the loop is stable again at mu*lambda = {gain:.3}: do not rely on it"));

@@ -40,6 +40,7 @@ mod tests;
 
 pub use apply::apply_edits;
 pub use scales::{Scales, Span};
+pub(crate) use sites::is_seen;
 
 use backdrive_plant::elements::Kind;
 use backdrive_plant::model::Model;

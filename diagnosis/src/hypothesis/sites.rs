@@ -130,7 +130,7 @@ impl Site {
 
 /// Whether a force between two places shows in any output: whether it moves a free body that an output depends on, or
 /// loads a body whose reaction is read.
-fn is_seen(model: &Model, ends: [Place; 2]) -> bool {
+pub(crate) fn is_seen(model: &Model, ends: [Place; 2]) -> bool {
     let is_moved = |body: usize| model.inputs.iter().any(|i| i.kind == InputKind::Motion && i.on == body);
     let mut reached = vec![false; model.bodies.len()];
     let mut front: Vec<usize> = ends.into_iter().flatten().collect();

@@ -10,7 +10,7 @@ use backdrive_control::operator::Intent;
 use backdrive_control::scaling::{GainChange, GainPlan};
 use backdrive_msgs::MAX_AXES;
 use backdrive_plant::elements::Range;
-use backdrive_plant::excitation::{Excitation, ExcitationError};
+use backdrive_plant::excitation::{Excitation, ExcitationError, Shape};
 use backdrive_plant::model::{Fragment, Model};
 use backdrive_plant::tomlfile::{FileError, Table, read_text, unknown};
 use std::path::{Path, PathBuf};
@@ -319,10 +319,29 @@ impl NodeReader<'_> {
     }
 
     /// A string or a list of strings, an excitation or a recorded force per axis, as samples at the graph's rate.
+    /// One multisine for a master of several axes (read before): each axis gets phases of its own, for what two axes do
+    /// together cannot be told apart.
+    fn for_each_axis(&self, excitation: &Excitation) -> Vec<Excitation> {
+        let axes = self.graph.nodes.iter().find(|n| n.kind == NodeKind::Master).map_or(1, |n| n.axes);
+        let own = |axis: usize| {
+            let mut own = excitation.clone();
+            if let Shape::Multisine { seed, .. } = &mut own.shape {
+                *seed = seed.wrapping_add(axis as u64);
+            }
+            own
+        };
+        (0..axes.max(1)).map(own).collect()
+    }
+
     fn excitations(&mut self, table: &mut Table, key: &str) -> Result<Vec<Vec<f64>>, FileError> {
         let Some(specs) = table.string_or_strings(key)? else { return Ok(Vec::new()) };
         if specs.len() > MAX_AXES {
             return Err(table.error_at(key, format!("at most {MAX_AXES} axes are possible")));
+        }
+        let one = specs.first().filter(|_| specs.len() == 1 && key == "dither").and_then(|spec| spec.parse::<Excitation>().ok());
+        if let Some(one) = one.filter(|e| matches!(e.shape, Shape::Multisine { .. })) {
+            let samples = |e: &Excitation| e.samples(self.graph.timing.rate_hz).map_err(|e| table.error_at(key, e.to_string()));
+            return self.for_each_axis(&one).iter().map(samples).collect();
         }
         specs
             .iter()

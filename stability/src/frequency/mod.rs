@@ -232,14 +232,15 @@ pub fn analyse(session: &Session, options: &Options) -> Result<Frequency, Freque
     let mut rows = rows::usable(&session);
     rows.count.bridged = bridged;
     drop_unknown_gains(&mut rows);
-    if rows.hand_moves {
+    let has_dither = session.axes.iter().any(|a| a.dither.as_ref().is_some_and(|d| d.iter().any(|x| x.is_finite() && *x != 0.0)));
+    if rows.hand_moves && has_dither {
         notes.push("the hand never rests in contact: all of the contact was used, and below a few Hz its motion is noise".to_string());
     }
-    if rows.count.contact_losses > 0 && rows.count.free > 0 {
+    // The release at the end is one.
+    if rows.count.contact_losses > 1 && rows.count.free > 0 {
         notes.push(format!("contact was lost {} times; rows without contact and {} ms after are left out", rows.count.contact_losses, 200));
     }
     let advice = advice(&session);
-    let has_dither = session.axes.iter().any(|a| a.dither.as_ref().is_some_and(|d| d.iter().any(|x| x.is_finite() && *x != 0.0)));
     let mut result = Frequency {
         levels: Vec::new(),
         gains: Vec::new(),

@@ -1,0 +1,61 @@
+//! What the nonlinear elements of the nominal model do along the path that the device really took.
+
+use super::channel::Split;
+use super::trajectory::Trajectory;
+use backdrive_plant::elements::{Law, Mechanics, Role};
+
+/// Forces of the nonlinear elements along the simulated motion with the deviation added, less those along the simulated motion, less what
+/// the linear part already says: one column for each element of [`Split::nonlinear`].
+pub(super) fn extra_forces(split: &Split, trajectory: &Trajectory, position: &[Vec<f64>], velocity: &[Vec<f64>]) -> Vec<Vec<f64>> {
+    let one = |index: &usize| {
+        let element = &split.model.elements[*index];
+        let linear = split.linear.elements[*index];
+        let (x, v) = trajectory.across(element.between);
+        let of = |columns: &[Vec<f64>], k: usize| {
+            let at = |end: Option<usize>| end.and_then(|b| columns.get(b)).and_then(|c| c.get(k)).copied().unwrap_or(0.0);
+            at(element.between[0]) - at(element.between[1])
+        };
+        let (dx, dv): (Vec<f64>, Vec<f64>) = (0..trajectory.len).map(|k| (of(position, k), of(velocity, k))).unzip();
+        let moved: Vec<f64> = x.iter().zip(&dx).map(|(a, b)| a + b).collect();
+        let faster: Vec<f64> = v.iter().zip(&dv).map(|(a, b)| a + b).collect();
+        let slip = SLIP * rms(&x);
+        let (before, after) =
+            (along(&element.law, &x, &v, trajectory.period, slip), along(&element.law, &moved, &faster, trajectory.period, slip));
+        (0..trajectory.len).map(|k| after[k] - before[k] - linear.stiffness * dx[k] - linear.damping * dv[k]).collect()
+    };
+    split.nonlinear.iter().map(one).collect()
+}
+
+/// Force of a law along a path. Dry friction builds up over the distance `slip`, so that noise about rest does not make it chatter.
+fn along(law: &Law, x: &[f64], v: &[f64], period: f64, slip: f64) -> Vec<f64> {
+    let mut memory = vec![0.0; law.memory_len()];
+    let (mut last, mut force) = (x.first().copied().unwrap_or(0.0), 0.0_f64);
+    let levels = match law.role() {
+        Role::Friction(levels) => Some(levels),
+        _ => None,
+    };
+    let step = |(x, v): (&f64, &f64)| {
+        match &levels {
+            Some(levels) => {
+                let (up, down) = (levels.sliding(0, *v), levels.sliding(1, *v));
+                let slope = if slip > 0.0 { up.max(down) / slip } else { f64::INFINITY };
+                let change = x - last;
+                force = if change == 0.0 { force } else { (force + slope * change).min(up).max(-down) };
+            }
+            None => {
+                law.advance(&mut memory, last, *x, period);
+                force = law.force(&memory, *x, *v);
+            }
+        }
+        last = *x;
+        force
+    };
+    x.iter().zip(v).map(step).collect()
+}
+
+pub(super) fn rms(x: &[f64]) -> f64 {
+    (x.iter().map(|x| x * x).sum::<f64>() / x.len().max(1) as f64).sqrt()
+}
+
+/// Distance over which dry friction builds up, in rms displacements.
+const SLIP: f64 = 1e-3;

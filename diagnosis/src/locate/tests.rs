@@ -1,0 +1,245 @@
+//! Devices with known hidden physics: simulated with it, located without.
+
+use super::*;
+use backdrive_plant::stepper::{Options as StepOptions, simulate};
+use rand::SeedableRng;
+use rand_distr::{Distribution, Normal};
+
+const PERIOD: f64 = 5e-4;
+
+/// A motor, a drum and a handle; `extra` is TOML that is added.
+fn master(extra: &str, input: &str) -> Model {
+    let text = format!(
+        "name = 'master'\n[bodies]\nmotor = 0.02\ndrum = 0.03\nhandle = 0.1\n\
+         [[elements]]\nname = 'cable'\nkind = 'spring'\nbetween = ['motor', 'drum']\nstiffness = 8000.0\n\
+         [[elements]]\nname = 'cable_damping'\nkind = 'damper'\nbetween = ['motor', 'drum']\ndamping = 3.0\n\
+         [[elements]]\nname = 'linkage'\nkind = 'spring'\nbetween = ['drum', 'handle']\nstiffness = 1500.0\n\
+         [[elements]]\nname = 'linkage_damping'\nkind = 'damper'\nbetween = ['drum', 'handle']\ndamping = 1.0\n\
+         [[elements]]\nname = 'user'\nkind = 'spring'\nbetween = ['handle', 'ground']\nstiffness = 400.0\n\
+         [[elements]]\nname = 'user_damping'\nkind = 'damper'\nbetween = ['handle', 'ground']\ndamping = 6.0\n{extra}\n\
+         [[inputs]]\nname = 'force'\nkind = 'force'\non = 'motor'\nhold = 'zero'\n{input}\n\
+         [[outputs]]\nname = 'motor_position'\nkind = 'position'\nof = 'motor'\n\
+         [[outputs]]\nname = 'handle_velocity'\nkind = 'velocity'\nof = 'handle'\n"
+    );
+    Model::from_toml(&text, "master").expect("a model")
+}
+
+/// A sweep and a sum of sines, s seconds each.
+fn drives(amplitude: f64, seconds: f64) -> Vec<Vec<f64>> {
+    let n = (seconds / PERIOD) as usize;
+    let sweep = |k: usize| {
+        let t = k as f64 * PERIOD;
+        let (from, to) = (0.5_f64, 40.0_f64);
+        let phase = std::f64::consts::TAU * from * seconds / (to / from).ln() * ((to / from).powf(t / seconds) - 1.0);
+        amplitude * phase.sin()
+    };
+    let sines = |k: usize| {
+        let t = k as f64 * PERIOD * std::f64::consts::TAU;
+        0.5 * amplitude * ((0.7 * t).sin() + 0.8 * (1.9 * t).sin() + 0.6 * (4.3 * t).sin() + 0.4 * (11.0 * t).sin())
+    };
+    vec![(0..n).map(sweep).collect(), (0..n).map(sines).collect()]
+}
+
+/// What sensors of these noises see of a device in two runs: inputs and outputs.
+fn recorded(truth: &Model, amplitude: f64, seconds: f64, noise: &[f64]) -> Vec<(Vec<Vec<f64>>, Vec<Vec<f64>>)> {
+    let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(7);
+    let one = |drive: Vec<f64>| {
+        let mut outputs =
+            simulate(truth, std::slice::from_ref(&drive), PERIOD, &StepOptions { substeps: Some(20), ..StepOptions::default() })
+                .expect("simulates");
+        for (column, noise) in outputs.iter_mut().zip(noise) {
+            let normal = Normal::new(0.0, *noise).expect("a noise");
+            column.iter_mut().for_each(|y| *y += normal.sample(&mut random));
+        }
+        (vec![drive], outputs)
+    };
+    drives(amplitude, seconds).into_iter().map(one).collect()
+}
+
+fn located(truth: &Model, nominal: &Model, amplitude: f64, seconds: f64) -> Location {
+    let noise = [2e-6, 2e-4];
+    let data = recorded(truth, amplitude, seconds, &noise);
+    let runs: Vec<Run> = data
+        .iter()
+        .map(|(inputs, outputs)| Run { name: "run", period: PERIOD, inputs, outputs: outputs.iter().map(|o| Some(o.as_slice())).collect() })
+        .collect();
+    let started = std::time::Instant::now();
+    let location = locate(nominal, &runs, &noise, &Options::default()).expect("locates");
+    println!("located in {:?}, mismatch {:.1}: {}", started.elapsed(), location.mismatch, location.shows.state);
+    for c in &location.ranking {
+        let law = c.laws.first().expect("laws");
+        println!(
+            "  {:<14} ll {:>9.0} evidence {:>9.0} jump {:>8.0} rms {:.4} sd {:.4} | {:?} {:?} {:.3} {:.3} ev {:.0} | second {:?} {:.3} {:?}",
+            c.place.to_string(),
+            c.log_likelihood,
+            c.evidence,
+            c.jump_gain.unwrap_or(f64::NAN),
+            c.rms,
+            c.deviation,
+            law.variable,
+            law.form,
+            law.share,
+            law.held_out_share,
+            law.evidence.unwrap_or(f64::NAN),
+            c.laws[1].variable,
+            c.laws[1].held_out_share,
+            c.character
+        );
+    }
+    println!("  classes {:?}", location.classes.iter().map(|c| c.members.clone()).collect::<Vec<_>>());
+    location
+}
+
+fn between(a: &str, b: &str) -> Place {
+    Place::Between(a.to_string(), b.to_string())
+}
+
+#[test]
+fn dry_friction_is_found_where_it_is() {
+    for body in ["motor", "drum", "handle"] {
+        let extra = format!("[[elements]]\nname = 'f'\nkind = 'coulomb'\nbetween = ['{body}', 'ground']\nforce = 0.3\n");
+        let location = located(&master(&extra, ""), &master("", ""), 2.0, 5.0);
+        let best = &location.ranking[0];
+        assert_eq!(best.place, between(body, "ground"));
+        let law = &best.laws[0];
+        assert!(matches!(law.variable, Variable::Direction | Variable::Velocity), "{:?}", law.variable);
+        assert!(law.held_out_share > 0.7, "{}", law.held_out_share);
+        let character = best.character.expect("it moves");
+        assert!(character.odd_share > 0.9 && character.dissipated_per_cycle > 0.0, "{character:?}");
+        assert!((character.energy_exponent.expect("amplitudes differ") - 1.0).abs() < 0.35, "{character:?}");
+    }
+}
+
+#[test]
+fn a_stiffening_spring_is_found_in_its_joint() {
+    let cubic = "[[elements]]\nname = 'f'\nkind = 'cubic_spring'\nbetween = ['drum', 'handle']\nstiffness = 0.0\ncubic = 3.0e8\n";
+    let location = located(&master(cubic, ""), &master("", ""), 2.0, 5.0);
+    let best = &location.ranking[0];
+    assert_eq!(best.place, between("drum", "handle"));
+    assert_eq!(best.laws[0].variable, Variable::Displacement);
+}
+
+#[test]
+fn cogging_is_found_with_its_period() {
+    let cogging =
+        "[[elements]]\nname = 'f'\nkind = 'cogging'\nbetween = ['motor', 'ground']\namplitude = 0.15\nperiod = 1.3e-3\nphase = 0.4\n";
+    let location = located(&master(cogging, ""), &master("", ""), 2.5, 5.0);
+    let best = &location.ranking[0];
+    assert_eq!(best.place, between("motor", "ground"));
+    assert_eq!(best.laws[0].variable, Variable::Ripple);
+    let ripple = best.ripple.expect("a ripple");
+    assert!((ripple.period - 1.3e-3).abs() < 2e-5, "{ripple:?}");
+    assert!((ripple.amplitude - 0.15).abs() < 0.04, "{ripple:?}");
+    assert!((ripple.phase - 0.4).abs() < 0.5, "{ripple:?}");
+}
+
+#[test]
+fn a_delay_shows_at_its_input() {
+    let location = located(&master("", "delay = 0.002\n"), &master("", ""), 2.0, 5.0);
+    let best = &location.ranking[0];
+    assert_eq!(best.place, Place::Signal("force".to_string()));
+    assert_eq!(best.laws[0].variable, Variable::SignalRate);
+}
+
+#[test]
+fn a_sensor_offset_shows_at_its_output() {
+    let mut truth = master("", "");
+    truth.outputs[0].offset = 1e-4;
+    let location = located(&truth, &master("", ""), 2.0, 5.0);
+    assert_eq!(location.ranking[0].place, Place::Signal("motor_position".to_string()));
+    assert_eq!(location.ranking[0].laws[0].variable, Variable::Constant);
+}
+
+#[test]
+fn friction_in_the_nominal_model_is_taken_along() {
+    let nominal = "[[elements]]\nname = 'n'\nkind = 'coulomb'\nbetween = ['drum', 'ground']\nforce = 0.2\n";
+    let both = format!("{nominal}[[elements]]\nname = 'f'\nkind = 'quadratic_drag'\nbetween = ['handle', 'ground']\ncoefficient = 60.0\n");
+    let location = located(&master(&both, ""), &master(nominal, ""), 4.0, 5.0);
+    let best = &location.ranking[0];
+    assert_eq!(best.place, between("handle", "ground"));
+    assert_eq!(best.laws[0].variable, Variable::Velocity);
+}
+
+/// The smoother against the posterior of the joint Gaussian of all samples, written out as one dense problem.
+#[test]
+fn the_smoother_is_the_posterior_mean() {
+    let model = master("", "");
+    let split = Split::of(&model, 1e-3).expect("linear");
+    let channel = Channel::Force([Some(1), None]);
+    let noise = [2e-6, 2e-4];
+    for chain in [1, 2] {
+        let equations = split.equations(channel, chain, &[0, 1]);
+        let system = System::of(&equations, PERIOD, [1e-3, 0.05, 0.3], &noise).expect("finite");
+        let len = 25;
+        let residual: Vec<Vec<f64>> =
+            noise.iter().map(|n| (0..len).map(|k| n * (3.0 * (0.4 * k as f64).sin() + (k * k % 7) as f64 - 3.0)).collect()).collect();
+        let data = Data { residual: &residual, forces: &[], known: &[] };
+        for (jumps, jump) in [(vec![], 0.0), (vec![10, 11], 0.5)] {
+            let smoothed = system.smooth(2.0, data, &jumps, jump).expect("smooths");
+            let dense = system.dense(2.0, &residual, &jumps, jump);
+            for k in 0..len {
+                let size = dense.0.amax();
+                assert!((smoothed.value[k] - dense.0[k]).abs() < 1e-6 * size, "{chain} {k}: {} {}", smoothed.value[k], dense.0[k]);
+            }
+            // A backward covariance that counts as settled is so only far from the end.
+            if !jumps.is_empty() {
+                assert!((smoothed.deviation[9] / dense.1[9] - 1.0).abs() < 1e-6, "{} {}", smoothed.deviation[9], dense.1[9]);
+            }
+            assert!((smoothed.log_likelihood - dense.2).abs() < 1e-6 * dense.2.abs(), "{} {}", smoothed.log_likelihood, dense.2);
+            if jumps.is_empty() {
+                let fast = system.log_likelihood(2.0, data).expect("finite");
+                assert!((fast - dense.2).abs() < 1e-6 * dense.2.abs());
+            }
+        }
+    }
+}
+
+#[test]
+fn one_sensor_on_the_motor_still_tells_motor_from_drum() {
+    for body in ["motor", "drum"] {
+        let extra = format!("[[elements]]\nname = 'f'\nkind = 'coulomb'\nbetween = ['{body}', 'ground']\nforce = 0.3\n");
+        let mut truth = master(&extra, "");
+        let mut nominal = master("", "");
+        truth.outputs.truncate(1);
+        nominal.outputs.truncate(1);
+        let location = located(&truth, &nominal, 2.0, 5.0);
+        assert_eq!(location.ranking[0].place, between(body, "ground"));
+    }
+}
+
+#[test]
+fn places_that_no_sensor_tells_apart_are_one_class() {
+    // Two stiffly joined bodies, a slow force: the motor and the drum are one.
+    let text = "name = 'a'\n[bodies]\na = 0.5\nb = 0.5\n[[elements]]\nname = 'k'\nkind = 'spring'\nbetween = ['a', 'b']\nstiffness = 1e8\n\
+        [[elements]]\nname = 'd'\nkind = 'damper'\nbetween = ['a', 'b']\ndamping = 500.0\n\
+        [[elements]]\nname = 'g'\nkind = 'spring'\nbetween = ['b', 'ground']\nstiffness = 500.0\n\
+        [[elements]]\nname = 'h'\nkind = 'damper'\nbetween = ['b', 'ground']\ndamping = 5.0\nEXTRA\n\
+        [[inputs]]\nname = 'u'\nkind = 'force'\non = 'a'\n[[outputs]]\nname = 'y'\nkind = 'position'\nof = 'a'\n\
+        [[outputs]]\nname = 'w'\nkind = 'velocity'\nof = 'b'\n";
+    let nominal = Model::from_toml(&text.replace("EXTRA", ""), "a").expect("a model");
+    let extra = "[[elements]]\nname = 'f'\nkind = 'coulomb'\nbetween = ['b', 'ground']\nforce = 0.3\n";
+    let location = located(&Model::from_toml(&text.replace("EXTRA", extra), "a").expect("a model"), &nominal, 2.0, 5.0);
+    let index = |place: &Place| location.ranking.iter().position(|c| c.place == *place).expect("ranked");
+    let (a, b) = (index(&between("a", "ground")), index(&between("b", "ground")));
+    assert!(location.classes.iter().any(|c| c.members.contains(&a) && c.members.contains(&b)), "{:?}", location.classes);
+    let all: usize = location.classes.iter().map(|c| c.members.len()).sum();
+    assert_eq!(all, location.ranking.len());
+    assert!(location.classes.len() > 1, "everything is one class");
+}
+
+#[test]
+fn wrong_columns_are_refused() {
+    let model = master("", "");
+    let drive = vec![vec![0.0; 100]];
+    let short = vec![vec![0.0; 5]];
+    let zeros = vec![0.0; 100];
+    let run = |inputs, outputs| Run { name: "r", period: PERIOD, inputs, outputs };
+    let of = |run: Run, noise: &[f64]| locate(&model, &[run], noise, &Options::default());
+    assert!(matches!(locate(&model, &[], &[1e-6, 1e-4], &Options::default()), Err(LocateError::NoRuns)));
+    assert!(matches!(of(run(&drive, vec![Some(&zeros), None]), &[1e-6]), Err(LocateError::Noise { .. })));
+    assert!(matches!(of(run(&drive, vec![Some(&zeros)]), &[1e-6, 1e-4]), Err(LocateError::Columns { .. })));
+    assert!(matches!(of(run(&short, vec![Some(&zeros), None]), &[1e-6, 1e-4]), Err(LocateError::TooShort { .. })));
+    assert!(matches!(of(run(&drive, vec![None, None]), &[1e-6, 1e-4]), Err(LocateError::NothingMeasured { .. })));
+    // Constant signals and no noise at all: nothing is found, nothing breaks.
+    assert!(of(run(&drive, vec![Some(&zeros), Some(&zeros)]), &[0.0, 0.0]).is_ok());
+}
