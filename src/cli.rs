@@ -169,7 +169,7 @@ fn rate(text: &str) -> Result<f64, String> {
 /// A dither that is small beside a finger's force, and broad enough for a frequency response.
 const DEFAULT_DITHER: &str = "multisine:peak=0.05,from=1,to=500,period=2";
 
-/// See [`Changes::sensors`].
+/// See [`Parts::sensors`].
 #[derive(Debug, Clone, Copy, ValueEnum)]
 pub enum Sensors {
     /// As the model files say.
@@ -178,7 +178,7 @@ pub enum Sensors {
     Ideal,
 }
 
-/// See [`Changes::limits`].
+/// See [`Parts::limits`].
 #[derive(Debug, Clone, Copy, ValueEnum)]
 pub enum Limits {
     /// As the model files say.

@@ -210,7 +210,7 @@ fn the_live_margin_says_where_the_edge_of_the_linear_loop_is() {
         assert!((last.factor * share).ln().abs() < 0.1 + 2.0 * last.deviation, "{share}: {last:?}");
         for m in &done.margins {
             let t = m.step as f64 * PERIOD;
-            assert!(!(t < 0.8 || t > 6.5) || m.known == margin::FREE, "{t}: {m:?}");
+            assert!((0.8..=6.5).contains(&t) || m.known == margin::FREE, "{t}: {m:?}");
             assert!(m.known == margin::KNOWN || m.known == margin::ABOVE || m.factor.is_nan(), "{m:?}");
             assert!(m.known != margin::ABOVE || m.factor * share < 1.1, "{t}: above {} at {share}", m.factor);
         }

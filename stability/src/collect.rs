@@ -192,7 +192,7 @@ impl Collector {
     pub fn traces(&self) -> Vec<Trace> {
         let rows = self.rows();
         let clamped: Vec<bool> = self.flags.iter().take(rows).map(|f| f & flag::LIMITED != 0).collect();
-        let path = (self.axes.len() > 1).then(|| self.path());
+        let path = (self.axes.len() > 1).then(|| way(&self.axes.iter().map(|c| held(&c.intent, c.intent.len())).collect::<Vec<_>>()));
         let trace = |(columns, axis): (&Columns, &AxisSignals)| Trace {
             period_s: self.blank.period_s,
             intent: path.clone().unwrap_or_else(|| held(&columns.intent, columns.intent.len())),
@@ -210,19 +210,6 @@ impl Collector {
     /// The verdict on what went by: the worst of the axes. `None` where there is no master or no contact to judge by.
     pub fn outcome(&self) -> Option<Outcome> {
         Outcome::worst(self.traces().iter().filter(|t| !t.position.is_empty()).map(judge))
-    }
-
-    fn path(&self) -> Vec<f64> {
-        let intents: Vec<Vec<f64>> = self.axes.iter().map(|c| held(&c.intent, c.intent.len())).collect();
-        let steps = intents.iter().map(Vec::len).min().unwrap_or(0);
-        let mut come = 0.0;
-        let moved = |step: usize| intents.iter().map(|x| (x[step] - x[step.saturating_sub(1)]).abs()).sum::<f64>();
-        (0..steps)
-            .map(|step| {
-                come += moved(step);
-                come
-            })
-            .collect()
     }
 
     /// The signals, one row per step.
@@ -261,6 +248,19 @@ impl Collector {
     pub fn last_loop_gain(&self) -> f64 {
         self.gains.last().map_or(f64::NAN, |(_, mu, lambda)| mu * lambda)
     }
+}
+
+/// The way that a hand of several axes has come by each step: it holds still where this does.
+pub(crate) fn way(intents: &[Vec<f64>]) -> Vec<f64> {
+    let steps = intents.iter().map(Vec::len).min().unwrap_or(0);
+    let mut come = 0.0;
+    let moved = |step: usize| intents.iter().map(|x| (x[step] - x[step.saturating_sub(1)]).abs()).sum::<f64>();
+    (0..steps)
+        .map(|step| {
+            come += moved(step);
+            come
+        })
+        .collect()
 }
 
 #[inline]

@@ -8,6 +8,7 @@
 //!
 //! Energy never leads: passivity is enough for stability, and not needed for it.
 
+use crate::collect::way;
 use crate::energy::{EnergyAnswer, EnergyVerdict, energy};
 use crate::frequency::{self, CannotTell, Frequency, FrequencyAnswer, FrequencyError, Parts};
 use crate::model_check::{PartCheck, check};
@@ -363,9 +364,11 @@ fn compare_loops(measured: &Frequency, modelled: &Frequency) -> Option<LoopCheck
 
 /// What the recording itself did: the same function as for a live run.
 fn recorded_outcome(session: &Session) -> Option<Outcome> {
+    let intents: Vec<Vec<f64>> = session.axes.iter().map(|a| a.intent.clone().unwrap_or_default()).collect();
+    let way = (intents.len() > 1).then(|| way(&intents));
     let trace = |axis: &crate::session::AxisSignals| Trace {
         period_s: session.period_s,
-        intent: axis.intent.clone().unwrap_or_default(),
+        intent: way.clone().or(axis.intent.clone()).unwrap_or_default(),
         position: axis.master.clone(),
         contact: axis.contact.clone(),
         feedback: axis.force.clone(),

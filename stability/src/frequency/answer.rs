@@ -60,6 +60,8 @@ impl Frequency {
         };
         if let Some(cannot) = &self.cannot_tell {
             (answer.reason, answer.advice) = (cannot.reason.clone(), cannot.advice.clone());
+            (answer.critical_gain, answer.at_least, answer.critical_gain_ci95, answer.frequency_hz) = (None, None, None, None);
+            answer.amplitude_dependent = false;
             return answer;
         }
         if !(gain.is_finite() && gain >= 0.0) {
