@@ -301,7 +301,7 @@ impl<'a> Evaluator<'a> {
     }
 
     /// Whether fits should come to an end.
-    fn is_late(&self) -> bool {
+    pub fn is_late(&self) -> bool {
         self.stop.is_some_and(|s| s.load(Ordering::Relaxed)) || self.until.is_some_and(|t| std::time::Instant::now() > t)
     }
 

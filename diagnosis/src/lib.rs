@@ -9,6 +9,7 @@ pub mod fit;
 pub mod floor;
 pub mod hypothesis;
 pub mod intervals;
+pub mod locate;
 pub mod problem;
 pub mod screen;
 pub mod search;

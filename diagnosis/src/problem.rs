@@ -270,7 +270,7 @@ fn lag_of(model: &Model, fit: &[Record], output: usize) -> usize {
         return 0;
     }
     let shortest = fit.iter().map(|r| r.len).min().unwrap_or(0);
-    shortest / 20
+    (shortest / 150).max(20)
 }
 
 /// Whether springs, or what acts like one, tie a body to ground or to a body whose motion is prescribed.

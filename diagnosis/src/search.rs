@@ -93,8 +93,12 @@ pub fn price(candidate: &Candidate, samples: usize, correlation_time: f64) -> f6
     effective * (candidate.fit.cost.max(1e-300) / samples.max(1) as f64).ln() + candidate.structure.numbers.len() as f64 * effective.ln()
 }
 
+/// Correlation time of residuals that nothing could explain, samples: whatever their size, they are measuring error.
+const WHITE: f64 = 1.1;
+/// What the best of many hypotheses takes from a cost of white noise by chance, squares of the noise.
+const CHANCE: f64 = 25.0;
 /// Numbers of a physics that is tried first, at most.
-const SIMPLE: usize = 4;
+const SIMPLE: usize = 6;
 /// A residual at its floor has this level, up to chance and rounding.
 pub const AT_FLOOR: f64 = 1.04;
 
@@ -161,10 +165,11 @@ pub fn search(
     });
 
     report("screening");
-    let coarse = Evaluator { substeps: 8, ..evaluator.clone() };
+    let coarse = Evaluator { substeps: 3, ..evaluator.clone() };
     let promises = screen(&coarse, &nominal.structure, &nominal.fit, &hypotheses);
     // Physics of many numbers come in where simpler relatives do not suffice.
-    let (simple, rich): (Vec<Promise>, Vec<Promise>) = promises.into_iter().partition(|p| hypotheses[p.hypothesis].parameters.len() <= SIMPLE);
+    let (simple, rich): (Vec<Promise>, Vec<Promise>) =
+        promises.into_iter().partition(|p| hypotheses[p.hypothesis].parameters.len() <= SIMPLE);
     let promises = simple;
     let mut found: Vec<Candidate> = Vec::new();
     let mut tried: Vec<Tried> = Vec::new();
@@ -175,10 +180,34 @@ pub fn search(
         }
     }
     report("fitting single effects");
-    let singles = race(&evaluator, problem, &nominal, &hypotheses, single_seeds(&promises, 18), [8, 5], &given);
-    found.extend(singles);
-    sort(&mut found, samples);
-    if !late(0.5) && !done(&found, &nominal, samples) {
+    // At the floor only what promises more than chance is worth a fit.
+    let quiet = nominal.correlation_time < WHITE || nominal.levels.iter().all(|l| *l < AT_FLOOR);
+    let chance = CHANCE * nominal.correlation_time / samples as f64;
+    let seeds = if quiet { promises.iter().filter(|p| p.share > chance).count().min(8) } else { 18 };
+    // Those that promise most first: where one of them reaches the floor, the rest have nothing left to explain.
+    let mut all = single_seeds(&promises, seeds);
+    let first = all.len().min(6);
+    for (wave, keep) in [(all.drain(..first).collect::<Vec<_>>(), [5, 4]), (all, [7, 4])] {
+        if found.is_empty() || !done(&found, &nominal, samples) {
+            found.extend(race(&evaluator, problem, &nominal, &hypotheses, wave, keep, &given));
+            sort(&mut found, samples);
+        }
+    }
+    // A law that wins with more numbers has to win over its simpler relatives, whatever these promised.
+    if let Some(best) = found.first() {
+        let own = &best.structure.added[0];
+        let relative = |h: &Hypothesis| h.place.same(&own.place) && h.family == own.family && h.parameters.len() < own.parameters.len();
+        let missing = |h: &Hypothesis| found.iter().all(|c| c.structure.added[0].id != h.id);
+        let simpler: Vec<Seed> = hypotheses
+            .iter()
+            .enumerate()
+            .filter(|(_, h)| relative(h) && missing(h))
+            .filter_map(|(index, h)| Some(Seed { effects: vec![(index, h.starts.first()?.clone())], stated: None }))
+            .collect();
+        found.extend(race(&evaluator, problem, &nominal, &hypotheses, simpler, [3, 3], &given));
+        sort(&mut found, samples);
+    }
+    if !late(0.4) && !quiet && !done(&found, &nominal, samples) {
         let richer = race(&evaluator, problem, &nominal, &hypotheses, single_seeds(&rich, 5), [3, 2], &given);
         found.extend(richer);
         sort(&mut found, samples);
@@ -205,7 +234,8 @@ pub fn search(
             }
             let next = screen(&coarse, &base.structure, &base.fit, &hypotheses);
             let mut used = std::collections::HashSet::new();
-            for promise in next.iter().filter(|p| hypotheses[p.hypothesis].parameters.len() <= SIMPLE && used.insert(p.hypothesis)).take(6) {
+            for promise in next.iter().filter(|p| hypotheses[p.hypothesis].parameters.len() <= SIMPLE && used.insert(p.hypothesis)).take(6)
+            {
                 seeds.push(extended(base, base.structure.stated_of(problem, &base.fit.values), &hypotheses, promise));
             }
         }
@@ -214,6 +244,18 @@ pub fn search(
         found.append(&mut more);
         sort(&mut found, samples);
         stopped = late(1.0);
+    }
+    // The numbers of what was found may lead the nominal model out of a wrong basin: then there was less to find.
+    let mut nominal = nominal;
+    let last = Evaluator { until: Some(Instant::now() + Duration::from_secs(3)), ..evaluator.clone() };
+    for found in found.iter().take(2) {
+        let stated = found.structure.stated_of(problem, &found.fit.values);
+        let start = nominal.structure.values(problem, &stated, &[]);
+        if let Some(fit) = last.fit(&nominal.structure, &start, Effort::FULL)
+            && fit.cost < 0.999 * nominal.fit.cost
+        {
+            nominal = candidate(&evaluator, nominal.structure, fit);
+        }
     }
     for t in &mut tried {
         let single = found.iter().find(|c| c.structure.added.len() == 1 && c.structure.added[0].id == t.id);
@@ -265,7 +307,7 @@ fn sort(found: &mut [Candidate], samples: usize) {
 /// Whether the best structure leaves nothing that another effect could explain.
 fn done(found: &[Candidate], nominal: &Candidate, samples: usize) -> bool {
     let best = found.first().filter(|b| advantage_over(nominal, b, samples) > 0.0).unwrap_or(nominal);
-    best.levels.iter().all(|l| *l < AT_FLOOR) && best.correlation_time < 1.5
+    best.correlation_time < WHITE || best.levels.iter().all(|l| *l < AT_FLOOR) && best.correlation_time < 1.5
 }
 
 /// How much better a candidate is than another one, with the correlation time of the better.
@@ -318,9 +360,10 @@ fn race(
     let refitted = nominal.structure.stated_of(problem, &nominal.fit.values);
     // The first steps on the recordings that are explained worst, with few substeps.
     let few = worst_records(evaluator, &nominal.fit, 2);
-    let whole = few.len() == evaluator.records.len() || problem.initial == Initial::Free || problem.fit.iter().any(|r| !r.conditions.is_empty());
+    let whole =
+        few.len() == evaluator.records.len() || problem.initial == Initial::Free || problem.fit.iter().any(|r| !r.conditions.is_empty());
     let some: Vec<Record> = if whole { problem.fit.clone() } else { few.iter().map(|r| problem.fit[*r].clone()).collect() };
-    let coarse = Evaluator { substeps: 16, records: &some, ..evaluator.clone() };
+    let coarse = Evaluator { substeps: 6, records: &some, ..evaluator.clone() };
     let nominal_there = if whole { nominal.fit.clone() } else { restricted(evaluator, &nominal.fit, &few) };
     let structure_of = |seed: &Seed| Structure::new(problem, &some, seed.effects.iter().map(|(h, _)| hypotheses[*h].clone()).collect());
     let mut running: Vec<(Structure, Fit)> = seeds
@@ -354,7 +397,12 @@ fn race(
         running.truncate(count);
         // Once one is near its end, those far behind have no chance.
         let best = running.first().map_or(0.0, |(_, f)| hopeful(f));
-        running.retain(|(_, f)| hopeful(f) < 4.0 * best.max(f.residuals.len() as f64) || best > 4.0 * f.residuals.len() as f64);
+        let floor = running.first().map_or(0.0, |(_, f)| f.residuals.len() as f64);
+        let margin = if best < 1.2 * floor { 1.3 } else { 4.0 };
+        running.retain(|(_, f)| hopeful(f) < margin * best.max(floor) || best > 4.0 * floor);
+        // Nor does a fit that runs out of time leave nothing.
+        let enough = evaluator.is_late() && count > 3;
+        running.truncate(if enough { 3 } else { count });
         running = running
             .into_par_iter()
             .map(|(structure, fit)| {
@@ -364,7 +412,7 @@ fn race(
             .collect();
     }
     let size = evaluator.len();
-    running.into_iter().filter(|(_, f)| f.residuals.len() == size).map(|(s, f)| candidate(evaluator, s, f)).collect()
+    running.into_iter().filter(|(_, f)| f.residuals.len() == size && f.cost.is_finite()).map(|(s, f)| candidate(evaluator, s, f)).collect()
 }
 
 /// A fit's residuals and derivatives on some of its recordings.

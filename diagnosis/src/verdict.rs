@@ -80,10 +80,12 @@ pub fn verdict(problem: &Problem, search: &Search, model_name: &str) -> Result<V
     let excess = |c: f64| (c / search.samples as f64 - 1.0).max(0.0);
     let explained = 1.0 - excess(best.fit.cost) / excess(nominal_cost).max(1e-12);
     let added = !best.structure.added.is_empty();
+    let bursts = bursts(problem, best);
     let off = given_is_off(problem, search);
     let word = match () {
         () if added && (at_floor || explained > 0.99) => "missing",
         () if added => "unexplained",
+        () if !bursts.is_empty() => "unexplained",
         () if !at_floor && search.nominal.correlation_time > 3.0 => "unexplained",
         () if off => "parameters",
         () => "nothing_missing",
@@ -97,13 +99,49 @@ pub fn verdict(problem: &Problem, search: &Search, model_name: &str) -> Result<V
         "schema": 1,
         "verdict": word,
         "findings": findings,
-        "where": place_in_signals(problem, search),
+        "where": place_in_signals(problem, search, &bursts),
         "parameters": parameters,
         "held_out": held,
         "model_after": model_name,
         "next_experiment": Json::Null,
     });
     Ok(Verdict { json, model, sentence })
+}
+
+/// Samples a burst may span, and how many spreads away it starts.
+const BURST: (usize, f64) = (40, 8.0);
+
+/// Times at which a motion sensor is far off for a moment while all the rest is measuring error, s: glitches, which no physics of the
+/// device makes. Empty where the rest is no measuring error, or a reversal of friction could be it.
+fn bursts(problem: &Problem, best: &Candidate) -> Vec<[f64; 2]> {
+    use backdrive_plant::model::OutputKind;
+    let evaluator = crate::fit::Evaluator::new(problem);
+    let mut all = Vec::new();
+    for (r, output, range) in evaluator.layout() {
+        let Some(part) = best.fit.residuals.get(range) else { continue };
+        if matches!(problem.model.outputs[output].kind, OutputKind::Reaction(_)) {
+            continue;
+        }
+        let mut sizes: Vec<f64> = part.iter().map(|x| x.abs()).collect();
+        let middle = sizes.len() / 2;
+        let spread = 1.4826 * *sizes.select_nth_unstable_by(middle, f64::total_cmp).1;
+        // A rounded signal may well be right in more than half of its samples.
+        let far = BURST.1 * spread.max(1.0);
+        let away: Vec<usize> = part.iter().enumerate().filter(|(_, x)| x.abs() > far).map(|(i, _)| i).collect();
+        if away.len() < 3 || away.len() * 50 > part.len() {
+            continue;
+        }
+        let mut groups: Vec<(usize, usize)> = Vec::new();
+        for i in away {
+            match groups.last_mut() {
+                Some(group) if i - group.1 <= BURST.0 => group.1 = i,
+                _ => groups.push((i, i)),
+            }
+        }
+        let period = problem.fit[r].period;
+        all.extend(groups.iter().filter(|g| g.1 - g.0 <= 4 * BURST.0).map(|g| [g.0 as f64 * period, (g.1 + 1) as f64 * period]));
+    }
+    all
 }
 
 /// Whether the refitted numbers explain more than the given ones do.
@@ -294,7 +332,7 @@ fn model_text(problem: &Problem, best: &Candidate, spread: &Spread, use_best: bo
 }
 
 /// When and at which frequencies the refitted nominal model leaves most over.
-fn place_in_signals(problem: &Problem, search: &Search) -> Json {
+fn place_in_signals(problem: &Problem, search: &Search, bursts: &[[f64; 2]]) -> Json {
     let residuals = &search.nominal.fit.residuals;
     let evaluator = crate::fit::Evaluator::new(problem);
     let mut strongest: Option<(f64, [f64; 2], [f64; 2])> = None;
@@ -311,7 +349,9 @@ fn place_in_signals(problem: &Problem, search: &Search) -> Json {
     }
     let Some((_, time, band)) = strongest else { return Json::Null };
     let r = |x: f64| round_significant(x, 4);
-    json!({ "time": [[r(time[0]), r(time[1])]], "band_hz": [r(band[0]), r(band[1])], "state": Json::Null })
+    let times: Vec<[f64; 2]> = if bursts.is_empty() { vec![time] } else { bursts.to_vec() };
+    let times: Vec<[f64; 2]> = times.iter().take(20).map(|t| [r(t[0]), r(t[1])]).collect();
+    json!({ "time": times, "band_hz": [r(band[0]), r(band[1])], "state": Json::Null })
 }
 
 /// Frequencies between which the middle eight tenths of a signal's energy lie, Hz.

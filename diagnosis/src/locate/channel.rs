@@ -45,6 +45,10 @@ pub(super) struct Equations {
     pub d: DMatrix<f64>,
     /// What a known value of the unknown does, beside the state: columns of `a` and `h` at the unknown itself.
     pub value: usize,
+    /// States of the unknown and its derivatives; what comes behind them are other unknowns.
+    pub chain: usize,
+    /// Standard deviation of the errors that stand behind them, N.
+    pub errors: Vec<f64>,
     /// Rows of position and of velocity of every body.
     pub position: Vec<DVector<f64>>,
     pub velocity: Vec<DVector<f64>>,
@@ -70,6 +74,31 @@ impl<'a> Split<'a> {
         let inertia = DMatrix::from_fn(free.len(), free.len(), |i, j| linear.inertia[(free[i], free[j])]);
         let inverse = if free.is_empty() { inertia } else { inertia.try_inverse()? };
         Some(Split { model, linear, nonlinear, inverse })
+    }
+
+    /// The same with an error of every nonlinear element's force, beyond what is known of it, as another unknown: it stays about 0 with the
+    /// standard deviation `sizes` (N) and is forgotten at `rate` (1/s).
+    pub fn loosened(&self, equations: &Equations, sizes: &[f64], rate: f64) -> Equations {
+        let (n, count, rows) = (equations.a.nrows(), equations.b.ncols(), equations.h.nrows());
+        let wider = |m: &DMatrix<f64>, more: &DMatrix<f64>, height: usize| {
+            let mut wide = DMatrix::zeros(height, n + count);
+            wide.view_mut((0, 0), m.shape()).copy_from(m);
+            wide.view_mut((0, n), more.shape()).copy_from(more);
+            wide
+        };
+        let mut a = wider(&equations.a, &equations.b, n + count);
+        (n..n + count).for_each(|i| a[(i, i)] = -rate);
+        Equations {
+            a,
+            b: equations.b.clone().resize_vertically(n + count, 0.0),
+            h: wider(&equations.h, &equations.d, rows),
+            d: equations.d.clone(),
+            value: equations.value,
+            chain: equations.chain,
+            errors: sizes.to_vec(),
+            position: equations.position.clone(),
+            velocity: equations.velocity.clone(),
+        }
     }
 
     /// The equations of a channel whose unknown is a chain of `chain` integrators driven by white noise, for the outputs `rows`.
@@ -188,6 +217,6 @@ impl<'a> Split<'a> {
             h.row_mut(r).copy_from(&row.transpose());
             d.row_mut(r).copy_from(&by.transpose());
         }
-        Equations { a, b, h, d, value, position, velocity }
+        Equations { a, b, h, d, value, chain, errors: Vec::new(), position, velocity }
     }
 }

@@ -1,7 +1,6 @@
 //! Places that the sensors cannot tell apart.
 
-use super::channel::Split;
-use backdrive_plant::linear::LinearModel;
+use super::channel::Equations;
 use nalgebra::{Complex, DMatrix, DVector};
 use std::f64::consts::TAU;
 
@@ -9,14 +8,13 @@ use std::f64::consts::TAU;
 pub(super) type Spectrum = Vec<(f64, f64)>;
 
 /// Response of each output row to a unit force of a channel at a frequency, Hz; `None` where nothing holds the device.
-pub(super) fn response(split: &Split, equations: &super::channel::Equations, frequency_hz: f64) -> Option<DVector<Complex<f64>>> {
-    let _: &LinearModel = &split.linear;
+pub(super) fn response(equations: &Equations, frequency_hz: f64) -> Option<DVector<Complex<f64>>> {
     let value = equations.value;
     let s = Complex::new(0.0, TAU * frequency_hz);
     let complex = |x: f64| Complex::new(x, 0.0);
     // s x = A x + (column of the unknown and its derivatives), over the bodies' states alone.
     let matrix = DMatrix::from_fn(value, value, |i, j| if i == j { s } else { complex(0.0) } - complex(equations.a[(i, j)]));
-    let chain = equations.a.nrows() - value;
+    let chain = equations.chain;
     let derivative = |m: usize| s.powu(m as u32);
     let right = DVector::from_fn(value, |i, _| (0..chain).map(|m| derivative(m) * equations.a[(i, value + m)]).sum::<Complex<f64>>());
     let state = if value == 0 { right } else { matrix.lu().solve(&right)? };

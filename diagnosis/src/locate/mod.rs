@@ -26,7 +26,7 @@ use backdrive_plant::model::{InputKind, Model};
 use backdrive_plant::stepper::CompileError;
 use channel::{Channel, Split, channels};
 use law::{Reversals, Samples};
-use nonlinear::{extra_forces, rms};
+use nonlinear::{extra_forces, rms, sizes};
 use rayon::prelude::*;
 use serde::{Serialize, Serializer};
 use smoother::{Data, Smoothed, System};
@@ -43,6 +43,15 @@ pub struct Run<'a> {
     pub inputs: &'a [Vec<f64>],
     /// Samples of each output of the model; `None` where it was not recorded.
     pub outputs: Vec<Option<&'a [f64]>>,
+    /// The model with the numbers that differ in this run; `None` where none do.
+    pub model: Option<&'a Model>,
+}
+
+impl<'a> From<&'a crate::problem::Record> for Run<'a> {
+    fn from(record: &'a crate::problem::Record) -> Run<'a> {
+        let outputs = record.outputs.iter().map(|column| column.as_deref()).collect();
+        Run { name: &record.name, period: record.period, inputs: &record.inputs, outputs, model: None }
+    }
 }
 
 /// How to look.
@@ -200,6 +209,8 @@ struct Scene<'a> {
     runs: &'a [Run<'a>],
     split: Split<'a>,
     trajectories: Vec<Trajectory>,
+    /// Forces of the nonlinear elements beyond their linear part, N, in each run.
+    sizes: Vec<Vec<f64>>,
     noise: Vec<f64>,
     options: &'a Options,
 }
@@ -209,12 +220,23 @@ struct Trial {
     channel: Channel,
     chain: usize,
     intensity: f64,
+    /// Share of their forces that nonlinear elements may be wrong by.
+    loose: f64,
     /// Log-likelihood with the steady filter.
     log_likelihood: f64,
     /// Forces of nonlinear elements, for each run.
     forces: Vec<Vec<Vec<f64>>>,
     smoothed: Vec<Smoothed>,
     size: f64,
+}
+
+/// The filter that suits a channel best.
+struct Best {
+    chain: usize,
+    loose: f64,
+    intensity: f64,
+    log_likelihood: f64,
+    systems: Vec<System>,
 }
 
 /// Finds the latent force at every place of a model. `noise` is the standard deviation of the measuring error of each output, in its unit.
@@ -228,7 +250,7 @@ pub fn locate(model: &Model, runs: &[Run], noise: &[f64], options: &Options) -> 
     if noise.len() != model.outputs.len() || noise.iter().any(|n| !n.is_finite() || *n < 0.0) {
         return Err(LocateError::Noise { found: noise.len(), expected: model.outputs.len() });
     }
-    let trajectories = runs.iter().map(|run| Trajectory::of(model, run)).collect::<Result<Vec<_>, _>>()?;
+    let trajectories = runs.iter().map(|run| Trajectory::of(run.model.unwrap_or(model), run)).collect::<Result<Vec<_>, _>>()?;
     let amplitude = {
         let nonlinear = model.elements.iter().map(|e| e.between);
         let across = nonlinear.flat_map(|ends| trajectories.iter().map(move |t| rms(&t.across(ends).0)));
@@ -236,7 +258,8 @@ pub fn locate(model: &Model, runs: &[Run], noise: &[f64], options: &Options) -> 
     };
     let split = Split::of(model, amplitude).ok_or(LocateError::Singular)?;
     let noise = (0..noise.len()).map(|output| floor_of(output, noise[output], &trajectories)).collect();
-    let scene = Scene { model, runs, split, trajectories, noise, options };
+    let sizes = trajectories.iter().map(|t| sizes(&split, t)).collect();
+    let scene = Scene { model, runs, split, trajectories, sizes, noise, options };
     let mut trials: Vec<Trial> = channels(model).into_par_iter().filter_map(|channel| scene.trial(channel)).collect();
     if trials.is_empty() {
         return Err(LocateError::Singular);
@@ -271,9 +294,17 @@ fn floor_of(output: usize, given: f64, trajectories: &[Trajectory]) -> f64 {
 }
 
 impl Scene<'_> {
-    fn system(&self, channel: Channel, chain: usize, run: usize, scales: [f64; 3]) -> Option<System> {
+    /// The filter of a channel; `loose` is the share of their forces that nonlinear elements may be wrong by.
+    fn system(&self, channel: Channel, chain: usize, run: usize, scales: [f64; 3], loose: f64) -> Option<System> {
         let trajectory = &self.trajectories[run];
-        let equations = self.split.equations(channel, chain, &trajectory.rows);
+        let mut equations = self.split.equations(channel, chain, &trajectory.rows);
+        if loose > 0.0 && !self.split.nonlinear.is_empty() {
+            // An error at the very place in question is the unknown itself.
+            let here = |ends: [Option<usize>; 2]| matches!(channel, Channel::Force([a, b]) if ends == [a, b] || ends == [b, a]);
+            let share = |element: &usize| if here(self.model.elements[*element].between) { 1e-3 * loose } else { loose };
+            let sizes: Vec<f64> = self.split.nonlinear.iter().zip(&self.sizes[run]).map(|(e, s)| share(e) * s).collect();
+            equations = self.split.loosened(&equations, &sizes, 1.0 / (FORGOTTEN * trajectory.period));
+        }
         let noise: Vec<f64> = trajectory.rows.iter().map(|r| self.noise[*r]).collect();
         System::of(&equations, trajectory.period, scales, &noise)
     }
@@ -341,34 +372,36 @@ impl Scene<'_> {
             Channel::Sensor(_) => &[1],
         };
         let runs = self.trajectories.len();
-        let none: Vec<Vec<Vec<f64>>> = Vec::new();
-        let of_chain = |chain: &usize| {
-            let systems = (0..runs).map(|run| self.system(channel, *chain, run, scales)).collect::<Option<Vec<_>>>()?;
-            let (intensity, log_likelihood) = self.best_intensity(&systems, &none, &[], None);
-            log_likelihood.is_finite().then_some((*chain, intensity, log_likelihood, systems))
+        let best = |forces: &[Vec<Vec<f64>>], chains: &[usize], loose: &[f64]| {
+            let options = chains.iter().flat_map(|chain| loose.iter().map(|loose| (*chain, *loose)));
+            let of = |(chain, loose): (usize, f64)| {
+                let systems = (0..runs).map(|run| self.system(channel, chain, run, scales, loose)).collect::<Option<Vec<_>>>()?;
+                let (intensity, log_likelihood) = self.best_intensity(&systems, forces, &[], None);
+                log_likelihood.is_finite().then_some(Best { chain, loose, intensity, log_likelihood, systems })
+            };
+            options.filter_map(of).max_by(|a, b| a.log_likelihood.total_cmp(&b.log_likelihood))
         };
-        let (chain, mut intensity, mut log_likelihood, systems) = chains.iter().filter_map(of_chain).max_by(|a, b| a.2.total_cmp(&b.2))?;
-        let smooth = |intensity: f64, forces: &[Vec<Vec<f64>>]| {
-            systems
-                .iter()
-                .enumerate()
-                .map(|(run, s)| s.smooth(intensity, self.data(forces, run, &[]), &[], 0.0))
-                .collect::<Option<Vec<_>>>()
+        let smooth = |best: &Best, forces: &[Vec<Vec<f64>>]| {
+            let one = |(run, s): (usize, &System)| s.smooth(best.intensity, self.data(forces, run, &[]), &[], 0.0);
+            best.systems.iter().enumerate().map(one).collect::<Option<Vec<_>>>()
         };
+        let with_path = !self.split.nonlinear.is_empty() && !matches!(channel, Channel::Sensor(_));
+        // Nonlinear elements push along the path that was really taken: first what the sensors say of it whatever these elements do, then
+        // what follows with them as they are.
+        let mut found = best(&[], if with_path { &chains[..1] } else { chains }, &[if with_path { LOOSE } else { 0.0 }])?;
+        let mut smoothed = smooth(&found, &[])?;
         let mut forces: Vec<Vec<Vec<f64>>> = Vec::new();
-        let mut smoothed = smooth(intensity, &forces)?;
-        if !self.split.nonlinear.is_empty() && !matches!(channel, Channel::Sensor(_)) {
-            for _ in 0..self.options.iterations {
-                let next: Vec<Vec<Vec<f64>>> = (0..runs).map(|run| self.forces_along(channel, chain, run, &smoothed[run])).collect();
-                let (other, likelihood) = self.best_intensity(&systems, &next, &[], Some(intensity * 1e3));
-                if likelihood <= log_likelihood {
-                    break;
-                }
-                let Some(again) = smooth(other, &next) else { break };
-                (intensity, log_likelihood, forces, smoothed) = (other, likelihood, next, again);
+        for _ in 0..if with_path { self.options.iterations } else { 0 } {
+            let next: Vec<_> = (0..runs).map(|run| self.forces_along(channel, found.chain, run, &smoothed[run])).collect();
+            let Some(tighter) = best(&next, chains, &TIGHT) else { break };
+            if !forces.is_empty() && tighter.log_likelihood <= found.log_likelihood {
+                break;
             }
+            let Some(path) = smooth(&tighter, &next) else { break };
+            (found, forces, smoothed) = (tighter, next, path);
         }
-        Some(Trial { channel, chain, intensity, log_likelihood, forces, smoothed, size: scales[2] })
+        let Best { chain, loose, intensity, log_likelihood, .. } = found;
+        Some(Trial { channel, chain, intensity, loose, log_likelihood, forces, smoothed, size: scales[2] })
     }
 
     fn motions(&self, channel: Channel, chain: usize, run: usize, smoothed: &Smoothed) -> (Vec<Vec<f64>>, Vec<Vec<f64>>) {
@@ -479,7 +512,7 @@ impl Scene<'_> {
         let mut laws = samples.laws(ripple.as_ref());
         let scales = [self.scales(trial.channel)[0], self.scales(trial.channel)[1], trial.size];
         let runs = self.trajectories.len();
-        let systems = (0..runs).map(|run| self.system(trial.channel, trial.chain, run, scales)).collect::<Option<Vec<_>>>()?;
+        let systems = (0..runs).map(|run| self.system(trial.channel, trial.chain, run, scales, trial.loose)).collect::<Option<Vec<_>>>()?;
         let mut of_forms = [0usize; 3];
         for law in &mut laws {
             // The best of few numbers and the best of many.
@@ -533,7 +566,7 @@ impl Scene<'_> {
             // The turning point is known to a sample or two.
             let jumps: Vec<usize> = at.flat_map(|k| k.saturating_sub(1)..(k + 3).min(len)).collect();
             offset += len;
-            let Some(system) = self.system(trial.channel, trial.chain, run, scales) else { return };
+            let Some(system) = self.system(trial.channel, trial.chain, run, scales, trial.loose) else { return };
             let data = self.data(&trial.forces, run, &[]);
             let Some(state) = system.smooth(trial.intensity, data, &jumps, 2.0 * candidate.rms) else { return };
             before += trial.smoothed[run].log_likelihood;
@@ -574,10 +607,10 @@ impl Scene<'_> {
         let noise: Vec<f64> = trajectory.rows.iter().map(|r| self.noise[*r]).collect();
         let responses = |spectrum: &classes::Spectrum, (channel, chain): (Channel, usize)| {
             let equations = self.split.equations(channel, chain, &trajectory.rows);
-            spectrum.iter().map(|(f, _)| classes::response(&self.split, &equations, *f)).collect::<Option<Vec<_>>>()
+            spectrum.iter().map(|(f, _)| classes::response(&equations, *f)).collect::<Option<Vec<_>>>()
         };
         let mut classes: Vec<Class> = Vec::new();
-        for (index, candidate) in ranking.iter().enumerate() {
+        for index in 0..ranking.len() {
             let alike = classes.iter().position(|class| {
                 let Some(first) = class.members.first() else { return false };
                 let columns: Vec<(&[f64], f64)> = ranking[*first].courses.iter().map(|c| (c.force.as_slice(), c.period)).collect();
@@ -590,7 +623,6 @@ impl Scene<'_> {
                 };
                 classes::distance(&spectrum, &own, &other, &noise) < INDISTINCT
             });
-            let _ = candidate;
             match alike {
                 Some(class) => classes[class].members.push(index),
                 None => classes.push(Class { members: vec![index] }),
@@ -706,6 +738,11 @@ fn describe(candidate: &Candidate) -> String {
 
 /// Noise at least, as a share of a signal: below that the simulation itself is not exact.
 const SMALLEST_NOISE: f64 = 1e-5;
+/// Share of their forces that nonlinear elements may be wrong by while nothing is known of their path, and once it is.
+const LOOSE: f64 = 2.0;
+const TIGHT: [f64; 3] = [0.01, 0.1, 0.5];
+/// Samples after which an error of a nonlinear element is forgotten.
+const FORGOTTEN: f64 = 20.0;
 /// Displacement that makes a turning point, in rms displacements.
 const TURN: f64 = 0.05;
 /// Places whose readings differ by less than this many noises are one.

@@ -26,6 +26,19 @@ pub(super) fn extra_forces(split: &Split, trajectory: &Trajectory, position: &[V
     split.nonlinear.iter().map(one).collect()
 }
 
+/// Root mean square of what each nonlinear element pushes beyond its linear part along the simulated motion, N.
+pub(super) fn sizes(split: &Split, trajectory: &Trajectory) -> Vec<f64> {
+    let one = |index: &usize| {
+        let element = &split.model.elements[*index];
+        let linear = split.linear.elements[*index];
+        let (x, v) = trajectory.across(element.between);
+        let force = along(&element.law, &x, &v, trajectory.period, SLIP * rms(&x));
+        let rest: Vec<f64> = (0..x.len()).map(|k| force[k] - linear.stiffness * x[k] - linear.damping * v[k]).collect();
+        rms(&rest).max(f64::MIN_POSITIVE.sqrt())
+    };
+    split.nonlinear.iter().map(one).collect()
+}
+
 /// Force of a law along a path. Dry friction builds up over the distance `slip`, so that noise about rest does not make it chatter.
 fn along(law: &Law, x: &[f64], v: &[f64], period: f64, slip: f64) -> Vec<f64> {
     let mut memory = vec![0.0; law.memory_len()];

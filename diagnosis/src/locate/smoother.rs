@@ -15,6 +15,8 @@ pub(super) struct System {
     h: DMatrix<f64>,
     /// Process noise for a unit intensity of the unknown's last derivative.
     q: DMatrix<f64>,
+    /// Process noise of the errors of nonlinear elements.
+    of_errors: DMatrix<f64>,
     /// Known forces, held over a sample: on the state, on the outputs.
     gamma: DMatrix<f64>,
     d: DMatrix<f64>,
@@ -69,12 +71,13 @@ impl System {
     pub fn of(equations: &Equations, period: f64, scales: [f64; 3], noise: &[f64]) -> Option<System> {
         let (n, p) = (equations.a.nrows(), equations.h.nrows());
         let bodies = equations.value / 2;
-        let chain = n - equations.value;
+        let chain = equations.chain;
         // Derivatives of the unknown are measured per sample time, or the covariance would mix numbers of very different size.
         let scale = DVector::from_fn(n, |i, _| match i {
             i if i < bodies => scales[0],
             i if i < 2 * bodies => scales[1],
-            i => scales[2] / (period * SLOW).powi((i - 2 * bodies) as i32),
+            i if i < 2 * bodies + chain => scales[2] / (period * SLOW).powi((i - 2 * bodies) as i32),
+            i => equations.errors[i - 2 * bodies - chain],
         });
         let a = DMatrix::from_fn(n, n, |i, j| equations.a[(i, j)] * scale[j] / scale[i]);
         let b = DMatrix::from_fn(n, equations.b.ncols(), |i, j| equations.b[(i, j)] / scale[i]);
@@ -94,22 +97,41 @@ impl System {
         let d_value = h.column(equations.value) / scale[equations.value];
         // Van Loan 1978: the noise that a white last derivative leaves after a sample. Intensity 1 moves the unknown by its scale in SLOW samples.
         let last = equations.value + chain - 1;
-        let mut loan = DMatrix::zeros(2 * n, 2 * n);
-        loan.view_mut((0, 0), (n, n)).copy_from(&(-&a * period));
-        loan.view_mut((n, n), (n, n)).copy_from(&(a.transpose() * period));
-        loan[(last, n + last)] = 1.0 / SLOW;
-        let loan = loan.exp();
-        let q = loan.view((n, n), (n, n)).transpose() * loan.view((0, n), (n, n));
-        let q = (&q + q.transpose()) * 0.5;
-        let good = f.iter().chain(q.iter()).chain(gamma.iter()).chain(h.iter()).all(|x| x.is_finite());
-        good.then(|| System { n, p, f, h, q, gamma, d, gamma_value, d_value, value: equations.value, scale, noise: noise.to_vec() })
+        let noise_of = |power: &dyn Fn(usize) -> f64| {
+            let mut loan = DMatrix::zeros(2 * n, 2 * n);
+            loan.view_mut((0, 0), (n, n)).copy_from(&(-&a * period));
+            loan.view_mut((n, n), (n, n)).copy_from(&(a.transpose() * period));
+            (0..n).for_each(|i| loan[(i, n + i)] = power(i));
+            let loan = loan.exp();
+            let q = loan.view((n, n), (n, n)).transpose() * loan.view((0, n), (n, n));
+            (&q + q.transpose()) * 0.5
+        };
+        let q = noise_of(&|i| if i == last { 1.0 / SLOW } else { 0.0 });
+        // An error of standard deviation 1 that is forgotten at a rate needs twice that rate of noise.
+        let of_errors = noise_of(&|i| if i > last { -2.0 * a[(i, i)] * period } else { 0.0 });
+        let good = f.iter().chain(q.iter()).chain(of_errors.iter()).chain(gamma.iter()).chain(h.iter()).all(|x| x.is_finite());
+        good.then(|| System {
+            n,
+            p,
+            f,
+            h,
+            q,
+            of_errors,
+            gamma,
+            d,
+            gamma_value,
+            d_value,
+            value: equations.value,
+            scale,
+            noise: noise.to_vec(),
+        })
     }
 
     /// Predicted covariance that the filter settles at: doubling of the Riccati equation (Anderson 1978), each pass twice as far in time.
     fn steady(&self, intensity: f64) -> Option<Steady> {
         let mut a = self.f.transpose();
         let mut g = self.h.transpose() * &self.h;
-        let mut x = &self.q * intensity;
+        let mut x = self.process_noise(intensity);
         for _ in 0..DOUBLINGS {
             let lu = (DMatrix::identity(self.n, self.n) + &g * &x).lu();
             let (wa, wg) = (lu.solve(&a)?, lu.solve(&g)?);
@@ -154,8 +176,12 @@ impl System {
         if jumps.is_empty() || len * self.n * self.n > LARGEST {
             self.smooth_steadily(&steady, data, len)
         } else {
-            self.smooth_with_jumps(&steady, &self.q * intensity, data, len, jumps, jump)
+            self.smooth_with_jumps(&steady, self.process_noise(intensity), data, len, jumps, jump)
         }
+    }
+
+    fn process_noise(&self, intensity: f64) -> DMatrix<f64> {
+        &self.q * intensity + &self.of_errors
     }
 
     fn constant(&self) -> f64 {
@@ -319,7 +345,7 @@ impl System {
     /// Posterior mean and standard deviation of the unknown, and log-likelihood, from the covariance of all samples at once.
     pub fn dense(&self, intensity: f64, residual: &[Vec<f64>], jumps: &[usize], jump: f64) -> (DVector<f64>, Vec<f64>, f64) {
         let (n, p, len) = (self.n, self.p, residual[0].len());
-        let q = &self.q * intensity;
+        let q = self.process_noise(intensity);
         // Each state is a sum of the initial state and the noises before it.
         let mut state = vec![DMatrix::<f64>::zeros(n, n * len); len];
         let mut prior = DMatrix::<f64>::zeros(n * len, n * len);

@@ -24,6 +24,7 @@ pub use swap::{PartError, Parts};
 
 use crate::session::Session;
 use crate::spectra::{Averaging, CrossSpectra, Window, by_periods, repeats_after, welch};
+use backdrive_control::margins::critical_factor;
 use edge::Loop;
 use local::{Columns, DITHERED, LocalFit, MOVED, fit};
 use nalgebra::{Complex, DMatrix};
@@ -670,8 +671,76 @@ impl Frequency {
         let edges: Vec<Edge> = self.levels.iter().map(|l| l.edge).collect();
         let several = self.amplitude_dependent || states.len() > 1;
         self.edge = if several { widest(&edges) } else { sharpest(&edges) };
+        if self.amplitude_dependent && states.len() == 1 {
+            self.continue_to_large_amplitude();
+            self.continue_to_rest();
+        }
         if let Some(level) = self.levels.first() {
             self.method = describe(level);
+        }
+    }
+}
+
+impl Frequency {
+    /// Widens the interval to where the edge goes beyond the largest dither, for an impact moves the master more than a dither may.
+    ///
+    /// What dry friction (and a hysteresis that has reached its limit) takes of a force of amplitude `d` is a share `c/d` of it, by
+    /// its describing function: so the edge tends to its limit as `1/d`, a straight line through the two largest amplitudes.
+    fn continue_to_large_amplitude(&mut self) {
+        let mut levels: Vec<(f64, f64, f64)> = Vec::new();
+        for level in &self.levels {
+            let low = level.edge.interval().map_or(0.0, |i| i.0);
+            levels.extend(level.edge.gain.or(level.edge.at_least).map(|gain| (level.amplitude_rms, gain, low)));
+        }
+        levels.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let [.., (d1, k1, _), (d2, k2, low)] = levels[..] else { return };
+        if !(d2 > 1.2 * d1 && k2 > 0.0) {
+            return;
+        }
+        // A line through two points tells no more than a factor of three.
+        let limit = (k2 + (k2 - k1) * d1 / (d2 - d1)).clamp(k2 / 3.0, 3.0 * k2);
+        if let Some((from, to)) = &mut self.edge.ci95 {
+            *from = from.min(limit * low / k2);
+            *to = to.map(|to| to.max(limit));
+            self.notes.push(format!("the interval is continued to large amplitudes, where the edge tends to {limit:.3} by the describing function of dry friction"));
+        }
+    }
+}
+
+impl Frequency {
+    /// Widens the interval to where the edge goes below the smallest dither, where something is cancelled.
+    ///
+    /// A master that dry friction holds does not move, and the canceller subtracts all the same: G_f is then 0, and what is left of
+    /// the way from F_f to x_c is the canceller's own response, measured as the difference of the two.
+    fn continue_to_rest(&mut self) {
+        let largest = self.levels.iter().max_by(|a, b| a.amplitude_rms.total_cmp(&b.amplitude_rms));
+        let Some((level, axis)) = largest.and_then(|level| Some((level, level.axes.first().filter(|_| level.axes.len() == 1)?))) else {
+            return;
+        };
+        let complex = |v: &[f64; 2]| Complex::new(v[0], v[1]);
+        let (mut hz, mut held) = (Vec::new(), Vec::new());
+        let (mut cancelled, mut moved) = (0.0, 0.0);
+        for (line, f) in level.hz.iter().enumerate().filter(|(line, _)| axis.told[*line]) {
+            let (g, c) = (complex(&axis.g_f.value[line]), complex(&axis.motion.value[line]));
+            if !(g.norm().is_finite() && c.norm().is_finite() && c.norm() > 0.0) {
+                continue;
+            }
+            (cancelled, moved) = (cancelled + (c - g).norm_sqr(), moved + g.norm_sqr());
+            hz.push(*f);
+            held.push(complex(&axis.l[line]) * (c - g) / c);
+        }
+        // Where nothing is cancelled a held master opens the loop.
+        if cancelled < 0.04 * moved {
+            return;
+        }
+        let Some(edge) = critical_factor(&hz, &held) else { return };
+        if let Some((from, to)) = &mut self.edge.ci95 {
+            *from = from.min(0.95 * edge.factor);
+            *to = to.map(|to| to.max(1.05 * edge.factor));
+            self.notes.push(format!(
+                "the interval is continued to rest: while dry friction holds the master the canceller subtracts all the same, and the edge is {:.3}",
+                edge.factor
+            ));
         }
     }
 }

@@ -1,0 +1,142 @@
+//! Devices of known physics: what was left out is named, and nothing is named where nothing was.
+
+use backdrive_diagnosis::fit::{Effort, Evaluator};
+use backdrive_diagnosis::intervals::Spread;
+use backdrive_diagnosis::problem::{Problem, Record};
+use backdrive_diagnosis::search::{Settings, search};
+use backdrive_diagnosis::structure::Structure;
+use backdrive_diagnosis::verdict::verdict;
+use backdrive_plant::model::Model;
+use backdrive_plant::recording::Recording;
+use backdrive_plant::set::Initial;
+use backdrive_plant::stepper::{Options, simulate};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+
+const NOMINAL: &str = r#"
+name = "two"   # a motor and a load
+motion = "translation"
+[bodies]
+motor = 0.1
+load = 0.4
+[[elements]]
+name = "belt"
+kind = "spring"
+between = ["motor", "load"]
+stiffness = 900.0  # from the data sheet
+[[elements]]
+name = "belt_damping"
+kind = "damper"
+between = ["motor", "load"]
+damping = 1.5
+[[elements]]
+name = "anchor"
+kind = "spring"
+between = ["load", "ground"]
+stiffness = 60.0
+[[elements]]
+name = "air"
+kind = "damper"
+between = ["load", "ground"]
+damping = 0.8
+[[inputs]]
+name = "force"
+kind = "force"
+on = "motor"
+[[outputs]]
+name = "position"
+kind = "position"
+of = "motor"
+resolution = 1e-5
+"#;
+
+const COULOMB: &str = "\n[[elements]]\nname = \"rub\"\nkind = \"coulomb\"\nbetween = [\"load\", \"ground\"]\nforce = 0.6\n";
+
+fn recorded(truth: &str, seed: u64) -> Problem {
+    let model = Model::from_toml(truth, "truth").unwrap();
+    let nominal = Model::from_toml(NOMINAL, "nominal").unwrap();
+    let period = 1e-3;
+    let shapes: [&dyn Fn(f64) -> f64; 3] = [
+        &|t| 3.0 * (2.0 * std::f64::consts::PI * (0.3 + 0.9 * t) * t).sin(),
+        &|t| 4.0 * (2.0 * std::f64::consts::PI * 0.7 * t).sin() + 2.0 * (2.0 * std::f64::consts::PI * 3.1 * t).sin(),
+        &|t| 5.0 * ((t * 0.8).fract() * 4.0 - 2.0).abs() - 5.0,
+    ];
+    let records: Vec<Record> = shapes
+        .iter()
+        .enumerate()
+        .map(|(i, shape)| {
+            let t: Vec<f64> = (0..4000).map(|k| k as f64 * period).collect();
+            let u: Vec<f64> = t.iter().map(|t| shape(*t)).collect();
+            let mut random = ChaCha8Rng::seed_from_u64(seed * 10 + i as u64);
+            let clean = simulate(&model, std::slice::from_ref(&u), period, &Options::default()).unwrap().remove(0);
+            let y = clean
+                .iter()
+                .map(|y| {
+                    let e: f64 = StandardNormal.sample(&mut random);
+                    ((y + 2e-5 * e) / 1e-5).round() * 1e-5
+                })
+                .collect();
+            let recording = Recording::new(format!("{i}"), t, vec![("force".into(), u), ("position".into(), y)]).unwrap();
+            Record::new(&recording, &nominal, Vec::new()).unwrap()
+        })
+        .collect();
+    let (fit, held_out) = (records[..2].to_vec(), records[2..].to_vec());
+    Problem::new(NOMINAL.to_string(), "nominal.toml".into(), nominal, fit, held_out, Initial::Rest).unwrap()
+}
+
+#[test]
+fn refitted_numbers_lie_in_their_intervals() {
+    let truth = NOMINAL.replace("900.0", "1100.0").replace("damping = 0.8", "damping = 1.0");
+    let problem = recorded(&truth, 1);
+    let evaluator = Evaluator::new(&problem);
+    let structure = Structure::new(&problem, &problem.fit, Vec::new());
+    let given: Vec<f64> = problem.stated.iter().map(|s| s.given).collect();
+    let fit = evaluator.fit(&structure, &structure.values(&problem, &given, &[]), Effort::FULL).unwrap();
+    let level = (fit.cost / fit.residuals.len() as f64).sqrt();
+    assert!(level < 1.1, "{level} floors");
+    let candidate = backdrive_diagnosis::search::Candidate { structure, fit, correlation_time: 1.0, levels: vec![level] };
+    let spread = Spread::of(&candidate);
+    for (path, true_value) in [("elements.belt.stiffness", 1100.0), ("elements.air.damping", 1.0), ("bodies.load", 0.4)] {
+        let index = problem.stated.iter().position(|s| s.path == path).unwrap();
+        let value = candidate.fit.values[index];
+        let [low, high] = spread.interval(&candidate, index);
+        let half = 0.5 * (high - low);
+        assert!((value - true_value).abs() < 1.7 * half, "{path}: {value} in {low}..{high}");
+        assert!(half < 0.05 * true_value, "{path}: {low}..{high}");
+    }
+}
+
+#[test]
+fn dry_friction_that_was_left_out_is_named() {
+    let problem = recorded(&format!("{NOMINAL}{COULOMB}"), 2);
+    let found = search(&problem, &Settings::default(), None, &|_| {}).unwrap();
+    let said = verdict(&problem, &found, "after.toml").unwrap();
+    assert_eq!(said.json["verdict"], "missing", "{:#}", said.json);
+    assert_eq!(said.json["findings"][0]["physics"], "coulomb", "{:#}", said.json);
+    assert_eq!(said.json["findings"][0]["between"], serde_json::json!(["load", "ground"]));
+    let force = said.json["findings"][0]["parameters"]["force"]["value"].as_f64().unwrap();
+    assert!((force - 0.6).abs() < 0.02, "{force}");
+    let held = &said.json["held_out"];
+    assert!(held["nrmse_after"].as_f64().unwrap() < 1.2 * held["noise_floor"].as_f64().unwrap(), "{held}");
+    assert!(said.model.contains("# a motor and a load"));
+    Model::from_toml(&said.model, "after").unwrap();
+}
+
+#[test]
+fn wrong_numbers_alone_are_no_physics() {
+    let problem = recorded(&NOMINAL.replace("900.0", "1300.0").replace("load = 0.4", "load = 0.33"), 3);
+    let found = search(&problem, &Settings::default(), None, &|_| {}).unwrap();
+    let said = verdict(&problem, &found, "after.toml").unwrap();
+    assert_eq!(said.json["verdict"], "parameters", "{:#}", said.json);
+}
+
+#[test]
+fn a_right_model_lacks_nothing() {
+    for seed in 4..7 {
+        let problem = recorded(NOMINAL, seed);
+        let found = search(&problem, &Settings::default(), None, &|_| {}).unwrap();
+        let said = verdict(&problem, &found, "after.toml").unwrap();
+        assert_eq!(said.json["verdict"], "nothing_missing", "{:#}", said.json);
+    }
+}
