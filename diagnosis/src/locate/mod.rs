@@ -4,7 +4,7 @@
 //! (after Rogers & Friis 2022); a smoother finds the force, its standard deviation and the likelihood of the recordings. What is not linear in
 //! the nominal model enters as known forces along the path that the device really took, found by iteration. Sign jumps survive because the
 //! force may jump where the place's motion reverses (after Marino & Cicirello 2023). Each force is then tabulated against what moves
-//! at its place ([`law`]); the place whose force follows the simplest law explains the recordings best.
+//! at its place (`law`); the place whose force follows the simplest law explains the recordings best.
 
 mod channel;
 mod character;
