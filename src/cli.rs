@@ -27,6 +27,22 @@ const STABILITY_HELP: &str = "Examples:
 
 Exit codes: 0 stable, 1 not, 7 it cannot be told.";
 
+const DIAGNOSE_HELP: &str = "Examples:
+  backdrive run launch/identify.toml --out identify
+  backdrive diagnose identify --model plant/models/impulse-engine-linear.toml --out diagnosis
+  backdrive diagnose session.csv held-out.csv --model model.toml --out diagnosis --patience 60
+  backdrive diagnose set/ --without coulomb --out diagnosis
+
+Writes verdict.json, model.diagnosed.toml, report.html and time.txt. Ctrl-C ends the search and writes what was found until then.
+
+Exit codes: 0 nothing is missing (numbers may be off), 1 something is missing, unexplained or ambiguous, 7 it cannot be told.";
+
+const FIT_HELP: &str = "Examples:
+  backdrive fit model.toml set/ --out model.fitted.toml
+  backdrive fit model.toml sweep.csv steps.csv --json
+
+Exit codes: 0 fitted, 1 the records disagree: the structure is not the device's.";
+
 /// The verbs.
 #[derive(Debug, Subcommand)]
 pub enum Command {
@@ -39,6 +55,12 @@ pub enum Command {
     /// Ask a bag whether its loop would be stable at another gain, and how far away the edge is.
     #[command(after_help = STABILITY_HELP)]
     Stability(Stability),
+    /// Find where a model and recordings part, and which physics the model leaves out.
+    #[command(after_help = DIAGNOSE_HELP)]
+    Diagnose(Diagnose),
+    /// Refit a model's numbers to recordings, its structure as it is: standard errors, correlations, agreement between records.
+    #[command(after_help = FIT_HELP)]
+    Fit(Fit),
     /// Check a graph file; errors point at the line.
     #[command(after_help = "Example:\n  backdrive check launch/contact.toml")]
     Check(Graph),
@@ -293,6 +315,57 @@ pub struct Stability {
     #[command(flatten)]
     #[allow(missing_docs)]
     pub parts: Parts,
+}
+
+/// `backdrive diagnose`
+#[derive(Debug, Args)]
+pub struct Diagnose {
+    /// A folder with set.toml, a set.toml, a folder of recordings, or recordings (CSV or MCAP). Without a set.toml the last one is held out.
+    #[arg(required = true, value_name = "SET")]
+    pub set: Vec<PathBuf>,
+    /// Folder for verdict.json, model.diagnosed.toml and report.html; made if it is not there.
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+    /// The nominal model; without this the set's own.
+    #[arg(long, value_name = "FILE")]
+    pub model: Option<PathBuf>,
+    /// A physics that is not to be considered, and with it all that contain it as a special case; may be given several times.
+    #[arg(long, value_name = "KIND", value_parser = physics)]
+    pub without: Vec<String>,
+    /// How long to search, at most.
+    #[arg(long, value_name = "SECONDS", value_parser = positive, default_value_t = 24.0, allow_negative_numbers = true)]
+    pub patience: f64,
+    /// Print the verdict as JSON.
+    #[arg(long)]
+    pub json: bool,
+    /// Write no report.html.
+    #[arg(long)]
+    pub no_report: bool,
+}
+
+/// `backdrive fit`
+#[derive(Debug, Args)]
+pub struct Fit {
+    /// The model file.
+    pub model: PathBuf,
+    /// A folder with set.toml, a set.toml, a folder of recordings, or recordings (CSV or MCAP).
+    #[arg(required = true, value_name = "SET")]
+    pub set: Vec<PathBuf>,
+    /// Write the refitted model, with what was given and the intervals in comments.
+    #[arg(long, value_name = "FILE")]
+    pub out: Option<PathBuf>,
+    /// How long to fit, at most.
+    #[arg(long, value_name = "SECONDS", value_parser = positive, default_value_t = 60.0, allow_negative_numbers = true)]
+    pub patience: f64,
+    /// Print the result as JSON.
+    #[arg(long)]
+    pub json: bool,
+}
+
+fn physics(name: &str) -> Result<String, String> {
+    use backdrive_diagnosis::hypothesis::{PHYSICS, physics_named};
+    let known = || PHYSICS.iter().map(|p| p.name).collect::<Vec<_>>().join(", ");
+    physics_named(name).map(|p| p.name.to_string()).ok_or_else(|| format!("no such physics; there are {}", known()))
 }
 
 /// Gains of a sweep.

@@ -2,13 +2,18 @@
 
 mod bag;
 mod cli;
+mod diagnose;
+mod diagnose_page;
+mod diagnose_text;
 mod experiments;
 mod failure;
+mod fit;
 mod graph;
 mod model;
 mod node;
 mod play;
 mod progress;
+mod recordings;
 mod replay;
 mod run;
 mod simulate;
@@ -30,6 +35,8 @@ fn main() -> ExitCode {
         Command::Run(options) => run::run(&options),
         Command::Replay(options) => replay::replay(&options),
         Command::Stability(options) => stability::stability(&options),
+        Command::Diagnose(options) => diagnose::diagnose(&options),
+        Command::Fit(options) => fit::fit(&options),
         Command::Check(options) => graph::check(&options),
         Command::Graph(options) => graph::draw(&options),
         Command::Simulate(options) => simulate::simulate(&options),

@@ -1,5 +1,6 @@
 //! Fits by simulation error: bounded Levenberg-Marquardt steps with differences in parallel.
 
+use crate::guide::Guide;
 use crate::problem::{Problem, Record};
 use crate::structure::{Number, Structure};
 use nalgebra::{DMatrix, DVector};
@@ -26,6 +27,12 @@ pub struct Evaluator<'a> {
     pub simulations: Arc<AtomicUsize>,
     /// Substeps per sample, at most: fewer are faster, and blur what is very stiff.
     pub substeps: usize,
+    /// What leads the simulations along the recordings; `None` for simulation errors.
+    pub guide: Option<Guide>,
+    /// How wide differences are at first, in steps of each number.
+    pub stretch: f64,
+    /// How wide they may become where narrow ones mislead.
+    pub widest: f64,
 }
 
 /// How long to try.
@@ -76,6 +83,9 @@ impl<'a> Evaluator<'a> {
             until: None,
             simulations: Arc::default(),
             substeps: 64,
+            guide: None,
+            stretch: 1.0,
+            widest: 64.0,
         }
     }
 
@@ -120,10 +130,13 @@ impl<'a> Evaluator<'a> {
     ) -> Option<Vec<f64>> {
         let record = self.records.get(r)?;
         self.simulations.fetch_add(1, Ordering::Relaxed);
-        let mut columns = structure.predict(model, values, record, r, self.substeps)?;
+        let mut columns = structure.predict_along(model, values, record, r, self.substeps, self.guide.as_ref())?;
         for (column, output) in columns.chunks_exact_mut(record.len).zip(measured(record)) {
             let samples = record.outputs.get(output)?.as_deref()?;
-            let (floor, lag) = (self.floor.get(output).copied()?, self.problem.lag.get(output).copied().unwrap_or(0));
+            let (floor, lag) = (
+                self.floor.get(output).copied()?,
+                if self.guide.is_some() { 0 } else { self.problem.lag.get(output).copied().unwrap_or(0) },
+            );
             for (prediction, sample) in column.iter_mut().zip(samples) {
                 *prediction = (sample - *prediction) / floor;
             }
@@ -148,11 +161,11 @@ impl<'a> Evaluator<'a> {
 
     /// Derivatives of the residuals by each number in the fit's own unit.
     pub fn jacobian(&self, structure: &Structure, own: &[f64], residuals: &[f64]) -> Vec<Vec<f64>> {
-        self.columns(structure, own, residuals, &(0..own.len()).collect::<Vec<_>>())
+        self.columns(structure, own, residuals, &(0..own.len()).collect::<Vec<_>>(), 1.0)
     }
 
-    /// The same by some of the numbers.
-    fn columns(&self, structure: &Structure, own: &[f64], residuals: &[f64], which: &[usize]) -> Vec<Vec<f64>> {
+    /// The same by some of the numbers, differences taken over `stretch` times their steps.
+    pub(crate) fn columns(&self, structure: &Structure, own: &[f64], residuals: &[f64], which: &[usize], stretch: f64) -> Vec<Vec<f64>> {
         let spans: Vec<std::ops::Range<usize>> = self
             .records
             .iter()
@@ -173,13 +186,16 @@ impl<'a> Evaluator<'a> {
         let moved: Vec<Option<(Vec<f64>, backdrive_plant::model::Model, f64)>> = which
             .iter()
             .map(|j| {
-                let (values, step) = moved_values(structure, own, *j, &structure.numbers[*j]);
+                let (values, step) = moved_values(structure, own, *j, stretch);
                 Some((values.clone(), structure.model(self.problem, &values)?, step))
             })
             .collect();
         let parts: Vec<Option<Vec<f64>>> = jobs
             .par_iter()
             .map(|(j, r)| {
+                if self.is_late() {
+                    return None;
+                }
                 let (values, model, step) = moved.get(*j)?.as_ref()?;
                 let mut part = self.record_residuals(structure, model, values, *r)?;
                 let before = residuals.get(spans[*r].clone())?;
@@ -219,6 +235,9 @@ impl<'a> Evaluator<'a> {
         // Steps since the derivatives were computed.
         let mut age = if known.is_some() { 1 } else { 0 };
         let (mut lambda, mut steps, mut weak) = (1e-3, 0, 0);
+        // Slips that start a step earlier or later make small differences rough: wider ones are taken where narrow ones mislead.
+        let mut stretch = self.stretch;
+        let everything: Vec<usize> = (0..own.len()).collect();
         let mut foreseen;
         loop {
             let weights = self.weights(&residuals);
@@ -236,11 +255,13 @@ impl<'a> Evaluator<'a> {
             if ended {
                 break;
             }
-            if foreseen < effort.tolerance * unit {
+            // Far from the noise a thousandth of what is left decides nothing.
+            let enough = if unit > 2.0 { 1e-3 * cost } else { 0.0 };
+            if foreseen < (effort.tolerance * unit).max(enough) {
                 if age == 0 || effort.tolerance > 1.0 {
                     break;
                 }
-                (jacobian, age) = (self.jacobian(structure, &own, &residuals), 0);
+                (jacobian, age) = (self.columns(structure, &own, &residuals, &everything, stretch), 0);
                 continue;
             }
             let tries = if age > 0 { 2 } else { 6 };
@@ -264,9 +285,12 @@ impl<'a> Evaluator<'a> {
             }
             let Some((next, r, c)) = accepted else {
                 if age == 0 {
-                    break;
+                    if stretch >= self.widest {
+                        break;
+                    }
+                    stretch *= 8.0;
                 }
-                (jacobian, age, lambda) = (self.jacobian(structure, &own, &residuals), 0, lambda.min(1e-1));
+                (jacobian, age, lambda) = (self.columns(structure, &own, &residuals, &everything, stretch), 0, lambda.min(1e-1));
                 continue;
             };
             let ratio = (cost - c) / foreseen.max(1e-300);
@@ -280,7 +304,7 @@ impl<'a> Evaluator<'a> {
             (own, residuals, cost) = (next, r, c);
             steps += 1;
             if fresh && steps < effort.steps {
-                (jacobian, age) = (self.jacobian(structure, &own, &residuals), 0);
+                (jacobian, age) = (self.columns(structure, &own, &residuals, &everything, stretch), 0);
             } else {
                 age += 1;
             }
@@ -290,13 +314,15 @@ impl<'a> Evaluator<'a> {
 
     /// Derivatives at the start, those by stated numbers from another fit where there is one.
     fn first_jacobian(&self, structure: &Structure, own: &[f64], residuals: &[f64], known: Option<(&Structure, &Fit)>) -> Vec<Vec<f64>> {
-        let Some((other, fit)) = known else { return self.jacobian(structure, own, residuals) };
+        let Some((other, fit)) = known else {
+            return self.columns(structure, own, residuals, &(0..own.len()).collect::<Vec<_>>(), self.stretch);
+        };
         let column = |number: &Number| {
             let place = other.numbers.iter().position(|n| n.role == number.role);
             place.and_then(|p| fit.jacobian.get(p)).filter(|c| c.len() == residuals.len())
         };
         let missing: Vec<usize> = (0..own.len()).filter(|j| column(&structure.numbers[*j]).is_none()).collect();
-        let mut new = self.columns(structure, own, residuals, &missing).into_iter();
+        let mut new = self.columns(structure, own, residuals, &missing, self.stretch).into_iter();
         structure.numbers.iter().map(|n| column(n).cloned().or_else(|| new.next()).unwrap_or_else(|| vec![0.0; residuals.len()])).collect()
     }
 
@@ -326,10 +352,13 @@ fn residuals_in(record: &Record) -> usize {
 }
 
 /// Values with one number moved by its step, away from a bound, and the step taken in the fit's own unit.
-fn moved_values(structure: &Structure, own: &[f64], j: usize, number: &Number) -> (Vec<f64>, f64) {
+fn moved_values(structure: &Structure, own: &[f64], j: usize, stretch: f64) -> (Vec<f64>, f64) {
+    let number = &structure.numbers[j];
     let (low, high) = number.bounds();
-    let mut step = number.step.min(0.5 * (high - low));
-    if own[j] + step > high {
+    // What already spans a sample has no need of more.
+    let longer = if number.coarse { stretch.clamp(-1.0, 2.0) } else { stretch };
+    let mut step = (number.step * longer).clamp(-0.5 * (high - low), 0.5 * (high - low));
+    if own[j] + step > high || own[j] + step < low {
         step = -step;
     }
     let moved = (own[j] + step).clamp(low, high);

@@ -1,8 +1,10 @@
 //! How sure the numbers of a fit are.
 
-use crate::fit::normal_equations;
+use crate::fit::{Evaluator, normal_equations};
 use crate::search::Candidate;
-use nalgebra::DMatrix;
+use crate::simulate::TWICE;
+use nalgebra::{DMatrix, DVector};
+use std::time::{Duration, Instant};
 
 /// Standard deviations of a fit's numbers, in the fit's own unit (logarithms where it steps in them), and their correlations. Residuals
 /// that hang together count as fewer, and what is left over counts as error.
@@ -10,42 +12,101 @@ use nalgebra::DMatrix;
 pub struct Spread {
     /// One for each number; infinite where the recordings do not determine it.
     pub deviation: Vec<f64>,
+    /// How far each number may be off beside that, whatever the noise: what the fit's last step and finer simulation steps would move it.
+    pub bias: Vec<f64>,
     /// Correlation of each with each.
     pub correlation: DMatrix<f64>,
 }
 
 /// 97.5 % of a normal distribution.
 const NORMAL_975: f64 = 1.959_964;
+/// Blocks that each recording's output is divided into, where the scores of a fit are summed.
+const BLOCKS: usize = 25;
+/// What a simulation of all recordings may take before it counts as slow.
+const SLOW: Duration = Duration::from_millis(200);
 
 impl Spread {
     /// From the curvature where the fit ended.
     pub fn of(candidate: &Candidate) -> Spread {
         let fit = &candidate.fit;
         let n = fit.values.len();
-        let (mut matrix, _) = normal_equations(&fit.jacobian, &fit.residuals, None);
-        for (j, number) in candidate.structure.numbers.iter().enumerate() {
-            if let Some((_, spread)) = number.prior {
-                matrix[(j, j)] += 1.0 / (spread * spread);
-            }
-        }
-        let scale: Vec<f64> = (0..n).map(|j| matrix[(j, j)].sqrt()).collect();
-        let live: Vec<usize> = (0..n).filter(|j| scale[*j] > 0.0).collect();
-        let scaled = DMatrix::from_fn(live.len(), live.len(), |a, b| {
-            matrix[(live[a], live[b])] / (scale[live[a]] * scale[live[b]]) + if a == b { 1e-12 } else { 0.0 }
-        });
+        let matrix = curvature(candidate, &fit.jacobian, &fit.residuals);
+        let unit = unit(candidate, &fit.residuals);
         let mut deviation = vec![f64::INFINITY; n];
         let mut correlation = DMatrix::identity(n, n);
-        let unit =
-            (fit.residuals.iter().map(|r| r * r).sum::<f64>() / fit.residuals.len().max(1) as f64).max(1.0) * candidate.correlation_time;
-        if let Some(inverse) = scaled.cholesky().map(|c| c.inverse()) {
-            for (a, j) in live.iter().enumerate() {
-                deviation[*j] = (inverse[(a, a)] * unit).sqrt() / scale[*j];
-                for (b, k) in live.iter().enumerate() {
-                    correlation[(*j, *k)] = inverse[(a, b)] / (inverse[(a, a)] * inverse[(b, b)]).sqrt();
+        if let Some(inverse) = inverse(&matrix) {
+            for j in (0..n).filter(|j| matrix[(*j, *j)] > 0.0) {
+                deviation[j] = (inverse[(j, j)] * unit).sqrt();
+                for k in 0..n {
+                    let size = (inverse[(j, j)] * inverse[(k, k)]).sqrt();
+                    correlation[(j, k)] =
+                        if j == k || !(size > 0.0 && size.is_finite()) { f64::from(u8::from(j == k)) } else { inverse[(j, k)] / size };
                 }
             }
         }
-        Spread { deviation, correlation }
+        Spread { deviation, bias: vec![0.0; n], correlation }
+    }
+
+    /// The same, measured where the fit ended: derivatives from both sides, the scatter of the scores over blocks of the recordings
+    /// (what is left over hangs together, and differs from place to place: Huber's sandwich by blocks), and what finer steps of the simulation would change.
+    pub fn measured(evaluator: &Evaluator, candidate: &Candidate) -> Spread {
+        let mut spread = Spread::of(candidate);
+        let structure = &candidate.structure;
+        let own: Vec<f64> = structure.numbers.iter().zip(&candidate.fit.values).map(|(n, v)| n.inward(*v)).collect();
+        let began = Instant::now();
+        let Some(residuals) = evaluator.residuals(structure, &candidate.fit.values) else { return spread };
+        // Where simulations are slow, derivatives come from fewer substeps, and finer ones are not tried.
+        let slow = began.elapsed() > SLOW;
+        let coarser = Evaluator { substeps: if slow { 8 } else { evaluator.substeps }, ..evaluator.clone() };
+        let Some(there) = (if slow { coarser.residuals(structure, &candidate.fit.values) } else { Some(residuals.clone()) }) else {
+            return spread;
+        };
+        let all: Vec<usize> = (0..own.len()).collect();
+        let (ahead, behind) = (coarser.columns(structure, &own, &there, &all, 1.0), coarser.columns(structure, &own, &there, &all, -1.0));
+        let jacobian: Vec<Vec<f64>> =
+            ahead.iter().zip(&behind).map(|(a, b)| a.iter().zip(b).map(|(x, y)| 0.5 * (x + y)).collect()).collect();
+        let matrix = curvature(candidate, &jacobian, &residuals);
+        let Some(inverse) = inverse(&matrix) else { return spread };
+        let n = own.len();
+        let unit = unit(candidate, &residuals);
+        // Scores by blocks.
+        let mut scatter = DMatrix::<f64>::zeros(n, n);
+        let mut blocks = 0.0f64;
+        for (_, _, range) in evaluator.layout() {
+            let length = (range.len() / BLOCKS).max((4.0 * candidate.correlation_time) as usize).clamp(1, range.len().max(1));
+            for from in range.clone().step_by(length) {
+                let to = (from + length).min(range.end);
+                let score = DVector::from_iterator(n, jacobian.iter().map(|c| crate::fit::dot(&c[from..to], &residuals[from..to])));
+                scatter += &score * score.transpose();
+                blocks += 1.0;
+            }
+        }
+        let correction = if blocks > n as f64 + 1.0 { blocks / (blocks - n as f64) } else { 2.0 };
+        let sandwich = &inverse * scatter * &inverse * correction;
+        let step = |residuals: &[f64]| {
+            let slope = DVector::from_iterator(n, jacobian.iter().map(|c| crate::fit::dot(c, residuals)));
+            &inverse * slope
+        };
+        let last = step(&residuals);
+        let fine = Evaluator { substeps: TWICE, ..evaluator.clone() };
+        let finer = if slow { None } else { fine.residuals(structure, &candidate.fit.values) };
+        let numerical = finer.map(|f| step(&f.iter().zip(&residuals).map(|(a, b)| a - b).collect::<Vec<f64>>()));
+        for j in 0..n {
+            let variance = (inverse[(j, j)] * unit).max(sandwich[(j, j)]);
+            if variance.is_finite() && variance > 0.0 {
+                spread.deviation[j] = variance.sqrt();
+            }
+            let prior = structure.numbers[j].prior.is_none() || spread.deviation[j] < 1.0;
+            let moved = if prior { last[j].abs().min(3.0 * spread.deviation[j]) } else { 0.0 };
+            spread.bias[j] = moved + numerical.as_ref().map_or(0.0, |d| d[j].abs());
+        }
+        spread
+    }
+
+    /// Half of a number's 95 % interval, in the fit's own unit.
+    pub fn half(&self, number: usize) -> f64 {
+        let deviation = self.deviation.get(number).copied().unwrap_or(f64::INFINITY);
+        NORMAL_975 * deviation + self.bias.get(number).copied().unwrap_or(0.0)
     }
 
     /// 95 % interval of a number, as it stands in the model.
@@ -55,7 +116,41 @@ impl Spread {
         };
         let (low, high) = n.bounds();
         let own = n.inward(*value);
-        let half = NORMAL_975 * self.deviation.get(number).copied().unwrap_or(f64::INFINITY);
+        let half = self.half(number);
         [n.outward((own - half).max(low)), n.outward((own + half).min(high))]
     }
+}
+
+/// Curvature of half the cost, priors included.
+fn curvature(candidate: &Candidate, jacobian: &[Vec<f64>], residuals: &[f64]) -> DMatrix<f64> {
+    let (mut matrix, _) = normal_equations(jacobian, residuals, None);
+    for (j, number) in candidate.structure.numbers.iter().enumerate() {
+        if let Some((_, spread)) = number.prior {
+            matrix[(j, j)] += 1.0 / (spread * spread);
+        }
+    }
+    matrix
+}
+
+/// Variance of one independent residual, times how many residuals are worth one.
+fn unit(candidate: &Candidate, residuals: &[f64]) -> f64 {
+    (residuals.iter().map(|r| r * r).sum::<f64>() / residuals.len().max(1) as f64).max(1.0) * candidate.correlation_time
+}
+
+/// Inverse by scaled Cholesky factors; rows without curvature stay 0.
+fn inverse(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    let n = matrix.nrows();
+    let scale: Vec<f64> = (0..n).map(|j| matrix[(j, j)].sqrt()).collect();
+    let live: Vec<usize> = (0..n).filter(|j| scale[*j] > 0.0).collect();
+    let scaled = DMatrix::from_fn(live.len(), live.len(), |a, b| {
+        matrix[(live[a], live[b])] / (scale[live[a]] * scale[live[b]]) + if a == b { 1e-12 } else { 0.0 }
+    });
+    let inner = scaled.cholesky()?.inverse();
+    let mut inverse = DMatrix::zeros(n, n);
+    for (a, j) in live.iter().enumerate() {
+        for (b, k) in live.iter().enumerate() {
+            inverse[(*j, *k)] = inner[(a, b)] / (scale[*j] * scale[*k]);
+        }
+    }
+    Some(inverse)
 }

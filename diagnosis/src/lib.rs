@@ -5,12 +5,19 @@
 //! [`verdict`] says what follows, as a file and a model.
 
 pub mod audit;
+pub mod compare;
+pub mod evidence;
+pub mod experiment;
 pub mod fit;
 pub mod floor;
+pub mod guide;
 pub mod hypothesis;
 pub mod intervals;
 pub mod locate;
+pub mod numbers;
+pub mod per_record;
 pub mod problem;
+pub mod race;
 pub mod screen;
 pub mod search;
 pub mod simulate;

@@ -96,14 +96,21 @@ impl Problem {
     /// # Errors
     /// When a file is missing or wrong, a signal is not recorded, or the nominal model cannot be simulated.
     pub fn open(set: &Path, model: Option<&Path>) -> Result<Problem, ProblemError> {
-        let set = RecordingSet::open(set)?;
+        Problem::of_set(&RecordingSet::open(set)?, model)
+    }
+
+    /// The same of a set at hand.
+    ///
+    /// # Errors
+    /// As [`Problem::open`].
+    pub fn of_set(set: &RecordingSet, model: Option<&Path>) -> Result<Problem, ProblemError> {
         let no_model =
             || ProblemError::Set(format!("{}: no model is named; say model = \"...\" in set.toml or give one", set.folder.display()));
         let model_path = model.map(Path::to_path_buf).or_else(|| set.model.clone()).ok_or_else(no_model)?;
         let text = read_text(&model_path)?;
         let model = Model::load(&model_path)?;
         set.check_conditions(&model)?;
-        let read = |files: &[String]| files.iter().map(|file| record(&set, file, &model)).collect::<Result<Vec<_>, _>>();
+        let read = |files: &[String]| files.iter().map(|file| record(set, file, &model)).collect::<Result<Vec<_>, _>>();
         let (fit, held_out) = (read(&set.fit)?, read(&set.held_out)?);
         Problem::new(text, model_path, model, fit, held_out, set.initial)
     }

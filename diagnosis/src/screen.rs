@@ -5,6 +5,7 @@ use crate::hypothesis::Hypothesis;
 use crate::structure::Structure;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
+use std::time::{Duration, Instant};
 
 /// What a hypothesis could explain.
 #[derive(Debug, Clone)]
@@ -78,99 +79,185 @@ pub fn worst_records(evaluator: &Evaluator, fit: &Fit, count: usize) -> Vec<usiz
     order
 }
 
-/// Every hypothesis's best start with what it promises, most promising first.
-pub fn screen(evaluator: &Evaluator, base: &Structure, fit: &Fit, hypotheses: &[Hypothesis]) -> Vec<Promise> {
-    let stride = fit.residuals.len().div_ceil(KEPT).max(1);
-    let projector = Projector::new(&fit.jacobian, stride);
-    let mut left: Vec<f64> = fit.residuals.iter().step_by(stride).copied().collect();
-    let total = dot(&left, &left);
-    projector.apply(&mut left);
-    let problem = evaluator.problem;
-    let (stated, added) = (base.stated_of(problem, &fit.values), base.added_of(&fit.values));
-    // First all starts on the two recordings that are explained worst, then the best ones on all.
-    let few = worst_records(evaluator, fit, 2);
-    let all: Vec<(usize, &Vec<f64>)> = hypotheses
-        .iter()
-        .enumerate()
-        .filter(|(_, h)| base.added.iter().all(|b| b.compatible(h)))
-        .flat_map(|(index, h)| h.starts.iter().map(move |start| (index, start)))
-        .collect();
-    let mut jobs = all;
-    if evaluator.records.len() > few.len() && problem.initial == backdrive_plant::set::Initial::Rest {
-        let layout = evaluator.layout();
-        let kept: Vec<usize> = layout.iter().filter(|l| few.contains(&l.0)).flat_map(|l| l.2.clone()).step_by(stride).collect();
-        let pick = |all: &[f64]| kept.iter().filter_map(|i| all.get(*i).copied()).collect::<Vec<f64>>();
-        let small = Projector::of(fit.jacobian.iter().map(|c| pick(c)).collect());
-        let mut left = pick(&fit.residuals);
-        small.apply(&mut left);
-        let total = dot(&left, &left);
-        let mut scores: Vec<(f64, (usize, &Vec<f64>))> = jobs
+/// What each hypothesis does to the residuals of a base, so that it can be held against what any later fit leaves over: along the
+/// measured path its effect hardly depends on what else is in the model.
+pub struct Screen {
+    stride: usize,
+    effects: Vec<Effect>,
+}
+
+/// A start of a hypothesis and its effect in full and weakened, of length 1.
+struct Effect {
+    hypothesis: usize,
+    values: [Vec<f64>; 2],
+    columns: [Option<Vec<f64>>; 2],
+    /// Length of the weakened effect before it was brought to 1, floors.
+    length: f64,
+}
+
+/// Starts that pass to the second pass.
+const STARTS: usize = 70;
+
+impl Screen {
+    /// Simulates every hypothesis beside a base: all starts on the two recordings that are explained worst, the best ones on all.
+    /// In about the time given: where that is short, fewer starts of each are tried.
+    pub fn new(evaluator: &Evaluator, base: &Structure, fit: &Fit, hypotheses: &[Hypothesis], time: Duration) -> Screen {
+        let stride = fit.residuals.len().div_ceil(KEPT).max(1);
+        let problem = evaluator.problem;
+        let (stated, added) = (base.stated_of(problem, &fit.values), base.added_of(&fit.values));
+        // What a simulation of a recording takes, by a sample of the hypotheses: nonlinear ones are slower than a linear base.
+        let began = Instant::now();
+        let sample: Vec<&Hypothesis> = hypotheses.iter().step_by((hypotheses.len() / 8).max(1)).collect();
+        sample.par_iter().for_each(|h| {
+            let structure = Structure::new(problem, evaluator.records, [base.added.clone(), vec![(*h).clone()]].concat());
+            let values = structure.values(problem, &stated, &[added.clone(), h.starts.first().cloned().into_iter().collect()].concat());
+            if let Some(model) = structure.model(problem, &values) {
+                let _ = evaluator.record_residuals(&structure, &model, &values, 0);
+            }
+        });
+        let each = began.elapsed().as_secs_f64() / sample.len().max(1) as f64;
+        // Half of the time for either pass.
+        let affordable = (time.as_secs_f64() / each.max(1e-6)) as usize / 2;
+        let mut few = worst_records(evaluator, fit, 2);
+        let starts: usize = hypotheses.iter().map(|h| h.starts.len()).sum();
+        if 2 * starts > affordable {
+            few = worst_records(evaluator, fit, 1);
+        }
+        let depth = (affordable / (few.len() * hypotheses.len().max(1))).max(1);
+        let mut jobs: Vec<(usize, &Vec<f64>)> = hypotheses
+            .iter()
+            .enumerate()
+            .filter(|(_, h)| base.added.iter().all(|b| b.compatible(h)))
+            .flat_map(|(index, h)| h.starts.iter().take(depth).map(move |start| (index, start)))
+            .collect();
+        // First starts first: where simulations are slower than the sample, the last ones are left out.
+        let rank = |(index, start): &(usize, &Vec<f64>)| hypotheses[*index].starts.iter().position(|s| std::ptr::eq(s, *start));
+        jobs.sort_by_key(rank);
+        let first_pass = Instant::now();
+        let most = (affordable / (2 * evaluator.records.len()).max(1)).clamp(24, STARTS);
+        let with = |index: usize| {
+            let mut with = base.added.clone();
+            with.push(hypotheses[index].clone());
+            Structure::new(problem, evaluator.records, with)
+        };
+        if evaluator.records.len() > few.len() && problem.initial == backdrive_plant::set::Initial::Rest && jobs.len() > most {
+            let layout = evaluator.layout();
+            let kept: Vec<usize> = layout.iter().filter(|l| few.contains(&l.0)).flat_map(|l| l.2.clone()).step_by(stride).collect();
+            let pick = |all: &[f64]| kept.iter().filter_map(|i| all.get(*i).copied()).collect::<Vec<f64>>();
+            let small = Projector::of(fit.jacobian.iter().map(|c| pick(c)).collect());
+            let before = pick(&fit.residuals);
+            let mut left = before.clone();
+            small.apply(&mut left);
+            let total = dot(&left, &left);
+            let mut scores: Vec<(f64, (usize, &Vec<f64>))> = jobs
+                .par_iter()
+                .filter_map(|(index, start)| {
+                    if first_pass.elapsed() > time.mul_f64(0.6) {
+                        return None;
+                    }
+                    let structure = with(*index);
+                    let values = structure.values(problem, &stated, &[added.clone(), vec![start.to_vec()]].concat());
+                    let model = structure.model(problem, &values)?;
+                    let parts: Option<Vec<Vec<f64>>> =
+                        few.iter().map(|r| evaluator.record_residuals(&structure, &model, &values, *r)).collect();
+                    let mut column = unit(parts?.concat().into_iter().step_by(stride).zip(&before).map(|(a, b)| a - b).collect())?;
+                    small.apply(&mut column);
+                    Some((share(&[&column], &left, total), (*index, *start)))
+                })
+                .collect();
+            scores.sort_by(|a, b| b.0.total_cmp(&a.0));
+            let mut seen = vec![0; hypotheses.len()];
+            scores.retain(|s| {
+                seen[s.1.0] += 1;
+                seen[s.1.0] <= 2
+            });
+            // One start of each at least: what does little beside the base may do much beside something else.
+            let mut first = std::collections::HashSet::new();
+            let (firsts, seconds): (Vec<_>, Vec<_>) = scores.into_iter().map(|s| s.1).partition(|job| first.insert(job.0));
+            let room = most.saturating_sub(firsts.len());
+            jobs = firsts.into_iter().take(most).chain(seconds.into_iter().take(room)).collect();
+        }
+        let second_pass = Instant::now();
+        let effects = jobs
             .par_iter()
-            .filter_map(|(index, start)| {
-                let mut with = base.added.clone();
-                with.push(hypotheses[*index].clone());
-                let structure = Structure::new(problem, evaluator.records, with);
-                let values = structure.values(problem, &stated, &[added.clone(), vec![start.to_vec()]].concat());
-                let model = structure.model(problem, &values)?;
-                let parts: Option<Vec<Vec<f64>>> =
-                    few.iter().map(|r| evaluator.record_residuals(&structure, &model, &values, *r)).collect();
-                let joined = parts?.concat();
-                let mut column: Vec<f64> = joined.into_iter().step_by(stride).zip(pick(&fit.residuals)).map(|(a, b)| a - b).collect();
-                let size = dot(&column, &column).sqrt();
-                if !(size > 0.0 && size.is_finite()) {
-                    return None;
-                }
-                column.iter_mut().for_each(|x| *x /= size);
-                small.apply(&mut column);
-                Some((share(&[&column], &left, total), (*index, *start)))
+            .map(|(index, start)| {
+                let structure = with(*index);
+                let effect = |values: &Vec<f64>| -> Option<(Vec<f64>, f64)> {
+                    if evaluator.is_late() || second_pass.elapsed() > time {
+                        return None;
+                    }
+                    let all = [added.clone(), vec![values.clone()]].concat();
+                    let residuals = evaluator.residuals(&structure, &structure.values(problem, &stated, &all))?;
+                    measured(residuals.iter().step_by(stride).zip(fit.residuals.iter().step_by(stride)).map(|(a, b)| a - b).collect())
+                };
+                let values = [start.to_vec(), weakened(&hypotheses[*index], start)];
+                let (full, weak) = (effect(&values[0]), effect(&values[1]));
+                // Every so manieth residual was kept.
+                let length = weak.as_ref().map_or(0.0, |w| w.1 * (stride as f64).sqrt());
+                Effect { hypothesis: *index, values, columns: [full.map(|e| e.0), weak.map(|e| e.0)], length }
             })
             .collect();
-        scores.sort_by(|a, b| b.0.total_cmp(&a.0));
-        let mut seen = vec![0; hypotheses.len()];
-        scores.retain(|s| {
-            seen[s.1.0] += 1;
-            seen[s.1.0] <= 2
-        });
-        jobs = scores.into_iter().take(60).map(|s| s.1).collect();
+        Screen { stride, effects }
     }
-    let mut promises: Vec<Promise> = jobs
-        .par_iter()
-        .filter_map(|(index, start)| {
-            let hypothesis = &hypotheses[*index];
-            let mut with = base.added.clone();
-            with.push(hypothesis.clone());
-            let structure = Structure::new(problem, evaluator.records, with);
-            let effect = |values: Vec<f64>| -> Option<Vec<f64>> {
-                let all = [added.clone(), vec![values]].concat();
-                let residuals = evaluator.residuals(&structure, &structure.values(problem, &stated, &all))?;
-                let mut column: Vec<f64> =
-                    residuals.iter().step_by(stride).zip(fit.residuals.iter().step_by(stride)).map(|(a, b)| a - b).collect();
-                let size = dot(&column, &column).sqrt();
-                if !(size > 0.0 && size.is_finite()) {
-                    return None;
-                }
-                column.iter_mut().for_each(|x| *x /= size);
-                projector.apply(&mut column);
-                Some(column)
-            };
-            let full = effect(start.to_vec());
-            let weak = effect(weakened(hypothesis, start));
-            let share_of = |column: &Option<Vec<f64>>| column.as_ref().map_or(0.0, |c| share(&[c], &left, total));
-            // A fit starts where the effect looks most like what is left over.
-            let values = if share_of(&weak) > share_of(&full) { weakened(hypothesis, start) } else { start.to_vec() };
-            let columns: Vec<Vec<f64>> = [full, weak].into_iter().flatten().collect();
-            let share = share(&columns.iter().collect::<Vec<_>>(), &left, total);
-            (share > 0.0).then_some(Promise { hypothesis: *index, values, share, columns })
-        })
-        .collect();
-    promises.sort_by(|a, b| b.share.total_cmp(&a.share));
-    let mut seen = vec![0; hypotheses.len()];
-    // Two starts of the same hypothesis are enough.
-    promises.retain(|p| {
-        seen[p.hypothesis] += 1;
-        seen[p.hypothesis] <= 2
-    });
-    promises
+
+    /// For each start (hypothesis, values of the weakened effect) the length of what its effect adds beyond all that the fit's numbers can do, floors.
+    pub fn lengths(&self, fit: &Fit) -> Vec<((usize, Vec<f64>), f64)> {
+        let projector = Projector::new(&fit.jacobian, self.stride);
+        let one = |effect: &Effect| {
+            let mut column = effect.columns[1].clone()?;
+            projector.apply(&mut column);
+            let length = effect.length * dot(&column, &column).sqrt();
+            (length > 0.0).then(|| ((effect.hypothesis, effect.values[1].clone()), length))
+        };
+        self.effects.par_iter().filter_map(one).collect()
+    }
+
+    /// What each hypothesis promises of what a fit leaves over, most promising first. The fit is of the base, or of more than it.
+    pub fn look(&self, fit: &Fit, wanted: &(dyn Fn(usize) -> bool + Sync)) -> Vec<Promise> {
+        let projector = Projector::new(&fit.jacobian, self.stride);
+        let mut left: Vec<f64> = fit.residuals.iter().step_by(self.stride).copied().collect();
+        let total = dot(&left, &left);
+        projector.apply(&mut left);
+        let mut promises: Vec<Promise> = self
+            .effects
+            .par_iter()
+            .filter(|e| wanted(e.hypothesis))
+            .filter_map(|effect| {
+                let [full, weak] = &effect.columns;
+                let projected = |column: &Option<Vec<f64>>| {
+                    column.clone().map(|mut c| {
+                        projector.apply(&mut c);
+                        c
+                    })
+                };
+                let (full, weak) = (projected(full), projected(weak));
+                let share_of = |column: &Option<Vec<f64>>| column.as_ref().map_or(0.0, |c| share(&[c], &left, total));
+                // A fit starts where the effect looks most like what is left over.
+                let values = effect.values[usize::from(share_of(&weak) > share_of(&full))].clone();
+                let columns: Vec<Vec<f64>> = [full, weak].into_iter().flatten().collect();
+                let share = share(&columns.iter().collect::<Vec<_>>(), &left, total);
+                (share > 0.0).then_some(Promise { hypothesis: effect.hypothesis, values, share, columns })
+            })
+            .collect();
+        promises.sort_by(|a, b| b.share.total_cmp(&a.share));
+        promises
+    }
+}
+
+/// A column of length 1 and its length before.
+fn measured(column: Vec<f64>) -> Option<(Vec<f64>, f64)> {
+    let length = dot(&column, &column).sqrt();
+    Some((unit(column)?, length))
+}
+
+/// A column of length 1; `None` where there is nothing in it.
+fn unit(mut column: Vec<f64>) -> Option<Vec<f64>> {
+    let size = dot(&column, &column).sqrt();
+    if !(size > 0.0 && size.is_finite()) {
+        return None;
+    }
+    column.iter_mut().for_each(|x| *x /= size);
+    Some(column)
 }
 
 /// Share of `total` that columns explain of what is left.

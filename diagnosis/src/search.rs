@@ -2,13 +2,16 @@
 
 use crate::fit::{Effort, Evaluator, Fit, measured};
 use crate::floor;
-use crate::hypothesis::{self, Hypothesis, Scales};
+use crate::guide::Guide;
+use crate::hypothesis::{self, Hypothesis, Place, Scales};
 use crate::problem::{Problem, Record};
-use crate::screen::{Promise, pairs, screen, worst_records};
+use crate::race::{Course, Seed, distinct};
+use crate::screen::{Promise, Screen, pairs};
 use crate::statistics::{advantage, correlation_time, levels};
 use crate::structure::Structure;
 use backdrive_plant::set::Initial;
 use rayon::prelude::*;
+use std::collections::HashSet;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
@@ -25,7 +28,7 @@ pub struct Settings {
 
 impl Default for Settings {
     fn default() -> Settings {
-        Settings { without: Vec::new(), effects: 3, patience: Duration::from_secs(24) }
+        Settings { without: Vec::new(), effects: 3, patience: Duration::from_secs(26) }
     }
 }
 
@@ -40,6 +43,8 @@ pub struct Candidate {
     pub correlation_time: f64,
     /// Root mean square of what it leaves over at each output, floors.
     pub levels: Vec<f64>,
+    /// Mean square of its residuals on the recordings that no fit has seen, floors; `None` where it was not held against them.
+    pub unseen: Option<f64>,
 }
 
 /// A hypothesis that was tried alone.
@@ -51,6 +56,21 @@ pub struct Tried {
     pub promised: f64,
     /// Share that a refit took, where there was one.
     pub taken: Option<f64>,
+}
+
+/// The smallest size of a physics that the recordings would have shown.
+#[derive(Debug, Clone)]
+pub struct Detectable {
+    /// Its name.
+    pub physics: &'static str,
+    /// Where.
+    pub place: Place,
+    /// The parameter that says how large it is.
+    pub key: String,
+    /// Its size.
+    pub size: f64,
+    /// Unit of that.
+    pub unit: String,
 }
 
 /// What a search found.
@@ -70,6 +90,10 @@ pub struct Search {
     pub hypotheses: usize,
     /// Number of residuals.
     pub samples: usize,
+    /// Number of residuals of the recordings that no fit has seen.
+    pub unseen_samples: usize,
+    /// What would have been seen beside the refitted nominal model, each physics at the place where it shows best.
+    pub detectable: Vec<Detectable>,
     /// Simulations of a recording.
     pub simulations: usize,
     /// Whether it was stopped before its end.
@@ -99,6 +123,14 @@ const WHITE: f64 = 1.1;
 const CHANCE: f64 = 25.0;
 /// Numbers of a physics that is tried first, at most.
 const SIMPLE: usize = 6;
+/// Substeps per sample, at most: for screening and the first steps of fits, and for their middle.
+pub(crate) const COARSE: usize = 2;
+/// See [`COARSE`].
+pub(crate) const MIDDLE: usize = 4;
+/// Level above which fits start along the measured path, floors.
+const FAR: f64 = 2.0;
+/// Candidates that are held against recordings that no fit has seen.
+const FINALISTS: usize = 12;
 /// A residual at its floor has this level, up to chance and rounding.
 pub const AT_FLOOR: f64 = 1.04;
 
@@ -116,7 +148,7 @@ pub fn search(
     let late = |share: f64| began.elapsed() > settings.patience.mul_f64(share) || stop.is_some_and(|s| s.load(Ordering::Relaxed));
     let mut evaluator = Evaluator::new(problem);
     evaluator.stop = stop;
-    evaluator.until = Some(began + settings.patience);
+    evaluator.until = Some(began + settings.patience.mul_f64(0.75));
     if friction_on_prescribed(problem) {
         evaluator.robust = 6.0;
     }
@@ -125,7 +157,8 @@ pub fn search(
     let given: Vec<f64> = problem.stated.iter().map(|s| s.given).collect();
     let start = structure.values(problem, &given, &[]);
     let first = evaluator.residuals(&structure, &start).ok_or(SearchError::RunsAway)?;
-    let quick = evaluator.fit(&structure, &start, Effort { steps: 12, tolerance: 3.0 }).ok_or(SearchError::RunsAway)?;
+    let middle = Evaluator { substeps: MIDDLE, ..evaluator.clone() };
+    let quick = middle.fit(&structure, &start, Effort { steps: 12, tolerance: 3.0 }).ok_or(SearchError::RunsAway)?;
     // What a fit leaves over shows the measuring error better than the signal does.
     let before = evaluator.floor.clone();
     evaluator.floor = floors(&evaluator, &quick.residuals);
@@ -134,136 +167,341 @@ pub fn search(
     let levels_given = rescaled;
     let mut nominal = evaluator.fit(&structure, &quick.values, Effort::FULL).ok_or(SearchError::RunsAway)?;
     let samples = nominal.residuals.len();
-    if nominal.cost > AT_FLOOR * AT_FLOOR * samples as f64 {
-        for shift in [0.35, -0.35] {
-            // Inertias one way, the rest the other: what a wrong structure trades most easily.
-            let moved: Vec<f64> = problem
-                .stated
-                .iter()
-                .map(|s| if s.path.starts_with("bodies") { s.given * f64::exp(shift) } else { s.given * f64::exp(-shift) })
-                .collect();
-            let from = structure.values(problem, &moved, &[]);
-            if let Some(other) = evaluator.fit(&structure, &from, Effort { steps: 15, tolerance: 3.0 })
-                && other.cost < 0.999 * nominal.cost
-                && let Some(other) = evaluator.fit(&structure, &other.values, Effort::FULL)
-            {
-                nominal = other;
-            }
-        }
-    }
-    let nominal = candidate(&evaluator, structure, nominal);
-
-    let model = nominal.structure.model(problem, &nominal.fit.values).ok_or(SearchError::RunsAway)?;
+    // Far from the noise the measured path shows better than a simulation what is missing, and leads the numbers out of wrong basins.
+    let model = structure.model(problem, &nominal.values).ok_or(SearchError::RunsAway)?;
     let runs: Vec<(Vec<Vec<f64>>, f64)> = problem.fit.iter().map(|r| (r.inputs.clone(), r.period)).collect();
     let scales = Scales::of(&model, &runs)?;
+    let level = levels(&evaluator, &nominal.residuals).into_iter().fold(0.0, f64::max);
+    let strength = if level > 3.0 * FAR { 1.0 } else { 0.3 };
+    let loose = Guide::new(problem, &problem.fit, &scales, &evaluator.floor, strength);
+    let guided = level > FAR && !loose.is_empty();
+    let coarse = Evaluator { substeps: COARSE, widest: 8.0, guide: guided.then(|| loose.clone()), ..evaluator.clone() };
+    let from = if guided { &start } else { &nominal.values };
+    let base = coarse.fit(&structure, from, Effort { steps: if guided { 12 } else { 2 }, tolerance: 1.0 }).ok_or(SearchError::RunsAway)?;
+    if guided
+        && let Some(other) = middle.fit(&structure, &base.values, Effort { steps: 10, tolerance: 2.0 })
+        && other.cost < 0.99 * nominal.cost
+        && let Some(other) = evaluator.fit(&structure, &other.values, Effort::FULL)
+        && other.cost < nominal.cost
+    {
+        nominal = other;
+    }
+    let base = candidate(&evaluator, structure.clone(), base);
+    let nominal = candidate(&evaluator, structure, nominal);
+
     let withheld: Vec<&str> = settings.without.iter().map(String::as_str).collect();
     let mut hypotheses = hypothesis::without(hypothesis::all(&model, &scales), &withheld);
-    let mut classes = std::collections::HashSet::new();
+    let mut classes = HashSet::new();
     hypotheses.retain(|h| {
         let is_number = h.same_as.as_ref().is_some_and(|path| problem.stated.iter().any(|s| s.path == *path));
         !is_number && classes.insert(h.class.clone())
     });
 
     report("screening");
-    let coarse = Evaluator { substeps: 3, ..evaluator.clone() };
-    let promises = screen(&coarse, &nominal.structure, &nominal.fit, &hypotheses);
-    // Physics of many numbers come in where simpler relatives do not suffice.
-    let (simple, rich): (Vec<Promise>, Vec<Promise>) =
-        promises.into_iter().partition(|p| hypotheses[p.hypothesis].parameters.len() <= SIMPLE);
-    let promises = simple;
-    let mut found: Vec<Candidate> = Vec::new();
-    let mut tried: Vec<Tried> = Vec::new();
-    for promise in promises.iter().chain(&rich) {
-        let id = &hypotheses[promise.hypothesis].id;
-        if !tried.iter().any(|t| t.id == *id) {
-            tried.push(Tried { id: id.clone(), promised: promise.share, taken: None });
+    let course = Course {
+        evaluator: &evaluator,
+        along: guided.then_some((&loose, &base)),
+        hypotheses: &hypotheses,
+        nominal: &nominal,
+        given: &given,
+    };
+    let few_numbers = |h: usize| hypotheses[h].parameters.len() <= SIMPLE;
+    let look_from = |evaluator: &Evaluator, base: &Candidate, share: f64| {
+        let screen = Screen::new(evaluator, &base.structure, &base.fit, &hypotheses, settings.patience.mul_f64(share));
+        let promises = screen.look(&base.fit, &|_| true);
+        let (simple, rich) = promises.into_iter().partition(|p| few_numbers(p.hypothesis));
+        let stated = base.structure.stated_of(problem, &base.fit.values);
+        View { screen, fit: base.fit.clone(), stated, guided: evaluator.guide.is_some(), simple, rich }
+    };
+    let mut views = vec![look_from(&coarse, &base, if level > FAR { 0.08 } else { 0.12 })];
+    if level > FAR {
+        // Some effects show better on a free simulation; and the refit of a wrong structure may have carried the numbers off, so that
+        // without a measured path the given ones are another base.
+        let free = Evaluator { guide: None, ..coarse.clone() };
+        let (from, steps) = if guided { (&nominal.fit.values, 2) } else { (&start, 0) };
+        if let Some(fit) = free.fit(&base.structure, from, Effort { steps, tolerance: 1.0 }) {
+            views.push(look_from(&free, &candidate(&evaluator, base.structure.clone(), fit), 0.08));
         }
     }
-    report("fitting single effects");
+    let view = &views[0].screen;
+    let mut tried: Vec<Tried> = Vec::new();
+    for promise in views.iter().flat_map(|v| v.simple.iter().chain(&v.rich)) {
+        let id = &hypotheses[promise.hypothesis].id;
+        match tried.iter_mut().find(|t| t.id == *id) {
+            Some(t) => t.promised = t.promised.max(promise.share),
+            None => tried.push(Tried { id: id.clone(), promised: promise.share, taken: None }),
+        }
+    }
+    tried.sort_by(|a, b| b.promised.total_cmp(&a.promised));
+
+    let mut found: Vec<Candidate> = Vec::new();
     // At the floor only what promises more than chance is worth a fit.
     let quiet = nominal.correlation_time < WHITE || nominal.levels.iter().all(|l| *l < AT_FLOOR);
     let chance = CHANCE * nominal.correlation_time / samples as f64;
-    let seeds = if quiet { promises.iter().filter(|p| p.share > chance).count().min(8) } else { 18 };
-    // Those that promise most first: where one of them reaches the floor, the rest have nothing left to explain.
-    let mut all = single_seeds(&promises, seeds);
-    let first = all.len().min(6);
-    for (wave, keep) in [(all.drain(..first).collect::<Vec<_>>(), [5, 4]), (all, [7, 4])] {
-        if found.is_empty() || !done(&found, &nominal, samples) {
-            found.extend(race(&evaluator, problem, &nominal, &hypotheses, wave, keep, &given));
-            sort(&mut found, samples);
-        }
-    }
-    // A law that wins with more numbers has to win over its simpler relatives, whatever these promised.
-    if let Some(best) = found.first() {
-        let own = &best.structure.added[0];
-        let relative = |h: &Hypothesis| h.place.same(&own.place) && h.family == own.family && h.parameters.len() < own.parameters.len();
-        let missing = |h: &Hypothesis| found.iter().all(|c| c.structure.added[0].id != h.id);
-        let simpler: Vec<Seed> = hypotheses
-            .iter()
-            .enumerate()
-            .filter(|(_, h)| relative(h) && missing(h))
-            .filter_map(|(index, h)| Some(Seed { effects: vec![(index, h.starts.first()?.clone())], stated: None }))
-            .collect();
-        found.extend(race(&evaluator, problem, &nominal, &hypotheses, simpler, [3, 3], &given));
-        sort(&mut found, samples);
-    }
-    if !late(0.4) && !quiet && !done(&found, &nominal, samples) {
-        let richer = race(&evaluator, problem, &nominal, &hypotheses, single_seeds(&rich, 5), [3, 2], &given);
-        found.extend(richer);
-        sort(&mut found, samples);
-    }
-
-    let mut stopped = late(1.0);
-    for effects in 2..=settings.effects {
-        if late(0.6) || done(&found, &nominal, samples) {
-            break;
-        }
-        report(if effects == 2 { "fitting pairs" } else { "fitting triples" });
-        let mut seeds: Vec<Seed> = Vec::new();
-        if effects == 2 {
-            let compatible = |a: usize, b: usize| hypotheses[a].compatible(&hypotheses[b]);
-            let together = pairs(&promises, &nominal.fit, &nominal.fit.jacobian, 90, compatible);
-            seeds.extend(pair_seeds(&promises, &together, 12));
-        }
-        // From the best that have one effect less, and what each of them promises.
-        let bases: Vec<&Candidate> =
-            found.iter().filter(|c| c.structure.added.len() == effects - 1).take(if effects == 2 { 4 } else { 3 }).collect();
-        for base in bases {
-            if late(0.75) {
-                break;
-            }
-            let next = screen(&coarse, &base.structure, &base.fit, &hypotheses);
-            let mut used = std::collections::HashSet::new();
-            for promise in next.iter().filter(|p| hypotheses[p.hypothesis].parameters.len() <= SIMPLE && used.insert(p.hypothesis)).take(6)
-            {
-                seeds.push(extended(base, base.structure.stated_of(problem, &base.fit.values), &hypotheses, promise));
+    let mut singles: Vec<Seed> = Vec::new();
+    for rank in 0..16 {
+        for view in &views {
+            let mut used = HashSet::new();
+            let Some(promise) = view.simple.iter().filter(|p| used.insert(p.hypothesis)).nth(rank) else { continue };
+            // Those that promise little beside the best wait.
+            let top = view.simple.first().map_or(0.0, |p| p.share);
+            let wanted = if quiet { rank < 8 && promise.share > chance } else { rank < 3 || rank < 8 && promise.share > 0.5 * top };
+            if wanted {
+                singles.push(Seed::single(promise, &view.stated, view.guided));
             }
         }
-        seeds.retain(|s| s.effects.len() == effects);
-        let mut more = race(&evaluator, problem, &nominal, &hypotheses, seeds, [7, 4], &given);
-        found.append(&mut more);
-        sort(&mut found, samples);
-        stopped = late(1.0);
     }
+    distinct(&mut singles);
+    let finished = |found: &[Candidate]| done(found, &nominal, samples) || late(1.0);
+    let mut waves: Vec<(&str, [usize; 2])> = vec![("fitting single effects", [4, 3]), ("fitting simpler relatives", [3, 3])];
+    if !quiet {
+        waves.extend([("fitting pairs", [5, 3]), ("exchanging effects", [4, 2]), ("fitting richer laws", [2, 1])]);
+        waves.extend([("fitting more single effects", [4, 2]), ("fitting more pairs", [5, 3]), ("exchanging effects", [4, 2])]);
+        if settings.effects > 2 {
+            waves.extend([("fitting triples", [4, 3]), ("exchanging effects", [4, 2])]);
+        }
+    }
+    let first = singles.len().min(8);
+    let mut later = singles.split_off(first);
+    let mut effects = 1;
+    for (wave, keep) in waves {
+        let relatives = wave == "fitting simpler relatives";
+        if late(0.7) || (!relatives && finished(&found)) {
+            continue;
+        }
+        report(wave);
+        let mut seeds: Vec<Seed> = match wave {
+            "fitting single effects" => std::mem::take(&mut singles),
+            "fitting more single effects" => std::mem::take(&mut later),
+            // A law that wins with more numbers has to win over its simpler relatives, whatever these promised.
+            "fitting simpler relatives" => course.relatives(&found, guided),
+            "fitting richer laws" => {
+                let mut used = HashSet::new();
+                // In the place of what is the best of its kind.
+                let best = distinct_structures(&found, 1).next().map(|c| &c.structure.added[0]);
+                let like = |h: &Hypothesis| best.is_some_and(|b| b.place.same(&h.place) && ["friction", "hysteresis"].contains(&b.family));
+                views[0]
+                    .rich
+                    .iter()
+                    .filter(|p| like(&hypotheses[p.hypothesis]) && used.insert(p.hypothesis))
+                    .take(1)
+                    .map(|p| Seed::single(p, &views[0].stated, guided))
+                    .collect()
+            }
+            "fitting pairs" => {
+                effects = 2;
+                let compatible = |a: usize, b: usize| hypotheses[a].compatible(&hypotheses[b]);
+                let mut seeds: Vec<Seed> = Vec::new();
+                for view in &views {
+                    let simple = &view.simple;
+                    let together = pairs(simple, &view.fit, &view.fit.jacobian, 90, compatible);
+                    let mut used = HashSet::new();
+                    let best = together.iter().filter(|(a, b, _)| used.insert((simple[*a].hypothesis, simple[*b].hypothesis)));
+                    let pair = |a: usize, b: usize| [a, b].map(|p| (simple[p].hypothesis, simple[p].values.clone())).to_vec();
+                    seeds.extend(best.take(5).map(|(a, b, _)| Seed {
+                        effects: pair(*a, *b),
+                        stated: view.stated.clone(),
+                        guided: view.guided,
+                    }));
+                }
+                for base in distinct_structures(&found, 1).take(3) {
+                    seeds.extend(course.extensions(view, &coarse, base, 4));
+                }
+                seeds
+            }
+            "fitting more pairs" => {
+                distinct_structures(&found, 1).take(5).flat_map(|base| course.extensions(view, &coarse, base, 7)).collect()
+            }
+            "exchanging effects" => {
+                let best = found.iter().find(|c| c.structure.added.len() == effects);
+                best.map_or_else(Vec::new, |best| course.exchanges(view, &coarse, best, 4))
+            }
+            _ => {
+                effects = 3;
+                distinct_structures(&found, 2).take(3).flat_map(|base| course.extensions(view, &coarse, base, 5)).collect()
+            }
+        };
+        distinct(&mut seeds);
+        let known: HashSet<String> = found.iter().map(|c| key_of(&c.structure.added)).collect();
+        seeds.retain(|s| !known.contains(&key_of(s.effects.iter().map(|(h, _)| &hypotheses[*h]))));
+        found.extend(course.race(seeds, keep));
+        sort(&mut found, samples);
+    }
+    let stopped = late(1.0);
+    report("fitting the best to the end");
+    let last = Evaluator { until: Some(began + settings.patience.mul_f64(0.9)), ..evaluator.clone() };
+    let best = found.first().map_or(f64::INFINITY, |c| c.fit.cost);
+    let ends: Vec<usize> = (0..found.len().min(6))
+        .filter(|i| found[*i].fit.cost < 1.5 * best && found[*i].fit.foreseen > 0.5 * found[*i].fit.cost / samples as f64)
+        .collect();
+    let polished: Vec<(usize, Fit)> =
+        ends.par_iter().filter_map(|i| Some((*i, last.fit(&found[*i].structure, &found[*i].fit.values, Effort::FULL)?))).collect();
+    for (i, fit) in polished {
+        found[i] = candidate(&evaluator, found[i].structure.clone(), fit);
+    }
+    sort(&mut found, samples);
     // The numbers of what was found may lead the nominal model out of a wrong basin: then there was less to find.
-    let mut nominal = nominal;
-    let last = Evaluator { until: Some(Instant::now() + Duration::from_secs(3)), ..evaluator.clone() };
+    let mut better = None;
+    let last = Evaluator { until: Some(began + settings.patience.mul_f64(0.97)), ..evaluator.clone() };
     for found in found.iter().take(2) {
         let stated = found.structure.stated_of(problem, &found.fit.values);
         let start = nominal.structure.values(problem, &stated, &[]);
+        let least = better.as_ref().map_or(nominal.fit.cost, |f: &Fit| f.cost);
         if let Some(fit) = last.fit(&nominal.structure, &start, Effort::FULL)
-            && fit.cost < 0.999 * nominal.fit.cost
+            && fit.cost < 0.999 * least
         {
-            nominal = candidate(&evaluator, nominal.structure, fit);
+            better = Some(fit);
         }
     }
+    let mut nominal = nominal;
+    if let Some(fit) = better {
+        nominal = candidate(&evaluator, nominal.structure, fit);
+    }
+    // The best are held against the recordings that no fit has seen.
+    let unseen = Evaluator { records: &problem.held_out, ..Evaluator::new(problem) };
+    let unseen = Evaluator { floor: evaluator.floor.clone(), ..unseen };
+    for c in found.iter_mut().take(FINALISTS).chain(std::iter::once(&mut nominal)) {
+        c.unseen = unseen_cost(&unseen, &c.structure, &c.fit.values);
+    }
+    sort(&mut found, samples);
     for t in &mut tried {
         let single = found.iter().find(|c| c.structure.added.len() == 1 && c.structure.added[0].id == t.id);
         t.taken = single.map(|c| 1.0 - c.fit.cost / nominal.fit.cost);
     }
     let simulations = evaluator.simulations.load(Ordering::Relaxed);
     let (floor, count) = (evaluator.floor.clone(), hypotheses.len());
-    Ok(Search { floor, levels_given, nominal, found, tried, hypotheses: count, samples, simulations, stopped })
+    let unseen_samples = unseen.len();
+    let detectable = detectable(view, &base, &hypotheses);
+    Ok(Search { floor, levels_given, nominal, found, tried, hypotheses: count, samples, unseen_samples, detectable, simulations, stopped })
+}
+
+impl Course<'_> {
+    /// Simpler laws of the same family in the place of each effect of the best.
+    fn relatives(&self, found: &[Candidate], guided: bool) -> Vec<Seed> {
+        let Some(best) = found.first() else { return Vec::new() };
+        let stated = best.structure.stated_of(self.evaluator.problem, &best.fit.values);
+        let own = self.effects_of(&best.structure, &best.fit.values);
+        let mut seeds = Vec::new();
+        for (out, effect) in best.structure.added.iter().enumerate() {
+            let relative =
+                |h: &Hypothesis| h.place.same(&effect.place) && h.family == effect.family && h.parameters.len() < effect.parameters.len();
+            for (index, h) in self.hypotheses.iter().enumerate().filter(|(_, h)| relative(h)) {
+                let Some(start) = h.starts.first() else { continue };
+                let mut effects = own.clone();
+                if let Some(slot) = effects.get_mut(out) {
+                    *slot = (index, start.clone());
+                    seeds.push(Seed { effects, stated: stated.clone(), guided });
+                }
+            }
+        }
+        seeds
+    }
+
+    /// A structure with each of what promises most beside it added.
+    fn extensions(&self, view: &Screen, coarse: &Evaluator, base: &Candidate, count: usize) -> Vec<Seed> {
+        let problem = self.evaluator.problem;
+        let fit = if coarse.guide.is_none() {
+            Some(base.fit.clone())
+        } else {
+            coarse.fit(&base.structure, &base.fit.values, Effort { steps: 4, tolerance: 2.0 })
+        };
+        let Some(fit) = fit else { return Vec::new() };
+        let fits = |h: usize| {
+            let new = &self.hypotheses[h];
+            new.parameters.len() <= SIMPLE && base.structure.added.iter().all(|b| b.compatible(new))
+        };
+        let own = self.effects_of(&base.structure, &fit.values);
+        let stated = base.structure.stated_of(problem, &fit.values);
+        let mut used = HashSet::new();
+        let next = view.look(&fit, &fits).into_iter().filter(|p| used.insert(p.hypothesis));
+        next.take(count)
+            .map(|p| Seed {
+                effects: [own.clone(), vec![(p.hypothesis, p.values)]].concat(),
+                stated: stated.clone(),
+                guided: coarse.guide.is_some(),
+            })
+            .collect()
+    }
+
+    /// A structure with each of its effects exchanged for what promises most in its place.
+    fn exchanges(&self, view: &Screen, coarse: &Evaluator, best: &Candidate, count: usize) -> Vec<Seed> {
+        let problem = self.evaluator.problem;
+        let stated = best.structure.stated_of(problem, &best.fit.values);
+        let values = best.structure.added_of(&best.fit.values);
+        let mut seeds = Vec::new();
+        for out in 0..best.structure.added.len() {
+            let keep = |i: &usize| *i != out;
+            let added: Vec<Hypothesis> = (0..values.len()).filter(keep).map(|i| best.structure.added[i].clone()).collect();
+            let kept: Vec<Vec<f64>> = (0..values.len()).filter(keep).map(|i| values[i].clone()).collect();
+            let structure = Structure::new(problem, &problem.fit, added);
+            let start = structure.values(problem, &stated, &kept);
+            let Some(fit) = coarse.fit(&structure, &start, Effort { steps: 3, tolerance: 2.0 }) else { continue };
+            seeds.extend(self.extensions(view, coarse, &candidate(self.evaluator, structure, fit), count));
+        }
+        seeds
+    }
+
+    fn effects_of(&self, structure: &Structure, values: &[f64]) -> Vec<(usize, Vec<f64>)> {
+        let place = |h: &Hypothesis| self.hypotheses.iter().position(|other| other.id == h.id);
+        structure.added.iter().zip(structure.added_of(values)).filter_map(|(h, v)| Some((place(h)?, v))).collect()
+    }
+}
+
+/// What screening sees from one base.
+struct View {
+    screen: Screen,
+    fit: Fit,
+    stated: Vec<f64>,
+    /// Whether it is along the measured path.
+    guided: bool,
+    simple: Vec<Promise>,
+    /// Physics of many numbers come in where simpler relatives do not suffice.
+    rich: Vec<Promise>,
+}
+
+/// Physics whose effect grows in proportion to their first parameter: what an effect is worth claiming, at the place where the least is enough.
+fn detectable(view: &Screen, base: &Candidate, hypotheses: &[Hypothesis]) -> Vec<Detectable> {
+    const LINEAR: [&str; 9] = ["coulomb", "damper", "spring", "quadratic_drag", "cogging", "bias", "inertia", "delay", "back_emf"];
+    let effective = (base.fit.residuals.len() as f64 / base.correlation_time).max(2.0);
+    let needed = (30.0 + effective.ln()) * base.correlation_time * base.fit.cost / base.fit.residuals.len().max(1) as f64;
+    let mut found: Vec<Detectable> = Vec::new();
+    for (index, length) in view.lengths(&base.fit) {
+        let h = &hypotheses[index.0];
+        let (Some(parameter), Some(value)) = (h.parameters.first(), index.1.first()) else { continue };
+        let size = value.abs() * (needed / (length * length)).sqrt();
+        if !LINEAR.contains(&h.physics) || !size.is_finite() || parameter.neutral != Some(0.0) {
+            continue;
+        }
+        let new = Detectable { physics: h.physics, place: h.place.clone(), key: parameter.key.clone(), size, unit: parameter.unit.clone() };
+        match found.iter_mut().find(|d| d.physics == h.physics) {
+            Some(d) if d.size <= size => {}
+            Some(d) => *d = new,
+            None => found.push(new),
+        }
+    }
+    found
+}
+
+/// The ids of a structure's effects, whatever their order.
+fn key_of<'h>(added: impl IntoIterator<Item = &'h Hypothesis>) -> String {
+    let mut ids: Vec<&str> = added.into_iter().map(|h| h.id.as_str()).collect();
+    ids.sort_unstable();
+    ids.join("+")
+}
+
+/// The best candidates of so many effects, each structure once.
+fn distinct_structures(found: &[Candidate], effects: usize) -> impl Iterator<Item = &Candidate> {
+    let mut seen = HashSet::new();
+    found.iter().filter(move |c| c.structure.added.len() == effects && seen.insert(key_of(&c.structure.added)))
+}
+
+/// Mean square of the residuals on recordings that no fit has seen, in floors; `None` where something of them would have to be fitted.
+fn unseen_cost(unseen: &Evaluator, structure: &Structure, values: &[f64]) -> Option<f64> {
+    if unseen.is_empty() || structure.numbers.iter().any(|n| n.record.is_some()) || unseen.problem.initial == Initial::Free {
+        return None;
+    }
+    let residuals = unseen.residuals(structure, values)?;
+    Some(residuals.iter().map(|r| r * r).sum::<f64>() / residuals.len() as f64)
 }
 
 /// Whether dry friction acts on a body whose motion is prescribed: its force then jumps with the sign of a measured motion.
@@ -292,10 +530,10 @@ fn floors(evaluator: &Evaluator, residuals: &[f64]) -> Vec<f64> {
         .collect()
 }
 
-fn candidate(evaluator: &Evaluator, structure: Structure, fit: Fit) -> Candidate {
+pub(crate) fn candidate(evaluator: &Evaluator, structure: Structure, fit: Fit) -> Candidate {
     let correlation_time = correlation_time(evaluator, &fit.residuals);
     let levels = levels(evaluator, &fit.residuals);
-    Candidate { structure, fit, correlation_time, levels }
+    Candidate { structure, fit, correlation_time, levels, unseen: None }
 }
 
 /// Sorts by price, with the correlation time of the one that costs least.
@@ -314,119 +552,6 @@ fn done(found: &[Candidate], nominal: &Candidate, samples: usize) -> bool {
 pub fn advantage_over(base: &Candidate, better: &Candidate, samples: usize) -> f64 {
     let (a, b) = (base.structure.numbers.len(), better.structure.numbers.len());
     advantage(base.fit.cost, a, better.fit.cost.max(1e-300), b, samples, better.correlation_time)
-}
-
-/// A structure to be fitted: its hypotheses, where each starts, and the stated numbers to start from where they are known.
-struct Seed {
-    effects: Vec<(usize, Vec<f64>)>,
-    stated: Option<Vec<f64>>,
-}
-
-fn single_seeds(promises: &[Promise], count: usize) -> Vec<Seed> {
-    promises.iter().take(count).map(|p| Seed { effects: vec![(p.hypothesis, p.values.clone())], stated: None }).collect()
-}
-
-fn pair_seeds(promises: &[Promise], together: &[(usize, usize, f64)], count: usize) -> Vec<Seed> {
-    let mut seen = std::collections::HashSet::new();
-    together
-        .iter()
-        .filter(|(a, b, _)| seen.insert((promises[*a].hypothesis, promises[*b].hypothesis)))
-        .take(count)
-        .map(|(a, b, _)| Seed {
-            effects: [a, b].iter().map(|p| (promises[**p].hypothesis, promises[**p].values.clone())).collect(),
-            stated: None,
-        })
-        .collect()
-}
-
-fn extended(base: &Candidate, stated: Vec<f64>, hypotheses: &[Hypothesis], promise: &Promise) -> Seed {
-    let values = base.structure.added_of(&base.fit.values);
-    let place = |h: &Hypothesis| hypotheses.iter().position(|other| other.id == h.id);
-    let mut effects: Vec<(usize, Vec<f64>)> = base.structure.added.iter().zip(values).filter_map(|(h, v)| Some((place(h)?, v))).collect();
-    effects.push((promise.hypothesis, promise.values.clone()));
-    Seed { effects, stated: Some(stated) }
-}
-
-/// Fits many structures a little, the better half more, the best to the end.
-fn race(
-    evaluator: &Evaluator,
-    problem: &Problem,
-    nominal: &Candidate,
-    hypotheses: &[Hypothesis],
-    seeds: Vec<Seed>,
-    keep: [usize; 2],
-    given: &[f64],
-) -> Vec<Candidate> {
-    let refitted = nominal.structure.stated_of(problem, &nominal.fit.values);
-    // The first steps on the recordings that are explained worst, with few substeps.
-    let few = worst_records(evaluator, &nominal.fit, 2);
-    let whole =
-        few.len() == evaluator.records.len() || problem.initial == Initial::Free || problem.fit.iter().any(|r| !r.conditions.is_empty());
-    let some: Vec<Record> = if whole { problem.fit.clone() } else { few.iter().map(|r| problem.fit[*r].clone()).collect() };
-    let coarse = Evaluator { substeps: 6, records: &some, ..evaluator.clone() };
-    let nominal_there = if whole { nominal.fit.clone() } else { restricted(evaluator, &nominal.fit, &few) };
-    let structure_of = |seed: &Seed| Structure::new(problem, &some, seed.effects.iter().map(|(h, _)| hypotheses[*h].clone()).collect());
-    let mut running: Vec<(Structure, Fit)> = seeds
-        .par_iter()
-        .filter_map(|seed| {
-            let values: Vec<Vec<f64>> = seed.effects.iter().map(|(_, v)| v.clone()).collect();
-            let structure = structure_of(seed);
-            let from_refit = structure.values(problem, seed.stated.as_deref().unwrap_or(&refitted), &values);
-            let from_given = structure.values(problem, given, &values);
-            let effort = Effort { steps: 2, tolerance: 3.0 };
-            let known = Some((&nominal.structure, &nominal_there));
-            let fits = [from_refit, from_given].into_iter().filter_map(|start| coarse.fit_knowing(&structure, &start, effort, known));
-            let best = fits.min_by(|a, b| hopeful(a).total_cmp(&hopeful(b)))?;
-            Some((structure, best))
-        })
-        .collect();
-    let last = Evaluator { until: evaluator.until.map(|t| t + Duration::from_secs(2)), ..evaluator.clone() };
-    let stages = [
-        (keep[0] + 6, &coarse, Effort { steps: 3, tolerance: 2.0 }),
-        (keep[0], evaluator, Effort { steps: 5, tolerance: 1.0 }),
-        (keep[1], &last, Effort::FULL),
-    ];
-    for (count, held_against, effort) in stages {
-        running.sort_by(|a, b| hopeful(&a.1).total_cmp(&hopeful(&b.1)));
-        let mut names = std::collections::HashSet::new();
-        running.retain(|(s, _)| {
-            let mut ids: Vec<&str> = s.added.iter().map(|h| h.id.as_str()).collect();
-            ids.sort_unstable();
-            names.insert(ids.join("+"))
-        });
-        running.truncate(count);
-        // Once one is near its end, those far behind have no chance.
-        let best = running.first().map_or(0.0, |(_, f)| hopeful(f));
-        let floor = running.first().map_or(0.0, |(_, f)| f.residuals.len() as f64);
-        let margin = if best < 1.2 * floor { 1.3 } else { 4.0 };
-        running.retain(|(_, f)| hopeful(f) < margin * best.max(floor) || best > 4.0 * floor);
-        // Nor does a fit that runs out of time leave nothing.
-        let enough = evaluator.is_late() && count > 3;
-        running.truncate(if enough { 3 } else { count });
-        running = running
-            .into_par_iter()
-            .map(|(structure, fit)| {
-                let next = held_against.fit_knowing(&structure, &fit.values, effort, Some((&structure, &fit))).unwrap_or(fit);
-                (structure, next)
-            })
-            .collect();
-    }
-    let size = evaluator.len();
-    running.into_iter().filter(|(_, f)| f.residuals.len() == size && f.cost.is_finite()).map(|(s, f)| candidate(evaluator, s, f)).collect()
-}
-
-/// A fit's residuals and derivatives on some of its recordings.
-fn restricted(evaluator: &Evaluator, fit: &Fit, records: &[usize]) -> Fit {
-    let layout = evaluator.layout();
-    let pick = |all: &Vec<f64>| -> Vec<f64> {
-        layout.iter().filter(|l| records.contains(&l.0)).filter_map(|l| all.get(l.2.clone())).flatten().copied().collect()
-    };
-    Fit { residuals: pick(&fit.residuals), jacobian: fit.jacobian.iter().map(pick).collect(), ..fit.clone() }
-}
-
-/// What a fit would cost if most of what its next step foresees came true.
-fn hopeful(fit: &Fit) -> f64 {
-    fit.cost - fit.foreseen.min(0.6 * fit.cost)
 }
 
 /// Normalised root mean squared error of a structure with these values, averaged over the recordings and their outputs; each over the

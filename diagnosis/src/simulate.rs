@@ -1,9 +1,13 @@
 //! A model run on a recording: what its sensors would have said before rounding.
 
+use crate::guide::Guide;
 use crate::problem::Record;
 use backdrive_plant::model::Model;
 use backdrive_plant::set::Condition;
 use backdrive_plant::stepper::{Options, Plant, Segment};
+
+/// As a number of substeps: twice as many as the model asks for.
+pub const TWICE: usize = usize::MAX;
 
 /// A motion that a record starts with: body, position in m, velocity in m/s.
 pub type Start = (usize, f64, f64);
@@ -11,6 +15,17 @@ pub type Start = (usize, f64, f64);
 /// Predictions of a record's measured outputs, one column after the other in the order of the model, `record.len` samples each.
 /// At most `substeps` per sample. `None` where the model cannot be simulated or its motion leaves all bounds.
 pub fn predict(model: &Model, record: &Record, starts: &[Start], substeps: usize) -> Option<Vec<f64>> {
+    predict_along(model, record, starts, substeps, None)
+}
+
+/// The same, led by a guide: which, and the record's place in it.
+pub fn predict_along(
+    model: &Model,
+    record: &Record,
+    starts: &[Start],
+    substeps: usize,
+    guide: Option<(&Guide, usize)>,
+) -> Option<Vec<f64>> {
     let conditioned;
     let model = if record.conditions.iter().any(|(_, c)| matches!(c, Condition::Value(_))) {
         let mut changed = model.clone();
@@ -24,11 +39,22 @@ pub fn predict(model: &Model, record: &Record, starts: &[Start], substeps: usize
     } else {
         model
     };
+    let guided;
+    let mut moved = Vec::new();
+    let model = match guide.filter(|(g, _)| !g.is_empty()) {
+        Some((guide, index)) => {
+            (guided, moved) = guide.attach(model, index, record.period)?;
+            &guided
+        }
+        None => model,
+    };
     let mut plant = Plant::new(model, record.period, &Options::default()).ok()?;
-    if plant.substeps() > substeps {
-        plant = Plant::new(model, record.period, &Options { substeps: Some(substeps), ..Options::default() }).ok()?;
+    let wanted = if substeps == TWICE { 2 * plant.substeps() } else { plant.substeps().min(substeps) };
+    if wanted != plant.substeps() {
+        plant = Plant::new(model, record.period, &Options { substeps: Some(wanted), ..Options::default() }).ok()?;
     }
-    let first: Vec<f64> = record.inputs.iter().map(|samples| samples.first().copied().unwrap_or(0.0)).collect();
+    let mut first: Vec<f64> = record.inputs.iter().map(|samples| samples.first().copied().unwrap_or(0.0)).collect();
+    first.extend(moved.iter().map(|path| path.first().map_or(0.0, |s| s.c[0])));
     plant.start_at(&first);
     for (body, position, velocity) in starts {
         plant.set_motion(*body, *position, *velocity);
@@ -36,7 +62,7 @@ pub fn predict(model: &Model, record: &Record, starts: &[Start], substeps: usize
     let measured: Vec<usize> = (0..model.outputs.len()).filter(|o| record.outputs.get(*o).is_some_and(Option::is_some)).collect();
     let mut columns = vec![0.0; measured.len() * record.len];
     let mut values = vec![0.0; model.outputs.len()];
-    let mut now = vec![Segment::default(); record.segments.len()];
+    let mut now = vec![Segment::default(); record.segments.len() + moved.len()];
     for sample in 0..record.len {
         plant.outputs(&mut values);
         for (column, output) in measured.iter().enumerate() {
@@ -46,7 +72,8 @@ pub fn predict(model: &Model, record: &Record, starts: &[Start], substeps: usize
             return None;
         }
         if sample + 1 < record.len {
-            for (segment, column) in now.iter_mut().zip(&record.segments) {
+            let columns = record.segments.iter().chain(moved.iter().map(|path| path.as_ref()));
+            for (segment, column) in now.iter_mut().zip(columns) {
                 *segment = column[sample];
             }
             plant.step(&now);

@@ -1,8 +1,9 @@
 //! A nominal model with some physics added, and every number of it that a fit may move.
 
+use crate::guide::Guide;
 use crate::hypothesis::Hypothesis;
 use crate::problem::{Problem, Record, Stated};
-use crate::simulate::{Start, predict};
+use crate::simulate::{Start, predict_along};
 use backdrive_plant::model::Model;
 use backdrive_plant::set::{Condition, Initial};
 
@@ -32,6 +33,8 @@ pub struct Number {
     pub log: bool,
     /// Step for differences, in the fit's own unit (the logarithm where `log`).
     pub step: f64,
+    /// Whether that step is as wide as it can be (a delay, over about a sample).
+    pub coarse: bool,
     /// The record that alone depends on it, if there is one.
     pub record: Option<usize>,
     /// What it would be without data, and how sure that is, in the fit's own unit: holds what the recordings say nothing of.
@@ -97,7 +100,15 @@ impl Structure {
                 };
                 // A delay is searched as it is: it may well be none.
                 let log = parameter.log && parameter.key != "delay";
-                numbers.push(Number { role: Role::Added(h, p), range: parameter.range, log, step, record: None, prior: None });
+                numbers.push(Number {
+                    role: Role::Added(h, p),
+                    range: parameter.range,
+                    log,
+                    step,
+                    coarse: parameter.key == "delay",
+                    record: None,
+                    prior: None,
+                });
             }
         }
         for (r, record) in records.iter().enumerate() {
@@ -108,7 +119,15 @@ impl Structure {
                 let given = problem.model.values_at(path).ok().and_then(|v| v.first().copied()).unwrap_or(0.0);
                 let (range, log) = if given > 0.0 { ((given / 1e3, given * 1e3), true) } else { ((-1e6, 1e6), false) };
                 let step = if log { 1e-3 } else { 1e-6 };
-                numbers.push(Number { role: Role::Condition(path.clone(), r), range, log, step, record: Some(r), prior: None });
+                numbers.push(Number {
+                    role: Role::Condition(path.clone(), r),
+                    range,
+                    log,
+                    step,
+                    coarse: false,
+                    record: Some(r),
+                    prior: None,
+                });
             }
             if problem.initial == Initial::Free {
                 numbers.extend(start_numbers(problem, record, r));
@@ -166,8 +185,21 @@ impl Structure {
         Some(model)
     }
 
-    /// Predictions of one of `records`; see [`predict`].
+    /// Predictions of one of `records`; see [`crate::simulate::predict`].
     pub fn predict(&self, model: &Model, values: &[f64], record: &Record, index: usize, substeps: usize) -> Option<Vec<f64>> {
+        self.predict_along(model, values, record, index, substeps, None)
+    }
+
+    /// The same, led by a guide of these records.
+    pub fn predict_along(
+        &self,
+        model: &Model,
+        values: &[f64],
+        record: &Record,
+        index: usize,
+        substeps: usize,
+        guide: Option<&Guide>,
+    ) -> Option<Vec<f64>> {
         let mut starts: Vec<Start> = Vec::new();
         let mut changed: Option<Model> = None;
         for (number, value) in self.numbers.iter().zip(values).filter(|(n, _)| n.record == Some(index)) {
@@ -181,7 +213,7 @@ impl Structure {
                 Role::Stated(_) | Role::Added(..) => {}
             }
         }
-        predict(changed.as_ref().unwrap_or(model), record, &starts, substeps)
+        predict_along(changed.as_ref().unwrap_or(model), record, &starts, substeps, guide.map(|g| (g, index)))
     }
 
     /// What the structure adds, such as `coulomb@drum-ground`; `nominal` where it adds nothing.
@@ -198,7 +230,7 @@ fn stated_number(index: usize, stated: &Stated) -> Number {
     let centre = if log { stated.given.ln() } else { stated.given };
     let spread = if log { PRIOR_SPREAD } else { 2.0 * stated.given.abs() };
     let step = if log { 1e-3 } else { 1e-3 * stated.given.abs() };
-    Number { role: Role::Stated(index), range, log, step, record: None, prior: Some((centre, spread)) }
+    Number { role: Role::Stated(index), range, log, step, coarse: false, record: None, prior: Some((centre, spread)) }
 }
 
 /// Positions and velocities of the free bodies at a record's start, in the range of what the record shows.
@@ -222,6 +254,7 @@ fn start_numbers(problem: &Problem, record: &Record, r: usize) -> Vec<Number> {
             range: (-width, width),
             log: false,
             step: 1e-5 * width,
+            coarse: false,
             record: Some(r),
             prior: Some((0.0, 0.3 * width)),
         };

@@ -1,6 +1,8 @@
 //! What a search says: the verdict file, and the nominal model's file with what was found.
 
-use crate::hypothesis::{Hypothesis, PHYSICS, Place};
+use crate::experiment::{excite, separate};
+use crate::fit::Evaluator;
+use crate::hypothesis::{Hypothesis, PHYSICS, Place, physics_named, withheld};
 use crate::intervals::Spread;
 use crate::problem::Problem;
 use crate::search::{AT_FLOOR, Candidate, Search, advantage_over, nrmse};
@@ -8,6 +10,8 @@ use crate::statistics::advantage;
 use crate::structure::Role;
 use backdrive_plant::write::{Edit, Value, patch, round_significant};
 use serde_json::{Value as Json, json};
+use std::collections::HashSet;
+use std::time::{Duration, Instant};
 
 /// A verdict, ready to be written.
 #[derive(Debug)]
@@ -18,7 +22,14 @@ pub struct Verdict {
     pub model: String,
     /// In one sentence.
     pub sentence: String,
+    /// The excitation file of the next experiment, to be written as [`EXPERIMENT_FILE`]; `None` where none is needed or can be had.
+    pub experiment: Option<String>,
 }
+
+/// Name of the file of the next experiment.
+pub const EXPERIMENT_FILE: &str = "next-experiment.toml";
+/// How long the next experiment is looked for.
+const EXPERIMENT: Duration = Duration::from_secs(2);
 
 /// Why a verdict cannot be written.
 #[derive(Debug, thiserror::Error)]
@@ -37,6 +48,8 @@ const LEAST_ADVANTAGE: f64 = 30.0;
 const LEAST_SHARE: f64 = 0.02;
 /// Structures of an advantage below this over a simpler one are ties, which the simpler one wins.
 const TIE: f64 = 8.0;
+/// Explanations of an advantage below this over each other cannot be told apart.
+const ALIKE: f64 = 6.0;
 /// Level above which what is left over is no measuring error.
 const LEFT_OVER: f64 = 1.15;
 
@@ -46,14 +59,19 @@ pub fn chosen(search: &Search) -> &Candidate {
     for effects in 1..=search.found.iter().map(|c| c.structure.added.len()).max().unwrap_or(0) {
         let next = search.found.iter().filter(|c| c.structure.added.len() == effects).min_by(|a, b| a.fit.cost.total_cmp(&b.fit.cost));
         let Some(next) = next else { continue };
+        let next = search
+            .found
+            .iter()
+            .filter(|c| c.structure.added.len() == effects)
+            .fold(next, |best, c| if evidence(search, best, c) > 0.0 { c } else { best });
         // Ties go to the fewest numbers, then to the physics that is named first.
         let simplest = search
             .found
             .iter()
-            .filter(|c| c.structure.added.len() == effects && advantage_over(c, next, search.samples) < TIE)
+            .filter(|c| c.structure.added.len() == effects && evidence(search, c, next) < TIE)
             .min_by_key(|c| (c.structure.numbers.len(), c.structure.added.iter().map(order).sum::<usize>()))
             .unwrap_or(next);
-        if worth(best, simplest, search.samples) {
+        if worth(search, best, simplest) {
             best = simplest;
         }
     }
@@ -64,8 +82,27 @@ fn order(h: &Hypothesis) -> usize {
     PHYSICS.iter().position(|p| p.name == h.physics).unwrap_or(usize::MAX)
 }
 
-fn worth(base: &Candidate, better: &Candidate, samples: usize) -> bool {
-    advantage_over(base, better, samples) > LEAST_ADVANTAGE && better.fit.cost < (1.0 - LEAST_SHARE) * base.fit.cost
+/// What the fits and the recordings that no fit has seen say for a candidate against another one, as a difference of information
+/// criteria with effective samples.
+fn evidence(search: &Search, base: &Candidate, better: &Candidate) -> f64 {
+    advantage_over(base, better, search.samples) + unseen_evidence(search, base, better)
+}
+
+/// What the recordings that no fit has seen say alone; 0 where there are none.
+fn unseen_evidence(search: &Search, base: &Candidate, better: &Candidate) -> f64 {
+    match (base.unseen, better.unseen) {
+        (Some(a), Some(b)) if a > 0.0 && b > 0.0 => (search.unseen_samples as f64 / better.correlation_time) * (a / b).ln(),
+        _ => 0.0,
+    }
+}
+
+fn worth(search: &Search, base: &Candidate, better: &Candidate) -> bool {
+    // What no fit has seen must not speak against it: a law that is there is there in every recording, if not always to be seen.
+    let seen_again = match (base.unseen, better.unseen) {
+        (Some(a), Some(b)) => b < a * 1.005,
+        _ => true,
+    };
+    evidence(search, base, better) > LEAST_ADVANTAGE && better.fit.cost < (1.0 - LEAST_SHARE) * base.fit.cost && seen_again
 }
 
 /// Says what a search found. `model_name` is the name under which the model will be written.
@@ -74,23 +111,42 @@ fn worth(base: &Candidate, better: &Candidate, samples: usize) -> bool {
 /// When what was found cannot be written into the model's text.
 pub fn verdict(problem: &Problem, search: &Search, model_name: &str) -> Result<Verdict, VerdictError> {
     let best = chosen(search);
-    let spread = Spread::of(best);
+    let evaluator = Evaluator { floor: search.floor.clone(), ..Evaluator::new(problem) };
+    let spread = Spread::measured(&evaluator, best);
     let at_floor = best.levels.iter().all(|l| *l < LEFT_OVER);
     let nominal_cost = search.nominal.fit.cost;
     let excess = |c: f64| (c / search.samples as f64 - 1.0).max(0.0);
     let explained = 1.0 - excess(best.fit.cost) / excess(nominal_cost).max(1e-12);
     let added = !best.structure.added.is_empty();
     let bursts = bursts(problem, best);
+    let alike = alike(search, best);
     let off = given_is_off(problem, search);
     let word = match () {
+        () if added && (at_floor || explained > 0.99) && !alike.is_empty() => "ambiguous",
         () if added && (at_floor || explained > 0.99) => "missing",
         () if added => "unexplained",
         () if !bursts.is_empty() => "unexplained",
         () if !at_floor && search.nominal.correlation_time > 3.0 => "unexplained",
         () if off => "parameters",
+        () if !is_excited(problem, search) => "cannot_tell",
         () => "nothing_missing",
     };
-    let findings = findings(search, best, &spread);
+    let until = Instant::now() + EXPERIMENT;
+    let planned = match word {
+        "ambiguous" => Some(separate(problem, &[&[best], alike.as_slice()].concat(), &search.floor, until)),
+        "cannot_tell" => best.structure.model(problem, &best.fit.values).map(|model| {
+            let all: Vec<usize> = (0..best.structure.numbers.len()).collect();
+            excite(problem, &model, &best.structure, &best.fit.values, &all, &search.floor, until)
+        }),
+        _ => None,
+    };
+    let (next, experiment) = match planned {
+        Some(Ok(plan)) => (plan.json(EXPERIMENT_FILE), Some(plan.text)),
+        Some(Err(reason)) => (json!({ "sentence": reason.to_string() }), None),
+        None => (Json::Null, None),
+    };
+    let adequacy = adequacy(best);
+    let findings = findings(search, best, &spread, adequacy);
     let held = held_out(problem, search, best, off || added);
     let model = model_text(problem, best, &spread, off || added)?;
     let parameters = if off || added { moved(problem, best, &spread) } else { json!({}) };
@@ -103,9 +159,10 @@ pub fn verdict(problem: &Problem, search: &Search, model_name: &str) -> Result<V
         "parameters": parameters,
         "held_out": held,
         "model_after": model_name,
-        "next_experiment": Json::Null,
+        "next_experiment": next,
+        "detectable": if added { Json::Null } else { detectable(search) },
     });
-    Ok(Verdict { json, model, sentence })
+    Ok(Verdict { json, model, sentence, experiment })
 }
 
 /// Samples a burst may span, and how many spreads away it starts.
@@ -159,14 +216,69 @@ fn given_is_off(problem: &Problem, search: &Search) -> bool {
     advantage(cost, 0, refit.fit.cost, numbers, total, refit.correlation_time) > 0.0 && refit.fit.cost < 0.99 * cost
 }
 
-fn findings(search: &Search, best: &Candidate, spread: &Spread) -> Vec<Json> {
+/// Structures of as many effects that cannot be told from the best: another place, or a law that is no richer form of its own.
+fn alike<'s>(search: &'s Search, best: &Candidate) -> Vec<&'s Candidate> {
+    let ids = |c: &Candidate| c.structure.added.iter().map(|h| h.id.clone()).collect::<HashSet<String>>();
+    let own = ids(best);
+    let differs = |c: &Candidate| {
+        let other: Vec<&Hypothesis> = c.structure.added.iter().filter(|h| !own.contains(&h.id)).collect();
+        let mine: Vec<&Hypothesis> = best.structure.added.iter().filter(|h| !ids(c).contains(&h.id)).collect();
+        match (other.as_slice(), mine.as_slice()) {
+            ([rival], [own]) => !(rival.place.same(&own.place) && contains(rival.physics, own)) && rival.class != own.class,
+            ([], _) => false,
+            _ => true,
+        }
+    };
+    let mut seen = HashSet::new();
+    let close = |c: &&Candidate| c.structure.added.len() == best.structure.added.len() && evidence(search, c, best) < ALIKE && differs(c);
+    search.found.iter().filter(close).filter(|c| seen.insert(c.structure.name())).take(3).collect()
+}
+
+/// Whether a physics has another one, or one of its family at the same place, as a special or limiting case.
+fn contains(rich: &str, own: &Hypothesis) -> bool {
+    withheld(&[own.physics]).contains(&rich) || physics_named(rich).is_some_and(|p| p.family == own.family)
+}
+
+/// How far what is left over is measuring error: 1 where it is, less the more is left.
+fn adequacy(best: &Candidate) -> f64 {
+    let level = best.levels.iter().fold(0.0f64, |a, b| a.max(*b));
+    (-(level - LEFT_OVER).max(0.0) / 0.8).exp().max(0.05)
+}
+
+/// Whether the recordings move the device by more than the measuring error.
+fn is_excited(problem: &Problem, search: &Search) -> bool {
+    let moves = |(output, floor): (usize, &f64)| {
+        problem.fit.iter().any(|r| r.outputs.get(output).is_some_and(Option::is_some) && r.spread[output] > 5.0 * floor)
+    };
+    search.floor.iter().enumerate().any(moves)
+}
+
+/// What would have been seen: for each physics the smallest size at the place where it shows best.
+fn detectable(search: &Search) -> Json {
+    let one = |d: &crate::search::Detectable| {
+        let mut entry = place(&d.place);
+        entry["physics"] = json!(d.physics);
+        entry[&d.key] = json!(round_significant(d.size, 3));
+        entry["unit"] = json!(d.unit);
+        entry
+    };
+    json!(search.detectable.iter().map(one).collect::<Vec<Json>>())
+}
+
+fn findings(search: &Search, best: &Candidate, spread: &Spread, adequacy: f64) -> Vec<Json> {
     let total = best.structure.added.len();
     let mut all: Vec<(f64, Json)> = Vec::new();
     for (h, hypothesis) in best.structure.added.iter().enumerate() {
         let rivals = rivals(search, best, h);
         // The weight of each, softened: a simulator is never the device.
-        let weights: Vec<f64> = rivals.iter().map(|(_, behind)| (-behind.max(0.0) / 20.0).exp()).collect();
-        let sum = 1.0 + weights.iter().sum::<f64>();
+        // A richer law at the same place that fits no better is the same law.
+        let nested = |rival: &Hypothesis| rival.place.same(&hypothesis.place) && contains(rival.physics, hypothesis);
+        let weight = |(rival, behind): &(Hypothesis, f64)| (-behind.max(0.0) / 20.0).exp() * if nested(rival) { 0.1 } else { 1.0 };
+        let weights: Vec<f64> = rivals.iter().map(weight).collect();
+        // And of those that promised as much, but were not fitted: little, for they did not win their race.
+        let own = search.tried.iter().find(|t| t.id == hypothesis.id).map_or(1.0, |t| t.promised);
+        let unfitted = search.tried.iter().filter(|t| t.taken.is_none() && t.promised > 0.9 * own).count() as f64;
+        let sum = 1.0 + weights.iter().sum::<f64>() + 0.02 * unfitted.min(10.0);
         let alternatives: Vec<Json> = rivals
             .iter()
             .zip(&weights)
@@ -182,7 +294,7 @@ fn findings(search: &Search, best: &Candidate, spread: &Spread) -> Vec<Json> {
         entry["physics"] = json!(hypothesis.physics);
         entry["parameters"] = parameters_of(best, spread, h);
         entry["replaces"] = json!(hypothesis.replaces);
-        entry["confidence"] = json!(round_significant(1.0 / sum, 3));
+        entry["confidence"] = json!(round_significant(adequacy / sum, 3));
         entry["alternatives"] = json!(alternatives);
         // What the cost would be without it tells how important it is.
         let without = search
@@ -210,7 +322,7 @@ fn rivals(search: &Search, best: &Candidate, which: usize) -> Vec<(Hypothesis, f
         let rest: Vec<&Hypothesis> = added.iter().filter(|h| !others.contains(&h.id.as_str())).collect();
         let [rival] = rest.as_slice() else { continue };
         if rival.id != own.id && added.len() - 1 == others.len() {
-            found.push(((*rival).clone(), advantage_over(candidate, best, search.samples)));
+            found.push(((*rival).clone(), evidence(search, candidate, best)));
         }
     }
     found.sort_by(|a, b| a.1.total_cmp(&b.1));
@@ -382,6 +494,8 @@ fn sentence(word: &str, best: &Candidate) -> String {
     let level = best.levels.iter().fold(0.0f64, |a, b| a.max(*b));
     let end = if level < AT_FLOOR { "down to the noise".to_string() } else { format!("to {level:.2} floors") };
     match word {
+        "ambiguous" => format!("the model leaves out {} or something that the recordings cannot tell from it", best.structure.name()),
+        "cannot_tell" => "the recordings hardly move the device: they cannot tell what is missing".to_string(),
         "missing" => format!("the model leaves out {}; with it the recordings are explained {end}", best.structure.name()),
         "unexplained" => format!("something is missing that no known physics explains; the nearest is {}, {end}", best.structure.name()),
         "parameters" => format!("nothing is missing, but the model's numbers are off; refitted they explain the recordings {end}"),

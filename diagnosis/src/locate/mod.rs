@@ -26,6 +26,7 @@ use backdrive_plant::model::{InputKind, Model};
 use backdrive_plant::stepper::CompileError;
 use channel::{Channel, Split, channels};
 use law::{Reversals, Samples};
+pub(crate) use nonlinear::force_along;
 use nonlinear::{extra_forces, rms, sizes};
 use rayon::prelude::*;
 use serde::{Serialize, Serializer};
@@ -63,11 +64,24 @@ pub struct Options {
     pub jumps_at: usize,
     /// Iterations for nonlinear elements of the nominal model.
     pub iterations: usize,
+    /// Samples of all runs together, at most: of longer ones every second, third, ... is taken.
+    pub most_samples: usize,
+    /// The only place to look at; all places where there is none.
+    pub only: Option<Place>,
+    /// Whether filters are tuned on the run with the largest mismatch alone.
+    pub tuned_on_one: bool,
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Options { laws_of_a_form: 2, jumps_at: 4, iterations: 2 }
+        Options { laws_of_a_form: 2, jumps_at: 4, iterations: 2, most_samples: usize::MAX, only: None, tuned_on_one: false }
+    }
+}
+
+impl Options {
+    /// Fast rather than fine: for a set of any length in a second or two.
+    pub fn quick() -> Options {
+        Options { laws_of_a_form: 1, jumps_at: 0, iterations: 1, most_samples: 30_000, only: None, tuned_on_one: true }
     }
 }
 
@@ -250,7 +264,12 @@ pub fn locate(model: &Model, runs: &[Run], noise: &[f64], options: &Options) -> 
     if noise.len() != model.outputs.len() || noise.iter().any(|n| !n.is_finite() || *n < 0.0) {
         return Err(LocateError::Noise { found: noise.len(), expected: model.outputs.len() });
     }
-    let trajectories = runs.iter().map(|run| Trajectory::of(run.model.unwrap_or(model), run)).collect::<Result<Vec<_>, _>>()?;
+    let mut trajectories = runs.par_iter().map(|run| Trajectory::of(run.model.unwrap_or(model), run)).collect::<Result<Vec<_>, _>>()?;
+    let samples: usize = trajectories.iter().map(|t| t.len).sum();
+    let stride = samples.div_ceil(options.most_samples.max(1)).max(1);
+    if stride > 1 {
+        trajectories.iter_mut().for_each(|t| t.thin(stride));
+    }
     let amplitude = {
         let nonlinear = model.elements.iter().map(|e| e.between);
         let across = nonlinear.flat_map(|ends| trajectories.iter().map(move |t| rms(&t.across(ends).0)));
@@ -260,7 +279,8 @@ pub fn locate(model: &Model, runs: &[Run], noise: &[f64], options: &Options) -> 
     let noise = (0..noise.len()).map(|output| floor_of(output, noise[output], &trajectories)).collect();
     let sizes = trajectories.iter().map(|t| sizes(&split, t)).collect();
     let scene = Scene { model, runs, split, trajectories, sizes, noise, options };
-    let mut trials: Vec<Trial> = channels(model).into_par_iter().filter_map(|channel| scene.trial(channel)).collect();
+    let wanted = |channel: &Channel| options.only.as_ref().is_none_or(|place| scene.stands_for(*channel, place));
+    let mut trials: Vec<Trial> = channels(model).into_par_iter().filter(wanted).filter_map(|channel| scene.trial(channel)).collect();
     if trials.is_empty() {
         return Err(LocateError::Singular);
     }
@@ -294,6 +314,20 @@ fn floor_of(output: usize, given: f64, trajectories: &[Trajectory]) -> f64 {
 }
 
 impl Scene<'_> {
+    /// Whether a channel is that of a place.
+    fn stands_for(&self, channel: Channel, place: &Place) -> bool {
+        let named = |end: Option<usize>| self.model.place_name(end).to_string();
+        match (channel, place) {
+            (Channel::Force(ends), Place::Between(..)) => Place::Between(named(ends[0]), named(ends[1])).same(place),
+            (Channel::Force([Some(body), None] | [None, Some(body)]), Place::Signal(name)) => {
+                self.model.inputs.iter().any(|i| i.kind == InputKind::Force && i.on == body && i.name == *name)
+            }
+            (Channel::Motion(input), Place::Signal(name)) => self.model.inputs[input].name == *name,
+            (Channel::Sensor(output), Place::Signal(name)) => self.model.outputs[output].name == *name,
+            _ => false,
+        }
+    }
+
     /// The filter of a channel; `loose` is the share of their forces that nonlinear elements may be wrong by.
     fn system(&self, channel: Channel, chain: usize, run: usize, scales: [f64; 3], loose: f64) -> Option<System> {
         let trajectory = &self.trajectories[run];
@@ -338,6 +372,16 @@ impl Scene<'_> {
         Data { residual: &self.trajectories[run].residual, forces: forces.get(run).map_or(&[], Vec::as_slice), known }
     }
 
+    /// The run with the largest mismatch for its length.
+    fn loudest(&self) -> usize {
+        let size = |t: &Trajectory| {
+            let square = |(row, r): (&usize, &Vec<f64>)| (rms(r) / self.noise[*row]).powi(2);
+            t.rows.iter().zip(&t.residual).map(square).sum::<f64>()
+        };
+        let all = self.trajectories.iter().enumerate();
+        all.max_by(|a, b| size(a.1).total_cmp(&size(b.1))).map_or(0, |(run, _)| run)
+    }
+
     fn log_likelihood(&self, systems: &[System], intensity: f64, forces: &[Vec<Vec<f64>>], known: &[&[f64]]) -> f64 {
         let of = |(run, system): (usize, &System)| {
             system.log_likelihood(intensity, self.data(forces, run, known.get(run).copied().unwrap_or(&[])))
@@ -347,7 +391,18 @@ impl Scene<'_> {
 
     /// The intensity of greatest likelihood: decades first, then between them.
     fn best_intensity(&self, systems: &[System], forces: &[Vec<Vec<f64>>], known: &[&[f64]], around: Option<f64>) -> (f64, f64) {
-        let at = |exponent: f64| (10f64.powf(exponent), self.log_likelihood(systems, 10f64.powf(exponent), forces, known));
+        let one = self.options.tuned_on_one.then(|| self.loudest());
+        let at = |exponent: f64| {
+            let intensity = 10f64.powf(exponent);
+            let value = match one.and_then(|run| systems.get(run).map(|system| (run, system))) {
+                Some((run, system)) => {
+                    let data = self.data(forces, run, known.get(run).copied().unwrap_or(&[]));
+                    system.log_likelihood(intensity, data).unwrap_or(f64::NEG_INFINITY)
+                }
+                None => self.log_likelihood(systems, intensity, forces, known),
+            };
+            (intensity, value)
+        };
         let grid: Vec<f64> = match around {
             // A law takes force away from the latent rest, never adds to it.
             Some(intensity) => [-4.5, -3.0, -1.5, 0.0].map(|d| intensity.log10() + d).to_vec(),
@@ -359,6 +414,9 @@ impl Scene<'_> {
         for width in [step, 0.5 * step] {
             let centre = best.0.log10();
             best = [at(centre - width), at(centre + width)].into_iter().fold(best, better);
+        }
+        if one.is_some() {
+            best.1 = self.log_likelihood(systems, best.0, forces, known);
         }
         best
     }
@@ -610,22 +668,26 @@ impl Scene<'_> {
             spectrum.iter().map(|(f, _)| classes::response(&equations, *f)).collect::<Option<Vec<_>>>()
         };
         let mut classes: Vec<Class> = Vec::new();
+        // Of each class's first place: the spectrum of its force, and what the outputs make of it.
+        let mut firsts = Vec::new();
         for index in 0..ranking.len() {
-            let alike = classes.iter().position(|class| {
+            let alike = classes.iter().zip(&firsts).position(|(class, (spectrum, own)): (&Class, &(classes::Spectrum, Option<Vec<_>>))| {
                 let Some(first) = class.members.first() else { return false };
-                let columns: Vec<(&[f64], f64)> = ranking[*first].courses.iter().map(|c| (c.force.as_slice(), c.period)).collect();
-                let spectrum = classes::spectrum(&columns);
                 if channels[*first].0 == channels[index].0 {
                     return true;
                 }
-                let (Some(own), Some(other)) = (responses(&spectrum, channels[*first]), responses(&spectrum, channels[index])) else {
-                    return false;
-                };
-                classes::distance(&spectrum, &own, &other, &noise) < INDISTINCT
+                let (Some(own), Some(other)) = (own, responses(spectrum, channels[index])) else { return false };
+                classes::distance(spectrum, own, &other, &noise) < INDISTINCT
             });
             match alike {
                 Some(class) => classes[class].members.push(index),
-                None => classes.push(Class { members: vec![index] }),
+                None => {
+                    let columns: Vec<(&[f64], f64)> = ranking[index].courses.iter().map(|c| (c.force.as_slice(), c.period)).collect();
+                    let spectrum = classes::spectrum(&columns);
+                    let own = responses(&spectrum, channels[index]);
+                    firsts.push((spectrum, own));
+                    classes.push(Class { members: vec![index] });
+                }
             }
         }
         classes
@@ -715,6 +777,13 @@ fn rate(column: &[f64], period: f64) -> Vec<f64> {
     (0..column.len()).map(at).collect()
 }
 
+/// In which state the mismatch shows, in words, such as `reversals of drum-ground`; `None` where there is no mismatch to speak of.
+pub fn state(location: &Location) -> Option<String> {
+    let best = location.ranking.first()?;
+    let telling = location.mismatch > QUIET && best.log_likelihood > location.log_likelihood_without;
+    (telling && !location.shows.state.is_empty()).then(|| location.shows.state.clone())
+}
+
 /// Where a force shows, in words.
 fn describe(candidate: &Candidate) -> String {
     let place = &candidate.place;
@@ -736,6 +805,8 @@ fn describe(candidate: &Candidate) -> String {
     format!("{what}, at {place}")
 }
 
+/// Mismatch, in noises, below which nothing shows.
+const QUIET: f64 = 1.02;
 /// Noise at least, as a share of a signal: below that the simulation itself is not exact.
 const SMALLEST_NOISE: f64 = 1e-5;
 /// Share of their forces that nonlinear elements may be wrong by while nothing is known of their path, and once it is.

@@ -39,6 +39,11 @@ pub(super) fn sizes(split: &Split, trajectory: &Trajectory) -> Vec<f64> {
     split.nonlinear.iter().map(one).collect()
 }
 
+/// Force of a law along a path, N; of displacement, m, and velocity, m/s, at samples `period` s apart.
+pub(crate) fn force_along(law: &Law, x: &[f64], v: &[f64], period: f64) -> Vec<f64> {
+    along(law, x, v, period, SLIP * rms(x))
+}
+
 /// Force of a law along a path. Dry friction builds up over the distance `slip`, so that noise about rest does not make it chatter.
 fn along(law: &Law, x: &[f64], v: &[f64], period: f64, slip: f64) -> Vec<f64> {
     let mut memory = vec![0.0; law.memory_len()];

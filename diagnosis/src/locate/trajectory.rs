@@ -72,6 +72,16 @@ impl Trajectory {
         Ok(Trajectory { period: run.period, len, position, velocity, drive, rows, predicted, residual })
     }
 
+    /// Leaves only every so many-th sample.
+    pub fn thin(&mut self, stride: usize) {
+        let all = [&mut self.position, &mut self.velocity, &mut self.drive, &mut self.predicted, &mut self.residual];
+        for column in all.into_iter().flatten() {
+            *column = column.iter().step_by(stride).copied().collect();
+        }
+        self.len = self.len.div_ceil(stride);
+        self.period *= stride as f64;
+    }
+
     /// Displacement and velocity of one place against another.
     pub fn across(&self, ends: [Option<usize>; 2]) -> (Vec<f64>, Vec<f64>) {
         let of = |columns: &[Vec<f64>]| {

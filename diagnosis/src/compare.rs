@@ -1,0 +1,125 @@
+//! What a fitted structure says of recordings that it has not seen, beside what was measured.
+
+use crate::fit::{Effort, Evaluator, measured};
+use crate::problem::{Problem, Record};
+use crate::structure::Structure;
+use serde::Serialize;
+
+/// Predictions of each output of the model in one record, in the output's unit, before rounding; `None` where it was not recorded.
+pub type Predicted = Vec<Option<Vec<f64>>>;
+
+/// Predictions of a structure with these values for each of `records`. Where a record starts freely, or a number is free in it, that is
+/// fitted first, and nothing else. `None` where the structure cannot be simulated.
+pub fn predictions(problem: &Problem, records: &[Record], structure: &Structure, values: &[f64]) -> Option<Vec<Predicted>> {
+    let fixed = Problem { model: structure.model(problem, values)?, stated: Vec::new(), ..problem.clone() };
+    let mut own = Structure::new(&fixed, records, Vec::new());
+    own.numbers.retain(|n| n.record.is_some());
+    let mut values = own.values(&fixed, &[], &[]);
+    if !own.numbers.is_empty()
+        && let Some(fit) = Evaluator::on(&fixed, records).fit(&own, &values, Effort { steps: 15, tolerance: 1.0 })
+    {
+        values = fit.values;
+    }
+    let one = |(r, record): (usize, &Record)| {
+        let columns = own.predict(&fixed.model, &values, record, r, 64)?;
+        let mut of_outputs: Predicted = vec![None; record.outputs.len()];
+        for (column, output) in columns.chunks_exact(record.len.max(1)).zip(measured(record)) {
+            *of_outputs.get_mut(output)? = Some(column.to_vec());
+        }
+        Some(of_outputs)
+    };
+    records.iter().enumerate().map(one).collect()
+}
+
+/// How well an output of a record is predicted.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Quality {
+    /// The record.
+    pub record: String,
+    /// The output.
+    pub output: String,
+    /// Root of the mean squared error over the standard deviation of what was measured.
+    pub nrmse: f64,
+    /// Root of the mean squared error over the standard deviation of the measuring error; of a position that nothing holds back over its
+    /// displacement in a while, as fits compare it.
+    pub floors: f64,
+    /// Whether fits saw this record.
+    pub fitted: bool,
+}
+
+/// Quality of predictions of `records`. `floor` is the measuring error of each output, in its unit.
+pub fn qualities(problem: &Problem, records: &[Record], predicted: &[Predicted], floor: &[f64], fitted: bool) -> Vec<Quality> {
+    let mut all = Vec::new();
+    for (record, predicted) in records.iter().zip(predicted) {
+        for (index, output) in problem.model.outputs.iter().enumerate() {
+            let (Some(Some(samples)), Some(Some(column))) = (record.outputs.get(index), predicted.get(index)) else { continue };
+            let error: Vec<f64> = samples.iter().zip(column).map(|(y, p)| y - p).collect();
+            let lag = problem.lag.get(index).copied().unwrap_or(0);
+            let lagged: Vec<f64> = match lag {
+                0 => error.clone(),
+                _ => error.iter().skip(lag).zip(&error).map(|(a, b)| (a - b) * std::f64::consts::FRAC_1_SQRT_2).collect(),
+            };
+            all.push(Quality {
+                record: record.name.clone(),
+                output: output.name.clone(),
+                nrmse: rms(&error) / record.spread.get(index).copied().unwrap_or(1.0),
+                floors: rms(&lagged) / floor.get(index).copied().unwrap_or(1.0).max(f64::MIN_POSITIVE),
+                fitted,
+            });
+        }
+    }
+    all
+}
+
+/// Root mean square; 0 of nothing.
+pub fn rms(samples: &[f64]) -> f64 {
+    (samples.iter().map(|x| x * x).sum::<f64>() / samples.len().max(1) as f64).sqrt()
+}
+
+/// Power spectral density of samples `period` s apart, by Welch's method (Hann windows, half overlapping, about 16 of them): frequencies,
+/// Hz, and density in the unit squared per Hz. White noise of standard deviation s has the density 2 s² period. Empty for fewer than 32
+/// samples.
+pub fn density(samples: &[f64], period: f64) -> (Vec<f64>, Vec<f64>) {
+    let size = (samples.len() / 8).max(32);
+    if samples.len() < size || size < 32 {
+        return Default::default();
+    }
+    let window: Vec<f64> = (0..size).map(|i| (std::f64::consts::PI * (i as f64 + 0.5) / size as f64).sin().powi(2)).collect();
+    let scale = 2.0 * period / window.iter().map(|w| w * w).sum::<f64>();
+    let mut planner = realfft::RealFftPlanner::<f64>::new();
+    let transform = planner.plan_fft_forward(size);
+    let (mut output, mut sums, mut count) = (transform.make_output_vec(), vec![0.0; size / 2 + 1], 0.0);
+    let mut from = 0;
+    while from + size <= samples.len() {
+        let part = &samples[from..from + size];
+        let mean = part.iter().sum::<f64>() / size as f64;
+        let mut input: Vec<f64> = part.iter().zip(&window).map(|(x, w)| (x - mean) * w).collect();
+        if transform.process(&mut input, &mut output).is_err() {
+            return Default::default();
+        }
+        sums.iter_mut().zip(&output).for_each(|(s, c)| *s += c.norm_sqr() * scale);
+        count += 1.0;
+        from += (size / 2).max(1);
+    }
+    // The mean was taken off: its line says nothing.
+    (1..sums.len()).map(|k| (k as f64 / (size as f64 * period), sums[k] / count)).unzip()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::SeedableRng;
+    use rand_distr::{Distribution, StandardNormal};
+
+    #[test]
+    fn white_noise_has_its_density() {
+        let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(5);
+        let noise: Vec<f64> =
+            (0..20_000).map(|_| 0.3 * <StandardNormal as Distribution<f64>>::sample(&StandardNormal, &mut random)).collect();
+        let (hz, density) = density(&noise, 1e-3);
+        let mean = density.iter().sum::<f64>() / density.len() as f64;
+        assert!((mean / (2.0 * 0.09 * 1e-3) - 1.0).abs() < 0.05, "{mean}");
+        assert!((hz[hz.len() - 1] - 500.0).abs() < 1.0);
+        assert!(super::density(&noise[..20], 1e-3).0.is_empty());
+    }
+}

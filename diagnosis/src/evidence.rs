@@ -1,0 +1,368 @@
+//! The force that gave a finding away: what the recordings ask for at its place when it alone is left out, beside what its law does there.
+
+use crate::hypothesis::{Hypothesis, Place};
+use crate::locate::{self, Course, force_along, locate};
+use crate::problem::{Problem, Record};
+use crate::search::Candidate;
+use crate::structure::Structure;
+use backdrive_plant::describe::unit_for;
+use backdrive_plant::model::{Element, Input, InputKind, Model, Output, OutputKind};
+use backdrive_plant::set::Condition;
+use backdrive_plant::stepper::{Options, simulate};
+
+/// What a law's force is drawn against.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Against {
+    /// Velocity across the place.
+    Velocity,
+    /// Displacement across the place.
+    Displacement,
+    /// Acceleration of the body.
+    Acceleration,
+    /// The command at an input, or the reading at an output.
+    Signal,
+    /// Its rate of change.
+    SignalRate,
+    /// Time.
+    Time,
+}
+
+/// Two curves over one variable.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Curve {
+    /// Time, s.
+    pub time: Vec<f64>,
+    /// The law's own variable.
+    pub variable: Vec<f64>,
+    /// Displacement across the place; empty at a signal.
+    pub displacement: Vec<f64>,
+    /// Force, or the signal's error.
+    pub force: Vec<f64>,
+}
+
+/// One record.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Trace {
+    /// The record.
+    pub record: String,
+    /// As the recordings ask for it.
+    pub latent: Curve,
+    /// Its standard deviation.
+    pub deviation: Vec<f64>,
+    /// As the law has it in the diagnosed model, simulated.
+    pub law: Curve,
+}
+
+/// What the recordings ask for at a finding's place, and what its law does.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Evidence {
+    /// The finding's id.
+    pub id: String,
+    /// Its place.
+    pub place: Place,
+    /// What its law depends on.
+    pub against: Against,
+    /// Unit of that variable.
+    pub variable_unit: String,
+    /// Unit of displacements.
+    pub displacement_unit: String,
+    /// Unit of the force, or of the signal.
+    pub force_unit: String,
+    /// Whether the law has a memory, so that its curve is a loop.
+    pub memory: bool,
+    /// Elements that the law takes the place of: their force is in both curves.
+    pub replaces: Vec<String>,
+    /// One for each record.
+    pub traces: Vec<Trace>,
+}
+
+/// Samples that a force is estimated at, at most.
+const SAMPLES: usize = 8000;
+/// Physics whose force depends on the path.
+const MEMORY: [&str; 7] = ["dahl", "lugre", "maxwell_slip", "preisach_lugre", "hysteretic_spring", "bouc_wen", "backlash"];
+
+/// What a physics is drawn against, by its name.
+pub fn against(physics: &str) -> Against {
+    match physics {
+        "coulomb" | "asymmetric_coulomb" | "stribeck" | "friction_deficit" | "damper" | "asymmetric_damper" | "quadratic_drag"
+        | "back_emf" => Against::Velocity,
+        "inertia" | "inerter" => Against::Acceleration,
+        "saturation" | "gain" => Against::Signal,
+        "delay" | "bandwidth" => Against::SignalRate,
+        "bias" | "offset" => Against::Time,
+        _ => Against::Displacement,
+    }
+}
+
+/// In which state a physics shows at a place (as places are written, `drum-ground` or a signal's name), in words.
+pub fn state(physics: &str, place: &str) -> String {
+    match physics {
+        "coulomb" | "asymmetric_coulomb" | "stribeck" | "friction_deficit" | "dahl" | "lugre" | "maxwell_slip" | "preisach_lugre" => {
+            format!("reversals of the velocity across {place}")
+        }
+        "contact" | "hunt_crossley" | "backlash" => format!("where the displacement across {place} meets or leaves its contact"),
+        "saturation" => format!("large values of {place}"),
+        "cogging" => format!("periodically in the displacement across {place}"),
+        _ => match against(physics) {
+            Against::Velocity => format!("with the velocity across {place}"),
+            Against::Displacement => format!("with the displacement across {place}"),
+            Against::Acceleration => format!("with the acceleration across {place}"),
+            Against::Signal => format!("with the value of {place}"),
+            Against::SignalRate => format!("with the rate of change of {place}"),
+            Against::Time => format!("all the time, at {place}"),
+        },
+    }
+}
+
+/// Evidence of one of the physics that a candidate adds; `None` where nothing can be located there. `floor` is the measuring error of
+/// each output, in its unit.
+pub fn evidence(problem: &Problem, best: &Candidate, floor: &[f64], which: usize) -> Option<Evidence> {
+    let finding = best.structure.added.get(which)?;
+    let values = &best.fit.values;
+    let rest = |i: &usize| *i != which;
+    let all = best.structure.added_of(values);
+    let others: Vec<Hypothesis> = (0..all.len()).filter(rest).filter_map(|i| best.structure.added.get(i).cloned()).collect();
+    let other_values: Vec<Vec<f64>> = (0..all.len()).filter(rest).filter_map(|i| all.get(i).cloned()).collect();
+    let structure = Structure::new(problem, &problem.fit, others);
+    let without = structure.model(problem, &structure.values(problem, &best.structure.stated_of(problem, values), &other_values))?;
+    let with = best.structure.model(problem, values)?;
+
+    let changed: Vec<Model> = problem.fit.iter().map(|r| under(&without, r)).collect();
+    let runs: Vec<locate::Run> =
+        problem.fit.iter().zip(&changed).map(|(r, m)| locate::Run { model: Some(m), ..locate::Run::from(r) }).collect();
+    let options = locate::Options { most_samples: SAMPLES, only: Some(finding.place.clone()), ..locate::Options::quick() };
+    let location = locate(&without, &runs, floor, &options).ok()?;
+    let found = location.ranking.into_iter().find(|c| c.place.same(&finding.place))?;
+    let against = against(finding.physics);
+    let scene = Scene { without: &without, with: &with, finding, place: &found.place, against };
+    let traces = problem.fit.iter().zip(&found.courses).filter_map(|(record, course)| scene.trace(record, course)).collect();
+    let (variable_unit, displacement_unit, force_unit) = scene.units(problem);
+    Some(Evidence {
+        id: finding.id.clone(),
+        place: found.place.clone(),
+        against,
+        variable_unit,
+        displacement_unit,
+        force_unit,
+        memory: MEMORY.contains(&finding.physics),
+        replaces: finding.replaces.clone(),
+        traces,
+    })
+}
+
+/// The model with the numbers that are known to differ in a record.
+fn under(model: &Model, record: &Record) -> Model {
+    let mut model = model.clone();
+    for (path, condition) in &record.conditions {
+        if let Condition::Value(value) = condition {
+            // A path that the added physics replaced has no value to take.
+            let _ = model.set_values_at(path, &[*value]);
+        }
+    }
+    model
+}
+
+struct Scene<'a> {
+    without: &'a Model,
+    with: &'a Model,
+    finding: &'a Hypothesis,
+    place: &'a Place,
+    against: Against,
+}
+
+impl Scene<'_> {
+    fn body(&self, model: &Model, name: &str) -> Option<usize> {
+        model.bodies.iter().position(|b| b.name == name)
+    }
+
+    fn input(&self) -> Option<(usize, &Input, &Input)> {
+        let Place::Signal(name) = self.place else { return None };
+        let index = self.with.inputs.iter().position(|i| i.name == *name)?;
+        Some((index, self.without.inputs.get(index)?, self.with.inputs.get(index)?))
+    }
+
+    fn units(&self, problem: &Problem) -> (String, String, String) {
+        let unit = |u: &str| unit_for(problem.model.motion, u);
+        let force = match (self.place, self.input()) {
+            (Place::Between(..), _) => unit("N"),
+            (_, Some((_, input, _))) => unit(if input.kind == InputKind::Force { "N" } else { "m" }),
+            (Place::Signal(name), None) => {
+                let output = problem.model.outputs.iter().find(|o| o.name == *name);
+                output.map_or(String::new(), |o| crate::numbers::unit_of_output(problem, &o.kind))
+            }
+        };
+        let variable = match self.against {
+            Against::Velocity => unit("m/s"),
+            Against::Displacement => unit("m"),
+            Against::Acceleration => unit("m/s²"),
+            Against::Signal => force.clone(),
+            Against::SignalRate => format!("{force}/s"),
+            Against::Time => "s".to_string(),
+        };
+        (variable, unit("m"), force)
+    }
+
+    fn trace(&self, record: &Record, course: &Course) -> Option<Trace> {
+        let stride = ((course.period / record.period).round() as usize).max(1);
+        let thin = |x: &[f64]| -> Vec<f64> { x.iter().step_by(stride).copied().collect() };
+        let time: Vec<f64> = (0..course.force.len()).map(|k| k as f64 * course.period).collect();
+        let signal = match (self.place, self.input()) {
+            (_, Some((index, ..))) => thin(record.inputs.get(index)?),
+            (Place::Signal(name), None) => {
+                let output = self.with.outputs.iter().position(|o| o.name == *name)?;
+                thin(record.outputs.get(output)?.as_deref()?)
+            }
+            _ => Vec::new(),
+        };
+        let variable = |velocity: &[f64], displacement: &[f64]| -> Vec<f64> {
+            match self.against {
+                Against::Velocity => velocity.to_vec(),
+                Against::Displacement => displacement.to_vec(),
+                Against::Acceleration => rate(velocity, course.period),
+                Against::Signal => signal.clone(),
+                Against::SignalRate => rate(&signal, course.period),
+                Against::Time => time.clone(),
+            }
+        };
+        // At a force input the error of the input pushes, where an element's force holds back.
+        let turned = matches!(self.input(), Some((_, input, _)) if input.kind == InputKind::Force);
+        let mut force: Vec<f64> = if turned { course.force.iter().map(|f| -f).collect() } else { course.force.clone() };
+        for (element, sign) in self.removed() {
+            let (x, v): (Vec<f64>, Vec<f64>) = course.displacement.iter().zip(&course.velocity).map(|(x, v)| (sign * x, sign * v)).unzip();
+            for (f, own) in force.iter_mut().zip(force_along(&element.law, &x, &v, course.period)) {
+                *f += sign * own;
+            }
+        }
+        let latent = Curve {
+            time: time.clone(),
+            variable: variable(&course.velocity, &course.displacement),
+            displacement: if matches!(self.place, Place::Between(..)) { course.displacement.clone() } else { Vec::new() },
+            force,
+        };
+        let (displacement, velocity, law) = match self.place {
+            Place::Between(a, b) => self.law_between(record, a, b)?,
+            Place::Signal(_) => (Vec::new(), Vec::new(), self.law_at_signal(record)?),
+        };
+        let (displacement, velocity, law) = (thin(&displacement), thin(&velocity), thin(&law));
+        let velocity = if velocity.is_empty() { course.velocity.clone() } else { velocity };
+        let variable = variable(&velocity, &displacement);
+        let law = Curve { time, variable, displacement, force: law };
+        Some(Trace { record: record.name.clone(), latent, deviation: course.deviation.clone(), law })
+    }
+
+    /// Elements that the finding takes the place of, with the sign of their direction.
+    fn removed(&self) -> Vec<(&Element, f64)> {
+        let Place::Between(a, _) = self.place else { return Vec::new() };
+        let first = self.body(self.without, a);
+        let replaced = self.without.elements.iter().filter(|e| self.finding.replaces.contains(&e.name));
+        // A joint that is split keeps its elements, which then act in a row with the new ones.
+        let split = self.finding.physics == "series_compliance";
+        let joint = self.without.elements.iter().filter(move |e| split && self.is_here(e));
+        replaced.chain(joint).map(|e| (e, if e.between[0] == first { 1.0 } else { -1.0 })).collect()
+    }
+
+    fn is_here(&self, element: &Element) -> bool {
+        let name = |end: Option<usize>| self.without.place_name(end).to_string();
+        Place::Between(name(element.between[0]), name(element.between[1])).same(self.place)
+    }
+
+    /// Displacement, velocity and force of what the finding added, as it moves in the diagnosed model.
+    fn law_between(&self, record: &Record, a: &str, b: &str) -> Option<(Vec<f64>, Vec<f64>, Vec<f64>)> {
+        let mut probe = under(self.with, record);
+        let asked = probe.outputs.len();
+        let ends = [a, b].map(|name| self.body(self.with, name));
+        for body in ends.into_iter().flatten() {
+            probe.outputs.push(plain(OutputKind::Position(body)));
+            probe.outputs.push(plain(OutputKind::Velocity(body)));
+            probe.outputs.push(plain(OutputKind::Acceleration(body)));
+        }
+        let before = |e: &Element| self.without.elements.iter().any(|o| o.name == e.name && o.law == e.law);
+        let added: Vec<usize> = (0..probe.elements.len()).filter(|i| !before(&self.with.elements[*i])).collect();
+        for index in &added {
+            probe.outputs.push(plain(OutputKind::Force(vec![*index])));
+        }
+        let columns = simulate(&probe, &record.inputs, record.period, &Options::default()).ok()?;
+        let mut columns = columns.into_iter().skip(asked);
+        let mut across = vec![vec![0.0; record.len]; 3];
+        for (end, sign) in ends.iter().zip([1.0, -1.0]) {
+            if end.is_some() {
+                for column in &mut across {
+                    let own = columns.next()?;
+                    column.iter_mut().zip(own).for_each(|(x, own)| *x += sign * own);
+                }
+            }
+        }
+        let mut force = vec![0.0; record.len];
+        if self.finding.physics == "inertia" {
+            let inertia = |m: &Model| ends[0].or(ends[1]).and_then(|b| m.bodies.get(b)).map_or(0.0, |b| b.inertia);
+            let more = inertia(self.with) - inertia(self.without);
+            force.iter_mut().zip(&across[2]).for_each(|(f, a)| *f = more * a);
+        }
+        for (index, column) in added.iter().zip(columns) {
+            let element = &self.with.elements[*index];
+            // What an added body is held by pulls the joint's second end, what holds it the first.
+            let sign = if element.between[0] == ends[0] && ends[0].is_some() || element.between[1] == ends[1] { 1.0 } else { -1.0 };
+            force.iter_mut().zip(column).for_each(|(f, own)| *f += sign * own);
+        }
+        let [x, v, _] = <[Vec<f64>; 3]>::try_from(across).ok()?;
+        Some((x, v, force))
+    }
+
+    /// What a finding at a signal makes of it: the difference to the signal without the finding.
+    fn law_at_signal(&self, record: &Record) -> Option<Vec<f64>> {
+        let run = |model: &Model| simulate(&under(model, record), &record.inputs, record.period, &Options::default()).ok();
+        let Some((index, before, after)) = self.input() else {
+            let Place::Signal(name) = self.place else { return None };
+            let output = self.with.outputs.iter().position(|o| o.name == *name)?;
+            let (a, b) = (run(self.without)?, run(self.with)?);
+            return Some(b.get(output)?.iter().zip(a.get(output)?).map(|(b, a)| b - a).collect());
+        };
+        let samples = record.inputs.get(index)?;
+        let mut error: Vec<f64> =
+            arriving(after, samples, record.period).iter().zip(arriving(before, samples, record.period)).map(|(b, a)| b - a).collect();
+        let lost = after.back_emf - before.back_emf;
+        if lost != 0.0 {
+            let mut probe = under(self.with, record);
+            probe.outputs = vec![plain(OutputKind::Velocity(after.on))];
+            let columns = simulate(&probe, &record.inputs, record.period, &Options::default()).ok()?;
+            error.iter_mut().zip(columns.first()?).for_each(|(e, v)| *e -= lost * v);
+        }
+        Some(error)
+    }
+}
+
+/// A command behind gain, saturation, delay and lag, at the samples.
+fn arriving(input: &Input, samples: &[f64], period: f64) -> Vec<f64> {
+    let late = input.delay / period;
+    let keep = if input.bandwidth.is_finite() { (-std::f64::consts::TAU * input.bandwidth * period).exp() } else { 0.0 };
+    let at = |place: f64| -> f64 {
+        let place = place.max(0.0);
+        let (k, part) = (place.floor() as usize, place.fract());
+        let of = |k: usize| samples.get(k).copied().unwrap_or(0.0);
+        let value = if part > 0.0 { of(k) + part * (of(k + 1) - of(k)) } else { of(k) };
+        (input.gain * value).clamp(-input.saturation, input.saturation)
+    };
+    let mut state = at(0.0);
+    (0..samples.len())
+        .map(|k| {
+            let now = at(k as f64 - late);
+            state = keep * state + (1.0 - keep) * now;
+            state
+        })
+        .collect()
+}
+
+/// An output that adds nothing of its own.
+fn plain(kind: OutputKind) -> Output {
+    Output { name: String::new(), kind, gain: 1.0, delay: 0.0, offset: 0.0, resolution: 0.0, noise: 0.0 }
+}
+
+/// Central differences.
+fn rate(column: &[f64], period: f64) -> Vec<f64> {
+    let last = column.len().saturating_sub(1);
+    let at = |k: usize| {
+        let (a, b) = (k.saturating_sub(1), (k + 1).min(last));
+        if b > a { (column[b] - column[a]) / ((b - a) as f64 * period) } else { 0.0 }
+    };
+    (0..column.len()).map(at).collect()
+}

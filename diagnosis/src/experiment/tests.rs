@@ -1,0 +1,263 @@
+//! Experiments chosen for devices of known physics, and what they then show.
+
+use super::*;
+use crate::fit::{Effort, Fit};
+use crate::hypothesis::{self, Hypothesis, Scales};
+use crate::problem::Record;
+use backdrive_plant::excitation::load_experiments;
+use backdrive_plant::recording::Recording;
+use backdrive_plant::set::Initial;
+use backdrive_plant::stepper::{Options, simulate};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+use std::f64::consts::TAU;
+use std::time::Duration;
+
+const PERIOD: f64 = 1e-3;
+
+const MASS: &str = r#"
+name = "mass"
+motion = "translation"
+[bodies]
+mass = 0.2
+[[elements]]
+name = "spring"
+kind = "spring"
+between = ["mass", "ground"]
+stiffness = 200.0
+[[inputs]]
+name = "force"
+kind = "force"
+on = "mass"
+[[outputs]]
+name = "position"
+kind = "position"
+of = "mass"
+"#;
+
+const RUB: &str = "\n[[elements]]\nname = \"rub\"\nkind = \"coulomb\"\nbetween = [\"mass\", \"ground\"]\nforce = 0.15\n";
+
+fn soon() -> Instant {
+    Instant::now() + Duration::from_secs(120)
+}
+
+/// What `truth` does under some inputs, with noise on its outputs, as a recording of `nominal`.
+fn record(truth: &Model, nominal: &Model, columns: &[Vec<f64>], noise: f64, seed: u64) -> Record {
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    let clean = simulate(truth, columns, PERIOD, &Options::default()).unwrap();
+    let t: Vec<f64> = (0..columns[0].len()).map(|k| k as f64 * PERIOD).collect();
+    let mut signals: Vec<(String, Vec<f64>)> = nominal.inputs.iter().map(|i| i.name.clone()).zip(columns.iter().cloned()).collect();
+    for (output, y) in nominal.outputs.iter().zip(clean) {
+        let y = y.iter().map(|y| {
+            let e: f64 = StandardNormal.sample(&mut random);
+            y + noise * e
+        });
+        signals.push((output.name.clone(), y.collect()));
+    }
+    Record::new(&Recording::new(format!("{seed}"), t, signals).unwrap(), nominal, Vec::new()).unwrap()
+}
+
+/// A sine that rises within half a second.
+fn sine(amplitude: f64, hz: f64, seconds: f64) -> Vec<f64> {
+    let rise = |t: f64| if t < 0.5 { 0.5 - 0.5 * (TAU * t).cos() } else { 1.0 };
+    (0..(seconds / PERIOD) as usize).map(|k| k as f64 * PERIOD).map(|t| rise(t) * amplitude * (TAU * hz * t).sin()).collect()
+}
+
+/// A problem of one recording: `nominal` is held against what `truth` does.
+fn problem(nominal: &str, truth: &str, column: Vec<f64>, noise: f64) -> Problem {
+    let model = Model::from_toml(nominal, "nominal").unwrap();
+    let truth = Model::from_toml(truth, "truth").unwrap();
+    let record = record(&truth, &model, &[column], noise, 1);
+    let mut problem = Problem::new(nominal.to_string(), "nominal.toml".into(), model, vec![record], Vec::new(), Initial::Rest).unwrap();
+    problem.floor = vec![noise; problem.model.outputs.len()];
+    problem
+}
+
+fn hypotheses(problem: &Problem) -> Vec<Hypothesis> {
+    let runs: Vec<(Vec<Vec<f64>>, f64)> = problem.fit.iter().map(|r| (r.inputs.clone(), r.period)).collect();
+    hypothesis::all(&problem.model, &Scales::of(&problem.model, &runs).unwrap())
+}
+
+/// The nominal model with some of its hypotheses, fitted.
+fn fitted(problem: &Problem, ids: &[&str]) -> (Structure, Fit) {
+    let all = hypotheses(problem);
+    let find = |id: &&str| all.iter().find(|h| h.id == *id).unwrap_or_else(|| panic!("no {id}")).clone();
+    let added: Vec<Hypothesis> = ids.iter().map(find).collect();
+    let structure = Structure::new(problem, &problem.fit, added.clone());
+    let given: Vec<f64> = problem.stated.iter().map(|s| s.given).collect();
+    let starts: Vec<Vec<f64>> = (0..2)
+        .map(|s| structure.values(problem, &given, &added.iter().map(|h| h.starts[s.min(h.starts.len() - 1)].clone()).collect::<Vec<_>>()))
+        .collect();
+    let fit = Evaluator::new(problem).best_of(&structure, &starts, Effort::FULL).unwrap();
+    (structure, fit)
+}
+
+/// The columns that an excitation file makes for a model: read from a file, as anybody would.
+fn columns(text: &str, model: &Model) -> Vec<Vec<f64>> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("next.toml");
+    std::fs::write(&path, text).unwrap();
+    let experiments = load_experiments(&path).unwrap_or_else(|e| panic!("{e}\n{text}"));
+    assert_eq!(experiments.len(), 1, "{text}");
+    experiments[0].columns_for(model, 1.0 / PERIOD).unwrap()
+}
+
+#[test]
+fn dry_and_viscous_friction_are_told_apart_by_as_much_as_was_said() {
+    let noise = 3e-3;
+    for (truth, rival) in [("coulomb@mass-ground", "damper@mass-ground"), ("damper@mass-ground", "coulomb@mass-ground")] {
+        let mut problem = problem(MASS, &format!("{MASS}{RUB}"), sine(0.7, 1.0, 4.0), noise);
+        let (right, wrong) = (fitted(&problem, &[truth]), fitted(&problem, &[rival]));
+        let alike = (right.1.cost - wrong.1.cost).abs();
+        let began = Instant::now();
+        let found = separate_fitted(&problem, &[(&right.0, &right.1), (&wrong.0, &wrong.1)], &problem.floor, soon()).unwrap();
+        println!("{:.2} s, costs apart by {alike:.1}: {found:#?}", began.elapsed().as_secs_f64());
+        assert!(alike < 0.3 * found.separation.powi(2), "the recording tells them apart already: {alike} of {}", found.separation.powi(2));
+        assert!(found.separation > 5.0, "{found:?}");
+        assert!(found.duration <= 4.2, "{}", found.duration);
+
+        // Made with one of them, the experiment costs the other as much as was said.
+        let device = right.0.model(&problem, &right.1.values).unwrap();
+        let driven = columns(&found.text, &problem.model);
+        problem.fit.push(record(&device, &problem.model, &driven, noise, 7));
+        let evaluator = Evaluator::new(&problem);
+        let cost = |s: &(Structure, Fit)| evaluator.fit(&s.0, &s.1.values, Effort::FULL).unwrap().cost;
+        let seen = cost(&wrong) - cost(&right);
+        let said = found.separation.powi(2);
+        println!("{truth}: said {said:.0}, seen {seen:.0}");
+        assert!(seen > 0.5 * said - 4.0 * found.separation && seen > 25.0, "{truth}: said {said}, seen {seen}");
+        assert!(seen < 6.0 * said, "{truth}: said {said}, seen {seen}");
+    }
+}
+
+#[test]
+fn the_file_plays_and_stays_within_what_was_recorded() {
+    let problem = problem(MASS, &format!("{MASS}{RUB}"), sine(0.7, 1.0, 4.0), 1e-3);
+    let (a, b) = (fitted(&problem, &["coulomb@mass-ground"]), fitted(&problem, &["damper@mass-ground"]));
+    let found = separate_fitted(&problem, &[(&a.0, &a.1), (&b.0, &b.1)], &problem.floor, soon()).unwrap();
+    let model = a.0.model(&problem, &a.1.values).unwrap();
+    let driven = columns(&found.text, &model);
+    assert!((driven[0].len() as f64 * PERIOD - found.duration).abs() < 2.0 * PERIOD);
+    assert!(driven[0].iter().all(|u| u.abs() <= 0.701), "beyond the recorded force");
+    let y = simulate(&model, &driven, PERIOD, &Options::default()).unwrap().remove(0);
+    let shown = problem.fit[0].outputs[0].as_ref().unwrap().iter().fold(0.0f64, |a, y| a.max(y.abs()));
+    assert!(y.iter().all(|y| y.is_finite() && y.abs() <= 1.5 * shown), "beyond the recorded motion");
+    let json = found.json("next.toml");
+    assert_eq!(json["file"], "next.toml");
+    assert!(json["separation_sd"].as_f64().unwrap() > 5.0 && json["sentence"].as_str().unwrap().contains("coulomb"));
+    let line: backdrive_plant::excitation::Excitation = found.excitation.parse().unwrap();
+    assert_eq!(line.samples(1.0 / PERIOD).unwrap(), driven[0], "the file and the line are the same excitation");
+}
+
+#[test]
+fn what_is_mechanically_the_same_has_no_experiment() {
+    let damped = format!("{MASS}\n[[elements]]\nname = \"oil\"\nkind = \"damper\"\nbetween = [\"mass\", \"ground\"]\ndamping = 0.8\n");
+    let problem = problem(MASS, &damped, sine(0.7, 2.0, 3.0), 1e-5);
+    let (a, b) = (fitted(&problem, &["back_emf@force"]), fitted(&problem, &["damper@mass-ground"]));
+    let said = separate_fitted(&problem, &[(&a.0, &a.1), (&b.0, &b.1)], &problem.floor, soon()).unwrap_err().to_string();
+    println!("{said}");
+    assert!(said.contains("the motor's current would tell") && said.contains("nor does any further sensor"), "{said}");
+    assert!(separate_fitted(&problem, &[(&a.0, &a.1)], &problem.floor, soon()).is_err());
+}
+
+const TWO: &str = r#"
+name = "two"
+motion = "translation"
+[bodies]
+motor = 0.1
+load = 0.3
+[[elements]]
+name = "belt"
+kind = "spring"
+between = ["motor", "load"]
+stiffness = 900.0
+[[elements]]
+name = "loss"
+kind = "damper"
+between = ["motor", "load"]
+damping = 2.0
+[[elements]]
+name = "anchor"
+kind = "spring"
+between = ["load", "ground"]
+stiffness = 60.0
+[[inputs]]
+name = "force"
+kind = "force"
+on = "motor"
+[[outputs]]
+name = "position"
+kind = "position"
+of = "motor"
+"#;
+
+#[test]
+fn the_sensor_that_would_help_is_named() {
+    let late = TWO.replace("on = \"motor\"", "on = \"motor\"\ndelay = 0.004");
+    let problem = problem(TWO, &late, (0..4000).map(|k| (1e-5 * f64::from(k * k)).sin() * 2.0).collect(), 2e-5);
+    let (a, b) = (fitted(&problem, &["delay@force"]), fitted(&problem, &["delay@position"]));
+    let said = separate_fitted(&problem, &[(&a.0, &a.1), (&b.0, &b.1)], &problem.floor, soon()).unwrap_err().to_string();
+    println!("{said}");
+    assert!(said.contains("measuring the"), "{said}");
+}
+
+#[test]
+fn what_slow_motion_hides_is_excited() {
+    let problem = problem(MASS, MASS, sine(0.7, 0.4, 5.0), 3e-3);
+    let (structure, fit) = fitted(&problem, &["damper@mass-ground"]);
+    let model = structure.model(&problem, &fit.values).unwrap();
+    let mass = structure.numbers.iter().position(|n| matches!(n.role, Role::Stated(i) if problem.stated[i].path == "bodies.mass")).unwrap();
+    let found = excite(&problem, &model, &structure, &fit.values, &[mass], &problem.floor, soon()).unwrap();
+    println!("{found:#?}");
+    assert!(found.separation > 8.0 && found.sentence.contains("bodies.mass"), "{found:?}");
+    // A refit to it knows the mass as well as was said.
+    let mut wider = problem.clone();
+    wider.fit.push(record(&Model::from_toml(MASS, "").unwrap(), &problem.model, &columns(&found.text, &problem.model), 3e-3, 3));
+    let again = fitted(&wider, &[]);
+    let value = again.1.values[mass];
+    assert!((value / 0.2 - 1.0).abs() < 4.0 / found.separation, "{value}");
+    assert!(excite(&problem, &model, &structure, &fit.values, &[], &problem.floor, soon()).is_err());
+}
+
+const MOVED: &str = r#"
+name = "moved"
+motion = "translation"
+[bodies]
+handle = 0.05
+load = 0.3
+[[elements]]
+name = "belt"
+kind = "spring"
+between = ["handle", "load"]
+stiffness = 900.0
+[[elements]]
+name = "loss"
+kind = "damper"
+between = ["handle", "load"]
+damping = 2.0
+[[inputs]]
+name = "motion"
+kind = "motion"
+on = "handle"
+[[outputs]]
+name = "force"
+kind = "reaction"
+of = "handle"
+"#;
+
+#[test]
+fn a_motion_is_smooth_and_no_faster_than_recorded() {
+    let truth = format!("{MOVED}{}", RUB.replace("mass", "load").replace("0.15", "0.3"));
+    let column = sine(0.01, 1.5, 4.0);
+    let problem = problem(MOVED, &truth, column.clone(), 0.15);
+    let (a, b) = (fitted(&problem, &["coulomb@load-ground"]), fitted(&problem, &["damper@load-ground"]));
+    let found = separate_fitted(&problem, &[(&a.0, &a.1), (&b.0, &b.1)], &problem.floor, soon()).unwrap();
+    println!("{found:#?}");
+    let driven = columns(&found.text, &problem.model).remove(0);
+    let fastest = |u: &[f64]| u.windows(2).fold(0.0f64, |a, w| a.max((w[1] - w[0]).abs() / PERIOD));
+    let hardest = |u: &[f64]| u.windows(3).fold(0.0f64, |a, w| a.max((w[2] - 2.0 * w[1] + w[0]).abs() / (PERIOD * PERIOD)));
+    assert!(driven.iter().all(|x| x.abs() <= 0.01005));
+    assert!(fastest(&driven) <= 1.02 * fastest(&column), "{} against {}", fastest(&driven), fastest(&column));
+    assert!(hardest(&driven) <= 1.1 * hardest(&column), "{} against {}", hardest(&driven), hardest(&column));
+}

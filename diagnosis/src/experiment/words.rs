@@ -1,0 +1,205 @@
+//! An experiment in words and as a file.
+
+use super::rivals::Trial;
+use crate::hypothesis::Hypothesis;
+use crate::structure::Structure;
+use backdrive_plant::excitation::{Excitation, Shape};
+use backdrive_plant::model::{InputKind, Model, Motion};
+use backdrive_plant::write::round_significant;
+use std::fmt::Write;
+
+/// The excitation file of an experiment: what `backdrive simulate MODEL FILE` plays. `about` becomes its comment.
+pub(super) fn file(model: &Model, trial: &Trial, name: &str, about: &str, rate_hz: f64) -> String {
+    let mut text = String::new();
+    for line in wrapped(about, 110) {
+        let _ = writeln!(text, "# {line}");
+    }
+    let _ = writeln!(text, "#\n#   backdrive simulate MODEL THIS_FILE --rate {rate_hz} --out predicted.csv\n#");
+    let _ = writeln!(text, "# or in a graph: exciter = {{ force = \"{}\" }}", trial.play.excitation);
+    let others = trial.others.iter().map(|(input, excitation)| (*input, excitation));
+    for (input, excitation) in std::iter::once((trial.play.input, &trial.play.excitation)).chain(others) {
+        let input = model.inputs.get(input).map_or("", |i| i.name.as_str());
+        let _ = writeln!(text, "\n[[excitations]]\nname = {}\ninput = {}", quoted(name), quoted(input));
+        text.push_str(&table(excitation));
+    }
+    text
+}
+
+fn quoted(text: &str) -> String {
+    toml_edit::Value::from(text).to_string()
+}
+
+/// An excitation as the keys of its table.
+fn table(excitation: &Excitation) -> String {
+    let line = excitation.to_string();
+    let (kind, keys) = line.split_once(':').unwrap_or((&line, ""));
+    let mut text = format!("kind = {}\n", quoted(kind));
+    for (key, value) in keys.split(',').filter_map(|pair| pair.split_once('=')) {
+        let number =
+            |x: &str| x.parse::<i64>().map(|i| i.to_string()).or_else(|_| x.parse::<f64>().map(|x| toml_edit::Value::from(x).to_string()));
+        let list: Vec<Option<String>> = value.split('/').map(|x| number(x).ok()).collect();
+        let value = match list.as_slice() {
+            [Some(one)] => one.clone(),
+            [_] => quoted(value),
+            _ => format!("[{}]", list.into_iter().flatten().collect::<Vec<_>>().join(", ")),
+        };
+        let _ = writeln!(text, "{key} = {value}");
+    }
+    text
+}
+
+fn wrapped(text: &str, width: usize) -> Vec<String> {
+    let mut lines: Vec<String> = Vec::new();
+    for word in text.split_whitespace() {
+        match lines.last_mut() {
+            Some(line) if line.chars().count() + 1 + word.chars().count() <= width => {
+                line.push(' ');
+                line.push_str(word);
+            }
+            _ => lines.push(word.to_string()),
+        }
+    }
+    lines
+}
+
+/// A number for a sentence.
+pub(super) fn short(x: f64) -> String {
+    round_significant(x, 2).to_string()
+}
+
+/// An excitation in words, such as `a triangle between reversals at 4 N, periods 3 and 1 s`.
+pub(super) fn described(model: &Model, trial: &Trial) -> String {
+    let input = model.inputs.get(trial.play.input);
+    let unit = match (input.map(|i| i.kind), model.motion) {
+        (Some(InputKind::Motion), Motion::Translation) => "m",
+        (Some(InputKind::Motion), Motion::Rotation) => "rad",
+        (_, Motion::Translation) => "N",
+        (_, Motion::Rotation) => "N m",
+    };
+    let list = |values: &[f64]| match values {
+        [rest @ .., last] if !rest.is_empty() => {
+            format!("{} and {}", rest.iter().map(|x| short(*x)).collect::<Vec<_>>().join(", "), short(*last))
+        }
+        _ => values.iter().map(|x| short(*x)).collect(),
+    };
+    let excitation = &trial.play.excitation;
+    let shape = match &excitation.shape {
+        Shape::Sweep { amplitude, from, to, tilt, .. } if *tilt != 0.0 => {
+            format!("a sweep from {} to {} Hz that begins with {} {unit} and gets smaller", short(*from), short(*to), short(*amplitude))
+        }
+        Shape::Sweep { amplitude, from, to, .. } => {
+            format!("a sweep of {} {unit} from {} to {} Hz", short(*amplitude), short(*from), short(*to))
+        }
+        Shape::Multisine { peak, rms, from, to, levels, .. } => {
+            let size = peak.or(*rms).unwrap_or(0.0);
+            let sizes: Vec<f64> = levels.iter().map(|l| l * size).collect();
+            format!("a multisine from {} to {} Hz with peaks of {} {unit}", short(*from), short(*to), list(&sizes))
+        }
+        Shape::Triangle { amplitude, period, nested, .. } => {
+            let inner = if *nested > 0 { " with reversals within reversals" } else { "" };
+            format!("a triangle{inner} of {} {unit} with periods of {} s", short(*amplitude), list(period))
+        }
+        Shape::Steps { amplitude, hold, .. } => format!("steps of {} {unit}, {} s each", list(amplitude), short(*hold)),
+        Shape::Impacts { amplitude, width, .. } => format!("knocks of {} {unit}, {} ms long", list(amplitude), short(1e3 * width)),
+        Shape::Sines { amplitude, frequency, .. } => format!("sines of {} {unit} at {} Hz", list(amplitude), list(frequency)),
+    };
+    let bias = if excitation.offset != 0.0 { format!(" about {} {unit}", short(excitation.offset)) } else { String::new() };
+    let name = input.map_or("", |i| i.name.as_str());
+    format!("{shape}{bias} on {name} for {} s", short(trial.record.len as f64 * trial.record.period))
+}
+
+/// Names of two structures without what both have.
+pub(super) fn names(a: &Structure, b: &Structure) -> [String; 2] {
+    let own = |s: &Structure, o: &Structure| {
+        let list: Vec<&str> = only(s, o).iter().map(|h| h.id.as_str()).collect();
+        if list.is_empty() { "nothing more".to_string() } else { list.join(" + ") }
+    };
+    [own(a, b), own(b, a)]
+}
+
+/// What one structure adds and the other does not.
+fn only<'a>(s: &'a Structure, other: &Structure) -> Vec<&'a Hypothesis> {
+    s.added.iter().filter(|h| other.added.iter().all(|o| o.id != h.id)).collect()
+}
+
+/// What it is that tells two structures apart, where each has one physics that the other has not.
+pub(super) fn separator(a: &Structure, b: &Structure) -> Option<&'static str> {
+    let (a, b) = (only(a, b), only(b, a));
+    let ([a], [b]) = (a.as_slice(), b.as_slice()) else { return None };
+    let same_place = a.place.same(&b.place);
+    let (x, y) = (kind(a.physics), kind(b.physics));
+    let pair = |p: &str, q: &str| (x == p && y == q) || (x == q && y == p);
+    let said = match () {
+        () if x == y && !same_place => "the same physics loads other bodies there, and each of these has its own frequency",
+        () if pair("dry", "viscous") => "dry friction is the same at every speed, viscous friction grows with it: two speeds tell",
+        () if pair("dry", "drag") || pair("viscous", "drag") => "drag grows with the square of the speed: two speeds tell",
+        () if pair("dry", "near rest") => "what friction does near rest shows in slow motion",
+        () if pair("dry", "presliding") || pair("near rest", "presliding") => {
+            "presliding gives way over a distance from each reversal, dry friction jumps with the velocity"
+        }
+        () if pair("presliding", "memory") => "reversals within reversals show how much of the past the force remembers",
+        () if pair("dry", "gap") || pair("presliding", "gap") => {
+            "in a gap nothing pulls, and small motion stays within it; friction is there at any amplitude"
+        }
+        () if pair("delay", "gap") || pair("lag", "gap") => {
+            "the lag of a gap falls with the amplitude, that of a delay grows with the frequency"
+        }
+        () if pair("delay", "lag") => "a delay turns the phase and leaves the gain, a lag takes the gain too: high frequencies tell",
+        () if pair("delay", "mass") || pair("lag", "mass") => "inertia takes gain and turns no phase by itself; a lag turns the phase",
+        () if pair("delay", "soft") || pair("lag", "soft") => "a compliance brings a resonance, a lag does not",
+        () if pair("limit", "shape") => {
+            "a limit of the drive belongs to the command, a softening spring to the displacement: several amplitudes tell"
+        }
+        () if pair("lopsided", "bias") => "an offset is there at rest and at every speed, lopsided friction has the sign of the motion",
+        () if pair("ripple", "dry") || pair("ripple", "bias") => "a ripple keeps its place in both directions",
+        () if pair("dry", "lopsided") => "lopsided friction is another in each direction: motion both ways about a bias tells",
+        () if ["spring", "shape", "mass", "soft", "limit"].iter().any(|other| pair("dry", other)) => {
+            "dry friction does not grow with the motion: several amplitudes tell"
+        }
+        () => return None,
+    };
+    Some(said)
+}
+
+/// What a physics is among those that are easily taken for each other.
+fn kind(physics: &str) -> &'static str {
+    match physics {
+        "coulomb" => "dry",
+        "damper" | "back_emf" => "viscous",
+        "quadratic_drag" => "drag",
+        "stribeck" | "friction_deficit" => "near rest",
+        "dahl" | "lugre" => "presliding",
+        "maxwell_slip" | "preisach_lugre" | "bouc_wen" | "hysteretic_spring" => "memory",
+        "backlash" | "contact" | "hunt_crossley" => "gap",
+        "delay" => "delay",
+        "bandwidth" => "lag",
+        "inertia" | "inerter" => "mass",
+        "series_compliance" => "soft",
+        "saturation" => "limit",
+        "cubic_spring" => "shape",
+        "asymmetric_coulomb" | "asymmetric_damper" => "lopsided",
+        "bias" | "offset" => "bias",
+        "cogging" => "ripple",
+        "spring" => "spring",
+        _ => "other",
+    }
+}
+
+/// What would have to be known of two structures that no recording of the same signals tells apart.
+pub(super) fn same_force(a: &Structure, b: &Structure) -> &'static str {
+    let own = [only(a, b), only(b, a)].concat();
+    let has = |name: &str| own.iter().any(|h| h.physics == name);
+    match () {
+        () if has("back_emf") => {
+            "back-EMF and a damper to ground on the driven body are the same force: the motor's current would tell, or letting the device coast with the winding open"
+        }
+        () if has("delay") || has("bandwidth") => {
+            "a delay at the only input and at the only output move the same signal: a second sensor would tell"
+        }
+        () if has("inertia") || has("inerter") => "inertia and an inerter to ground are the same force: weighing the body would tell",
+        () if has("asymmetric_coulomb") => {
+            "lopsided dry friction and dry friction with a bias are the same force: a force sensor at rest would tell"
+        }
+        () => "they are the same force under two names",
+    }
+}

@@ -1,0 +1,208 @@
+//! The numbers of a fit beside those that the file gives: how far each had to move, how sure it is, and which hang together.
+
+use crate::intervals::Spread;
+use crate::problem::Problem;
+use crate::search::Candidate;
+use crate::structure::Role;
+use backdrive_plant::describe::unit_for;
+use backdrive_plant::elements::KINDS;
+use backdrive_plant::model::OutputKind;
+use backdrive_plant::write::{Edit, PatchError, Value, patch, round_significant};
+use serde::Serialize;
+
+/// A number of a fit.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Row {
+    /// Path in the model, such as `elements.cable.stiffness`; of added physics its id and key; of a record's start what starts where.
+    pub name: String,
+    /// Its unit.
+    pub unit: String,
+    /// What the file says; `None` for what it does not state.
+    pub given: Option<f64>,
+    /// As fitted.
+    pub value: f64,
+    /// Standard error, in the number's unit; not finite where the recordings do not determine it.
+    pub standard_error: f64,
+    /// 95 % interval.
+    pub ci95: [f64; 2],
+    /// How far it moved from the file's value, in its own standard deviations.
+    pub moved_sd: Option<f64>,
+    /// Whether the recordings say more of it than what was assumed before.
+    pub determined: bool,
+    /// Whether it ended at the edge of what a fit may try.
+    pub at_bound: bool,
+}
+
+/// Two numbers that hang together.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Pair {
+    /// One.
+    pub first: String,
+    /// The other.
+    pub second: String,
+    /// From -1 to 1.
+    pub correlation: f64,
+}
+
+/// Standard deviation in the fit's own unit (a factor of e to this power) above which the recordings say little of a number.
+const UNSURE: f64 = 0.7;
+
+/// Every number of a fit.
+pub fn rows(problem: &Problem, candidate: &Candidate, spread: &Spread) -> Vec<Row> {
+    let numbers = candidate.structure.numbers.iter().zip(&candidate.fit.values).enumerate();
+    let row = |(index, (number, value)): (usize, (&crate::structure::Number, &f64))| {
+        let given = match &number.role {
+            Role::Stated(i) => problem.stated.get(*i).map(|s| s.given),
+            _ => None,
+        };
+        let deviation = spread.deviation.get(index).copied().unwrap_or(f64::INFINITY);
+        let (low, high) = number.bounds();
+        let own = number.inward(*value);
+        let edge = 1e-6 * (high - low);
+        let sure = match (number.log, given) {
+            (true, _) => deviation < UNSURE,
+            (false, Some(given)) => deviation < UNSURE * given.abs().max(value.abs()),
+            (false, None) => deviation < 0.25 * (high - low),
+        };
+        Row {
+            name: name_of(problem, candidate, index),
+            unit: unit_of(problem, candidate, index),
+            given,
+            value: *value,
+            standard_error: if number.log { deviation * value.abs() } else { deviation },
+            ci95: spread.interval(candidate, index),
+            moved_sd: given.map(|given| (own - number.inward(given)) / deviation),
+            determined: sure,
+            at_bound: own <= low + edge || own >= high - edge,
+        }
+    };
+    numbers.map(row).collect()
+}
+
+/// Pairs of numbers whose correlation is at least `least` in size, the strongest first.
+pub fn correlated(problem: &Problem, candidate: &Candidate, spread: &Spread, least: f64) -> Vec<Pair> {
+    let n = spread.correlation.nrows().min(candidate.structure.numbers.len());
+    let mut all = Vec::new();
+    for a in 0..n {
+        for b in 0..a {
+            let correlation = spread.correlation[(a, b)];
+            if correlation.abs() >= least {
+                let (first, second) = (name_of(problem, candidate, b), name_of(problem, candidate, a));
+                all.push(Pair { first, second, correlation });
+            }
+        }
+    }
+    all.sort_by(|a, b| b.correlation.abs().total_cmp(&a.correlation.abs()));
+    all
+}
+
+/// Name of a number of a fit, as [`Row::name`].
+pub fn name_of(problem: &Problem, candidate: &Candidate, index: usize) -> String {
+    let Some(number) = candidate.structure.numbers.get(index) else { return String::new() };
+    let record = |r: usize| problem.fit.get(r).map_or("?", |r| r.name.as_str());
+    let body = |b: usize| problem.model.bodies.get(b).map_or("?", |b| b.name.as_str());
+    match &number.role {
+        Role::Stated(i) => {
+            let Some(stated) = problem.stated.get(*i) else { return String::new() };
+            let list = problem.stated.iter().filter(|s| s.path == stated.path).count() > 1;
+            if list { format!("{}[{}]", stated.path, stated.index) } else { stated.path.clone() }
+        }
+        Role::Added(h, p) => {
+            let Some(hypothesis) = candidate.structure.added.get(*h) else { return String::new() };
+            let Some(parameter) = hypothesis.parameters.get(*p) else { return String::new() };
+            let at = parameter.index.map_or(String::new(), |i| format!("[{i}]"));
+            format!("{}: {}{at}", hypothesis.id, parameter.key)
+        }
+        Role::Condition(path, r) => format!("{path} in {}", record(*r)),
+        Role::Position(b, r) => format!("start of {} in {}", body(*b), record(*r)),
+        Role::Velocity(b, r) => format!("start speed of {} in {}", body(*b), record(*r)),
+    }
+}
+
+fn unit_of(problem: &Problem, candidate: &Candidate, index: usize) -> String {
+    let motion = problem.model.motion;
+    let of_path = |path: &str| unit_of_path(problem, path);
+    match candidate.structure.numbers.get(index).map(|n| &n.role) {
+        Some(Role::Stated(i)) => problem.stated.get(*i).map_or(String::new(), |s| of_path(&s.path)),
+        Some(Role::Added(h, p)) => {
+            let parameter = candidate.structure.added.get(*h).and_then(|h| h.parameters.get(*p));
+            parameter.map_or(String::new(), |p| p.unit.clone())
+        }
+        Some(Role::Condition(path, _)) => of_path(path),
+        Some(Role::Position(..)) => unit_for(motion, "m"),
+        Some(Role::Velocity(..)) => unit_for(motion, "m/s"),
+        None => String::new(),
+    }
+}
+
+/// Unit of a number of the model by its path.
+fn unit_of_path(problem: &Problem, path: &str) -> String {
+    let model = &problem.model;
+    let (owner, key) = path.rsplit_once('.').unwrap_or(("", path));
+    let unit = match owner.split_once('.') {
+        None if owner == "bodies" => "kg",
+        Some(("elements", name)) => {
+            let kind = model.elements.iter().find(|e| e.name == name).map(|e| e.law.kind().name);
+            let kind = KINDS.iter().find(|k| Some(k.name) == kind);
+            kind.and_then(|k| k.parameters.iter().find(|p| p.key == key)).map_or("", |p| p.unit)
+        }
+        Some((_, name)) => match key {
+            "delay" => "s",
+            "bandwidth" => "Hz",
+            "saturation" => "N",
+            "back_emf" => "N s/m",
+            "offset" => return model.outputs.iter().find(|o| o.name == name).map_or(String::new(), |o| unit_of_output(problem, &o.kind)),
+            _ => "",
+        },
+        None => "",
+    };
+    if unit == "-" { String::new() } else { unit_for(model.motion, unit) }
+}
+
+/// Unit of what an output measures, such as `m` or `rad/s`.
+pub fn unit_of_output(problem: &Problem, kind: &OutputKind) -> String {
+    let unit = match kind {
+        OutputKind::Position(_) => "m",
+        OutputKind::Velocity(_) => "m/s",
+        OutputKind::Acceleration(_) => "m/s²",
+        OutputKind::Force(_) | OutputKind::Reaction(_) => "N",
+    };
+    unit_for(problem.model.motion, unit)
+}
+
+/// The nominal model's text with the stated numbers as fitted; comments say what was given and the 95 % interval. What the recordings do
+/// not determine stays as given.
+///
+/// # Errors
+/// When the text cannot be edited.
+pub fn refitted_text(problem: &Problem, candidate: &Candidate, spread: &Spread) -> Result<String, PatchError> {
+    let rows = rows(problem, candidate, spread);
+    let mut edits = Vec::new();
+    let mut done: Vec<&str> = Vec::new();
+    for stated in &problem.stated {
+        if done.contains(&stated.path.as_str()) {
+            continue;
+        }
+        done.push(&stated.path);
+        let Ok(mut list) = problem.model.values_at(&stated.path) else { continue };
+        let mut said = Vec::new();
+        for (number, row) in candidate.structure.numbers.iter().zip(&rows) {
+            let Role::Stated(i) = number.role else { continue };
+            let Some(own) = problem.stated.get(i).filter(|s| s.path == stated.path && row.determined) else { continue };
+            if let Some(slot) = list.get_mut(own.index) {
+                *slot = round_significant(row.value, 7);
+                let [low, high] = row.ci95.map(|x| round_significant(x, 4));
+                said.push(format!("was {}, 95 %: {low} to {high}", own.given));
+            }
+        }
+        if said.is_empty() {
+            continue;
+        }
+        let value = match list.as_slice() {
+            [one] => Value::Number(*one),
+            _ => Value::Numbers(list),
+        };
+        edits.push(Edit::Set { path: stated.path.clone(), value, comment: Some(said.join("; ")) });
+    }
+    patch(&problem.text, &edits)
+}

@@ -1,0 +1,148 @@
+//! The same structure fitted to each record by itself: numbers that differ from record to record by more than their errors are the sign
+//! of a wrong structure, for a device has one set of numbers.
+
+use crate::fit::{Effort, Evaluator};
+use crate::intervals::Spread;
+use crate::numbers::name_of;
+use crate::problem::Problem;
+use crate::search::Candidate;
+use crate::statistics::{correlation_time, levels};
+use crate::structure::{Role, Structure};
+use rayon::prelude::*;
+use serde::Serialize;
+use statrs::distribution::{ChiSquared, ContinuousCDF};
+use std::sync::atomic::AtomicBool;
+use std::time::Instant;
+
+/// A number as one record alone has it.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Own {
+    /// As fitted.
+    pub value: f64,
+    /// 95 % interval.
+    pub ci95: [f64; 2],
+    /// Whether this record says something of it by itself.
+    pub determined: bool,
+}
+
+/// A number in every record.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Across {
+    /// Path in the model; of added physics its id and key.
+    pub name: String,
+    /// One for each record of [`PerRecord::records`].
+    pub own: Vec<Own>,
+    /// Weighted sum of squared distances from the common value, in standard deviations.
+    pub chi_square: f64,
+    /// Probability of so large a sum where all records have the same value; 1 where fewer than two determine it.
+    pub p_value: f64,
+}
+
+/// Fits of every record by itself.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct PerRecord {
+    /// The records, in order; those whose fit failed are left out.
+    pub records: Vec<String>,
+    /// Root mean square of what each record's own fit leaves over at each output, floors.
+    pub levels: Vec<Vec<f64>>,
+    /// Every number that all records share.
+    pub numbers: Vec<Across>,
+}
+
+/// Probability below which records disagree, over all numbers together.
+const SURPRISE: f64 = 1e-3;
+/// Standard deviation in the fit's own unit above which a record says little of a number by itself.
+const UNSURE: f64 = 0.5;
+
+/// Fits the structure of `joint` to each record by itself, from the joint values on. `floor` is the measuring error of each output, in
+/// its unit. Fits end early once `stop` is set or at `until`.
+pub fn fit_each(problem: &Problem, joint: &Candidate, floor: &[f64], stop: Option<&AtomicBool>, until: Option<Instant>) -> PerRecord {
+    let stated = joint.structure.stated_of(problem, &joint.fit.values);
+    let added = joint.structure.added_of(&joint.fit.values);
+    let one = |record| -> Option<(String, Candidate, Spread)> {
+        let records = std::slice::from_ref(record);
+        let mut evaluator = Evaluator::on(problem, records);
+        (evaluator.floor, evaluator.stop, evaluator.until) = (floor.to_vec(), stop, until);
+        let structure = Structure::new(problem, records, joint.structure.added.clone());
+        let start = structure.values(problem, &stated, &added);
+        let fit = evaluator.fit(&structure, &start, Effort { steps: 25, tolerance: 0.3 })?;
+        let correlation_time = correlation_time(&evaluator, &fit.residuals);
+        let levels = levels(&evaluator, &fit.residuals);
+        let candidate = Candidate { structure, fit, correlation_time, levels, unseen: None };
+        let spread = Spread::of(&candidate);
+        Some((record.name.clone(), candidate, spread))
+    };
+    let fits: Vec<_> = problem.fit.par_iter().filter_map(one).collect();
+    let shared = joint.structure.numbers.iter().enumerate().filter(|(_, n)| matches!(n.role, Role::Stated(_) | Role::Added(..)));
+    let numbers = shared.filter_map(|(index, number)| across(problem, joint, index, &number.role, &fits)).collect();
+    PerRecord { records: fits.iter().map(|f| f.0.clone()).collect(), levels: fits.iter().map(|f| f.1.levels.clone()).collect(), numbers }
+}
+
+fn across(problem: &Problem, joint: &Candidate, index: usize, role: &Role, fits: &[(String, Candidate, Spread)]) -> Option<Across> {
+    let mut own = Vec::new();
+    let mut points: Vec<(f64, f64)> = Vec::new();
+    for (_, candidate, spread) in fits {
+        let place = candidate.structure.numbers.iter().position(|n| n.role == *role)?;
+        let (number, value) = (candidate.structure.numbers.get(place)?, *candidate.fit.values.get(place)?);
+        let deviation = spread.deviation.get(place).copied().unwrap_or(f64::INFINITY);
+        let scale = if number.log { 1.0 } else { value.abs() };
+        let determined = deviation > 0.0 && deviation < UNSURE * scale;
+        if determined {
+            points.push((number.inward(value), deviation));
+        }
+        own.push(Own { value, ci95: spread.interval(candidate, place), determined });
+    }
+    let (chi_square, p_value) = disagreement(&points);
+    Some(Across { name: name_of(problem, joint, index), own, chi_square, p_value })
+}
+
+/// Chi-square of values about their weighted mean and its probability; (0, 1) for fewer than two.
+fn disagreement(points: &[(f64, f64)]) -> (f64, f64) {
+    if points.len() < 2 {
+        return (0.0, 1.0);
+    }
+    let weight = |p: &(f64, f64)| 1.0 / (p.1 * p.1);
+    let all: f64 = points.iter().map(weight).sum();
+    let mean = points.iter().map(|p| weight(p) * p.0).sum::<f64>() / all;
+    let sum: f64 = points.iter().map(|p| weight(p) * (p.0 - mean).powi(2)).sum();
+    (sum, ChiSquared::new((points.len() - 1) as f64).map_or(1.0, |d| d.sf(sum)))
+}
+
+impl PerRecord {
+    /// Numbers in which the records disagree by more than chance, the clearest first.
+    pub fn disagreements(&self) -> Vec<&Across> {
+        let each = SURPRISE / self.numbers.len().max(1) as f64;
+        let mut all: Vec<&Across> = self.numbers.iter().filter(|n| n.p_value < each).collect();
+        all.sort_by(|a, b| b.chi_square.total_cmp(&a.chi_square));
+        all
+    }
+
+    /// In one sentence.
+    pub fn sentence(&self) -> String {
+        if self.records.len() < 2 {
+            return "there is one record only: nothing to hold its numbers against".to_string();
+        }
+        match self.disagreements().as_slice() {
+            [] => format!("the {} records agree within their errors", self.records.len()),
+            all => {
+                let names: Vec<&str> = all.iter().take(3).map(|n| n.name.as_str()).collect();
+                let more = if all.len() > 3 { format!(" and {} more", all.len() - 3) } else { String::new() };
+                format!("the records disagree in {}{more}: the structure is not the device's", names.join(", "))
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_within_their_errors_agree_and_others_do_not() {
+        let (near, p) = disagreement(&[(1.0, 0.1), (1.05, 0.1), (0.93, 0.2)]);
+        assert!(near < 1.0 && p > 0.5, "{near} {p}");
+        let (far, p) = disagreement(&[(1.0, 0.01), (1.1, 0.01)]);
+        assert!((far - 50.0).abs() < 1e-9 && p < 1e-10, "{far} {p}");
+        assert_eq!(disagreement(&[(1.0, 0.1)]), (0.0, 1.0));
+    }
+}

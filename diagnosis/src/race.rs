@@ -1,0 +1,163 @@
+//! Many structures, fitted a little each; the better ones more, the best to their end.
+
+use crate::fit::{Effort, Evaluator, Fit};
+use crate::guide::Guide;
+use crate::hypothesis::Hypothesis;
+use crate::problem::Record;
+use crate::screen::{Promise, worst_records};
+use crate::search::{COARSE, Candidate, MIDDLE, candidate};
+use crate::structure::Structure;
+use backdrive_plant::set::Initial;
+use rayon::prelude::*;
+use std::collections::HashSet;
+
+/// A structure to be fitted: its hypotheses, where each starts, and the stated numbers to start from.
+#[derive(Debug, Clone)]
+pub struct Seed {
+    /// Places in the list of hypotheses, with values to start from.
+    pub effects: Vec<(usize, Vec<f64>)>,
+    /// Stated numbers to start from.
+    pub stated: Vec<f64>,
+    /// Whether it was found along the measured path, and is to be fitted there first.
+    pub guided: bool,
+}
+
+impl Seed {
+    /// A hypothesis alone, as screening found it beside these stated numbers.
+    pub fn single(promise: &Promise, stated: &[f64], guided: bool) -> Seed {
+        Seed { effects: vec![(promise.hypothesis, promise.values.clone())], stated: stated.to_vec(), guided }
+    }
+
+    /// What sets a structure apart, whatever its values.
+    fn key(&self) -> (Vec<usize>, bool) {
+        let mut key: Vec<usize> = self.effects.iter().map(|e| e.0).collect();
+        key.sort_unstable();
+        (key, self.guided)
+    }
+}
+
+/// Drops seeds whose structure came before.
+pub fn distinct(seeds: &mut Vec<Seed>) {
+    let mut seen = HashSet::new();
+    seeds.retain(|s| seen.insert(s.key()));
+}
+
+/// What structures are fitted against, and from where.
+pub struct Course<'a> {
+    /// The recordings.
+    pub evaluator: &'a Evaluator<'a>,
+    /// What leads along them where a fit starts far off, and the nominal model fitted so.
+    pub along: Option<(&'a Guide, &'a Candidate)>,
+    /// All hypotheses.
+    pub hypotheses: &'a [Hypothesis],
+    /// The nominal model refitted.
+    pub nominal: &'a Candidate,
+    /// The stated numbers as given.
+    pub given: &'a [f64],
+}
+
+impl Course<'_> {
+    /// Fits all seeds a little, `keep[0]` of them more, and `keep[1]` to their end.
+    pub fn race(&self, seeds: Vec<Seed>, keep: [usize; 2]) -> Vec<Candidate> {
+        let (evaluator, problem) = (self.evaluator, self.evaluator.problem);
+        // The first steps on the recordings that are explained worst, with few substeps.
+        let few = worst_records(evaluator, &self.nominal.fit, 2);
+        let whole = few.len() == evaluator.records.len()
+            || problem.initial == Initial::Free
+            || problem.fit.iter().any(|r| !r.conditions.is_empty());
+        let all: Vec<usize> = (0..problem.fit.len()).collect();
+        let some: Vec<Record> = if whole { problem.fit.clone() } else { few.iter().map(|r| problem.fit[*r].clone()).collect() };
+        let coarse = Evaluator { substeps: COARSE, records: &some, widest: 1.0, ..evaluator.clone() };
+        let led = self.along.map(|(guide, base)| {
+            let held = Evaluator { guide: Some(guide.of_records(if whole { &all } else { &few })), ..coarse.clone() };
+            (held, if whole { base.fit.clone() } else { restricted(evaluator, &base.fit, &few) })
+        });
+        let nominal_there = if whole { self.nominal.fit.clone() } else { restricted(evaluator, &self.nominal.fit, &few) };
+        let mut running: Vec<(Structure, Fit)> = seeds
+            .par_iter()
+            .filter_map(|seed| {
+                if evaluator.is_late() {
+                    return None;
+                }
+                let structure = Structure::new(problem, &some, seed.effects.iter().map(|(h, _)| self.hypotheses[*h].clone()).collect());
+                let values: Vec<Vec<f64>> = seed.effects.iter().map(|(_, v)| v.clone()).collect();
+                let from_seed = structure.values(problem, &seed.stated, &values);
+                let from_given = structure.values(problem, self.given, &values);
+                let mut starts = vec![from_seed];
+                if seed.effects.len() == 1 && !seed.guided {
+                    starts.push(from_given);
+                }
+                if seed.guided
+                    && let Some((held, base)) = &led
+                    && let Some(fit) =
+                        held.fit_knowing(&structure, &starts[0], Effort { steps: 3, tolerance: 3.0 }, Some((&self.nominal.structure, base)))
+                {
+                    starts[0] = fit.values;
+                }
+                let known = Some((&self.nominal.structure, &nominal_there));
+                let effort = Effort { steps: 2, tolerance: 3.0 };
+                let fits = starts.into_iter().filter_map(|start| coarse.fit_knowing(&structure, &start, effort, known));
+                let best = fits.min_by(|a, b| hopeful(a).total_cmp(&hopeful(b)))?;
+                Some((structure, best))
+            })
+            .collect();
+        let middle = Evaluator { substeps: MIDDLE, widest: 8.0, ..evaluator.clone() };
+        let stages = [
+            (keep[0] + 4, &coarse, Effort { steps: 3, tolerance: 2.0 }),
+            (keep[0], &middle, Effort { steps: 5, tolerance: 1.0 }),
+            (keep[1], evaluator, Effort { steps: 30, tolerance: 0.3 }),
+        ];
+        for (stage, (count, held_against, effort)) in stages.into_iter().enumerate() {
+            running.sort_by(|a, b| hopeful(&a.1).total_cmp(&hopeful(&b.1)));
+            let mut names = HashSet::new();
+            running.retain(|(s, _)| {
+                let mut ids: Vec<&str> = s.added.iter().map(|h| h.id.as_str()).collect();
+                ids.sort_unstable();
+                names.insert(ids.join("+"))
+            });
+            // Once one is near its end, those far behind have no chance.
+            let best = running.first().map_or(0.0, |(_, f)| hopeful(f));
+            let floor = running.first().map_or(0.0, |(_, f)| f.residuals.len() as f64);
+            let margin = if best < 1.2 * floor { 1.3 } else { 4.0 };
+            running.retain(|(_, f)| hopeful(f) < margin * best.max(floor) || best > 4.0 * floor);
+            // Far from the noise there is more to come: nothing is decided by the last steps.
+            if stage == 2 && best > NEAR * floor {
+                break;
+            }
+            // In the last stage those behind are kept as they are: they are rivals, if beaten ones.
+            let rest = if stage == 2 { running.split_off(count.min(running.len())) } else { Vec::new() };
+            running.truncate(count);
+            running = running
+                .into_par_iter()
+                .map(|(structure, fit)| {
+                    let next = held_against.fit_knowing(&structure, &fit.values, effort, Some((&structure, &fit))).unwrap_or(fit);
+                    (structure, next)
+                })
+                .collect();
+            running.extend(rest);
+        }
+        let size = evaluator.len();
+        running
+            .into_iter()
+            .filter(|(_, f)| f.residuals.len() == size && f.cost.is_finite())
+            .map(|(s, f)| candidate(evaluator, s, f))
+            .collect()
+    }
+}
+
+/// A fit's residuals and derivatives on some of its recordings.
+fn restricted(evaluator: &Evaluator, fit: &Fit, records: &[usize]) -> Fit {
+    let layout = evaluator.layout();
+    let pick = |all: &Vec<f64>| -> Vec<f64> {
+        layout.iter().filter(|l| records.contains(&l.0)).filter_map(|l| all.get(l.2.clone())).flatten().copied().collect()
+    };
+    Fit { residuals: pick(&fit.residuals), jacobian: fit.jacobian.iter().map(pick).collect(), ..fit.clone() }
+}
+
+/// Mean squared residual up to which a structure may be all that is missing, squares of the floor.
+const NEAR: f64 = 2.0;
+
+/// What a fit would cost if most of what its next step foresees came true.
+pub fn hopeful(fit: &Fit) -> f64 {
+    fit.cost - fit.foreseen.min(0.6 * fit.cost)
+}

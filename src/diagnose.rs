@@ -1,0 +1,183 @@
+//! `backdrive diagnose`: which physics a model leaves out, by recordings of its device.
+
+use crate::cli;
+use crate::diagnose_page::{Shown, page};
+use crate::diagnose_text::text;
+use crate::failure::{Failure, code};
+use crate::progress;
+use crate::recordings;
+use backdrive_diagnosis::audit::{self, Remark};
+use backdrive_diagnosis::evidence;
+use backdrive_diagnosis::locate::{self, Location, locate};
+use backdrive_diagnosis::per_record::{PerRecord, fit_each};
+use backdrive_diagnosis::problem::Problem;
+use backdrive_diagnosis::search::{Search, Settings, search};
+use backdrive_diagnosis::verdict::{EXPERIMENT_FILE, Verdict, verdict};
+use serde_json::{Value, json};
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+/// Name of the model file that is written.
+const MODEL: &str = "model.diagnosed.toml";
+/// How long each record is fitted by itself, at most.
+const PER_RECORD: Duration = Duration::from_secs(4);
+
+/// Everything that was found.
+pub struct Found {
+    /// The model and its recordings.
+    pub problem: Problem,
+    /// What the recordings say of themselves.
+    pub remarks: Vec<Remark>,
+    /// Structures and their fits.
+    pub search: Search,
+    /// What follows.
+    pub said: Verdict,
+    /// The refitted nominal model fitted to each record by itself.
+    pub per_record: PerRecord,
+    /// The latent force that the refitted nominal model needs, at every place; `None` where it cannot be had.
+    pub location: Option<Location>,
+}
+
+/// Diagnoses, writes, and says what was found.
+pub fn diagnose(options: &cli::Diagnose) -> Result<u8, Failure> {
+    let began = Instant::now();
+    let stop = Arc::new(AtomicBool::new(false));
+    let heard = stop.clone();
+    // A second Ctrl-C ends at once.
+    let handler = move || {
+        if heard.swap(true, Ordering::SeqCst) {
+            std::process::exit(i32::from(code::INTERRUPTED))
+        }
+    };
+    ctrlc::set_handler(handler).map_err(Failure::machine)?;
+
+    let opened = recordings::open(&options.set, options.model.as_deref())?;
+    for note in &opened.notes {
+        eprintln!("note: {note}");
+    }
+    // A folder that cannot be written is told before the work, not after it.
+    std::fs::create_dir_all(&options.out).map_err(|e| Failure::write(&options.out, e))?;
+    let patience = Duration::from_secs_f64(options.patience);
+    let settings = Settings { without: options.without.clone(), patience, ..Settings::default() };
+    let found = progress::at_most(patience, |report| find(opened.problem, &settings, &stop, report))?;
+
+    let write = |name: &str, text: &str| {
+        let path = options.out.join(name);
+        std::fs::write(&path, text).map_err(|e| Failure::write(&path, e))
+    };
+    let json = serde_json::to_string_pretty(&found.said.json).map_err(Failure::input)?;
+    write("verdict.json", &format!("{json}\n"))?;
+    write(MODEL, &found.said.model)?;
+    let mut written = vec!["verdict.json", MODEL];
+    if let Some(experiment) = &found.said.experiment {
+        write(EXPERIMENT_FILE, experiment)?;
+        written.push(EXPERIMENT_FILE);
+    }
+    if !options.no_report {
+        let shown = Shown { found: &found, name: &opened.name, notes: &opened.notes };
+        let path = options.out.join("report.html");
+        page(&shown).write(&path).map_err(|e| Failure::write(&path, e))?;
+        written.push("report.html");
+    }
+    let seconds = began.elapsed().as_secs_f64();
+    write("time.txt", &format!("{seconds:.2}\n"))?;
+    if options.json {
+        println!("{json}");
+    } else {
+        println!("{}", text(&found));
+        println!("wrote     {}: {} ({seconds:.1} s)", shown(&options.out), written.join(", "));
+    }
+    if stop.load(Ordering::SeqCst) {
+        return Err(Failure { code: code::INTERRUPTED, message: "stopped; what was found until then is written".to_string() });
+    }
+    Ok(exit_code(&found.said.json))
+}
+
+fn shown(folder: &Path) -> String {
+    let text = folder.display().to_string();
+    if text.is_empty() { ".".to_string() } else { text }
+}
+
+/// By what the verdict says.
+pub fn exit_code(verdict: &Value) -> u8 {
+    match verdict["verdict"].as_str() {
+        Some("nothing_missing" | "parameters") => 0,
+        Some("cannot_tell") => code::CANNOT_TELL,
+        _ => code::NEGATIVE,
+    }
+}
+
+/// Audit, search, verdict, and what shows it.
+fn find(problem: Problem, settings: &Settings, stop: &AtomicBool, report: &(dyn Fn(&str) + Sync)) -> Result<Found, Failure> {
+    report("looking at the recordings");
+    let remarks = audit::audit(&problem);
+    let search = search(&problem, settings, Some(stop), report).map_err(Failure::input)?;
+    report("deciding");
+    let mut said = verdict(&problem, &search, MODEL).map_err(Failure::input)?;
+    if said.json.get("audit").is_none_or(Value::is_null) {
+        said.json["audit"] = audit::json(&remarks);
+    }
+    report("fitting each record by itself");
+    let per_record = fit_each(&problem, &search.nominal, &search.floor, Some(stop), Some(Instant::now() + PER_RECORD));
+    report("locating the missing force");
+    let location = located(&problem, &search);
+    if said.json["where"].is_object() && said.json["where"]["state"].is_null() {
+        said.json["where"]["state"] = json!(state(&said.json, location.as_ref()));
+    }
+    if said.json["verdict"] == "unexplained"
+        && let Some(best) = location.as_ref().and_then(|l| l.ranking.first())
+    {
+        // What kind of force it is, where no law is its name.
+        said.json["where"]["class"] = serde_json::to_value(best.character).unwrap_or(Value::Null);
+    }
+    Ok(Found { problem, remarks, search, said, per_record, location })
+}
+
+/// In which state the mismatch shows: as the law that is claimed has it, else as the latent force does.
+fn state(verdict: &Value, location: Option<&Location>) -> Option<String> {
+    match verdict["verdict"].as_str() {
+        Some("missing" | "ambiguous") => {
+            let finding = &verdict["findings"][0];
+            let place = match (finding["between"].as_array(), finding["signal"].as_str()) {
+                (Some(ends), _) => ends.iter().filter_map(Value::as_str).collect::<Vec<_>>().join("-"),
+                (_, Some(signal)) => signal.to_string(),
+                _ => return None,
+            };
+            Some(evidence::state(finding["physics"].as_str()?, &place))
+        }
+        Some("unexplained") => location.and_then(locate::state),
+        _ => None,
+    }
+}
+
+/// The latent force that the refitted nominal model needs.
+fn located(problem: &Problem, search: &Search) -> Option<Location> {
+    let nominal = &search.nominal;
+    let model = nominal.structure.model(problem, &nominal.fit.values)?;
+    let runs: Vec<locate::Run> = problem.fit.iter().map(locate::Run::from).collect();
+    locate(&model, &runs, &search.floor, &locate::Options::quick()).ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_state_is_that_of_the_claimed_law() {
+        let verdict = json!({ "verdict": "missing", "findings": [{ "physics": "coulomb", "between": ["drum", "ground"] }] });
+        assert_eq!(state(&verdict, None).as_deref(), Some("reversals of the velocity across drum-ground"));
+        let verdict = json!({ "verdict": "missing", "findings": [{ "physics": "delay", "signal": "force" }] });
+        assert_eq!(state(&verdict, None).as_deref(), Some("with the rate of change of force"));
+        assert_eq!(state(&json!({ "verdict": "nothing_missing" }), None), None);
+    }
+
+    #[test]
+    fn exit_codes_follow_the_verdict() {
+        let code_of = |word: &str| exit_code(&json!({ "verdict": word }));
+        assert_eq!(["nothing_missing", "parameters"].map(code_of), [0, 0]);
+        assert_eq!(["missing", "unexplained", "ambiguous"].map(code_of), [1, 1, 1]);
+        assert_eq!(code_of("cannot_tell"), 7);
+    }
+}

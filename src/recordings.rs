@@ -1,0 +1,105 @@
+//! Recordings and the model that they are held against, as `diagnose` and `fit` are given them.
+
+use crate::failure::Failure;
+use backdrive_diagnosis::audit;
+use backdrive_diagnosis::problem::{Problem, ProblemError};
+use backdrive_plant::recording::{Columns, RecordingError};
+use backdrive_plant::set::{Initial, RecordingSet};
+use std::path::{Path, PathBuf};
+
+/// What was opened.
+pub struct Opened {
+    /// The model and its recordings.
+    pub problem: Problem,
+    /// The set or the recording, for titles.
+    pub name: String,
+    /// What a reader should know before the results.
+    pub notes: Vec<String>,
+}
+
+/// Opens a set, a folder of recordings, or recordings. Where nothing says what is held out, the last of several recordings is.
+pub fn open(paths: &[PathBuf], model: Option<&Path>) -> Result<Opened, Failure> {
+    let mut notes = Vec::new();
+    let (mut set, told) = match paths {
+        [one] if is_recording(one) => (of_files(paths)?, false),
+        [one] => {
+            if !one.exists() {
+                return Err(Failure::input(format!("{}: there is no such file or folder", one.display())));
+            }
+            let told = !one.is_dir() || one.join("set.toml").exists();
+            (RecordingSet::open(one)?, told)
+        }
+        _ => (of_files(paths)?, false),
+    };
+    if model.is_none() && set.model.is_none() {
+        let first = paths.first().map_or(String::new(), |p| p.display().to_string());
+        return Err(Failure::input(format!(
+            "{first}: no model is named; give one with --model MODEL.toml, or a set.toml that says model = \"...\""
+        )));
+    }
+    if set.held_out.is_empty() {
+        match set.fit.len() {
+            // Who says in a set.toml what is fitted means it.
+            _ if told => notes.push(
+                "no recording is held out: the improvement is shown on those that were fitted; name some in set.toml under held_out"
+                    .to_string(),
+            ),
+            0 | 1 => notes.push(
+                "one recording: it is fitted and judged alike; a second one, held out, would show whether the result holds".to_string(),
+            ),
+            _ => {
+                if let Some(last) = set.fit.pop() {
+                    notes.push(format!("{} is held out: no fit sees it", file_name(&last)));
+                    set.held_out.push(last);
+                }
+            }
+        }
+    }
+    let problem = Problem::of_set(&set, model).map_err(|e| told_failure(&e, model, &set))?;
+    audit::usable(&problem).map_err(Failure::input)?;
+    let name = paths.first().map_or(String::new(), |p| p.file_name().map_or(p.display().to_string(), |n| n.to_string_lossy().into_owned()));
+    Ok(Opened { problem, name, notes })
+}
+
+/// The last part of a path.
+pub fn file_name(path: &str) -> &str {
+    path.rsplit('/').find(|part| !part.is_empty()).unwrap_or(path)
+}
+
+fn is_recording(path: &Path) -> bool {
+    path.extension().is_some_and(|e| e.eq_ignore_ascii_case("csv") || e.eq_ignore_ascii_case("mcap"))
+}
+
+/// Single files as a set.
+fn of_files(paths: &[PathBuf]) -> Result<RecordingSet, Failure> {
+    for path in paths {
+        if !is_recording(path) {
+            return Err(Failure::input(format!("{}: is no recording (.csv or .mcap); give one set, or recordings only", path.display())));
+        }
+        if !path.is_file() {
+            return Err(Failure::input(format!("{}: there is no such file", path.display())));
+        }
+    }
+    let fit = paths.iter().map(|p| p.to_string_lossy().into_owned()).collect();
+    let (model, held_out, files) = (None, Vec::new(), Vec::new());
+    Ok(RecordingSet { folder: PathBuf::new(), model, fit, held_out, initial: Initial::Rest, columns: Columns::new(), files })
+}
+
+/// The error, with what to do about it where that is not plain.
+fn told_failure(error: &ProblemError, model: Option<&Path>, set: &RecordingSet) -> Failure {
+    let hint = match error {
+        ProblemError::Recording(RecordingError::NoSignal { .. }) => {
+            let model = model.or(set.model.as_deref()).map_or(String::new(), |m| format!(" of {}", m.display()));
+            format!("; every input{model} needs a column of its name, or say under [columns] of set.toml which column it is")
+        }
+        ProblemError::Recording(RecordingError::NotRising { .. }) => {
+            "; sort the rows, or cut the file where its clock starts anew".to_string()
+        }
+        ProblemError::Recording(RecordingError::NotFinite { .. }) => {
+            "; leave the row out, or name the rows that count in set.toml".to_string()
+        }
+        ProblemError::Set(_) if set.fit.is_empty() => "; name some in set.toml under fit".to_string(),
+        _ => String::new(),
+    };
+    Failure::input(format!("{error}{hint}"))
+}

@@ -1,0 +1,238 @@
+//! `backdrive diagnose` and `backdrive fit` on recordings made here: dry friction that was left out is named, a right model is left alone,
+//! and what cannot be diagnosed is told in one line.
+
+mod system;
+
+use backdrive_plant::excitation::Excitation;
+use backdrive_plant::model::Model;
+use backdrive_plant::stepper::{Options, simulate};
+use std::fmt::Write as _;
+use system::Place;
+
+const NOMINAL: &str = "name = 'small-master'
+[bodies]
+motor = 0.02   # kg
+handle = 0.1
+[[elements]]
+name = 'cable'
+kind = 'spring'
+between = ['motor', 'handle']
+stiffness = 3000.0
+[[elements]]
+name = 'cable_damping'
+kind = 'damper'
+between = ['motor', 'handle']
+damping = 3.0
+[[elements]]
+name = 'grip'
+kind = 'spring'
+between = ['handle', 'ground']
+stiffness = 400.0
+[[elements]]
+name = 'grip_damping'
+kind = 'damper'
+between = ['handle', 'ground']
+damping = 8.0
+[[inputs]]
+name = 'force'
+kind = 'force'
+on = 'motor'
+hold = 'zero'
+[[outputs]]
+name = 'position'
+kind = 'position'
+of = 'motor'
+";
+const FRICTION: &str = "[[elements]]
+name = 'friction'
+kind = 'coulomb'
+between = ['motor', 'ground']
+force = 0.4
+";
+const SET: &str = "model = 'model.toml'\nfit = ['sweep.csv', 'triangle.csv']\nheld_out = ['multisine.csv']\n";
+const RATE: f64 = 1000.0;
+
+/// A device that differs from the nominal text by what is added, recorded with a little noise.
+fn record(place: &Place, truth: &str) {
+    let model = Model::from_toml(truth, "truth").unwrap();
+    let drives = [
+        ("sweep", "sweep:amplitude=2,from=0.5,to=40,duration=2"),
+        ("triangle", "triangle:amplitude=1.5,period=0.5,cycles=4"),
+        ("multisine", "multisine:rms=1.2,from=0.5,to=40,period=2"),
+    ];
+    for (i, (name, drive)) in drives.iter().enumerate() {
+        let drive: Excitation = drive.parse().unwrap();
+        let force = drive.samples(RATE).unwrap();
+        let columns = simulate(&model, &[&force], 1.0 / RATE, &Options { substeps: Some(8), ..Options::default() }).unwrap();
+        let mut text = "t,force,position\n".to_string();
+        let mut state = 12345 + i as u64;
+        for (k, (u, y)) in force.iter().zip(&columns[0]).enumerate() {
+            // Noise of a standard deviation of 2 micrometres: the sum of twelve even numbers.
+            let mut noise = -6.0;
+            for _ in 0..12 {
+                state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+                noise += (state >> 33) as f64 / (1u64 << 31) as f64;
+            }
+            let _ = writeln!(text, "{},{u},{}", k as f64 / RATE, y + 2e-6 * noise);
+        }
+        place.write(&format!("{name}.csv"), &text);
+    }
+    place.write("model.toml", NOMINAL);
+    place.write("set.toml", SET);
+}
+
+fn read(place: &Place, name: &str) -> String {
+    std::fs::read_to_string(place.path(name)).unwrap()
+}
+
+#[test]
+fn friction_that_was_left_out_is_named_and_written() {
+    let place = Place::new();
+    record(&place, &format!("{NOMINAL}{FRICTION}"));
+    let done = place.backdrive(&["diagnose", ".", "--out", "out", "--patience", "60"]);
+    assert_eq!(done.code, Some(1), "{done:?}");
+    let verdict: serde_json::Value = serde_json::from_str(&read(&place, "out/verdict.json")).unwrap();
+    assert_eq!(verdict["verdict"], "missing", "{verdict:#}");
+    let finding = &verdict["findings"][0];
+    assert_eq!(finding["physics"], "coulomb", "{verdict:#}");
+    assert_eq!(finding["between"], serde_json::json!(["motor", "ground"]), "{verdict:#}");
+    let force = &finding["parameters"]["force"];
+    assert!((force["value"].as_f64().unwrap() - 0.4).abs() < 0.02, "{verdict:#}");
+    let held = &verdict["held_out"];
+    let of = |key: &str| held[key].as_f64().unwrap();
+    assert!(of("nrmse_after") < 0.1 * of("nrmse_refit") && of("nrmse_refit") <= of("nrmse_before"), "{verdict:#}");
+    assert!(verdict["audit"].as_array().is_some_and(|a| a.iter().any(|r| r["what"] == "noise")), "{verdict:#}");
+    // The model is the nominal one with the friction added: it loads, and keeps its comments.
+    let text = read(&place, "out/model.diagnosed.toml");
+    let model = Model::from_toml(&text, "diagnosed").unwrap();
+    assert!(model.elements.iter().any(|e| e.law.kind().name == "coulomb"), "{text}");
+    assert!(text.contains("# kg"), "{text}");
+    for said in ["audit ", "refit ", "MISSING", "coulomb motor to ground", "held out", "out: verdict.json"] {
+        assert!(done.stdout.contains(said), "\"{said}\" is missing: {}", done.stdout);
+    }
+    assert!(done.stdout.lines().count() < 20, "{}", done.stdout);
+    let report = read(&place, "out/report.html");
+    for said in
+        ["Where the models part most", "coulomb@motor-ground: force against velocity", "Every hypothesis", "sensor&#39;s noise", "held out"]
+    {
+        assert!(report.contains(said), "the report does not say \"{said}\"");
+    }
+    let seconds: f64 = read(&place, "out/time.txt").trim().parse().unwrap();
+    assert!(seconds > 0.0);
+
+    // Withheld, it is not named.
+    let done = place.backdrive(&["diagnose", ".", "--out", "less", "--without", "coulomb", "--patience", "10", "--no-report", "--json"]);
+    let verdict = done.json();
+    let named: Vec<&str> = verdict["findings"].as_array().unwrap().iter().filter_map(|f| f["physics"].as_str()).collect();
+    assert!(!named.contains(&"coulomb") && !named.contains(&"stribeck"), "{verdict:#}");
+    assert!(!place.path("less/report.html").exists());
+
+    // Refitting the numbers alone does not do.
+    let done = place.backdrive(&["fit", "model.toml", ".", "--out", "fitted.toml", "--json"]);
+    let fit = done.json();
+    let worst = fit["fitted"].as_array().unwrap().iter().map(|q| q["floors"].as_f64().unwrap()).fold(0.0, f64::max);
+    assert!(worst > 3.0, "{fit:#}");
+    assert!(done.code == Some(0) || done.code == Some(1), "{done:?}");
+    Model::from_toml(&read(&place, "fitted.toml"), "fitted").unwrap();
+}
+
+#[test]
+fn a_right_model_is_left_alone_and_its_numbers_are_found() {
+    let place = Place::new();
+    record(&place, NOMINAL);
+    let done = place.backdrive(&["diagnose", "set.toml", "--out", "out", "--no-report"]);
+    assert_eq!(done.code, Some(0), "{done:?}");
+    let verdict: serde_json::Value = serde_json::from_str(&read(&place, "out/verdict.json")).unwrap();
+    assert_eq!(verdict["verdict"], "nothing_missing", "{verdict:#}");
+    assert_eq!(verdict["findings"], serde_json::json!([]));
+
+    // Recordings by name: the last one is held out. A stiffness that is off by a fifth is found, with its error, and the rest stays.
+    place.write("off.toml", &NOMINAL.replace("3000.0", "2500.0"));
+    let done = place.backdrive(&["fit", "off.toml", "sweep.csv", "triangle.csv", "multisine.csv", "--out", "fitted.toml", "--json"]);
+    assert_eq!(done.code, Some(0), "{done:?}");
+    assert!(done.stderr.contains("multisine.csv is held out"), "{done:?}");
+    let fit = done.json();
+    let row = fit["numbers"].as_array().unwrap().iter().find(|r| r["name"] == "elements.cable.stiffness").unwrap();
+    let of = |key: &str| row[key].as_f64().unwrap();
+    assert!((of("value") - 3000.0).abs() < 4.0 * of("standard_error"), "{row}");
+    assert!(of("standard_error") < 30.0 && of("moved_sd") > 10.0, "{row}");
+    assert!(fit["fitted"].as_array().unwrap().iter().all(|q| q["floors"].as_f64().unwrap() < 1.2), "{fit:#}");
+    assert_eq!(fit["agree"], true, "{fit:#}");
+    let text = read(&place, "fitted.toml");
+    assert!(text.contains("was 2500"), "{text}");
+    let stiffness = Model::from_toml(&text, "fitted").unwrap().values_at("elements.cable.stiffness").unwrap()[0];
+    assert!((stiffness - of("value")).abs() < 1e-3 * stiffness);
+    let done = place.backdrive(&["fit", "off.toml", "set.toml"]);
+    for said in ["number", "std. error", "elements.cable.stiffness", "in noises", "sweep.csv", "agree within their errors"] {
+        assert!(done.stdout.contains(said), "\"{said}\" is missing: {}", done.stdout);
+    }
+}
+
+/// A recording of `n` rows with these columns; what is wrong with it is done to the text.
+fn recording(n: usize, header: &str, row: impl Fn(usize) -> String) -> String {
+    (0..n).fold(format!("{header}\n"), |text, k| format!("{text}{}\n", row(k)))
+}
+
+#[test]
+fn what_cannot_be_diagnosed_is_told_in_one_line() {
+    let place = Place::new();
+    place.write("model.toml", NOMINAL);
+    let wave = |k: usize, f: f64| (k as f64 * f).sin();
+    let fine = |k: usize| format!("{},{},{}", k as f64 * 1e-3, wave(k, 0.05), 1e-3 * wave(k, 0.049));
+    place.write("fine.csv", &recording(300, "t,force,position", fine));
+    place.write("other.csv", &recording(300, "t,torque,position", fine));
+    place.write("outputs.csv", &recording(300, "t,force,angle", fine));
+    place.write("short.csv", &recording(3, "t,force,position", fine));
+    place.write("empty.csv", "");
+    place.write("nan.csv", &recording(300, "t,force,position", |k| if k == 70 { "0.070,NaN,0.0".to_string() } else { fine(k) }));
+    let back = |k: usize| fine(if k > 150 { k - 100 } else { k });
+    place.write("back.csv", &recording(300, "t,force,position", back));
+    let still = |k: usize| format!("{},0,{}", k as f64 * 1e-3, 1e-3 * wave(k, 0.05));
+    place.write("still.csv", &recording(300, "t,force,position", still));
+    let dead = |k: usize| format!("{},{},0.004", k as f64 * 1e-3, wave(k, 0.05));
+    place.write("dead.csv", &recording(300, "t,force,position", dead));
+    let model = Model::from_toml(NOMINAL, "model").unwrap();
+    let force: Vec<f64> = (0..2000).map(|k| 2.0 * wave(k, 0.02)).collect();
+    let moved = simulate(&model, &[&force], 1e-3, &Options::default()).unwrap();
+    let in_mm = |k: usize| format!("{},{},{}", k as f64 * 1e-3, force[k], 1e3 * moved[0][k]);
+    place.write("mm.csv", &recording(2000, "t,force,position", in_mm));
+    for folder in ["nothing", "held"] {
+        std::fs::create_dir(place.path(folder)).unwrap();
+    }
+    place.write("held/model.toml", NOMINAL);
+    place.write("held/a.csv", &recording(300, "t,force,position", fine));
+    place.write("held/set.toml", "model = 'model.toml'\nfit = ['a.csv']\nheld_out = ['b.csv']\n");
+    let cases: [(&[&str], &[&str]); 15] = [
+        (&["fine.csv"], &["fine.csv", "--model"]),
+        (&["other.csv", "--model", "model.toml"], &["other.csv", "no signal \"force\"", "torque", "[columns]"]),
+        (&["outputs.csv", "--model", "model.toml"], &["position", "recorded"]),
+        (&["short.csv", "--model", "model.toml"], &["short.csv", "3 samples", "at least"]),
+        (&["empty.csv", "--model", "model.toml"], &["empty.csv"]),
+        (&["nan.csv", "--model", "model.toml"], &["nan.csv", "force", "NaN"]),
+        (&["back.csv", "--model", "model.toml"], &["back.csv", "time does not rise"]),
+        (&["still.csv", "--model", "model.toml"], &["still.csv", "force", "constant", "record an excitation"]),
+        (&["dead.csv", "--model", "model.toml"], &["dead.csv", "position", "constant"]),
+        (&["mm.csv", "--model", "model.toml"], &["mm.csv", "position", "1000 times", "mm", "scale = 0.001"]),
+        (&["nothing", "--model", "model.toml"], &["nothing", "no recordings"]),
+        (&["held"], &["set.toml", "b.csv", "no file"]),
+        (&["absent"], &["absent", "no such file"]),
+        (&["fine.csv", "held", "--model", "model.toml"], &["held", "no recording"]),
+        (&["fine.csv", "--model", "missing.toml"], &["missing.toml"]),
+    ];
+    for (arguments, says) in cases {
+        let all: Vec<&str> = ["diagnose"].into_iter().chain(arguments.iter().copied()).chain(["--out", "out"]).collect();
+        let done = place.backdrive(&all);
+        assert_eq!(done.code, Some(3), "{arguments:?}: {done:?}");
+        for text in says {
+            assert!(done.stderr.contains(text), "{arguments:?}: standard error does not say \"{text}\": {}", done.stderr);
+        }
+        assert_eq!(done.stderr.lines().filter(|l| l.starts_with("error:")).count(), 1, "{arguments:?}: {}", done.stderr);
+        assert!(!done.stderr.contains("panicked"), "{arguments:?}: {}", done.stderr);
+        assert_eq!(done.stdout, "", "{arguments:?}");
+        assert!(!place.path("out").exists(), "{arguments:?}: left a folder");
+    }
+    let done = place.backdrive(&["diagnose", "fine.csv", "--model", "model.toml", "--out", "out", "--without", "gravity"]);
+    assert!(done.code == Some(2) && done.stderr.contains("gravity") && done.stderr.contains("coulomb"), "{done:?}");
+    let done = place.backdrive(&["fit", "model.toml", "nothing"]);
+    assert!(done.code == Some(3) && done.stderr.contains("no recordings"), "{done:?}");
+}
