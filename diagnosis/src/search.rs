@@ -127,6 +127,8 @@ const SIMPLE: usize = 6;
 pub(crate) const COARSE: usize = 2;
 /// See [`COARSE`].
 pub(crate) const MIDDLE: usize = 4;
+/// Level above which the nominal model's refit is brought to its end after the search only, floors.
+const NOMINAL_END: f64 = 5.0;
 /// Level above which fits start along the measured path, floors.
 const FAR: f64 = 2.0;
 /// Candidates that are held against recordings that no fit has seen.
@@ -162,11 +164,15 @@ pub fn search(
     // What a fit leaves over shows the measuring error better than the signal does.
     let before = evaluator.floor.clone();
     evaluator.floor = floors(&evaluator, &quick.residuals);
-    let rescaled: Vec<f64> =
-        levels(&evaluator, &first).iter().zip(before.iter().zip(&evaluator.floor)).map(|(l, (b, f))| l * b / f).collect();
-    let levels_given = rescaled;
-    let mut nominal = evaluator.fit(&structure, &quick.values, Effort::FULL).ok_or(SearchError::RunsAway)?;
-    let samples = nominal.residuals.len();
+    let rescaled = |residuals: &[f64]| -> Vec<f64> {
+        levels(&evaluator, residuals).iter().zip(before.iter().zip(&evaluator.floor)).map(|(l, (b, f))| l * b / f).collect()
+    };
+    let levels_given = rescaled(&first);
+    let samples = quick.residuals.len();
+    // Far from the noise its end waits until the rest is known.
+    let is_far = rescaled(&quick.residuals).iter().any(|l| *l > NOMINAL_END);
+    let effort = if is_far { Effort { steps: 4, tolerance: 3.0 } } else { Effort::FULL };
+    let mut nominal = evaluator.fit(&structure, &quick.values, effort).ok_or(SearchError::RunsAway)?;
     // Far from the noise the measured path shows better than a simulation what is missing, and leads the numbers out of wrong basins.
     let model = structure.model(problem, &nominal.values).ok_or(SearchError::RunsAway)?;
     let runs: Vec<(Vec<Vec<f64>>, f64)> = problem.fit.iter().map(|r| (r.inputs.clone(), r.period)).collect();
@@ -181,7 +187,7 @@ pub fn search(
     if guided
         && let Some(other) = middle.fit(&structure, &base.values, Effort { steps: 10, tolerance: 2.0 })
         && other.cost < 0.99 * nominal.cost
-        && let Some(other) = evaluator.fit(&structure, &other.values, Effort::FULL)
+        && let Some(other) = evaluator.fit(&structure, &other.values, effort)
         && other.cost < nominal.cost
     {
         nominal = other;
@@ -213,14 +219,14 @@ pub fn search(
         let stated = base.structure.stated_of(problem, &base.fit.values);
         View { screen, fit: base.fit.clone(), stated, guided: evaluator.guide.is_some(), simple, rich }
     };
-    let mut views = vec![look_from(&coarse, &base, if level > FAR { 0.08 } else { 0.12 })];
+    let mut views = vec![look_from(&coarse, &base, if level > FAR { 0.14 } else { 0.2 })];
     if level > FAR {
         // Some effects show better on a free simulation; and the refit of a wrong structure may have carried the numbers off, so that
         // without a measured path the given ones are another base.
         let free = Evaluator { guide: None, ..coarse.clone() };
         let (from, steps) = if guided { (&nominal.fit.values, 2) } else { (&start, 0) };
         if let Some(fit) = free.fit(&base.structure, from, Effort { steps, tolerance: 1.0 }) {
-            views.push(look_from(&free, &candidate(&evaluator, base.structure.clone(), fit), 0.08));
+            views.push(look_from(&free, &candidate(&evaluator, base.structure.clone(), fit), 0.14));
         }
     }
     let view = &views[0].screen;
@@ -252,71 +258,50 @@ pub fn search(
         }
     }
     distinct(&mut singles);
-    let finished = |found: &[Candidate]| done(found, &nominal, samples) || late(1.0);
-    let mut waves: Vec<(&str, [usize; 2])> = vec![("fitting single effects", [4, 3]), ("fitting simpler relatives", [3, 3])];
+    use Wave::*;
+    let mut waves = vec![First, Singles, Relatives];
     if !quiet {
-        waves.extend([("fitting pairs", [5, 3]), ("exchanging effects", [4, 2]), ("fitting richer laws", [2, 1])]);
-        waves.extend([("fitting more single effects", [4, 2]), ("fitting more pairs", [5, 3]), ("exchanging effects", [4, 2])]);
+        waves.extend([Pairs, Exchanges, Richer, MoreSingles, MorePairs, Exchanges]);
         if settings.effects > 2 {
-            waves.extend([("fitting triples", [4, 3]), ("exchanging effects", [4, 2])]);
+            waves.extend([Triples, Exchanges]);
         }
     }
-    let first = singles.len().min(8);
-    let mut later = singles.split_off(first);
+    let mut singles = singles.into_iter();
     let mut effects = 1;
-    for (wave, keep) in waves {
-        let relatives = wave == "fitting simpler relatives";
-        if late(0.7) || (!relatives && finished(&found)) {
+    for wave in waves {
+        if late(0.7) || (wave != Relatives && done(&found, &nominal, samples)) {
             continue;
         }
-        report(wave);
+        report(wave.name());
         let mut seeds: Vec<Seed> = match wave {
-            "fitting single effects" => std::mem::take(&mut singles),
-            "fitting more single effects" => std::mem::take(&mut later),
+            // Those that promise most first: where one of them reaches the floor, the rest have nothing left to explain.
+            First => singles.by_ref().take(4).collect(),
+            Singles => singles.by_ref().take(5).collect(),
+            MoreSingles => singles.by_ref().collect(),
             // A law that wins with more numbers has to win over its simpler relatives, whatever these promised.
-            "fitting simpler relatives" => course.relatives(&found, guided),
-            "fitting richer laws" => {
-                let mut used = HashSet::new();
+            Relatives => course.relatives(&found, guided),
+            Richer => {
                 // In the place of what is the best of its kind.
                 let best = distinct_structures(&found, 1).next().map(|c| &c.structure.added[0]);
                 let like = |h: &Hypothesis| best.is_some_and(|b| b.place.same(&h.place) && ["friction", "hysteresis"].contains(&b.family));
-                views[0]
-                    .rich
-                    .iter()
-                    .filter(|p| like(&hypotheses[p.hypothesis]) && used.insert(p.hypothesis))
-                    .take(1)
-                    .map(|p| Seed::single(p, &views[0].stated, guided))
-                    .collect()
+                let rich = views[0].rich.iter().find(|p| like(&hypotheses[p.hypothesis]));
+                rich.map(|p| Seed::single(p, &views[0].stated, guided)).into_iter().collect()
             }
-            "fitting pairs" => {
+            Pairs => {
                 effects = 2;
-                let compatible = |a: usize, b: usize| hypotheses[a].compatible(&hypotheses[b]);
-                let mut seeds: Vec<Seed> = Vec::new();
-                for view in &views {
-                    let simple = &view.simple;
-                    let together = pairs(simple, &view.fit, &view.fit.jacobian, 90, compatible);
-                    let mut used = HashSet::new();
-                    let best = together.iter().filter(|(a, b, _)| used.insert((simple[*a].hypothesis, simple[*b].hypothesis)));
-                    let pair = |a: usize, b: usize| [a, b].map(|p| (simple[p].hypothesis, simple[p].values.clone())).to_vec();
-                    seeds.extend(best.take(5).map(|(a, b, _)| Seed {
-                        effects: pair(*a, *b),
-                        stated: view.stated.clone(),
-                        guided: view.guided,
-                    }));
-                }
+                let mut seeds: Vec<Seed> = views.iter().flat_map(|view| view.pairs(&hypotheses, 5)).collect();
                 for base in distinct_structures(&found, 1).take(3) {
                     seeds.extend(course.extensions(view, &coarse, base, 4));
                 }
                 seeds
             }
-            "fitting more pairs" => {
-                distinct_structures(&found, 1).take(5).flat_map(|base| course.extensions(view, &coarse, base, 7)).collect()
-            }
-            "exchanging effects" => {
+            MorePairs => distinct_structures(&found, 1).take(5).flat_map(|base| course.extensions(view, &coarse, base, 7)).collect(),
+            // A first step may have been the wrong one.
+            Exchanges => {
                 let best = found.iter().find(|c| c.structure.added.len() == effects);
                 best.map_or_else(Vec::new, |best| course.exchanges(view, &coarse, best, 4))
             }
-            _ => {
+            Triples => {
                 effects = 3;
                 distinct_structures(&found, 2).take(3).flat_map(|base| course.extensions(view, &coarse, base, 5)).collect()
             }
@@ -324,7 +309,7 @@ pub fn search(
         distinct(&mut seeds);
         let known: HashSet<String> = found.iter().map(|c| key_of(&c.structure.added)).collect();
         seeds.retain(|s| !known.contains(&key_of(s.effects.iter().map(|(h, _)| &hypotheses[*h]))));
-        found.extend(course.race(seeds, keep));
+        found.extend(course.race(seeds, wave.keep()));
         sort(&mut found, samples);
     }
     let stopped = late(1.0);
@@ -343,8 +328,9 @@ pub fn search(
     // The numbers of what was found may lead the nominal model out of a wrong basin: then there was less to find.
     let mut better = None;
     let last = Evaluator { until: Some(began + settings.patience.mul_f64(0.97)), ..evaluator.clone() };
-    for found in found.iter().take(2) {
-        let stated = found.structure.stated_of(problem, &found.fit.values);
+    let own = nominal.structure.stated_of(problem, &nominal.fit.values);
+    let others = found.iter().take(2).map(|c| c.structure.stated_of(problem, &c.fit.values));
+    for stated in others.chain(is_far.then_some(own)) {
         let start = nominal.structure.values(problem, &stated, &[]);
         let least = better.as_ref().map_or(nominal.fit.cost, |f: &Fit| f.cost);
         if let Some(fit) = last.fit(&nominal.structure, &start, Effort::FULL)
@@ -447,6 +433,46 @@ impl Course<'_> {
     }
 }
 
+/// What is tried next.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Wave {
+    First,
+    Singles,
+    Relatives,
+    Pairs,
+    Exchanges,
+    Richer,
+    MoreSingles,
+    MorePairs,
+    Triples,
+}
+
+impl Wave {
+    fn name(self) -> &'static str {
+        match self {
+            Wave::First | Wave::Singles => "fitting single effects",
+            Wave::Relatives => "fitting simpler relatives",
+            Wave::Pairs => "fitting pairs",
+            Wave::Exchanges => "exchanging effects",
+            Wave::Richer => "fitting richer laws",
+            Wave::MoreSingles => "fitting more single effects",
+            Wave::MorePairs => "fitting more pairs",
+            Wave::Triples => "fitting triples",
+        }
+    }
+
+    /// How many are fitted further, and how many to their end.
+    fn keep(self) -> [usize; 2] {
+        match self {
+            Wave::First | Wave::Relatives => [3, 3],
+            Wave::Singles | Wave::Exchanges | Wave::MoreSingles => [4, 2],
+            Wave::Pairs | Wave::MorePairs => [5, 3],
+            Wave::Richer => [2, 1],
+            Wave::Triples => [4, 3],
+        }
+    }
+}
+
 /// What screening sees from one base.
 struct View {
     screen: Screen,
@@ -457,6 +483,20 @@ struct View {
     simple: Vec<Promise>,
     /// Physics of many numbers come in where simpler relatives do not suffice.
     rich: Vec<Promise>,
+}
+
+impl View {
+    /// The most promising pairs.
+    fn pairs(&self, hypotheses: &[Hypothesis], count: usize) -> Vec<Seed> {
+        let simple = &self.simple;
+        let compatible = |a: usize, b: usize| hypotheses[a].compatible(&hypotheses[b]);
+        let together = pairs(simple, &self.fit, &self.fit.jacobian, 90, compatible);
+        let mut used = HashSet::new();
+        let best = together.iter().filter(|(a, b, _)| used.insert((simple[*a].hypothesis, simple[*b].hypothesis)));
+        let pair = |a: usize, b: usize| [a, b].map(|p| (simple[p].hypothesis, simple[p].values.clone())).to_vec();
+        let seed = |(a, b, _): &(usize, usize, f64)| Seed { effects: pair(*a, *b), stated: self.stated.clone(), guided: self.guided };
+        best.take(count).map(seed).collect()
+    }
 }
 
 /// Physics whose effect grows in proportion to their first parameter: what an effect is worth claiming, at the place where the least is enough.
