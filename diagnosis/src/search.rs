@@ -265,12 +265,21 @@ pub fn search(
         if settings.effects > 2 {
             waves.extend([Triples, Exchanges]);
         }
+        waves.push(Relatives);
     }
     let mut singles = singles.into_iter();
     let mut effects = 1;
+    // Of a best with so many effects the simpler relatives were tried.
+    let mut related = 0;
     for wave in waves {
         if late(0.7) || (wave != Relatives && done(&found, &nominal, samples)) {
             continue;
+        }
+        if wave == Relatives {
+            let best = found.first().map_or(0, |c| c.structure.added.len());
+            if std::mem::replace(&mut related, best) == best {
+                continue;
+            }
         }
         report(wave.name());
         let mut seeds: Vec<Seed> = match wave {
@@ -279,7 +288,7 @@ pub fn search(
             Singles => singles.by_ref().take(5).collect(),
             MoreSingles => singles.by_ref().collect(),
             // A law that wins with more numbers has to win over its simpler relatives, whatever these promised.
-            Relatives => course.relatives(&found, guided),
+            Relatives => course.relatives(&found),
             Richer => {
                 // In the place of what is the best of its kind.
                 let best = distinct_structures(&found, 1).next().map(|c| &c.structure.added[0]);
@@ -306,9 +315,12 @@ pub fn search(
                 distinct_structures(&found, 2).take(3).flat_map(|base| course.extensions(view, &coarse, base, 5)).collect()
             }
         };
-        distinct(&mut seeds);
+        // Relatives start anew beside the numbers of the best, even those whose own race went wrong.
+        if wave != Relatives {
+            distinct(&mut seeds);
+        }
         let known: HashSet<String> = found.iter().map(|c| key_of(&c.structure.added)).collect();
-        seeds.retain(|s| !known.contains(&key_of(s.effects.iter().map(|(h, _)| &hypotheses[*h]))));
+        seeds.retain(|s| wave == Relatives || !known.contains(&key_of(s.effects.iter().map(|(h, _)| &hypotheses[*h]))));
         found.extend(course.race(seeds, wave.keep()));
         sort(&mut found, samples);
     }
@@ -363,7 +375,7 @@ pub fn search(
 
 impl Course<'_> {
     /// Simpler laws of the same family in the place of each effect of the best.
-    fn relatives(&self, found: &[Candidate], guided: bool) -> Vec<Seed> {
+    fn relatives(&self, found: &[Candidate]) -> Vec<Seed> {
         let Some(best) = found.first() else { return Vec::new() };
         let stated = best.structure.stated_of(self.evaluator.problem, &best.fit.values);
         let own = self.effects_of(&best.structure, &best.fit.values);
@@ -372,11 +384,12 @@ impl Course<'_> {
             let relative =
                 |h: &Hypothesis| h.place.same(&effect.place) && h.family == effect.family && h.parameters.len() < effect.parameters.len();
             for (index, h) in self.hypotheses.iter().enumerate().filter(|(_, h)| relative(h)) {
-                let Some(start) = h.starts.first() else { continue };
-                let mut effects = own.clone();
-                if let Some(slot) = effects.get_mut(out) {
-                    *slot = (index, start.clone());
-                    seeds.push(Seed { effects, stated: stated.clone(), guided });
+                for start in &h.starts {
+                    let mut effects = own.clone();
+                    if let Some(slot) = effects.get_mut(out) {
+                        *slot = (index, start.clone());
+                        seeds.push(Seed { effects, stated: stated.clone(), guided: false });
+                    }
                 }
             }
         }
