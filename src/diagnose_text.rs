@@ -217,7 +217,7 @@ mod tests {
         });
         assert_eq!(described(&finding), "coulomb drum to ground: force 101 mN (95 %: 98.0 mN to 104 mN); confidence 0.97");
         let slip = json!({ "value": [1.0, 2.0], "ci95": [[0.5, 1.5], [1.0, 3.0]], "unit": "N" });
-        assert_eq!(parameter(&slip), "1 N (95 %: 500 mN to 1.5 N); 2 N (95 %: 1 N to 3 N)");
+        assert_eq!(parameter(&slip), "1.00 N (95 %: 500 mN to 1.50 N); 2.00 N (95 %: 1.00 N to 3.00 N)");
     }
 
     #[test]
