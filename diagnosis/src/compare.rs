@@ -31,6 +31,22 @@ pub fn predictions(problem: &Problem, records: &[Record], structure: &Structure,
     records.iter().enumerate().map(one).collect()
 }
 
+/// Normalised root mean squared error of a structure with these values, averaged over the recordings and their outputs; each over the
+/// output's own standard deviation. Where records start freely, or a number is free in a file, that is fitted first, and nothing else.
+pub fn nrmse(problem: &Problem, records: &[Record], structure: &Structure, values: &[f64]) -> Option<f64> {
+    let predicted = predictions(problem, records, structure, values)?;
+    let (mut sum, mut count) = (0.0, 0usize);
+    for (record, predicted) in records.iter().zip(&predicted) {
+        for output in measured(record) {
+            let (samples, column) = (record.outputs.get(output)?.as_deref()?, predicted.get(output)?.as_deref()?);
+            let error = column.iter().zip(samples).map(|(a, b)| (a - b) * (a - b)).sum::<f64>() / record.len as f64;
+            sum += error.sqrt() / record.spread[output];
+            count += 1;
+        }
+    }
+    (count > 0).then(|| sum / count as f64)
+}
+
 /// How well an output of a record is predicted.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Quality {

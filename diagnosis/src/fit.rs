@@ -146,6 +146,7 @@ impl<'a> Evaluator<'a> {
                     column[i] = (column[i] - column[i - lag]) * std::f64::consts::FRAC_1_SQRT_2;
                 }
             }
+            column.iter_mut().take(record.skip).for_each(|r| *r = 0.0);
         }
         Some(columns)
     }

@@ -83,14 +83,18 @@ impl Guide {
         Guide { strength, ..self.clone() }
     }
 
-    /// The same guide for some of the records.
-    pub fn of_records(&self, records: &[usize]) -> Guide {
-        let pick = |link: &Link| Link {
-            samples: records.iter().filter_map(|r| link.samples.get(*r).cloned()).collect(),
-            paths: records.iter().filter_map(|r| link.paths.get(*r).cloned()).collect(),
-            ..link.clone()
+    /// The same guide for parts of the records: which record, from which sample to which, and its sample time.
+    pub fn of_parts(&self, parts: &[(usize, std::ops::Range<usize>, f64)]) -> Guide {
+        let cut = |link: &Link| {
+            let part = |(r, range, _): &(usize, std::ops::Range<usize>, f64)| {
+                let samples = link.samples.get(*r).and_then(|s| s.get(range.clone()));
+                Arc::new(samples.map(<[f64]>::to_vec).unwrap_or_default())
+            };
+            let samples: Vec<Arc<Vec<f64>>> = parts.iter().map(part).collect();
+            let paths = samples.iter().zip(parts).map(|(s, p)| Arc::new(path(s, link.sensor, link.integrations, p.2))).collect();
+            Link { samples, paths, ..link.clone() }
         };
-        Guide { links: self.links.iter().map(pick).collect(), ..self.clone() }
+        Guide { links: self.links.iter().map(cut).collect(), ..self.clone() }
     }
 
     /// The model with the guide of a record, and how the bodies that lead are moved: inputs behind those of the model.

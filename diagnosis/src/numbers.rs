@@ -170,12 +170,9 @@ pub fn unit_of_output(problem: &Problem, kind: &OutputKind) -> String {
     unit_for(problem.model.motion, unit)
 }
 
-/// The nominal model's text with the stated numbers as fitted; comments say what was given and the 95 % interval. What the recordings do
-/// not determine stays as given.
-///
-/// # Errors
-/// When the text cannot be edited.
-pub fn refitted_text(problem: &Problem, candidate: &Candidate, spread: &Spread) -> Result<String, PatchError> {
+/// Edits that put the stated numbers as fitted into the nominal model's text; comments say what was given and the 95 % interval, or that
+/// the recordings do not determine it.
+pub fn stated_edits(problem: &Problem, candidate: &Candidate, spread: &Spread) -> Vec<Edit> {
     let rows = rows(problem, candidate, spread);
     let mut edits = Vec::new();
     let mut done: Vec<&str> = Vec::new();
@@ -185,17 +182,21 @@ pub fn refitted_text(problem: &Problem, candidate: &Candidate, spread: &Spread) 
         }
         done.push(&stated.path);
         let Ok(mut list) = problem.model.values_at(&stated.path) else { continue };
+        let before = list.clone();
         let mut said = Vec::new();
         for (number, row) in candidate.structure.numbers.iter().zip(&rows) {
             let Role::Stated(i) = number.role else { continue };
-            let Some(own) = problem.stated.get(i).filter(|s| s.path == stated.path && row.determined) else { continue };
+            let Some(own) = problem.stated.get(i).filter(|s| s.path == stated.path) else { continue };
             if let Some(slot) = list.get_mut(own.index) {
                 *slot = round_significant(row.value, 7);
                 let [low, high] = row.ci95.map(|x| round_significant(x, 4));
-                said.push(format!("was {}, 95 %: {low} to {high}", own.given));
+                said.push(match row.determined {
+                    true => format!("was {}, 95 %: {low} to {high}", own.given),
+                    false => format!("was {}, not determined by the recordings", own.given),
+                });
             }
         }
-        if said.is_empty() {
+        if said.is_empty() || list == before {
             continue;
         }
         let value = match list.as_slice() {
@@ -204,5 +205,13 @@ pub fn refitted_text(problem: &Problem, candidate: &Candidate, spread: &Spread) 
         };
         edits.push(Edit::Set { path: stated.path.clone(), value, comment: Some(said.join("; ")) });
     }
-    patch(&problem.text, &edits)
+    edits
+}
+
+/// The nominal model's text with the stated numbers as fitted.
+///
+/// # Errors
+/// When the text cannot be edited.
+pub fn refitted_text(problem: &Problem, candidate: &Candidate, spread: &Spread) -> Result<String, PatchError> {
+    patch(&problem.text, &stated_edits(problem, candidate, spread))
 }

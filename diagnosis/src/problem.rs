@@ -50,6 +50,10 @@ pub struct Record {
     pub spread: Vec<f64>,
     /// Parameters with another value in this file.
     pub conditions: Vec<(String, Condition)>,
+    /// Bodies that do not start at rest, where it is a part of a recording: body, position in m, velocity in m/s.
+    pub begins: Vec<(usize, f64, f64)>,
+    /// Samples at its start that do not count, for the same reason.
+    pub skip: usize,
 }
 
 /// A number that the nominal file states, and that may be off.
@@ -198,7 +202,22 @@ impl Record {
         let period = recording.period;
         let segments = model.inputs.iter().zip(&inputs).map(|(input, samples)| segments(input.hold, samples, period)).collect();
         let spread = outputs.iter().map(|o| o.as_deref().map_or(1.0, spread)).collect();
-        Ok(Record { name: recording.name.clone(), period, len: recording.len(), jitter, inputs, segments, outputs, spread, conditions })
+        let (name, len, begins) = (recording.name.clone(), recording.len(), Vec::new());
+        Ok(Record { name, period, len, jitter, inputs, segments, outputs, spread, conditions, begins, skip: 0 })
+    }
+
+    /// A part of the recording, with the motion that the bodies begin with and the samples that do not count.
+    pub fn part(&self, range: std::ops::Range<usize>, begins: Vec<(usize, f64, f64)>, skip: usize) -> Record {
+        let of = |samples: &Vec<f64>| samples.get(range.clone()).map(<[f64]>::to_vec).unwrap_or_default();
+        Record {
+            len: range.len(),
+            inputs: self.inputs.iter().map(of).collect(),
+            segments: self.segments.iter().map(|s| s.get(range.clone()).map(<[Segment]>::to_vec).unwrap_or_default()).collect(),
+            outputs: self.outputs.iter().map(|o| o.as_ref().map(of)).collect(),
+            begins,
+            skip,
+            ..self.clone()
+        }
     }
 }
 

@@ -1,7 +1,6 @@
 //! Many structures, fitted a little each; the better ones more, the best to their end.
 
 use crate::fit::{Effort, Evaluator, Fit};
-use crate::guide::Guide;
 use crate::hypothesis::Hypothesis;
 use crate::problem::Record;
 use crate::screen::{Promise, worst_records};
@@ -46,8 +45,8 @@ pub fn distinct(seeds: &mut Vec<Seed>) {
 pub struct Course<'a> {
     /// The recordings.
     pub evaluator: &'a Evaluator<'a>,
-    /// What leads along them where a fit starts far off, and the nominal model fitted so.
-    pub along: Option<(&'a Guide, &'a Candidate)>,
+    /// What fits that start far off are held against first, led along the recordings, and the nominal model fitted so.
+    pub along: Option<(&'a Evaluator<'a>, &'a Candidate)>,
     /// All hypotheses.
     pub hypotheses: &'a [Hypothesis],
     /// The nominal model refitted.
@@ -61,40 +60,22 @@ impl Course<'_> {
     pub fn race(&self, seeds: Vec<Seed>, keep: [usize; 2]) -> Vec<Candidate> {
         let (evaluator, problem) = (self.evaluator, self.evaluator.problem);
         // The first steps on the recordings that are explained worst, with few substeps.
-        let few = worst_records(evaluator, &self.nominal.fit, 2);
+        let few = worst_records(evaluator, &self.nominal.fit.residuals, 2);
         let whole = few.len() == evaluator.records.len()
             || problem.initial == Initial::Free
             || problem.fit.iter().any(|r| !r.conditions.is_empty());
-        let all: Vec<usize> = (0..problem.fit.len()).collect();
         let some: Vec<Record> = if whole { problem.fit.clone() } else { few.iter().map(|r| problem.fit[*r].clone()).collect() };
         let coarse = Evaluator { substeps: COARSE, records: &some, widest: 1.0, ..evaluator.clone() };
-        let led = self.along.map(|(guide, base)| {
-            let held = Evaluator { guide: Some(guide.of_records(if whole { &all } else { &few })), ..coarse.clone() };
-            (held, if whole { base.fit.clone() } else { restricted(evaluator, &base.fit, &few) })
-        });
         let nominal_there = if whole { self.nominal.fit.clone() } else { restricted(evaluator, &self.nominal.fit, &few) };
-        let mut running: Vec<(Structure, Fit)> = seeds
-            .par_iter()
-            .filter_map(|seed| {
+        let entries = self.entries(&seeds, keep[0] + 2);
+        let mut running: Vec<(Structure, Fit)> = entries
+            .into_par_iter()
+            .filter_map(|(structure, starts)| {
                 if evaluator.is_late() {
                     return None;
                 }
-                let structure = Structure::new(problem, &some, seed.effects.iter().map(|(h, _)| self.hypotheses[*h].clone()).collect());
-                let values: Vec<Vec<f64>> = seed.effects.iter().map(|(_, v)| v.clone()).collect();
-                let from_seed = structure.values(problem, &seed.stated, &values);
-                let from_given = structure.values(problem, self.given, &values);
-                let mut starts = vec![from_seed];
-                if seed.effects.len() == 1 && !seed.guided {
-                    starts.push(from_given);
-                }
-                if seed.guided
-                    && let Some((held, base)) = &led
-                    && let Some(fit) =
-                        held.fit_knowing(&structure, &starts[0], Effort { steps: 3, tolerance: 3.0 }, Some((&self.nominal.structure, base)))
-                {
-                    starts[0] = fit.values;
-                }
-                let known = Some((&self.nominal.structure, &nominal_there));
+                // Along the path the numbers have moved far from where the nominal model's derivatives hold.
+                let known = if self.along.is_some() { None } else { Some((&self.nominal.structure, &nominal_there)) };
                 let effort = Effort { steps: 2, tolerance: 3.0 };
                 let fits = starts.into_iter().filter_map(|start| coarse.fit_knowing(&structure, &start, effort, known));
                 let best = fits.min_by(|a, b| hopeful(a).total_cmp(&hopeful(b)))?;
@@ -103,23 +84,19 @@ impl Course<'_> {
             .collect();
         let middle = Evaluator { substeps: MIDDLE, widest: 8.0, ..evaluator.clone() };
         let stages = [
-            (keep[0] + 4, &coarse, Effort { steps: 3, tolerance: 2.0 }),
+            (if self.along.is_some() { 0 } else { keep[0] + 4 }, &coarse, Effort { steps: 3, tolerance: 2.0 }),
             (keep[0], &middle, Effort { steps: 5, tolerance: 1.0 }),
             (keep[1], evaluator, Effort { steps: 30, tolerance: 0.3 }),
         ];
-        for (stage, (count, held_against, effort)) in stages.into_iter().enumerate() {
+        for (stage, (count, held_against, effort)) in stages.into_iter().enumerate().filter(|(_, s)| s.0 > 0) {
             running.sort_by(|a, b| hopeful(&a.1).total_cmp(&hopeful(&b.1)));
-            let mut names = HashSet::new();
-            running.retain(|(s, _)| {
-                let mut ids: Vec<&str> = s.added.iter().map(|h| h.id.as_str()).collect();
-                ids.sort_unstable();
-                names.insert(ids.join("+"))
-            });
+            distinct_fits(&mut running);
             // Once one is near its end, those far behind have no chance.
             let best = running.first().map_or(0.0, |(_, f)| hopeful(f));
             let floor = running.first().map_or(0.0, |(_, f)| f.residuals.len() as f64);
             let margin = if best < 1.2 * floor { 1.3 } else { 4.0 };
-            running.retain(|(_, f)| hopeful(f) < margin * best.max(floor) || best > 4.0 * floor);
+            let mut place = 0..;
+            running.retain(|(_, f)| place.next() < Some(ALWAYS) || hopeful(f) < margin * best.max(floor) || best > 4.0 * floor);
             // Far from the noise there is more to come: nothing is decided by the last steps.
             if stage == 2 && best > NEAR * floor {
                 break;
@@ -145,6 +122,16 @@ impl Course<'_> {
     }
 }
 
+/// Keeps the first fit of each structure.
+pub(crate) fn distinct_fits(fits: &mut Vec<(Structure, Fit)>) {
+    let mut names = HashSet::new();
+    fits.retain(|(structure, _)| {
+        let mut ids: Vec<&str> = structure.added.iter().map(|h| h.id.as_str()).collect();
+        ids.sort_unstable();
+        names.insert(ids.join("+"))
+    });
+}
+
 /// A fit's residuals and derivatives on some of its recordings.
 fn restricted(evaluator: &Evaluator, fit: &Fit, records: &[usize]) -> Fit {
     let layout = evaluator.layout();
@@ -154,8 +141,10 @@ fn restricted(evaluator: &Evaluator, fit: &Fit, records: &[usize]) -> Fit {
     Fit { residuals: pick(&fit.residuals), jacobian: fit.jacobian.iter().map(pick).collect(), ..fit.clone() }
 }
 
+/// Those that go on whatever the best has reached: after two steps a fit may be far from its end.
+const ALWAYS: usize = 3;
 /// Mean squared residual up to which a structure may be all that is missing, squares of the floor.
-const NEAR: f64 = 2.0;
+pub(crate) const NEAR: f64 = 2.0;
 
 /// What a fit would cost if most of what its next step foresees came true.
 pub fn hopeful(fit: &Fit) -> f64 {

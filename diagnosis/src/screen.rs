@@ -66,11 +66,11 @@ fn weakened(hypothesis: &Hypothesis, values: &[f64]) -> Vec<f64> {
     hypothesis.parameters.iter().zip(values).map(one).collect()
 }
 
-/// The recordings that a fit explains worst, in their order.
-pub fn worst_records(evaluator: &Evaluator, fit: &Fit, count: usize) -> Vec<usize> {
+/// The recordings with the largest residuals, in their order.
+pub fn worst_records(evaluator: &Evaluator, residuals: &[f64], count: usize) -> Vec<usize> {
     let mut costs = vec![0.0; evaluator.records.len()];
     for (r, _, range) in evaluator.layout() {
-        costs[r] += fit.residuals.get(range).map_or(0.0, |part| dot(part, part));
+        costs[r] += residuals.get(range).map_or(0.0, |part| dot(part, part));
     }
     let mut order: Vec<usize> = (0..costs.len()).collect();
     order.sort_by(|a, b| costs[*b].total_cmp(&costs[*a]));
@@ -118,10 +118,10 @@ impl Screen {
         let each = began.elapsed().as_secs_f64() / sample.len().max(1) as f64;
         // Half of the time for either pass.
         let affordable = (time.as_secs_f64() / each.max(1e-6)) as usize / 2;
-        let mut few = worst_records(evaluator, fit, 2);
+        let mut few = worst_records(evaluator, &fit.residuals, 2);
         let starts: usize = hypotheses.iter().map(|h| h.starts.len()).sum();
         if 2 * starts > affordable {
-            few = worst_records(evaluator, fit, 1);
+            few = worst_records(evaluator, &fit.residuals, 1);
         }
         let depth = (affordable / (few.len() * hypotheses.len().max(1))).max(1);
         let mut jobs: Vec<(usize, &Vec<f64>)> = hypotheses

@@ -1,14 +1,17 @@
 //! Which physics was left out: from the nominal model, refitted, to the structures that explain the recordings best.
 
-use crate::fit::{Effort, Evaluator, Fit, measured};
+use crate::fit::{Effort, Evaluator, Fit};
 use crate::floor;
 use crate::guide::Guide;
 use crate::hypothesis::{self, Hypothesis, Place, Scales};
+use crate::locate;
+use crate::parts::Parts;
 use crate::problem::{Problem, Record};
-use crate::race::{Course, Seed, distinct};
-use crate::screen::{Promise, Screen, pairs};
+use crate::race::{Course, NEAR, Seed, distinct};
+use crate::screen::{Promise, Screen, pairs, worst_records};
 use crate::statistics::{advantage, correlation_time, levels};
 use crate::structure::Structure;
+use backdrive_plant::model::Model;
 use backdrive_plant::set::Initial;
 use rayon::prelude::*;
 use std::collections::HashSet;
@@ -131,10 +134,30 @@ pub(crate) const MIDDLE: usize = 4;
 const NOMINAL_END: f64 = 5.0;
 /// Level above which fits start along the measured path, floors.
 const FAR: f64 = 2.0;
+/// Samples in which ripples are looked for, at most.
+const LOCATED: usize = 12_000;
+/// Samples that screening is shown far from the noise, about.
+const SHOWN: usize = 5_000;
 /// Candidates that are held against recordings that no fit has seen.
 const FINALISTS: usize = 12;
 /// A residual at its floor has this level, up to chance and rounding.
 pub const AT_FLOOR: f64 = 1.04;
+
+/// A fit on the recordings that are explained worst first, where there are many samples, then on all; so many steps on either. `there` are
+/// the residuals at the start.
+fn worst_first(evaluator: &Evaluator, structure: &Structure, start: &[f64], there: &[f64], steps: [usize; 2]) -> Option<Fit> {
+    let problem = evaluator.problem;
+    let own_numbers = structure.numbers.iter().any(|n| n.record.is_some());
+    let worst = worst_records(evaluator, there, 2);
+    let effort = |steps: usize| Effort { steps, tolerance: 3.0 };
+    if own_numbers || there.len() < SHOWN || 2 * worst.len() > problem.fit.len() {
+        return evaluator.fit(structure, start, effort(steps[0]));
+    }
+    let some: Vec<Record> = worst.iter().map(|r| problem.fit[*r].clone()).collect();
+    let few = Evaluator { records: &some, ..evaluator.clone() };
+    let first = few.fit(structure, start, effort(steps[0]))?;
+    evaluator.fit(structure, &first.values, effort(steps[1]))
+}
 
 /// Searches.
 ///
@@ -160,7 +183,7 @@ pub fn search(
     let start = structure.values(problem, &given, &[]);
     let first = evaluator.residuals(&structure, &start).ok_or(SearchError::RunsAway)?;
     let middle = Evaluator { substeps: MIDDLE, ..evaluator.clone() };
-    let quick = middle.fit(&structure, &start, Effort { steps: 12, tolerance: 3.0 }).ok_or(SearchError::RunsAway)?;
+    let quick = worst_first(&middle, &structure, &start, &first, [12, 3]).ok_or(SearchError::RunsAway)?;
     // What a fit leaves over shows the measuring error better than the signal does.
     let before = evaluator.floor.clone();
     evaluator.floor = floors(&evaluator, &quick.residuals);
@@ -183,17 +206,22 @@ pub fn search(
     let guided = level > FAR && !loose.is_empty();
     let coarse = Evaluator { substeps: COARSE, widest: 8.0, guide: guided.then(|| loose.clone()), ..evaluator.clone() };
     let from = if guided { &start } else { &nominal.values };
-    let base = coarse.fit(&structure, from, Effort { steps: if guided { 12 } else { 2 }, tolerance: 1.0 }).ok_or(SearchError::RunsAway)?;
+    let at = coarse.fit(&structure, from, Effort { steps: if guided { 0 } else { 2 }, tolerance: 1.0 }).ok_or(SearchError::RunsAway)?;
+    let far = level > FAR;
+    // The parts where most is left over are enough for screening; along the measured path they begin as they were measured.
+    let parts = if far { Parts::of(&coarse, &structure, &at, SHOWN) } else { None };
+    let on_parts = parts.as_ref().map_or_else(|| coarse.clone(), |p| p.evaluator(&coarse));
+    let base = if guided { on_parts.fit(&structure, &at.values, Effort { steps: 12, tolerance: 1.0 }) } else { None }.unwrap_or(at);
     if guided
-        && let Some(other) = middle.fit(&structure, &base.values, Effort { steps: 10, tolerance: 2.0 })
+        && let Some(there) = middle.residuals(&structure, &base.values)
+        && let Some(other) = worst_first(&middle, &structure, &base.values, &there, [8, 2])
         && other.cost < 0.99 * nominal.cost
         && let Some(other) = evaluator.fit(&structure, &other.values, effort)
         && other.cost < nominal.cost
     {
         nominal = other;
     }
-    let base = candidate(&evaluator, structure.clone(), base);
-    let nominal = candidate(&evaluator, structure, nominal);
+    let nominal = candidate(&evaluator, structure.clone(), nominal);
 
     let withheld: Vec<&str> = settings.without.iter().map(String::as_str).collect();
     let mut hypotheses = hypothesis::without(hypothesis::all(&model, &scales), &withheld);
@@ -203,33 +231,28 @@ pub fn search(
         !is_number && classes.insert(h.class.clone())
     });
 
+    report("looking for ripples");
+    ripples(problem, &model, &evaluator.floor, &mut hypotheses);
     report("screening");
+    let share = if far { 0.08 } else { 0.2 };
+    let mut views = vec![View::of(&coarse, parts.as_ref(), &structure, base, &hypotheses, settings.patience.mul_f64(share))];
+    // Some effects show better on a free simulation; and the refit of a wrong structure may have carried the numbers off, so that
+    // without a measured path the given ones are another base.
+    let free = Evaluator { guide: None, ..coarse.clone() };
+    let (from, steps) = if guided { (&nominal.fit.values, 2) } else { (&start, 0) };
+    let other = if far { free.fit(&structure, from, Effort { steps, tolerance: 1.0 }) } else { None };
+    let free_parts = other.as_ref().and_then(|fit| Parts::of(&free, &structure, fit, SHOWN));
+    if let Some(fit) = other {
+        views.push(View::of(&free, free_parts.as_ref(), &structure, fit, &hypotheses, settings.patience.mul_f64(share)));
+    }
+    let view = &views[0];
     let course = Course {
         evaluator: &evaluator,
-        along: guided.then_some((&loose, &base)),
+        along: guided.then_some((&view.evaluator, &view.base)),
         hypotheses: &hypotheses,
         nominal: &nominal,
         given: &given,
     };
-    let few_numbers = |h: usize| hypotheses[h].parameters.len() <= SIMPLE;
-    let look_from = |evaluator: &Evaluator, base: &Candidate, share: f64| {
-        let screen = Screen::new(evaluator, &base.structure, &base.fit, &hypotheses, settings.patience.mul_f64(share));
-        let promises = screen.look(&base.fit, &|_| true);
-        let (simple, rich) = promises.into_iter().partition(|p| few_numbers(p.hypothesis));
-        let stated = base.structure.stated_of(problem, &base.fit.values);
-        View { screen, fit: base.fit.clone(), stated, guided: evaluator.guide.is_some(), simple, rich }
-    };
-    let mut views = vec![look_from(&coarse, &base, if level > FAR { 0.14 } else { 0.2 })];
-    if level > FAR {
-        // Some effects show better on a free simulation; and the refit of a wrong structure may have carried the numbers off, so that
-        // without a measured path the given ones are another base.
-        let free = Evaluator { guide: None, ..coarse.clone() };
-        let (from, steps) = if guided { (&nominal.fit.values, 2) } else { (&start, 0) };
-        if let Some(fit) = free.fit(&base.structure, from, Effort { steps, tolerance: 1.0 }) {
-            views.push(look_from(&free, &candidate(&evaluator, base.structure.clone(), fit), 0.14));
-        }
-    }
-    let view = &views[0].screen;
     let mut tried: Vec<Tried> = Vec::new();
     for promise in views.iter().flat_map(|v| v.simple.iter().chain(&v.rich)) {
         let id = &hypotheses[promise.hypothesis].id;
@@ -251,7 +274,11 @@ pub fn search(
             let Some(promise) = view.simple.iter().filter(|p| used.insert(p.hypothesis)).nth(rank) else { continue };
             // Those that promise little beside the best wait.
             let top = view.simple.first().map_or(0.0, |p| p.share);
-            let wanted = if quiet { rank < 8 && promise.share > chance } else { rank < 3 || rank < 8 && promise.share > 0.5 * top };
+            let wanted = if quiet {
+                rank < 8 && promise.share > chance
+            } else {
+                rank < 3 || rank < if guided { 14 } else { 8 } && promise.share > 0.5 * top
+            };
             if wanted {
                 singles.push(Seed::single(promise, &view.stated, view.guided));
             }
@@ -259,9 +286,9 @@ pub fn search(
     }
     distinct(&mut singles);
     use Wave::*;
-    let mut waves = vec![First, Singles, Relatives];
+    let mut waves = vec![First, Laws, Singles, Relatives];
     if !quiet {
-        waves.extend([Pairs, Exchanges, Richer, MoreSingles, MorePairs, Exchanges]);
+        waves.extend([Pairs, Laws, Exchanges, Richer, MoreSingles, MorePairs, Laws, Exchanges]);
         if settings.effects > 2 {
             waves.extend([Triples, Exchanges]);
         }
@@ -284,8 +311,25 @@ pub fn search(
         report(wave.name());
         let mut seeds: Vec<Seed> = match wave {
             // Those that promise most first: where one of them reaches the floor, the rest have nothing left to explain.
-            First => singles.by_ref().take(4).collect(),
-            Singles => singles.by_ref().take(5).collect(),
+            First => singles.by_ref().take(if guided { 30 } else { 4 }).collect(),
+            // Where one law helps another one may be the right one: every law there, from every start.
+            Laws => {
+                // Along the measured path what is far off was tried already.
+                let near = |c: &&Candidate| !guided || c.fit.cost < NEAR * samples as f64;
+                let mut seeds = found.first().filter(near).map_or_else(Vec::new, |best| course.laws(&best.structure, &best.fit.values));
+                if !guided {
+                    // Without one each costs a fit: those that promise most.
+                    let own = |s: &Seed| -> f64 {
+                        let promised = |h: &usize| tried.iter().find(|t| t.id == hypotheses[*h].id).map_or(0.0, |t| t.promised);
+                        s.effects.iter().map(|(h, _)| promised(h)).sum()
+                    };
+                    seeds.sort_by(|a, b| own(b).total_cmp(&own(a)));
+                    distinct(&mut seeds);
+                    seeds.truncate(6);
+                }
+                seeds
+            }
+            Singles => singles.by_ref().take(if guided { 30 } else { 5 }).collect(),
             MoreSingles => singles.by_ref().collect(),
             // A law that wins with more numbers has to win over its simpler relatives, whatever these promised.
             Relatives => course.relatives(&found),
@@ -300,19 +344,19 @@ pub fn search(
                 effects = 2;
                 let mut seeds: Vec<Seed> = views.iter().flat_map(|view| view.pairs(&hypotheses, 5)).collect();
                 for base in distinct_structures(&found, 1).take(3) {
-                    seeds.extend(course.extensions(view, &coarse, base, 4));
+                    seeds.extend(course.extensions(view, base, 4));
                 }
                 seeds
             }
-            MorePairs => distinct_structures(&found, 1).take(5).flat_map(|base| course.extensions(view, &coarse, base, 7)).collect(),
+            MorePairs => distinct_structures(&found, 1).take(5).flat_map(|base| course.extensions(view, base, 7)).collect(),
             // A first step may have been the wrong one.
             Exchanges => {
                 let best = found.iter().find(|c| c.structure.added.len() == effects);
-                best.map_or_else(Vec::new, |best| course.exchanges(view, &coarse, best, 4))
+                best.map_or_else(Vec::new, |best| course.exchanges(view, best, 4))
             }
             Triples => {
                 effects = 3;
-                distinct_structures(&found, 2).take(3).flat_map(|base| course.extensions(view, &coarse, base, 5)).collect()
+                distinct_structures(&found, 2).take(3).flat_map(|base| course.extensions(view, base, 5)).collect()
             }
         };
         // Relatives start anew beside the numbers of the best, even those whose own race went wrong.
@@ -369,7 +413,7 @@ pub fn search(
     let simulations = evaluator.simulations.load(Ordering::Relaxed);
     let (floor, count) = (evaluator.floor.clone(), hypotheses.len());
     let unseen_samples = unseen.len();
-    let detectable = detectable(view, &base, &hypotheses);
+    let detectable = detectable(view, samples, &hypotheses);
     Ok(Search { floor, levels_given, nominal, found, tried, hypotheses: count, samples, unseen_samples, detectable, simulations, stopped })
 }
 
@@ -397,12 +441,12 @@ impl Course<'_> {
     }
 
     /// A structure with each of what promises most beside it added.
-    fn extensions(&self, view: &Screen, coarse: &Evaluator, base: &Candidate, count: usize) -> Vec<Seed> {
+    fn extensions(&self, view: &View, base: &Candidate, count: usize) -> Vec<Seed> {
         let problem = self.evaluator.problem;
-        let fit = if coarse.guide.is_none() {
+        let fit = if view.whole {
             Some(base.fit.clone())
         } else {
-            coarse.fit(&base.structure, &base.fit.values, Effort { steps: 4, tolerance: 2.0 })
+            view.evaluator.fit(&base.structure, &base.fit.values, Effort { steps: 4, tolerance: 2.0 })
         };
         let Some(fit) = fit else { return Vec::new() };
         let fits = |h: usize| {
@@ -412,18 +456,14 @@ impl Course<'_> {
         let own = self.effects_of(&base.structure, &fit.values);
         let stated = base.structure.stated_of(problem, &fit.values);
         let mut used = HashSet::new();
-        let next = view.look(&fit, &fits).into_iter().filter(|p| used.insert(p.hypothesis));
+        let next = view.screen.look(&fit, &fits).into_iter().filter(|p| used.insert(p.hypothesis));
         next.take(count)
-            .map(|p| Seed {
-                effects: [own.clone(), vec![(p.hypothesis, p.values)]].concat(),
-                stated: stated.clone(),
-                guided: coarse.guide.is_some(),
-            })
+            .map(|p| Seed { effects: [own.clone(), vec![(p.hypothesis, p.values)]].concat(), stated: stated.clone(), guided: view.guided })
             .collect()
     }
 
     /// A structure with each of its effects exchanged for what promises most in its place.
-    fn exchanges(&self, view: &Screen, coarse: &Evaluator, best: &Candidate, count: usize) -> Vec<Seed> {
+    fn exchanges(&self, view: &View, best: &Candidate, count: usize) -> Vec<Seed> {
         let problem = self.evaluator.problem;
         let stated = best.structure.stated_of(problem, &best.fit.values);
         let values = best.structure.added_of(&best.fit.values);
@@ -434,13 +474,13 @@ impl Course<'_> {
             let kept: Vec<Vec<f64>> = (0..values.len()).filter(keep).map(|i| values[i].clone()).collect();
             let structure = Structure::new(problem, &problem.fit, added);
             let start = structure.values(problem, &stated, &kept);
-            let Some(fit) = coarse.fit(&structure, &start, Effort { steps: 3, tolerance: 2.0 }) else { continue };
-            seeds.extend(self.extensions(view, coarse, &candidate(self.evaluator, structure, fit), count));
+            let Some(fit) = view.evaluator.fit(&structure, &start, Effort { steps: 3, tolerance: 2.0 }) else { continue };
+            seeds.extend(self.extensions(view, &candidate(&view.evaluator, structure, fit), count));
         }
         seeds
     }
 
-    fn effects_of(&self, structure: &Structure, values: &[f64]) -> Vec<(usize, Vec<f64>)> {
+    pub(crate) fn effects_of(&self, structure: &Structure, values: &[f64]) -> Vec<(usize, Vec<f64>)> {
         let place = |h: &Hypothesis| self.hypotheses.iter().position(|other| other.id == h.id);
         structure.added.iter().zip(structure.added_of(values)).filter_map(|(h, v)| Some((place(h)?, v))).collect()
     }
@@ -450,6 +490,7 @@ impl Course<'_> {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Wave {
     First,
+    Laws,
     Singles,
     Relatives,
     Pairs,
@@ -464,6 +505,7 @@ impl Wave {
     fn name(self) -> &'static str {
         match self {
             Wave::First | Wave::Singles => "fitting single effects",
+            Wave::Laws => "fitting other laws in the same place",
             Wave::Relatives => "fitting simpler relatives",
             Wave::Pairs => "fitting pairs",
             Wave::Exchanges => "exchanging effects",
@@ -477,7 +519,7 @@ impl Wave {
     /// How many are fitted further, and how many to their end.
     fn keep(self) -> [usize; 2] {
         match self {
-            Wave::First | Wave::Relatives => [3, 3],
+            Wave::First | Wave::Laws | Wave::Relatives => [3, 3],
             Wave::Singles | Wave::Exchanges | Wave::MoreSingles => [4, 2],
             Wave::Pairs | Wave::MorePairs => [5, 3],
             Wave::Richer => [2, 1],
@@ -487,23 +529,51 @@ impl Wave {
 }
 
 /// What screening sees from one base.
-struct View {
+struct View<'a> {
     screen: Screen,
-    fit: Fit,
+    /// What it looks at: the recordings, or parts of them.
+    evaluator: Evaluator<'a>,
+    /// The nominal model there.
+    base: Candidate,
     stated: Vec<f64>,
     /// Whether it is along the measured path.
     guided: bool,
+    /// Whether its residuals are those of the recordings, whole and without a guide.
+    whole: bool,
     simple: Vec<Promise>,
     /// Physics of many numbers come in where simpler relatives do not suffice.
     rich: Vec<Promise>,
 }
 
-impl View {
+impl<'a> View<'a> {
+    fn of(
+        evaluator: &Evaluator<'a>,
+        parts: Option<&'a Parts>,
+        structure: &Structure,
+        fit: Fit,
+        hypotheses: &[Hypothesis],
+        time: Duration,
+    ) -> View<'a> {
+        let on = parts.map_or_else(|| evaluator.clone(), |p| p.evaluator(evaluator));
+        let there = parts.and_then(|_| on.fit(structure, &fit.values, Effort { steps: 0, tolerance: 1.0 }));
+        // A part that cannot be simulated is none.
+        let (on, whole, fit) = match (parts, there) {
+            (Some(_), Some(there)) => (on, false, there),
+            _ => (evaluator.clone(), evaluator.guide.is_none(), fit),
+        };
+        let screen = Screen::new(&on, structure, &fit, hypotheses, time);
+        let promises = screen.look(&fit, &|_| true);
+        let (simple, rich) = promises.into_iter().partition(|p| hypotheses[p.hypothesis].parameters.len() <= SIMPLE);
+        let stated = structure.stated_of(on.problem, &fit.values);
+        let guided = on.guide.is_some();
+        View { screen, base: candidate(&on, structure.clone(), fit), evaluator: on, stated, guided, whole, simple, rich }
+    }
+
     /// The most promising pairs.
     fn pairs(&self, hypotheses: &[Hypothesis], count: usize) -> Vec<Seed> {
         let simple = &self.simple;
         let compatible = |a: usize, b: usize| hypotheses[a].compatible(&hypotheses[b]);
-        let together = pairs(simple, &self.fit, &self.fit.jacobian, 90, compatible);
+        let together = pairs(simple, &self.base.fit, &self.base.fit.jacobian, 90, compatible);
         let mut used = HashSet::new();
         let best = together.iter().filter(|(a, b, _)| used.insert((simple[*a].hypothesis, simple[*b].hypothesis)));
         let pair = |a: usize, b: usize| [a, b].map(|p| (simple[p].hypothesis, simple[p].values.clone())).to_vec();
@@ -512,16 +582,35 @@ impl View {
     }
 }
 
+/// A ripple shows in a force over displacement, at whatever period, but fits only start from a few: where locating finds one, a fit starts there.
+fn ripples(problem: &Problem, model: &Model, floor: &[f64], hypotheses: &mut [Hypothesis]) {
+    let runs: Vec<locate::Run> = problem.fit.iter().map(locate::Run::from).collect();
+    let options = locate::Options { most_samples: LOCATED, laws_of_a_form: 0, ..locate::Options::quick() };
+    // Where the model cannot be located in, fits start from the usual periods.
+    let Ok(location) = locate::locate(model, &runs, floor, &options) else { return };
+    for place in &location.ranking {
+        for h in hypotheses.iter_mut().filter(|h| h.physics == "cogging" && h.place.same(&place.place)) {
+            let starts = place.ripples.iter().map(|r| vec![r.amplitude, r.period, r.phase]);
+            let inside = |start: &Vec<f64>| start.iter().zip(&h.parameters).all(|(x, p)| (p.range.0..=p.range.1).contains(x));
+            let new: Vec<Vec<f64>> = starts.filter(inside).collect();
+            h.starts.splice(0..0, new);
+        }
+    }
+}
+
 /// Physics whose effect grows in proportion to their first parameter: what an effect is worth claiming, at the place where the least is enough.
-fn detectable(view: &Screen, base: &Candidate, hypotheses: &[Hypothesis]) -> Vec<Detectable> {
+fn detectable(view: &View, samples: usize, hypotheses: &[Hypothesis]) -> Vec<Detectable> {
     const LINEAR: [&str; 9] = ["coulomb", "damper", "spring", "quadratic_drag", "cogging", "bias", "inertia", "delay", "back_emf"];
-    let effective = (base.fit.residuals.len() as f64 / base.correlation_time).max(2.0);
+    let base = &view.base;
+    // All of the recordings show what their parts do, and more.
+    let more = samples as f64 / base.fit.residuals.len().max(1) as f64;
+    let effective = (samples as f64 / base.correlation_time).max(2.0);
     let needed = (30.0 + effective.ln()) * base.correlation_time * base.fit.cost / base.fit.residuals.len().max(1) as f64;
     let mut found: Vec<Detectable> = Vec::new();
-    for (index, length) in view.lengths(&base.fit) {
+    for (index, length) in view.screen.lengths(&base.fit) {
         let h = &hypotheses[index.0];
         let (Some(parameter), Some(value)) = (h.parameters.first(), index.1.first()) else { continue };
-        let size = value.abs() * (needed / (length * length)).sqrt();
+        let size = value.abs() * (needed / (more * length * length)).sqrt();
         if !LINEAR.contains(&h.physics) || !size.is_finite() || parameter.neutral != Some(0.0) {
             continue;
         }
@@ -605,29 +694,4 @@ fn done(found: &[Candidate], nominal: &Candidate, samples: usize) -> bool {
 pub fn advantage_over(base: &Candidate, better: &Candidate, samples: usize) -> f64 {
     let (a, b) = (base.structure.numbers.len(), better.structure.numbers.len());
     advantage(base.fit.cost, a, better.fit.cost.max(1e-300), b, samples, better.correlation_time)
-}
-
-/// Normalised root mean squared error of a structure with these values, averaged over the recordings and their outputs; each over the
-/// output's own standard deviation. Where records start freely, or a number is free in a file, that is fitted first, and nothing else.
-pub fn nrmse(problem: &Problem, records: &[Record], structure: &Structure, values: &[f64]) -> Option<f64> {
-    let fixed = Problem { model: structure.model(problem, values)?, stated: Vec::new(), ..problem.clone() };
-    let mut own = Structure::new(&fixed, records, Vec::new());
-    own.numbers.retain(|n| n.record.is_some());
-    let mut values = own.values(&fixed, &[], &[]);
-    if !own.numbers.is_empty()
-        && let Some(fit) = Evaluator::on(&fixed, records).fit(&own, &values, Effort { steps: 15, tolerance: 1.0 })
-    {
-        values = fit.values;
-    }
-    let (mut sum, mut count) = (0.0, 0usize);
-    for (r, record) in records.iter().enumerate() {
-        let columns = own.predict(&fixed.model, &values, record, r, 64)?;
-        for (column, output) in columns.chunks_exact(record.len).zip(measured(record)) {
-            let samples = record.outputs.get(output)?.as_deref()?;
-            let error = column.iter().zip(samples).map(|(a, b)| (a - b) * (a - b)).sum::<f64>() / record.len as f64;
-            sum += error.sqrt() / record.spread[output];
-            count += 1;
-        }
-    }
-    (count > 0).then(|| sum / count as f64)
 }

@@ -26,6 +26,46 @@ pub fn predict_along(
     substeps: usize,
     guide: Option<(&Guide, usize)>,
 ) -> Option<Vec<f64>> {
+    let measured: Vec<usize> = (0..model.outputs.len()).filter(|o| record.outputs.get(*o).is_some_and(Option::is_some)).collect();
+    let mut columns = vec![0.0; measured.len() * record.len];
+    let mut values = vec![0.0; model.outputs.len()];
+    run(model, record, starts, substeps, guide, record.len, &mut |plant, sample| {
+        plant.outputs(&mut values);
+        for (column, output) in measured.iter().enumerate() {
+            columns[column * record.len + sample] = values[*output];
+        }
+    })?;
+    columns.iter().all(|y| y.is_finite()).then_some(columns)
+}
+
+/// Position and velocity of each body at a sample of a record.
+pub fn motion_at(
+    model: &Model,
+    record: &Record,
+    starts: &[Start],
+    substeps: usize,
+    guide: Option<(&Guide, usize)>,
+    at: usize,
+) -> Option<Vec<Start>> {
+    let mut motion = Vec::new();
+    run(model, record, starts, substeps, guide, at + 1, &mut |plant, sample| {
+        if sample == at {
+            motion = (0..model.bodies.len()).map(|body| (body, plant.position(body), plant.velocity(body))).collect();
+        }
+    })?;
+    motion.iter().all(|(_, x, v)| x.is_finite() && v.is_finite()).then_some(motion)
+}
+
+/// Runs a model on the first samples of a record, and shows the plant at each.
+fn run(
+    model: &Model,
+    record: &Record,
+    starts: &[Start],
+    substeps: usize,
+    guide: Option<(&Guide, usize)>,
+    samples: usize,
+    show: &mut dyn FnMut(&mut Plant, usize),
+) -> Option<()> {
     let conditioned;
     let model = if record.conditions.iter().any(|(_, c)| matches!(c, Condition::Value(_))) {
         let mut changed = model.clone();
@@ -56,22 +96,16 @@ pub fn predict_along(
     let mut first: Vec<f64> = record.inputs.iter().map(|samples| samples.first().copied().unwrap_or(0.0)).collect();
     first.extend(moved.iter().map(|path| path.first().map_or(0.0, |s| s.c[0])));
     plant.start_at(&first);
-    for (body, position, velocity) in starts {
+    for (body, position, velocity) in record.begins.iter().chain(starts) {
         plant.set_motion(*body, *position, *velocity);
     }
-    let measured: Vec<usize> = (0..model.outputs.len()).filter(|o| record.outputs.get(*o).is_some_and(Option::is_some)).collect();
-    let mut columns = vec![0.0; measured.len() * record.len];
-    let mut values = vec![0.0; model.outputs.len()];
     let mut now = vec![Segment::default(); record.segments.len() + moved.len()];
-    for sample in 0..record.len {
-        plant.outputs(&mut values);
-        for (column, output) in measured.iter().enumerate() {
-            columns[column * record.len + sample] = values[*output];
-        }
+    for sample in 0..samples.min(record.len) {
+        show(&mut plant, sample);
         if sample % 256 == 0 && !plant.is_finite() {
             return None;
         }
-        if sample + 1 < record.len {
+        if sample + 1 < samples.min(record.len) {
             let columns = record.segments.iter().chain(moved.iter().map(|path| path.as_ref()));
             for (segment, column) in now.iter_mut().zip(columns) {
                 *segment = column[sample];
@@ -79,5 +113,5 @@ pub fn predict_along(
             plant.step(&now);
         }
     }
-    columns.iter().all(|y| y.is_finite()).then_some(columns)
+    Some(())
 }

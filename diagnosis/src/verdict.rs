@@ -1,14 +1,16 @@
 //! What a search says: the verdict file, and the nominal model's file with what was found.
 
+use crate::compare::nrmse;
 use crate::experiment::{excite, separate};
 use crate::fit::Evaluator;
-use crate::hypothesis::{Hypothesis, PHYSICS, Place, physics_named, withheld};
+use crate::hypothesis::{Hypothesis, PHYSICS, Place, apply_edits, physics_named, withheld};
 use crate::intervals::Spread;
+use crate::numbers::stated_edits;
 use crate::problem::Problem;
-use crate::search::{AT_FLOOR, Candidate, Search, advantage_over, nrmse};
+use crate::search::{AT_FLOOR, Candidate, Search, advantage_over};
 use crate::statistics::advantage;
 use crate::structure::Role;
-use backdrive_plant::write::{Edit, Value, patch, round_significant};
+use backdrive_plant::write::{patch, round_significant};
 use serde_json::{Value as Json, json};
 use std::collections::HashSet;
 use std::time::{Duration, Instant};
@@ -37,6 +39,9 @@ pub enum VerdictError {
     /// The model's text cannot be edited.
     #[error(transparent)]
     Patch(#[from] backdrive_plant::write::PatchError),
+    /// Refitted numbers cannot be put into the model.
+    #[error("the refitted numbers do not fit into the model: {0}")]
+    Refitted(String),
     /// A physics that was found cannot be put into the model.
     #[error(transparent)]
     Hypothesis(#[from] crate::hypothesis::HypothesisError),
@@ -399,42 +404,9 @@ fn model_text(problem: &Problem, best: &Candidate, spread: &Spread, use_best: bo
     if !use_best {
         return Ok(problem.text.clone());
     }
-    let mut edits = Vec::new();
-    let values = best.structure.stated_of(problem, &best.fit.values);
+    let mut edits = stated_edits(problem, best, spread);
     let mut model = problem.model.clone();
-    let mut paths: Vec<&str> = Vec::new();
-    for stated in &problem.stated {
-        if paths.contains(&stated.path.as_str()) {
-            continue;
-        }
-        paths.push(&stated.path);
-        let own: Vec<(usize, f64)> = problem
-            .stated
-            .iter()
-            .zip(&values)
-            .filter(|(s, _)| s.path == stated.path)
-            .map(|(s, v)| (s.index, round_significant(*v, 7)))
-            .collect();
-        let Ok(mut list) = model.values_at(&stated.path) else { continue };
-        for (index, value) in &own {
-            if let Some(slot) = list.get_mut(*index) {
-                *slot = *value;
-            }
-        }
-        if model.values_at(&stated.path).is_ok_and(|before| before == list) || model.set_values_at(&stated.path, &list).is_err() {
-            continue;
-        }
-        let number = best.structure.numbers.iter().position(|n| matches!(n.role, Role::Stated(i) if problem.stated[i].path == stated.path));
-        let comment = number.map(|index| {
-            let [low, high] = spread.interval(best, index);
-            format!("was {}, 95 %: {} to {}", stated.given, round_significant(low, 4), round_significant(high, 4))
-        });
-        let value = match list.as_slice() {
-            [one] => Value::Number(*one),
-            _ => Value::Numbers(list),
-        };
-        edits.push(Edit::Set { path: stated.path.clone(), value, comment });
-    }
+    apply_edits(&mut model, &edits).map_err(VerdictError::Refitted)?;
     for (hypothesis, values) in best.structure.added.iter().zip(best.structure.added_of(&best.fit.values)) {
         let rounded: Vec<f64> = values.iter().map(|v| round_significant(*v, 7)).collect();
         edits.extend(hypothesis.edits(&model, &rounded)?);

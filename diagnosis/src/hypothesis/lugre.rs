@@ -27,7 +27,7 @@ pub(super) const PHYSICS: Physics = Physics {
                 .number("velocity", log(1e-4 * v, 3.0 * site.speed_peak))
                 .tidy(|values| values[3][0] = values[3][0].max(values[2][0]));
             let start = |x_slip: f64, v_slip: f64| vec![c / (x_slip * x), 0.05 * c / v, c, 1.5 * c, v_slip * v];
-            Some(new.starts(vec![start(0.05, 0.1), start(0.005, 0.1), start(0.05, 0.5), start(0.005, 0.02)]))
+            Some(new.starts(vec![start(0.05, 0.1), start(0.005, 0.1), start(0.05, 0.5), start(0.005, 0.02), start(0.5, 0.3)]))
         };
         sites.near().filter_map(one).collect()
     },

@@ -172,8 +172,8 @@ pub struct Candidate {
     pub deviation: f64,
     /// Laws, best first: by evidence where it was computed, then by what they explain on other parts of the recordings.
     pub laws: Vec<Law>,
-    /// The strongest ripple over displacement.
-    pub ripple: Option<Ripple>,
+    /// The strongest ripples over displacement, strongest first.
+    pub ripples: Vec<Ripple>,
     /// Odd or even, memory, rate, energy; `None` at an output.
     pub character: Option<Character>,
     /// The force itself, one course for each run.
@@ -566,8 +566,8 @@ impl Scene<'_> {
     fn candidate(&self, trial: &Trial, place: Place, signals: Vec<Vec<f64>>) -> Option<Candidate> {
         let courses = self.courses(trial, &trial.smoothed);
         let samples = self.samples(&courses, &signals);
-        let ripple = if samples.x.is_empty() { None } else { scan(&samples.x, &samples.force) };
-        let mut laws = samples.laws(ripple.as_ref());
+        let ripples = scan(&samples.x, &samples.v, &samples.force);
+        let mut laws = samples.laws(ripples.first());
         let scales = [self.scales(trial.channel)[0], self.scales(trial.channel)[1], trial.size];
         let runs = self.trajectories.len();
         let systems = (0..runs).map(|run| self.system(trial.channel, trial.chain, run, scales, trial.loose)).collect::<Option<Vec<_>>>()?;
@@ -601,7 +601,7 @@ impl Scene<'_> {
             rms: rms(&samples.force),
             deviation: rms(&all),
             character: Character::of(&samples, &laws, courses.first().map_or(1.0, |c| c.period)),
-            ripple,
+            ripples,
             laws,
             courses,
         })

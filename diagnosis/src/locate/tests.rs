@@ -112,7 +112,7 @@ fn cogging_is_found_with_its_period() {
     let best = &location.ranking[0];
     assert_eq!(best.place, between("motor", "ground"));
     assert_eq!(best.laws[0].variable, Variable::Ripple);
-    let ripple = best.ripple.expect("a ripple");
+    let ripple = best.ripples.first().expect("a ripple");
     assert!((ripple.period - 1.3e-3).abs() < 2e-5, "{ripple:?}");
     assert!((ripple.amplitude - 0.15).abs() < 0.04, "{ripple:?}");
     assert!((ripple.phase - 0.4).abs() < 0.5, "{ripple:?}");
@@ -218,11 +218,13 @@ fn a_known_part_and_known_forces_are_taken_off() {
 fn a_ripple_is_found_among_trends() {
     let x: Vec<f64> = (0..5000).map(|k| 0.02 * (0.003 * k as f64).sin() + 0.01 * (0.00107 * k as f64).cos()).collect();
     let force: Vec<f64> = x.iter().map(|x| 0.3 * (std::f64::consts::TAU * x / 2.5e-3 + 1.1).sin() + 40.0 * x + 1e5 * x.powi(3)).collect();
-    let ripple = scan(&x, &force).expect("moves");
+    let v = vec![0.0; x.len()];
+    let ripples = scan(&x, &v, &force);
+    let ripple = ripples.first().expect("moves");
     assert!((ripple.period / 2.5e-3 - 1.0).abs() < 2e-3, "{ripple:?}");
     assert!((ripple.amplitude - 0.3).abs() < 0.02 && (ripple.phase - 1.1).abs() < 0.1, "{ripple:?}");
     assert!(ripple.share > 0.9 && ripple.prominence > 100.0, "{ripple:?}");
-    assert!(scan(&vec![1.0; 100], &force[..100]).is_none());
+    assert!(scan(&vec![1.0; 100], &v[..100], &force[..100]).is_empty());
 }
 
 #[test]

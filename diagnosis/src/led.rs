@@ -1,0 +1,147 @@
+//! The first part of a race, along the measured path: simulations are short there, fits go far in a step, and what is left over tells laws
+//! apart that a free simulation does not show until all else is right.
+
+use crate::fit::{Effort, Evaluator, Fit};
+use crate::hypothesis::{Hypothesis, Parameter};
+use crate::race::{Course, Seed, distinct_fits, hopeful};
+use crate::structure::Structure;
+use rayon::prelude::*;
+use std::time::{Duration, Instant};
+
+/// How many times the best cost ends a race.
+const BEHIND: f64 = 2.5;
+/// Mean squared residual along the measured path up to which a structure may be all that is missing, squares of the floor.
+const CLOSE: f64 = 1.2;
+/// Time in which every law at a place takes its first step; starts beyond the first of each come last.
+const LAWS: Duration = Duration::from_millis(2500);
+
+/// A structure and values to start from.
+pub type Entry = (Structure, Vec<Vec<f64>>);
+
+impl Course<'_> {
+    /// Structures to fit and where from. Where a measured path leads, all are fitted along it first, and only so many go on.
+    pub(crate) fn entries(&self, seeds: &[Seed], count: usize) -> Vec<Entry> {
+        if self.along.is_none() {
+            return seeds.iter().map(|seed| self.entry(seed)).collect();
+        }
+        let mut led = self.lead(self.first_steps(seeds, None), count);
+        let far = |led: &[(Structure, Fit)]| led.first().filter(|(_, f)| hopeful(f) > CLOSE * f.residuals.len() as f64).cloned();
+        // Where one law helps another one may be the right one: the place first, then the law.
+        if let Some((structure, fit)) = far(&led) {
+            led.extend(self.first_steps(&self.laws(&structure, &fit.values), Some(LAWS)));
+            led = self.lead(led, count);
+        }
+        led = self.loosen(led, count);
+        // What shows best on a free simulation may show little along the path.
+        let other = seeds.iter().find(|s| !s.guided).map(|seed| self.entry(seed));
+        led.into_iter().map(|(structure, fit)| (structure, vec![fit.values])).chain(other).collect()
+    }
+
+    fn entry(&self, seed: &Seed) -> Entry {
+        let problem = self.evaluator.problem;
+        let added = seed.effects.iter().map(|(h, _)| self.hypotheses[*h].clone()).collect();
+        let structure = Structure::new(problem, &problem.fit, added);
+        let values: Vec<Vec<f64>> = seed.effects.iter().map(|(_, v)| v.clone()).collect();
+        let mut starts = vec![structure.values(problem, &seed.stated, &values)];
+        if seed.effects.len() == 1 && !seed.guided {
+            starts.push(structure.values(problem, self.given, &values));
+        }
+        (structure, starts)
+    }
+
+    /// One step of each, as far as there is time.
+    fn first_steps(&self, seeds: &[Seed], time: Option<Duration>) -> Vec<(Structure, Fit)> {
+        let Some((held, base)) = self.along else { return Vec::new() };
+        let began = Instant::now();
+        let step = |seed: &Seed| {
+            if self.evaluator.is_late() || time.is_some_and(|t| began.elapsed() > t) {
+                return None;
+            }
+            let (structure, starts) = self.entry(seed);
+            let known = Some((&base.structure, &base.fit));
+            let fit = held.fit_knowing(&structure, starts.first()?, Effort { steps: 1, tolerance: 3.0 }, known)?;
+            Some((structure, fit))
+        };
+        // In their order, two at a time.
+        seeds.par_iter().with_max_len(1).filter_map(step).collect()
+    }
+
+    /// More steps of fewer; in the end so many, best first.
+    fn lead(&self, mut led: Vec<(Structure, Fit)>, count: usize) -> Vec<(Structure, Fit)> {
+        let Some((held, _)) = self.along else { return led };
+        for (keep, steps) in [(3 * count, 1), (2 * count, 2), (count + 2, 3)] {
+            rank(&mut led, keep);
+            led.par_iter_mut().filter(|_| !self.evaluator.is_late()).for_each(|(structure, fit)| {
+                let effort = Effort { steps, tolerance: 3.0 };
+                if let Some(next) = held.fit_knowing(structure, &fit.values, effort, Some((structure, fit))) {
+                    *fit = next;
+                }
+            });
+        }
+        rank(&mut led, count);
+        led
+    }
+
+    /// The same led more loosely: what is left over is less and less the force at hand, more and more the simulation error.
+    fn loosen(&self, mut led: Vec<(Structure, Fit)>, count: usize) -> Vec<(Structure, Fit)> {
+        let Some((held, _)) = self.along else { return led };
+        let guide = held.guide.as_ref().map(|g| g.with(0.1 * g.strength));
+        let held = Evaluator { guide, ..held.clone() };
+        led.par_iter_mut().filter(|_| !self.evaluator.is_late()).for_each(|(structure, fit)| {
+            if let Some(next) = held.fit(structure, &fit.values, Effort { steps: 3, tolerance: 3.0 }) {
+                *fit = next;
+            }
+        });
+        rank(&mut led, count);
+        led
+    }
+
+    /// Every law at the place of each effect of a structure, the others as they are.
+    pub(crate) fn laws(&self, structure: &Structure, values: &[f64]) -> Vec<Seed> {
+        let stated = structure.stated_of(self.evaluator.problem, values);
+        let own = self.effects_of(structure, values);
+        let mut seeds: Vec<(usize, Seed)> = Vec::new();
+        for (slot, (effect, values)) in structure.added.iter().zip(structure.added_of(values)).enumerate() {
+            let known: Vec<(&str, f64)> = effect.parameters.iter().zip(&values).map(|(p, v)| (p.key.as_str(), *v)).collect();
+            let beside = |h: &Hypothesis| structure.added.iter().enumerate().all(|(i, other)| i == slot || other.compatible(h));
+            for (index, h) in self.hypotheses.iter().enumerate() {
+                if !h.place.same(&effect.place) || h.id == effect.id || !beside(h) {
+                    continue;
+                }
+                let same = h.starts.first().map(|s| inherited(h, s, &known)).filter(|s| !h.starts.contains(s));
+                for (rank, start) in same.into_iter().chain(h.starts.iter().cloned()).enumerate() {
+                    let mut effects = own.clone();
+                    if let Some(place) = effects.get_mut(slot) {
+                        *place = (index, start);
+                        seeds.push((rank, Seed { effects, stated: stated.clone(), guided: true }));
+                    }
+                }
+            }
+        }
+        seeds.sort_by_key(|(rank, _)| *rank);
+        seeds.into_iter().map(|(_, seed)| seed).collect()
+    }
+}
+
+/// The best of each structure, best first, without those that are far behind; at most so many.
+fn rank(led: &mut Vec<(Structure, Fit)>, keep: usize) {
+    led.sort_by(|a, b| hopeful(&a.1).total_cmp(&hopeful(&b.1)));
+    distinct_fits(led);
+    let best = led.first().map_or(0.0, |(_, f)| hopeful(f).max(f.residuals.len() as f64));
+    led.retain(|(_, f)| hopeful(f) < BEHIND * best);
+    led.truncate(keep);
+}
+
+/// A start with the values that another law at the same place has for what both have: keys of the same name, levels of friction.
+fn inherited(hypothesis: &Hypothesis, start: &[f64], from: &[(&str, f64)]) -> Vec<f64> {
+    let level = |key: &str| ["force", "coulomb", "static"].contains(&key);
+    let value = |key: &str| {
+        let same = from.iter().find(|(other, _)| *other == key);
+        same.or_else(|| from.iter().find(|(other, _)| level(key) && level(other))).map(|(_, value)| *value)
+    };
+    let one = |(p, s): (&Parameter, &f64)| match value(&p.key).filter(|_| p.index.is_none()) {
+        Some(value) => value.clamp(p.range.0, p.range.1),
+        None => *s,
+    };
+    hypothesis.parameters.iter().zip(start).map(one).collect()
+}

@@ -1,0 +1,81 @@
+//! Parts of recordings that show enough: where many structures are tried, each is simulated only where what is left over is largest.
+//!
+//! A part is the recording's beginning where that shows enough. Others begin with the motion that the base of the search has there when it
+//! is led firmly; their first samples do not count, for laws with a memory begin without one.
+
+use crate::fit::{Evaluator, Fit, dot};
+use crate::guide::Guide;
+use crate::problem::Record;
+use crate::simulate::motion_at;
+use crate::structure::Structure;
+use backdrive_plant::set::Initial;
+use rayon::prelude::*;
+use std::ops::Range;
+
+/// Parts of recordings, ready to be simulated, and what leads along them.
+#[derive(Debug, Clone)]
+pub struct Parts {
+    /// The parts.
+    pub records: Vec<Record>,
+    /// The guide of the evaluator they were taken for, along them.
+    pub guide: Option<Guide>,
+}
+
+impl Parts {
+    /// The part of each recording where a fit leaves most over, all together about so many samples. `None` where the recordings are no
+    /// longer than that, or cannot be cut: they start freely, or have numbers of their own.
+    pub fn of(evaluator: &Evaluator, structure: &Structure, fit: &Fit, samples: usize) -> Option<Parts> {
+        let (problem, records) = (evaluator.problem, evaluator.records);
+        let total: usize = records.iter().map(|r| r.len).sum();
+        let own_numbers = problem.initial == Initial::Free || records.iter().any(|r| !r.conditions.is_empty());
+        if total < samples + samples / 2 || own_numbers {
+            return None;
+        }
+        let model = structure.model(problem, &fit.values)?;
+        // Led firmly, so that a part begins as it was measured and not as a model has it that lacks something.
+        let firm = evaluator.guide.as_ref().map(|g| g.with(FIRM * g.strength));
+        let layout = evaluator.layout();
+        let remembers = model.elements.iter().any(|e| MEMORY.contains(&e.law.kind().name));
+        let ranges: Vec<Range<usize>> = records
+            .iter()
+            .enumerate()
+            .map(|(r, record)| {
+                let length = (record.len * samples / total).clamp(record.len.min(SHORTEST), record.len);
+                let columns: Vec<&[f64]> = layout.iter().filter(|l| l.0 == r).filter_map(|l| fit.residuals.get(l.2.clone())).collect();
+                let stride = (length / 8).max(1);
+                let energy = |from: usize| columns.iter().filter_map(|c| c.get(from..from + length)).map(|c| dot(c, c)).sum::<f64>();
+                let from = (0..=record.len - length).step_by(stride).max_by(|a, b| energy(*a).total_cmp(&energy(*b))).unwrap_or(0);
+                // Of the same number of samples, less the first that do not count.
+                let early = remembers || energy(0) > (1.0 - FORGOTTEN) * energy(from) * ENOUGH;
+                if early { 0..length } else { from..from + length }
+            })
+            .collect();
+        let cut = |(r, range): (usize, &Range<usize>)| {
+            let begins = match range.start {
+                0 => Vec::new(),
+                at => motion_at(&model, &records[r], &[], evaluator.substeps, firm.as_ref().map(|g| (g, r)), at)?,
+            };
+            let skip = if range.start == 0 { 0 } else { (FORGOTTEN * range.len() as f64) as usize };
+            Some(records[r].part(range.clone(), begins, skip))
+        };
+        let parts = ranges.par_iter().enumerate().map(cut).collect::<Option<Vec<Record>>>()?;
+        let of: Vec<(usize, Range<usize>, f64)> = ranges.into_iter().enumerate().map(|(r, range)| (r, range, records[r].period)).collect();
+        Some(Parts { records: parts, guide: evaluator.guide.as_ref().map(|g| g.of_parts(&of)) })
+    }
+
+    /// An evaluator on these parts.
+    pub fn evaluator<'a>(&'a self, of: &Evaluator<'a>) -> Evaluator<'a> {
+        Evaluator { records: &self.records, guide: self.guide.clone(), ..of.clone() }
+    }
+}
+
+/// Kinds whose force depends on more than what moves now: no part can begin with it.
+const MEMORY: [&str; 6] = ["dahl", "lugre", "maxwell_slip", "preisach_lugre", "bouc_wen", "hysteretic_spring"];
+/// Share of a part that does not begin where its recording does, until what came before is forgotten.
+const FORGOTTEN: f64 = 0.3;
+/// Share of the most that a part could show which is enough for one that begins where its recording does.
+const ENOUGH: f64 = 0.4;
+/// How much more firmly the way to a part's beginning is led.
+const FIRM: f64 = 30.0;
+/// Samples of a part, at least.
+const SHORTEST: usize = 256;
