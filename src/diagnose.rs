@@ -23,6 +23,8 @@ use std::time::{Duration, Instant};
 const MODEL: &str = "model.diagnosed.toml";
 /// How long each record is fitted by itself, at most.
 const PER_RECORD: Duration = Duration::from_secs(4);
+/// And at least, where the search has taken all of its time.
+const LEAST: Duration = Duration::from_millis(500);
 
 /// Everything that was found.
 pub struct Found {
@@ -111,6 +113,7 @@ pub fn exit_code(verdict: &Value) -> u8 {
 
 /// Audit, search, verdict, and what shows it.
 fn find(problem: Problem, settings: &Settings, stop: &AtomicBool, report: &(dyn Fn(&str) + Sync)) -> Result<Found, Failure> {
+    let began = Instant::now();
     report("looking at the recordings");
     let remarks = audit::audit(&problem);
     let search = search(&problem, settings, Some(stop), report).map_err(Failure::input)?;
@@ -120,7 +123,9 @@ fn find(problem: Problem, settings: &Settings, stop: &AtomicBool, report: &(dyn 
         said.json["audit"] = audit::json(&remarks);
     }
     report("fitting each record by itself");
-    let per_record = fit_each(&problem, &search.nominal, &search.floor, Some(stop), Some(Instant::now() + PER_RECORD));
+    // A search that took all of its time leaves little for what only shows it.
+    let until = (began + settings.patience).clamp(Instant::now() + LEAST, Instant::now() + PER_RECORD);
+    let per_record = fit_each(&problem, &search.nominal, &search.floor, Some(stop), Some(until));
     report("locating the missing force");
     let location = located(&problem, &search);
     if said.json["where"].is_object() && said.json["where"]["state"].is_null() {

@@ -168,6 +168,55 @@ fn a_right_model_is_left_alone_and_its_numbers_are_found() {
     }
 }
 
+#[test]
+fn bags_that_do_not_start_at_rest_are_diagnosed_too() {
+    let place = Place::new();
+    record(&place, &format!("{NOMINAL}{FRICTION}"));
+    let done = place.backdrive(&["bag", "import", "sweep.csv", "triangle.csv", "multisine.csv", "--bag", "bags"]);
+    assert_eq!(done.code, Some(0), "{done:?}");
+    // The device moves already where the rows that count begin.
+    place.write(
+        "set.toml",
+        "model = 'model.toml'
+fit = ['bags/sweep.mcap', 'bags/triangle.mcap']
+held_out = ['bags/multisine.mcap']
+initial = 'free'
+[columns]
+force = { topic = '/recording/force', field = 'position[0]' }
+position = { topic = '/recording/position', field = 'position[0]' }
+[files.'bags/triangle.mcap']
+rows = [310, 1900]
+[files.'bags/multisine.mcap']
+rows = [155, 1900]
+",
+    );
+    let done = place.backdrive(&["diagnose", ".", "--out", "out", "--patience", "60", "--json"]);
+    let verdict = done.json();
+    assert_eq!(verdict["verdict"], "missing", "{verdict:#}");
+    assert_eq!(verdict["findings"][0]["physics"], "coulomb", "{verdict:#}");
+    let held = &verdict["held_out"];
+    let of = |key: &str| held[key].as_f64().unwrap();
+    assert!(of("nrmse_after") < 0.2 * of("nrmse_refit"), "{verdict:#}");
+    assert!(read(&place, "out/report.html").contains("coulomb@motor-ground"));
+}
+
+#[test]
+fn interrupted_it_writes_what_it_has() {
+    let place = Place::new();
+    record(&place, &format!("{NOMINAL}{FRICTION}"));
+    let run = place.start(&["diagnose", ".", "--out", "out", "--patience", "600"]);
+    std::thread::sleep(std::time::Duration::from_millis(300));
+    system::kill(run.pid(), nix::sys::signal::Signal::SIGINT);
+    let done = run.end();
+    // Either it was still at work, or it had found everything already.
+    assert!(done.code == Some(130) || done.code == Some(1), "{done:?}");
+    assert!(done.code == Some(1) || done.stderr.contains("what was found until then is written"), "{done:?}");
+    let verdict: serde_json::Value = serde_json::from_str(&read(&place, "out/verdict.json")).unwrap();
+    assert!(verdict["verdict"].is_string(), "{verdict:#}");
+    Model::from_toml(&read(&place, "out/model.diagnosed.toml"), "diagnosed").unwrap();
+    assert!(place.path("out/report.html").exists());
+}
+
 /// A recording of `n` rows with these columns; what is wrong with it is done to the text.
 fn recording(n: usize, header: &str, row: impl Fn(usize) -> String) -> String {
     (0..n).fold(format!("{header}\n"), |text, k| format!("{text}{}\n", row(k)))

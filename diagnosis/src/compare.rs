@@ -8,18 +8,33 @@ use serde::Serialize;
 /// Predictions of each output of the model in one record, in the output's unit, before rounding; `None` where it was not recorded.
 pub type Predicted = Vec<Option<Vec<f64>>>;
 
+/// A structure with these values, ready for recordings that no fit has seen: where a record starts freely, or a number is free in it, that
+/// is fitted to the record, and nothing else.
+struct Ready {
+    fixed: Problem,
+    own: Structure,
+    values: Vec<f64>,
+}
+
+impl Ready {
+    fn of(problem: &Problem, records: &[Record], structure: &Structure, values: &[f64]) -> Option<Ready> {
+        let fixed = Problem { model: structure.model(problem, values)?, stated: Vec::new(), ..problem.clone() };
+        let mut own = Structure::new(&fixed, records, Vec::new());
+        own.numbers.retain(|n| n.record.is_some());
+        let mut values = own.values(&fixed, &[], &[]);
+        if !own.numbers.is_empty()
+            && let Some(fit) = Evaluator::on(&fixed, records).fit(&own, &values, Effort { steps: 15, tolerance: 1.0 })
+        {
+            values = fit.values;
+        }
+        Some(Ready { fixed, own, values })
+    }
+}
+
 /// Predictions of a structure with these values for each of `records`. Where a record starts freely, or a number is free in it, that is
 /// fitted first, and nothing else. `None` where the structure cannot be simulated.
 pub fn predictions(problem: &Problem, records: &[Record], structure: &Structure, values: &[f64]) -> Option<Vec<Predicted>> {
-    let fixed = Problem { model: structure.model(problem, values)?, stated: Vec::new(), ..problem.clone() };
-    let mut own = Structure::new(&fixed, records, Vec::new());
-    own.numbers.retain(|n| n.record.is_some());
-    let mut values = own.values(&fixed, &[], &[]);
-    if !own.numbers.is_empty()
-        && let Some(fit) = Evaluator::on(&fixed, records).fit(&own, &values, Effort { steps: 15, tolerance: 1.0 })
-    {
-        values = fit.values;
-    }
+    let Ready { fixed, own, values } = Ready::of(problem, records, structure, values)?;
     let one = |(r, record): (usize, &Record)| {
         let columns = own.predict(&fixed.model, &values, record, r, 64)?;
         let mut of_outputs: Predicted = vec![None; record.outputs.len()];
@@ -29,6 +44,14 @@ pub fn predictions(problem: &Problem, records: &[Record], structure: &Structure,
         Some(of_outputs)
     };
     records.iter().enumerate().map(one).collect()
+}
+
+/// Mean square of what a structure with these values leaves over of `records`, as fits compare it, in squares of `floor`.
+pub fn mean_square(problem: &Problem, records: &[Record], structure: &Structure, values: &[f64], floor: &[f64]) -> Option<f64> {
+    let ready = Ready::of(problem, records, structure, values)?;
+    let evaluator = Evaluator { floor: floor.to_vec(), ..Evaluator::on(&ready.fixed, records) };
+    let residuals = evaluator.residuals(&ready.own, &ready.values).filter(|r| !r.is_empty())?;
+    Some(residuals.iter().map(|r| r * r).sum::<f64>() / residuals.len() as f64)
 }
 
 /// Normalised root mean squared error of a structure with these values, averaged over the recordings and their outputs; each over the

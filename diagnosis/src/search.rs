@@ -1,5 +1,6 @@
 //! Which physics was left out: from the nominal model, refitted, to the structures that explain the recordings best.
 
+use crate::compare::mean_square;
 use crate::fit::{Effort, Evaluator, Fit};
 use crate::floor;
 use crate::guide::Guide;
@@ -11,7 +12,7 @@ use crate::race::{Course, NEAR, Seed, distinct};
 use crate::screen::{Promise, Screen, pairs, worst_records};
 use crate::statistics::{advantage, correlation_time, levels};
 use crate::structure::Structure;
-use backdrive_plant::model::Model;
+use backdrive_plant::model::{InputKind, Model};
 use backdrive_plant::set::Initial;
 use rayon::prelude::*;
 use std::collections::HashSet;
@@ -203,16 +204,19 @@ pub fn search(
     let level = levels(&evaluator, &nominal.residuals).into_iter().fold(0.0, f64::max);
     let strength = if level > 3.0 * FAR { 1.0 } else { 0.3 };
     let loose = Guide::new(problem, &problem.fit, &scales, &evaluator.floor, strength);
-    let guided = level > FAR && !loose.is_empty();
-    let coarse = Evaluator { substeps: COARSE, widest: 8.0, guide: guided.then(|| loose.clone()), ..evaluator.clone() };
-    let from = if guided { &start } else { &nominal.values };
-    let at = coarse.fit(&structure, from, Effort { steps: if guided { 0 } else { 2 }, tolerance: 1.0 }).ok_or(SearchError::RunsAway)?;
+    let held = level > FAR && !loose.is_empty();
+    // A motion that is prescribed leads the device by itself.
+    let moved = problem.model.inputs.iter().any(|i| i.kind == InputKind::Motion);
+    let guided = held || level > FAR && moved;
+    let coarse = Evaluator { substeps: COARSE, widest: 8.0, guide: held.then(|| loose.clone()), ..evaluator.clone() };
+    let from = if held { &start } else { &nominal.values };
+    let at = coarse.fit(&structure, from, Effort { steps: if held { 0 } else { 2 }, tolerance: 1.0 }).ok_or(SearchError::RunsAway)?;
     let far = level > FAR;
     // The parts where most is left over are enough for screening; along the measured path they begin as they were measured.
     let parts = if far { Parts::of(&coarse, &structure, &at, SHOWN) } else { None };
     let on_parts = parts.as_ref().map_or_else(|| coarse.clone(), |p| p.evaluator(&coarse));
     let base = if guided { on_parts.fit(&structure, &at.values, Effort { steps: 12, tolerance: 1.0 }) } else { None }.unwrap_or(at);
-    if guided
+    if held
         && let Some(there) = middle.residuals(&structure, &base.values)
         && let Some(other) = worst_first(&middle, &structure, &base.values, &there, [8, 2])
         && other.cost < 0.99 * nominal.cost
@@ -235,15 +239,15 @@ pub fn search(
     ripples(problem, &model, &evaluator.floor, &mut hypotheses);
     report("screening");
     let share = if far { 0.08 } else { 0.2 };
-    let mut views = vec![View::of(&coarse, parts.as_ref(), &structure, base, &hypotheses, settings.patience.mul_f64(share))];
+    let mut views = vec![View::of(&coarse, parts.as_ref(), (&structure, base), &hypotheses, settings.patience.mul_f64(share), guided)];
     // Some effects show better on a free simulation; and the refit of a wrong structure may have carried the numbers off, so that
     // without a measured path the given ones are another base.
     let free = Evaluator { guide: None, ..coarse.clone() };
-    let (from, steps) = if guided { (&nominal.fit.values, 2) } else { (&start, 0) };
+    let (from, steps) = if held { (&nominal.fit.values, 2) } else { (&start, 0) };
     let other = if far { free.fit(&structure, from, Effort { steps, tolerance: 1.0 }) } else { None };
     let free_parts = other.as_ref().and_then(|fit| Parts::of(&free, &structure, fit, SHOWN));
     if let Some(fit) = other {
-        views.push(View::of(&free, free_parts.as_ref(), &structure, fit, &hypotheses, settings.patience.mul_f64(share)));
+        views.push(View::of(&free, free_parts.as_ref(), (&structure, fit), &hypotheses, settings.patience.mul_f64(share), false));
     }
     let view = &views[0];
     let course = Course {
@@ -400,10 +404,9 @@ pub fn search(
         nominal = candidate(&evaluator, nominal.structure, fit);
     }
     // The best are held against the recordings that no fit has seen.
-    let unseen = Evaluator { records: &problem.held_out, ..Evaluator::new(problem) };
-    let unseen = Evaluator { floor: evaluator.floor.clone(), ..unseen };
+    let unseen_samples = Evaluator { records: &problem.held_out, ..Evaluator::new(problem) }.len();
     for c in found.iter_mut().take(FINALISTS).chain(std::iter::once(&mut nominal)) {
-        c.unseen = unseen_cost(&unseen, &c.structure, &c.fit.values);
+        c.unseen = mean_square(problem, &problem.held_out, &c.structure, &c.fit.values, &evaluator.floor);
     }
     sort(&mut found, samples);
     for t in &mut tried {
@@ -412,7 +415,6 @@ pub fn search(
     }
     let simulations = evaluator.simulations.load(Ordering::Relaxed);
     let (floor, count) = (evaluator.floor.clone(), hypotheses.len());
-    let unseen_samples = unseen.len();
     let detectable = detectable(view, samples, &hypotheses);
     Ok(Search { floor, levels_given, nominal, found, tried, hypotheses: count, samples, unseen_samples, detectable, simulations, stopped })
 }
@@ -549,10 +551,10 @@ impl<'a> View<'a> {
     fn of(
         evaluator: &Evaluator<'a>,
         parts: Option<&'a Parts>,
-        structure: &Structure,
-        fit: Fit,
+        (structure, fit): (&Structure, Fit),
         hypotheses: &[Hypothesis],
         time: Duration,
+        guided: bool,
     ) -> View<'a> {
         let on = parts.map_or_else(|| evaluator.clone(), |p| p.evaluator(evaluator));
         let there = parts.and_then(|_| on.fit(structure, &fit.values, Effort { steps: 0, tolerance: 1.0 }));
@@ -565,7 +567,6 @@ impl<'a> View<'a> {
         let promises = screen.look(&fit, &|_| true);
         let (simple, rich) = promises.into_iter().partition(|p| hypotheses[p.hypothesis].parameters.len() <= SIMPLE);
         let stated = structure.stated_of(on.problem, &fit.values);
-        let guided = on.guide.is_some();
         View { screen, base: candidate(&on, structure.clone(), fit), evaluator: on, stated, guided, whole, simple, rich }
     }
 
@@ -635,15 +636,6 @@ fn key_of<'h>(added: impl IntoIterator<Item = &'h Hypothesis>) -> String {
 fn distinct_structures(found: &[Candidate], effects: usize) -> impl Iterator<Item = &Candidate> {
     let mut seen = HashSet::new();
     found.iter().filter(move |c| c.structure.added.len() == effects && seen.insert(key_of(&c.structure.added)))
-}
-
-/// Mean square of the residuals on recordings that no fit has seen, in floors; `None` where something of them would have to be fitted.
-fn unseen_cost(unseen: &Evaluator, structure: &Structure, values: &[f64]) -> Option<f64> {
-    if unseen.is_empty() || structure.numbers.iter().any(|n| n.record.is_some()) || unseen.problem.initial == Initial::Free {
-        return None;
-    }
-    let residuals = unseen.residuals(structure, values)?;
-    Some(residuals.iter().map(|r| r * r).sum::<f64>() / residuals.len() as f64)
 }
 
 /// Whether dry friction acts on a body whose motion is prescribed: its force then jumps with the sign of a measured motion.
