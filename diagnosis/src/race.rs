@@ -104,9 +104,13 @@ impl Course<'_> {
             // In the last stage those behind are kept as they are: they are rivals, if beaten ones.
             let rest = if stage == 2 { running.split_off(count.min(running.len())) } else { Vec::new() };
             running.truncate(count);
+            let lead = running.first().map_or(0.0, |(_, f)| hopeful(f));
             running = running
                 .into_par_iter()
                 .map(|(structure, fit)| {
+                    // Beside one that leaves nothing over, others only have to show that they do no better.
+                    let beaten = stage == 2 && lead < 1.1 * floor && hopeful(&fit) > lead;
+                    let effort = if beaten { Effort { steps: 6, ..effort } } else { effort };
                     let next = held_against.fit_knowing(&structure, &fit.values, effort, Some((&structure, &fit))).unwrap_or(fit);
                     (structure, next)
                 })

@@ -13,7 +13,6 @@ use crate::screen::{Promise, Screen, pairs, worst_records};
 use crate::statistics::{advantage, correlation_time, levels};
 use crate::structure::Structure;
 use backdrive_plant::model::{InputKind, Model};
-use backdrive_plant::set::Initial;
 use rayon::prelude::*;
 use std::collections::HashSet;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -139,6 +138,8 @@ const FAR: f64 = 2.0;
 const LOCATED: usize = 12_000;
 /// Samples that screening is shown far from the noise, about.
 const SHOWN: usize = 5_000;
+/// The last steps of those that could still win.
+const POLISH: Effort = Effort { steps: 15, tolerance: 0.3 };
 /// Candidates that are held against recordings that no fit has seen.
 const FINALISTS: usize = 12;
 /// A residual at its floor has this level, up to chance and rounding.
@@ -376,11 +377,12 @@ pub fn search(
     report("fitting the best to the end");
     let last = Evaluator { until: Some(began + settings.patience.mul_f64(0.9)), ..evaluator.clone() };
     let best = found.first().map_or(f64::INFINITY, |c| c.fit.cost);
-    let ends: Vec<usize> = (0..found.len().min(6))
-        .filter(|i| found[*i].fit.cost < 1.5 * best && found[*i].fit.foreseen > 0.5 * found[*i].fit.cost / samples as f64)
-        .collect();
+    // Those that could still win, or tie with the best.
+    let unit = best / samples as f64;
+    let open = |c: &Candidate| c.fit.foreseen > 0.5 * unit && c.fit.cost - 2.0 * c.fit.foreseen < best + 20.0 * unit * c.correlation_time;
+    let ends: Vec<usize> = (0..found.len().min(6)).filter(|i| found[*i].fit.cost < 1.5 * best && open(&found[*i])).collect();
     let polished: Vec<(usize, Fit)> =
-        ends.par_iter().filter_map(|i| Some((*i, last.fit(&found[*i].structure, &found[*i].fit.values, Effort::FULL)?))).collect();
+        ends.par_iter().filter_map(|i| Some((*i, last.fit(&found[*i].structure, &found[*i].fit.values, POLISH)?))).collect();
     for (i, fit) in polished {
         found[i] = candidate(&evaluator, found[i].structure.clone(), fit);
     }
@@ -390,10 +392,13 @@ pub fn search(
     let last = Evaluator { until: Some(began + settings.patience.mul_f64(0.97)), ..evaluator.clone() };
     let own = nominal.structure.stated_of(problem, &nominal.fit.values);
     let others = found.iter().take(2).map(|c| c.structure.stated_of(problem, &c.fit.values));
+    // Far from the noise its last thousandths say nothing.
+    let effort = if is_far { Effort { steps: 8, tolerance: 3.0 } } else { Effort::FULL };
+    let last = Evaluator { substeps: if is_far { MIDDLE } else { last.substeps }, ..last };
     for stated in others.chain(is_far.then_some(own)) {
         let start = nominal.structure.values(problem, &stated, &[]);
         let least = better.as_ref().map_or(nominal.fit.cost, |f: &Fit| f.cost);
-        if let Some(fit) = last.fit(&nominal.structure, &start, Effort::FULL)
+        if let Some(fit) = last.fit(&nominal.structure, &start, effort)
             && fit.cost < 0.999 * least
         {
             better = Some(fit);
