@@ -425,15 +425,19 @@ pub fn search(
 }
 
 impl Course<'_> {
-    /// Simpler laws of the same family in the place of each effect of the best.
+    /// Laws of the same family that are as simple or simpler in the place of each effect of the best.
     fn relatives(&self, found: &[Candidate]) -> Vec<Seed> {
         let Some(best) = found.first() else { return Vec::new() };
         let stated = best.structure.stated_of(self.evaluator.problem, &best.fit.values);
         let own = self.effects_of(&best.structure, &best.fit.values);
         let mut seeds = Vec::new();
         for (out, effect) in best.structure.added.iter().enumerate() {
-            let relative =
-                |h: &Hypothesis| h.place.same(&effect.place) && h.family == effect.family && h.parameters.len() < effect.parameters.len();
+            let relative = |h: &Hypothesis| {
+                h.place.same(&effect.place)
+                    && h.family == effect.family
+                    && h.id != effect.id
+                    && h.parameters.len() <= effect.parameters.len()
+            };
             for (index, h) in self.hypotheses.iter().enumerate().filter(|(_, h)| relative(h)) {
                 for start in &h.starts {
                     let mut effects = own.clone();

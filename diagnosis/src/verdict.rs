@@ -55,6 +55,10 @@ const LEAST_SHARE: f64 = 0.02;
 const TIE: f64 = 8.0;
 /// Explanations of an advantage below this over each other cannot be told apart.
 const ALIKE: f64 = 6.0;
+/// Level and correlation time (samples) up to which what is left over is measuring error beyond doubt.
+const NOISE_LEVEL: f64 = 1.05;
+/// See [`NOISE_LEVEL`].
+const NOISE_MEMORY: f64 = 1.2;
 /// Level above which what is left over is no measuring error.
 const LEFT_OVER: f64 = 1.15;
 
@@ -244,10 +248,13 @@ fn contains(rich: &str, own: &Hypothesis) -> bool {
     withheld(&[own.physics]).contains(&rich) || physics_named(rich).is_some_and(|p| p.family == own.family)
 }
 
-/// How far what is left over is measuring error: 1 where it is, less the more is left.
+/// How far what is left over is measuring error: 1 where it has its size and hangs together no more than it, less the more of either. A law
+/// that only imitates what is there leaves a little over, and that little is not white.
 fn adequacy(best: &Candidate) -> f64 {
     let level = best.levels.iter().fold(0.0f64, |a, b| a.max(*b));
-    (-(level - LEFT_OVER).max(0.0) / 0.8).exp().max(0.05)
+    let size = (-(level - NOISE_LEVEL).max(0.0) / 0.15).exp();
+    let whiteness = (-(best.correlation_time - NOISE_MEMORY).max(0.0) / 1.5).exp();
+    (size * whiteness).max(0.05)
 }
 
 /// Whether the recordings move the device by more than the measuring error.

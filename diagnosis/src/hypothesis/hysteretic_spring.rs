@@ -7,7 +7,8 @@ use super::sites::ELASTIC;
 pub(super) const PHYSICS: Physics = Physics {
     name: "hysteretic_spring",
     family: "hysteresis",
-    contains: &["spring"],
+    // Without slopes, and the same both ways, it is the Dahl friction.
+    contains: &["spring", "dahl"],
     propose: |sites| {
         let one = |site| {
             let new = ElementBuilder::new(sites, &PHYSICS, site)?;
