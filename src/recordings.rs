@@ -1,6 +1,7 @@
 //! Recordings and the model that they are held against, as `diagnose` and `fit` are given them.
 
 use crate::failure::Failure;
+use backdrive_bags::Reader;
 use backdrive_diagnosis::audit;
 use backdrive_diagnosis::problem::{Problem, ProblemError};
 use backdrive_plant::recording::{Columns, RecordingError};
@@ -55,10 +56,27 @@ pub fn open(paths: &[PathBuf], model: Option<&Path>) -> Result<Opened, Failure> 
             }
         }
     }
+    notes.extend(set.fit.iter().chain(&set.held_out).filter_map(|file| unfinished(&set.folder.join(file))));
     let problem = Problem::of_set(&set, model).map_err(|e| told_failure(&e, model, &set))?;
     audit::usable(&problem).map_err(Failure::input)?;
     let name = paths.first().map_or(String::new(), |p| p.file_name().map_or(p.display().to_string(), |n| n.to_string_lossy().into_owned()));
     Ok(Opened { problem, name, notes })
+}
+
+/// What is wrong with a bag whose recording did not come to its end; `None` where nothing is, and for what is no bag. What cannot be read
+/// at all is told when it is used.
+fn unfinished(path: &Path) -> Option<String> {
+    if !path.extension().is_some_and(|e| e.eq_ignore_ascii_case("mcap")) {
+        return None;
+    }
+    let reader = Reader::open(path).ok()?;
+    let name = path.display();
+    let recover = "what it holds is used, and `backdrive bag recover` makes a clean copy";
+    match reader.damage().first() {
+        Some(damage) => Some(format!("{name} is damaged ({damage}): {recover}")),
+        None if !reader.ended_cleanly() => Some(format!("{name} was not closed: {recover}")),
+        None => None,
+    }
 }
 
 /// The last part of a path.

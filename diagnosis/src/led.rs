@@ -2,7 +2,7 @@
 //! apart that a free simulation does not show until all else is right.
 
 use crate::fit::{Effort, Evaluator, Fit};
-use crate::hypothesis::{Hypothesis, Parameter};
+use crate::hypothesis::{Hypothesis, Parameter, Place};
 use crate::race::{Course, Seed, distinct_fits, hopeful};
 use crate::structure::Structure;
 use rayon::prelude::*;
@@ -12,6 +12,8 @@ use std::time::{Duration, Instant};
 const BEHIND: f64 = 2.5;
 /// Mean squared residual along the measured path up to which a structure may be all that is missing, squares of the floor.
 const CLOSE: f64 = 1.2;
+/// Places whose laws are tried.
+const PLACES: usize = 2;
 /// Time in which every law at a place takes its first step; starts beyond the first of each come last.
 const LAWS: Duration = Duration::from_millis(2500);
 
@@ -25,10 +27,20 @@ impl Course<'_> {
             return seeds.iter().map(|seed| self.entry(seed)).collect();
         }
         let mut led = self.lead(self.first_steps(seeds, None), count);
-        let far = |led: &[(Structure, Fit)]| led.first().filter(|(_, f)| hopeful(f) > CLOSE * f.residuals.len() as f64).cloned();
-        // Where one law helps another one may be the right one: the place first, then the law.
-        if let Some((structure, fit)) = far(&led) {
-            led.extend(self.first_steps(&self.laws(&structure, &fit.values), Some(LAWS)));
+        // Where one law helps another one may be the right one: the places first, then the laws.
+        if led.first().is_some_and(|(_, f)| hopeful(f) > CLOSE * f.residuals.len() as f64) {
+            let mut places: Vec<Vec<&Place>> = Vec::new();
+            let mut laws = Vec::new();
+            for (structure, fit) in &led {
+                let at: Vec<&Place> = structure.added.iter().map(|h| &h.place).collect();
+                if places.len() < PLACES && !places.contains(&at) {
+                    laws.extend(self.ranked_laws(structure, &fit.values));
+                    places.push(at);
+                }
+            }
+            laws.sort_by_key(|(rank, _)| *rank);
+            let laws: Vec<Seed> = laws.into_iter().map(|(_, seed)| seed).collect();
+            led.extend(self.first_steps(&laws, Some(LAWS)));
             led = self.lead(led, count);
         }
         led = self.loosen(led, count);
@@ -96,8 +108,15 @@ impl Course<'_> {
         led
     }
 
-    /// Every law at the place of each effect of a structure, the others as they are.
+    /// Every law at the place of each effect of a structure, the others as they are; first starts first.
     pub(crate) fn laws(&self, structure: &Structure, values: &[f64]) -> Vec<Seed> {
+        let mut seeds = self.ranked_laws(structure, values);
+        seeds.sort_by_key(|(rank, _)| *rank);
+        seeds.into_iter().map(|(_, seed)| seed).collect()
+    }
+
+    /// The same with the place of each start among those of its law.
+    fn ranked_laws(&self, structure: &Structure, values: &[f64]) -> Vec<(usize, Seed)> {
         let stated = structure.stated_of(self.evaluator.problem, values);
         let own = self.effects_of(structure, values);
         let mut seeds: Vec<(usize, Seed)> = Vec::new();
@@ -118,8 +137,7 @@ impl Course<'_> {
                 }
             }
         }
-        seeds.sort_by_key(|(rank, _)| *rank);
-        seeds.into_iter().map(|(_, seed)| seed).collect()
+        seeds
     }
 }
 
