@@ -337,7 +337,7 @@ pub fn search(
             Singles => singles.by_ref().take(if guided { 30 } else { 5 }).collect(),
             MoreSingles => singles.by_ref().collect(),
             // A law that wins with more numbers has to win over its simpler relatives, whatever these promised.
-            Relatives => course.relatives(&found),
+            Relatives => course.relatives(&found, done(&found, &nominal, samples)),
             Richer => {
                 // In the place of what is the best of its kind.
                 let best = distinct_structures(&found, 1).next().map(|c| &c.structure.added[0]);
@@ -425,8 +425,8 @@ pub fn search(
 }
 
 impl Course<'_> {
-    /// Laws of the same family that are as simple or simpler in the place of each effect of the best.
-    fn relatives(&self, found: &[Candidate]) -> Vec<Seed> {
+    /// Simpler laws of the same family in the place of each effect of the best; where something is left to explain, laws that are as simple, too.
+    fn relatives(&self, found: &[Candidate], done: bool) -> Vec<Seed> {
         let Some(best) = found.first() else { return Vec::new() };
         let stated = best.structure.stated_of(self.evaluator.problem, &best.fit.values);
         let own = self.effects_of(&best.structure, &best.fit.values);
@@ -436,7 +436,7 @@ impl Course<'_> {
                 h.place.same(&effect.place)
                     && h.family == effect.family
                     && h.id != effect.id
-                    && h.parameters.len() <= effect.parameters.len()
+                    && h.parameters.len() < effect.parameters.len() + usize::from(!done)
             };
             for (index, h) in self.hypotheses.iter().enumerate().filter(|(_, h)| relative(h)) {
                 for start in &h.starts {

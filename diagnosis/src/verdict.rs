@@ -476,6 +476,9 @@ fn sentence(word: &str, best: &Candidate) -> String {
         "ambiguous" => format!("the model leaves out {} or something that the recordings cannot tell from it", best.structure.name()),
         "cannot_tell" => "the recordings hardly move the device: they cannot tell what is missing".to_string(),
         "missing" => format!("the model leaves out {}; with it the recordings are explained {end}", best.structure.name()),
+        "unexplained" if best.structure.added.is_empty() => {
+            format!("something is missing that none of the laws tried explains; refitted, the model comes {end}")
+        }
         "unexplained" => format!("something is missing that no known physics explains; the nearest is {}, {end}", best.structure.name()),
         "parameters" => format!("nothing is missing, but the model's numbers are off; refitted they explain the recordings {end}"),
         _ => format!("the model explains the recordings {end}"),

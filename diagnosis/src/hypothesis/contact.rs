@@ -18,8 +18,7 @@ fn stops(sites: &Sites, site: &Site) -> Vec<super::Hypothesis> {
         let new = ElementBuilder::new(sites, &PHYSICS, site)?;
         let new = if reversed { new.reversed() } else { new };
         let new = new
-            // What does not push back is no stop.
-            .number("stiffness", even(0.02 * typical, 1000.0 * typical, 0.0))
+            .number("stiffness", even(0.0, 1000.0 * typical, 0.0))
             .number("damping", even(0.0, 100.0 * site.force / site.speed, 0.0))
             .number("gap", any(-peak, peak));
         let b = 0.01 * site.force / site.speed;
