@@ -4,7 +4,7 @@ use crate::fit::{Effort, Evaluator, Fit};
 use crate::hypothesis::Hypothesis;
 use crate::problem::Record;
 use crate::screen::{Promise, worst_records};
-use crate::search::{COARSE, Candidate, MIDDLE, candidate};
+use crate::search::{COARSE, Candidate, MIDDLE, candidate, key_of};
 use crate::structure::Structure;
 use backdrive_plant::set::Initial;
 use rayon::prelude::*;
@@ -129,11 +129,7 @@ impl Course<'_> {
 /// Keeps the first fit of each structure.
 pub(crate) fn distinct_fits(fits: &mut Vec<(Structure, Fit)>) {
     let mut names = HashSet::new();
-    fits.retain(|(structure, _)| {
-        let mut ids: Vec<&str> = structure.added.iter().map(|h| h.id.as_str()).collect();
-        ids.sort_unstable();
-        names.insert(ids.join("+"))
-    });
+    fits.retain(|(structure, _)| names.insert(key_of(&structure.added)));
 }
 
 /// A fit's residuals and derivatives on some of its recordings.

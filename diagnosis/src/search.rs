@@ -635,7 +635,7 @@ fn detectable(view: &View, samples: usize, hypotheses: &[Hypothesis]) -> Vec<Det
 }
 
 /// The ids of a structure's effects, whatever their order.
-fn key_of<'h>(added: impl IntoIterator<Item = &'h Hypothesis>) -> String {
+pub(crate) fn key_of<'h>(added: impl IntoIterator<Item = &'h Hypothesis>) -> String {
     let mut ids: Vec<&str> = added.into_iter().map(|h| h.id.as_str()).collect();
     ids.sort_unstable();
     ids.join("+")
