@@ -3,6 +3,7 @@
 use super::constraints::{Constraints, Work};
 use super::dense;
 use super::drive::Drive;
+use super::endpoint::Endpoint;
 use super::exact::Propagator;
 use super::sense::Sense;
 use super::{CompileError, FrictionContact, GROUND, MAX_BODIES, MAX_ELEMENTS, Options, PathElement, Plant, SLOTS, Slots, prescribed_slot};
@@ -350,6 +351,7 @@ pub(super) fn plant(model: &Model, period: f64, options: &Options) -> Result<Pla
         frictions,
         paths,
         work: Box::new(Work::new()),
+        instant: Some(Box::new(Endpoint::new())),
         sense,
         energy: None,
         exact,

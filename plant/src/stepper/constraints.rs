@@ -15,6 +15,10 @@ const SWEEPS: usize = 25;
 const ROUNDS: usize = 12;
 /// Change of a force in a sweep, against its span, that counts as none.
 const TOLERANCE: f64 = 1e-14;
+/// The same for a law of the path, against the force that would stop its ends.
+const TOLERANCE_OF_LAWS: f64 = 4e-12;
+/// How exactly one law is solved, as a share of the velocity across it: steep laws round their force more coarsely than a velocity.
+const EXACT: f64 = 1e-12;
 /// Elements whose force changes by more than this share per share of velocity are solved implicitly.
 const STIFF: f64 = 0.1;
 /// The same where slopes are only estimates.
@@ -176,8 +180,7 @@ impl Constraints {
                 let mut settled = true;
                 for c in 0..count {
                     let change = self.relax(c, work, paths).abs();
-                    let span = if c < self.frictions { work.bounds[c].high - work.bounds[c].low } else { work.force[c].abs() };
-                    settled &= change <= TOLERANCE * span;
+                    settled &= change <= self.tolerance(c, work, paths);
                 }
                 if settled {
                     return;
@@ -185,6 +188,20 @@ impl Constraints {
             }
             self.solve_sticking(work);
         }
+    }
+
+    /// Change of a constraint's force in a sweep that counts as none, N.
+    #[inline]
+    fn tolerance(&self, c: usize, work: &Work, paths: &[PathElement]) -> f64 {
+        if c < self.frictions {
+            return TOLERANCE * (work.bounds[c].high - work.bounds[c].low);
+        }
+        let own = self.own_compliance(c);
+        if own <= 0.0 {
+            return TOLERANCE_OF_LAWS * work.force[c].abs();
+        }
+        let unknown = self.paths.get(c - self.frictions).and_then(|p| paths.get(*p)).map_or(0.0, PathElement::rounding);
+        TOLERANCE_OF_LAWS * (work.force[c].abs() + work.base[c].abs() / own) + 4.0 * unknown / own
     }
 
     /// Newton step for the contacts inside their bounds: makes all of them stick at once. Contacts that depend on
@@ -239,11 +256,23 @@ fn transposed(columns: &Columns, i: usize) -> Slots {
     row
 }
 
+impl PathElement {
+    /// What rounding of its displacement leaves unknown of its mean velocity over a substep, m/s.
+    #[inline]
+    fn rounding(&self) -> f64 {
+        f64::EPSILON * self.reached.abs() / self.ahead
+    }
+}
+
 /// Force of a path element over a substep whose mean relative velocity is `u`.
 #[inline]
 fn trial_force(path: &mut PathElement, u: f64) -> f64 {
     let ahead = path.reached + path.ahead * u;
-    path.trial.copy_from_slice(&path.memory);
+    // Most have one number, which is quicker copied than asked for its length.
+    match (&mut path.trial[..], &path.memory[..]) {
+        ([trial], [memory]) => *trial = *memory,
+        (trial, memory) => trial.copy_from_slice(memory),
+    }
     path.law.advance(&mut path.trial, path.reached, ahead, path.ahead);
     if path.unresolved {
         path.law.force(&path.trial, ahead, u)
@@ -259,11 +288,12 @@ fn solve_law(path: &mut PathElement, w: f64, own: f64, start: f64) -> f64 {
         return trial_force(path, w);
     }
     let mut best_force = start;
+    let unknown = path.rounding();
     let mut excess = |u: f64, best: &mut f64| {
         *best = trial_force(path, u);
         u + own * *best - w
     };
-    let scale = 1e-15 * (w.abs() + own * start.abs());
+    let scale = 1e-15 * (w.abs() + own * start.abs()) + unknown;
     let mut a = w - own * start;
     let mut at_a = excess(a, &mut best_force);
     if at_a.abs() <= scale {
@@ -287,7 +317,7 @@ fn solve_law(path: &mut PathElement, w: f64, own: f64, start: f64) -> f64 {
         evaluations += 1;
     }
     // Illinois: the stale end's value is halved so that both ends close in.
-    while evaluations < EVALUATIONS && at_b.abs() > scale && (b - a).abs() > 1e-16 * (a.abs() + b.abs()) {
+    while evaluations < EVALUATIONS && at_b.abs() > scale && (b - a).abs() > EXACT * (a.abs() + b.abs()) + unknown {
         let next = b - at_b * (b - a) / (at_b - at_a);
         let value = excess(next, &mut best_force);
         if value * at_b < 0.0 {

@@ -3,13 +3,14 @@
 //! A substep knows forces as means over it; outputs want them at the sample.
 
 use super::compile::Share;
-use super::{MAX_ELEMENTS, Plant, SLOTS, Slots};
+use super::{GROUND, MAX_ELEMENTS, Plant, SLOTS, Slots};
 use crate::elements::Mechanics;
 
 /// Sweeps over the friction contacts: accelerations need no more digits than an output has.
 const SWEEPS: usize = 200;
 
 /// An instant.
+#[derive(Debug, Clone)]
 pub(super) struct Endpoint {
     /// m/s².
     pub(super) acceleration: Slots,
@@ -19,19 +20,37 @@ pub(super) struct Endpoint {
     pub(super) path: [f64; MAX_ELEMENTS],
 }
 
+impl Endpoint {
+    pub(super) fn new() -> Endpoint {
+        Endpoint { acceleration: [0.0; SLOTS], friction: [0.0; MAX_ELEMENTS], path: [0.0; MAX_ELEMENTS] }
+    }
+}
+
 impl Plant {
     /// The balance of forces now. Sliding contacts have the level of their speed; those that stick what keeps their
     /// ends together.
     pub(super) fn endpoint(&self) -> Endpoint {
+        let mut now = Endpoint::new();
+        self.balance(&mut now);
+        now
+    }
+
+    /// The same into a place that is there already.
+    pub(super) fn balance(&self, now: &mut Endpoint) {
         let fixed = &self.fixed;
-        let mut now = Endpoint { acceleration: self.prescribed_acceleration, friction: [0.0; MAX_ELEMENTS], path: [0.0; MAX_ELEMENTS] };
+        now.acceleration = self.prescribed_acceleration;
         let mut force = [0.0; SLOTS];
+        let prescribed = GROUND - fixed.prescribed;
         for i in 0..fixed.free {
-            let row = |matrix: &Slots, q: &Slots| matrix.iter().zip(q).map(|(m, q)| m * q).sum::<f64>();
-            force[i] = fixed.constant[i] + self.pushed[i]
-                - row(&fixed.stiffness[i], &self.x)
-                - row(&fixed.damping[i], &self.v)
-                - row(&fixed.mass[i], &self.prescribed_acceleration);
+            let (stiffness, damping, mass) = (&fixed.stiffness[i], &fixed.damping[i], &fixed.mass[i]);
+            let mut f = fixed.constant[i] + self.pushed[i];
+            for j in (0..fixed.free).chain(prescribed..GROUND) {
+                f -= stiffness[j] * self.x[j] + damping[j] * self.v[j];
+            }
+            for j in prescribed..GROUND {
+                f -= mass[j] * self.prescribed_acceleration[j];
+            }
+            force[i] = f;
         }
         for (path, f) in self.paths.iter().zip(&mut now.path) {
             let (first, second) = (path.first, path.second);
@@ -50,8 +69,7 @@ impl Plant {
             force[contact.second] += *f;
         }
         self.accelerate(&force, &mut now.acceleration);
-        self.hold_sticking(&mut force, &mut now);
-        now
+        self.hold_sticking(&mut force, now);
     }
 
     fn accelerate(&self, force: &Slots, acceleration: &mut Slots) {
@@ -114,7 +132,7 @@ impl Plant {
         }
         let fixed = &self.fixed;
         let mut reaction = -fixed.constant[slot] - self.pushed[slot];
-        for j in 0..SLOTS {
+        for j in (0..fixed.free).chain(GROUND - fixed.prescribed..GROUND) {
             reaction +=
                 fixed.mass[slot][j] * now.acceleration[j] + fixed.damping[slot][j] * self.v[j] + fixed.stiffness[slot][j] * self.x[j];
         }

@@ -31,6 +31,7 @@ use crate::model::Model;
 use compile::Compiled;
 use constraints::Work;
 use drive::Drive;
+use endpoint::Endpoint;
 use sense::Sense;
 
 /// Bodies, at most.
@@ -235,6 +236,8 @@ pub struct Plant {
     frictions: Vec<FrictionContact>,
     paths: Vec<PathElement>,
     work: Box<Work>,
+    /// Space for the balance of forces at a sample; always there between calls.
+    instant: Option<Box<Endpoint>>,
     sense: Sense,
     energy: Option<energy::Account>,
     exact: Option<exact::Propagator>,

@@ -115,10 +115,13 @@ impl Plant {
     /// Outputs now, in the order and units of the model: gain, delay, offset, then noise and resolution if the options
     /// say so. Values beyond `values` are dropped, what is beyond the outputs is left alone.
     pub fn outputs(&mut self, values: &mut [f64]) {
-        let now = self.sense.needs_forces.then(|| self.endpoint());
+        let now = if self.sense.needs_forces { self.instant.take() } else { None }.map(|mut now| {
+            self.balance(&mut now);
+            now
+        });
         for (index, value) in values.iter_mut().enumerate().take(self.sense.sensors.len()) {
             let sensor = &self.sense.sensors[index];
-            let raw = if sensor.delay > 0.0 { sensor.delayed(self.sense.noted) } else { self.reading(sensor, now.as_ref()) };
+            let raw = if sensor.delay > 0.0 { sensor.delayed(self.sense.noted) } else { self.reading(sensor, now.as_deref()) };
             *value = sensor.gain * raw + sensor.offset;
             let (noise, resolution) = (sensor.noise, sensor.resolution);
             if noise > 0.0
@@ -131,6 +134,7 @@ impl Plant {
                 *value = resolution * (*value / resolution + 0.5).floor();
             }
         }
+        self.instant = now.or(self.instant.take());
     }
 
     /// Number of outputs.
