@@ -7,6 +7,7 @@ use crate::failure::{Failure, code};
 use crate::progress;
 use crate::recordings;
 use backdrive_diagnosis::audit::{self, Remark};
+use backdrive_diagnosis::clock::Moment;
 use backdrive_diagnosis::evidence;
 use backdrive_diagnosis::locate::{self, Location, locate};
 use backdrive_diagnosis::per_record::{PerRecord, fit_each};
@@ -113,7 +114,7 @@ pub fn exit_code(verdict: &Value) -> u8 {
 
 /// Audit, search, verdict, and what shows it.
 fn find(problem: Problem, settings: &Settings, stop: &AtomicBool, report: &(dyn Fn(&str) + Sync)) -> Result<Found, Failure> {
-    let began = Instant::now();
+    let began = Moment::now();
     report("looking at the recordings");
     let remarks = audit::audit(&problem);
     let search = search(&problem, settings, Some(stop), report).map_err(Failure::input)?;
@@ -124,7 +125,8 @@ fn find(problem: Problem, settings: &Settings, stop: &AtomicBool, report: &(dyn 
     }
     report("fitting each record by itself");
     // A search that took all of its time leaves little for what only shows it.
-    let until = (began + settings.patience).clamp(Instant::now() + LEAST, Instant::now() + PER_RECORD);
+    let left = settings.patience.saturating_sub(began.elapsed()).clamp(LEAST, PER_RECORD);
+    let until = Moment::now() + left;
     let per_record = fit_each(&problem, &search.nominal, &search.floor, Some(stop), Some(until));
     report("locating the missing force");
     let location = located(&problem, &search);

@@ -4,6 +4,7 @@ use crate::cli;
 use crate::failure::{Failure, code};
 use crate::progress;
 use crate::recordings::{self, file_name};
+use backdrive_diagnosis::clock::Moment;
 use backdrive_diagnosis::compare::{Quality, predictions, qualities};
 use backdrive_diagnosis::hypothesis::PHYSICS;
 use backdrive_diagnosis::intervals::Spread;
@@ -16,7 +17,7 @@ use serde_json::json;
 use std::fmt::Write as _;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// Correlations from here on are named.
 const CORRELATED: f64 = 0.9;

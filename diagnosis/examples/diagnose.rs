@@ -36,7 +36,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             found.hypotheses, found.simulations, found.floor, found.levels_given
         );
         let nominal = &found.nominal;
-        eprintln!("nominal: {:.4} {:.3?} correlation {:.1}", nominal.fit.cost / n, nominal.levels, nominal.correlation_time);
+        eprintln!("nominal: {:.4} {:.3?} correlation {:.1} slow {:.1}", nominal.fit.cost / n, nominal.levels, nominal.correlation_time, nominal.slowness);
         for t in found.tried.iter().take(10) {
             eprintln!("   promised {:.3} taken {:.3?} {}", t.promised, t.taken, t.id);
         }
@@ -44,10 +44,11 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             let (cost, ahead) = (c.fit.cost / n, search::advantage_over(nominal, c, found.samples));
             let values = c.structure.added_of(&c.fit.values);
             eprintln!(
-                "{:<62} {cost:.4} {:.3?} correlation {:.1} ahead {ahead:.1} steps {} foreseen {:.2} {values:.4?}",
+                "{:<62} {cost:.4} {:.3?} correlation {:.1} slow {:.1} ahead {ahead:.1} steps {} foreseen {:.2} {values:.4?}",
                 c.structure.name(),
                 c.levels,
                 c.correlation_time,
+                c.slowness,
                 c.fit.steps,
                 c.fit.foreseen
             );

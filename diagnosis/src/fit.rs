@@ -22,7 +22,7 @@ pub struct Evaluator<'a> {
     /// Set from outside to end every fit after its present step.
     pub stop: Option<&'a AtomicBool>,
     /// When every fit ends after its present step.
-    pub until: Option<std::time::Instant>,
+    pub until: Option<crate::clock::Moment>,
     /// Simulations of a record so far.
     pub simulations: Arc<AtomicUsize>,
     /// Substeps per sample, at most: fewer are faster, and blur what is very stiff.
@@ -329,7 +329,7 @@ impl<'a> Evaluator<'a> {
 
     /// Whether fits should come to an end.
     pub fn is_late(&self) -> bool {
-        self.stop.is_some_and(|s| s.load(Ordering::Relaxed)) || self.until.is_some_and(|t| std::time::Instant::now() > t)
+        self.stop.is_some_and(|s| s.load(Ordering::Relaxed)) || self.until.is_some_and(|t| crate::clock::Moment::now() > t)
     }
 
     /// The best of fits from several starts.

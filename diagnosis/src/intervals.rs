@@ -1,10 +1,11 @@
 //! How sure the numbers of a fit are.
 
+use crate::clock::Moment;
 use crate::fit::{Evaluator, normal_equations};
 use crate::search::Candidate;
 use crate::simulate::TWICE;
 use nalgebra::{DMatrix, DVector};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// Standard deviations of a fit's numbers, in the fit's own unit (logarithms where it steps in them), and their correlations. Residuals
 /// that hang together count as fewer, and what is left over counts as error.
@@ -53,7 +54,7 @@ impl Spread {
         let mut spread = Spread::of(candidate);
         let structure = &candidate.structure;
         let own: Vec<f64> = structure.numbers.iter().zip(&candidate.fit.values).map(|(n, v)| n.inward(*v)).collect();
-        let began = Instant::now();
+        let began = Moment::now();
         let Some(residuals) = evaluator.residuals(structure, &candidate.fit.values) else { return spread };
         // Where simulations are slow, derivatives come from fewer substeps, and finer ones are not tried.
         let slow = began.elapsed() > SLOW;

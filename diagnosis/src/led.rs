@@ -1,12 +1,13 @@
 //! The first part of a race, along the measured path: simulations are short there, fits go far in a step, and what is left over tells laws
 //! apart that a free simulation does not show until all else is right.
 
+use crate::clock::Moment;
 use crate::fit::{Effort, Evaluator, Fit};
 use crate::hypothesis::{Hypothesis, Parameter, Place};
 use crate::race::{Course, Seed, distinct_fits, hopeful};
 use crate::structure::Structure;
 use rayon::prelude::*;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// How many times the best cost ends a race.
 const BEHIND: f64 = 2.5;
@@ -64,7 +65,7 @@ impl Course<'_> {
     /// One step of each, as far as there is time.
     fn first_steps(&self, seeds: &[Seed], time: Option<Duration>) -> Vec<(Structure, Fit)> {
         let Some((held, base)) = self.along else { return Vec::new() };
-        let began = Instant::now();
+        let began = Moment::now();
         let step = |seed: &Seed| {
             if self.evaluator.is_late() || time.is_some_and(|t| began.elapsed() > t) {
                 return None;

@@ -5,6 +5,7 @@
 //! [`verdict`] says what follows, as a file and a model.
 
 pub mod audit;
+pub mod clock;
 pub mod compare;
 pub mod evidence;
 pub mod experiment;

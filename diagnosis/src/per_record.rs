@@ -1,18 +1,18 @@
 //! The same structure fitted to each record by itself: numbers that differ from record to record by more than their errors are the sign
 //! of a wrong structure, for a device has one set of numbers.
 
+use crate::clock::Moment;
 use crate::fit::{Effort, Evaluator};
 use crate::intervals::Spread;
 use crate::numbers::name_of;
 use crate::problem::Problem;
 use crate::search::Candidate;
-use crate::statistics::{correlation_time, levels};
+use crate::statistics::{correlation_time, levels, slowness};
 use crate::structure::{Role, Structure};
 use rayon::prelude::*;
 use serde::Serialize;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 use std::sync::atomic::AtomicBool;
-use std::time::Instant;
 
 /// A number as one record alone has it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -56,7 +56,7 @@ const UNSURE: f64 = 0.5;
 
 /// Fits the structure of `joint` to each record by itself, from the joint values on. `floor` is the measuring error of each output, in
 /// its unit. Fits end early once `stop` is set or at `until`.
-pub fn fit_each(problem: &Problem, joint: &Candidate, floor: &[f64], stop: Option<&AtomicBool>, until: Option<Instant>) -> PerRecord {
+pub fn fit_each(problem: &Problem, joint: &Candidate, floor: &[f64], stop: Option<&AtomicBool>, until: Option<Moment>) -> PerRecord {
     let stated = joint.structure.stated_of(problem, &joint.fit.values);
     let added = joint.structure.added_of(&joint.fit.values);
     let one = |record| -> Option<(String, Candidate, Spread)> {
@@ -68,7 +68,8 @@ pub fn fit_each(problem: &Problem, joint: &Candidate, floor: &[f64], stop: Optio
         let fit = evaluator.fit(&structure, &start, Effort { steps: 25, tolerance: 0.3 })?;
         let correlation_time = correlation_time(&evaluator, &fit.residuals);
         let levels = levels(&evaluator, &fit.residuals);
-        let candidate = Candidate { structure, fit, correlation_time, levels, unseen: None };
+        let slowness = slowness(&evaluator, &fit.residuals);
+        let candidate = Candidate { structure, fit, correlation_time, slowness, levels, unseen: None };
         let spread = Spread::of(&candidate);
         Some((record.name.clone(), candidate, spread))
     };

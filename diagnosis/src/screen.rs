@@ -1,11 +1,12 @@
 //! Which hypotheses could explain what a fit leaves over: their effects, as residuals see them, held against it.
 
+use crate::clock::Moment;
 use crate::fit::{Evaluator, Fit, dot};
 use crate::hypothesis::Hypothesis;
 use crate::structure::Structure;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// What a hypothesis could explain.
 #[derive(Debug, Clone)]
@@ -106,7 +107,7 @@ impl Screen {
         let problem = evaluator.problem;
         let (stated, added) = (base.stated_of(problem, &fit.values), base.added_of(&fit.values));
         // What a simulation of a recording takes, by a sample of the hypotheses: nonlinear ones are slower than a linear base.
-        let began = Instant::now();
+        let began = Moment::now();
         let sample: Vec<&Hypothesis> = hypotheses.iter().step_by((hypotheses.len() / 8).max(1)).collect();
         sample.par_iter().for_each(|h| {
             let structure = Structure::new(problem, evaluator.records, [base.added.clone(), vec![(*h).clone()]].concat());
@@ -133,7 +134,7 @@ impl Screen {
         // First starts first: where simulations are slower than the sample, the last ones are left out.
         let rank = |(index, start): &(usize, &Vec<f64>)| hypotheses[*index].starts.iter().position(|s| std::ptr::eq(s, *start));
         jobs.sort_by_key(rank);
-        let first_pass = Instant::now();
+        let first_pass = Moment::now();
         let most = (affordable / (2 * evaluator.records.len()).max(1)).clamp(24, STARTS);
         let with = |index: usize| {
             let mut with = base.added.clone();
@@ -177,7 +178,7 @@ impl Screen {
             let room = most.saturating_sub(firsts.len());
             jobs = firsts.into_iter().take(most).chain(seconds.into_iter().take(room)).collect();
         }
-        let second_pass = Instant::now();
+        let second_pass = Moment::now();
         let effects = jobs
             .par_iter()
             .map(|(index, start)| {

@@ -1,5 +1,6 @@
 //! Which physics was left out: from the nominal model, refitted, to the structures that explain the recordings best.
 
+use crate::clock::Moment;
 use crate::compare::mean_square;
 use crate::fit::{Effort, Evaluator, Fit};
 use crate::floor;
@@ -10,13 +11,13 @@ use crate::parts::Parts;
 use crate::problem::{Problem, Record};
 use crate::race::{Course, NEAR, Seed, distinct};
 use crate::screen::{Promise, Screen, pairs, worst_records};
-use crate::statistics::{advantage, correlation_time, levels};
+use crate::statistics::{advantage, correlation_time, levels, slowness};
 use crate::structure::Structure;
 use backdrive_plant::model::{InputKind, Model};
 use rayon::prelude::*;
 use std::collections::HashSet;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// How to search.
 #[derive(Debug, Clone)]
@@ -25,7 +26,7 @@ pub struct Settings {
     pub without: Vec<String>,
     /// Effects at once, at most.
     pub effects: usize,
-    /// When the search has to come to an end, from its start.
+    /// When the search has to come to an end, from its start: computing time, see [`crate::clock`].
     pub patience: Duration,
 }
 
@@ -44,10 +45,19 @@ pub struct Candidate {
     pub fit: Fit,
     /// Correlation time of what it leaves over, samples.
     pub correlation_time: f64,
+    /// How far what it leaves over is from white noise at longer spans, see [`slowness`].
+    pub slowness: f64,
     /// Root mean square of what it leaves over at each output, floors.
     pub levels: Vec<f64>,
     /// Mean square of its residuals on the recordings that no fit has seen, floors; `None` where it was not held against them.
     pub unseen: Option<f64>,
+}
+
+impl Candidate {
+    /// Whether what it leaves over is white noise, as far as chance can tell.
+    pub fn is_white(&self) -> bool {
+        self.correlation_time < WHITE.0 && self.slowness < WHITE.1
+    }
 }
 
 /// A hypothesis that was tried alone.
@@ -120,8 +130,9 @@ pub fn price(candidate: &Candidate, samples: usize, correlation_time: f64) -> f6
     effective * (candidate.fit.cost.max(1e-300) / samples.max(1) as f64).ln() + candidate.structure.numbers.len() as f64 * effective.ln()
 }
 
-/// Correlation time of residuals that nothing could explain, samples: whatever their size, they are measuring error.
-const WHITE: f64 = 1.1;
+/// Correlation time of residuals that nothing could explain, samples, and their distance from white noise, in standard deviations of chance:
+/// whatever their size, they are measuring error.
+const WHITE: (f64, f64) = (1.5, 4.0);
 /// What the best of many hypotheses takes from a cost of white noise by chance, squares of the noise.
 const CHANCE: f64 = 25.0;
 /// Numbers of a physics that is tried first, at most.
@@ -134,6 +145,10 @@ pub(crate) const MIDDLE: usize = 4;
 const NOMINAL_END: f64 = 5.0;
 /// Level above which fits start along the measured path, floors.
 const FAR: f64 = 2.0;
+/// Mean squared residual that the nominal model has to leave along the measured path, squares of the floor; and guides tried for it, each looser.
+const SHOWS: f64 = 3.0;
+/// See [`SHOWS`].
+const LOOSER: usize = 4;
 /// Samples in which ripples are looked for, at most.
 const LOCATED: usize = 12_000;
 /// Samples that screening is shown far from the noise, about.
@@ -171,7 +186,7 @@ pub fn search(
     stop: Option<&AtomicBool>,
     report: &(dyn Fn(&str) + Sync),
 ) -> Result<Search, SearchError> {
-    let began = Instant::now();
+    let began = Moment::now();
     let late = |share: f64| began.elapsed() > settings.patience.mul_f64(share) || stop.is_some_and(|s| s.load(Ordering::Relaxed));
     let mut evaluator = Evaluator::new(problem);
     evaluator.stop = stop;
@@ -204,19 +219,30 @@ pub fn search(
     let scales = Scales::of(&model, &runs)?;
     let level = levels(&evaluator, &nominal.residuals).into_iter().fold(0.0, f64::max);
     let strength = if level > 3.0 * FAR { 1.0 } else { 0.3 };
-    let loose = Guide::new(problem, &problem.fit, &scales, &evaluator.floor, strength);
-    let held = level > FAR && !loose.is_empty();
+    let far = level > FAR;
+    let mut loose = Guide::new(problem, &problem.fit, &scales, &evaluator.floor, strength);
+    let held = far && !loose.is_empty();
     // A motion that is prescribed leads the device by itself.
     let moved = problem.model.inputs.iter().any(|i| i.kind == InputKind::Motion);
-    let guided = held || level > FAR && moved;
-    let coarse = Evaluator { substeps: COARSE, widest: 8.0, guide: held.then(|| loose.clone()), ..evaluator.clone() };
-    let from = if held { &start } else { &nominal.values };
-    let at = coarse.fit(&structure, from, Effort { steps: if held { 0 } else { 2 }, tolerance: 1.0 }).ok_or(SearchError::RunsAway)?;
-    let far = level > FAR;
-    // The parts where most is left over are enough for screening; along the measured path they begin as they were measured.
-    let parts = if far { Parts::of(&coarse, &structure, &at, SHOWN) } else { None };
-    let on_parts = parts.as_ref().map_or_else(|| coarse.clone(), |p| p.evaluator(&coarse));
-    let base = if guided { on_parts.fit(&structure, &at.values, Effort { steps: 12, tolerance: 1.0 }) } else { None }.unwrap_or(at);
+    let guided = held || far && moved;
+    let mut attempts = 0;
+    let (coarse, parts, base) = loop {
+        let coarse = Evaluator { substeps: COARSE, widest: 8.0, guide: held.then(|| loose.clone()), ..evaluator.clone() };
+        let from = if held { &start } else { &nominal.values };
+        let at = coarse.fit(&structure, from, Effort { steps: if held { 0 } else { 2 }, tolerance: 1.0 }).ok_or(SearchError::RunsAway)?;
+        // The parts where most is left over are enough for screening; along the measured path they begin as they were measured.
+        let parts = if far { Parts::of(&coarse, &structure, &at, SHOWN) } else { None };
+        let on_parts = parts.as_ref().map_or_else(|| coarse.clone(), |p| p.evaluator(&coarse));
+        let led = if guided { on_parts.fit(&structure, &at.values, Effort { steps: 12, tolerance: 1.0 }) } else { None };
+        let base = led.unwrap_or(at);
+        // Led so firmly that nothing is left over, every physics looks as good as any other.
+        let shows = base.cost > SHOWS * base.residuals.len() as f64;
+        attempts += 1;
+        if !held || shows || attempts >= LOOSER {
+            break (coarse, parts, base);
+        }
+        loose = loose.with(0.2 * loose.strength);
+    };
     if held
         && let Some(there) = middle.residuals(&structure, &base.values)
         && let Some(other) = worst_first(&middle, &structure, &base.values, &there, [8, 2])
@@ -270,7 +296,7 @@ pub fn search(
 
     let mut found: Vec<Candidate> = Vec::new();
     // At the floor only what promises more than chance is worth a fit.
-    let quiet = nominal.correlation_time < WHITE || nominal.levels.iter().all(|l| *l < AT_FLOOR);
+    let quiet = nominal.is_white() || nominal.levels.iter().all(|l| *l < AT_FLOOR);
     let chance = CHANCE * nominal.correlation_time / samples as f64;
     let mut singles: Vec<Seed> = Vec::new();
     for rank in 0..16 {
@@ -308,6 +334,11 @@ pub fn search(
             continue;
         }
         if wave == Relatives {
+            // Far from the noise more effects come first: which law it is shows beside them.
+            let near = found.first().is_some_and(|c| c.fit.cost < NEAR * samples as f64);
+            if !quiet && effects == 1 && !near {
+                continue;
+            }
             let best = found.first().map_or(0, |c| c.structure.added.len());
             if std::mem::replace(&mut related, best) == best {
                 continue;
@@ -675,8 +706,8 @@ fn floors(evaluator: &Evaluator, residuals: &[f64]) -> Vec<f64> {
 
 pub(crate) fn candidate(evaluator: &Evaluator, structure: Structure, fit: Fit) -> Candidate {
     let correlation_time = correlation_time(evaluator, &fit.residuals);
-    let levels = levels(evaluator, &fit.residuals);
-    Candidate { structure, fit, correlation_time, levels, unseen: None }
+    let (levels, slowness) = (levels(evaluator, &fit.residuals), slowness(evaluator, &fit.residuals));
+    Candidate { structure, fit, correlation_time, slowness, levels, unseen: None }
 }
 
 /// Sorts by price, with the correlation time of the one that costs least.
@@ -688,7 +719,7 @@ fn sort(found: &mut [Candidate], samples: usize) {
 /// Whether the best structure leaves nothing that another effect could explain.
 fn done(found: &[Candidate], nominal: &Candidate, samples: usize) -> bool {
     let best = found.first().filter(|b| advantage_over(nominal, b, samples) > 0.0).unwrap_or(nominal);
-    best.correlation_time < WHITE || best.levels.iter().all(|l| *l < AT_FLOOR) && best.correlation_time < 1.5
+    best.is_white()
 }
 
 /// How much better a candidate is than another one, with the correlation time of the better.

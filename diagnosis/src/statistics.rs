@@ -36,6 +36,35 @@ fn time_of(part: &[f64], energy: f64) -> f64 {
     1.0 + 2.0 * sum
 }
 
+/// How far the residuals are from white noise, in standard deviations of what chance does: means over blocks of many samples show what
+/// is slow and small long before neighbours correlate. The most over the block lengths, 4 to 256 samples; 0 where all are too short for blocks.
+pub fn slowness(evaluator: &Evaluator, residuals: &[f64]) -> f64 {
+    let layout = evaluator.layout();
+    let parts: Vec<&[f64]> = layout.iter().filter_map(|(_, _, range)| residuals.get(range.clone())).collect();
+    BLOCKS.into_iter().map(|length| slow_by(&parts, length)).fold(0.0, f64::max)
+}
+
+/// How much larger sums over blocks of so many samples are than those of white noise, in standard deviations.
+fn slow_by(parts: &[&[f64]], length: usize) -> f64 {
+    let (mut surplus, mut variance) = (0.0, 0.0);
+    for part in parts {
+        let blocks = part.len() / length;
+        let power = part.iter().map(|x| x * x).sum::<f64>() / part.len().max(1) as f64;
+        if blocks < FEWEST_BLOCKS || power <= 0.0 {
+            continue;
+        }
+        let sums = part.chunks_exact(length).map(|block| block.iter().sum::<f64>().powi(2) / (length as f64 * power));
+        surplus += sums.map(|s| s - 1.0).sum::<f64>();
+        variance += 2.0 * blocks as f64;
+    }
+    if variance > 0.0 { surplus / variance.sqrt() } else { 0.0 }
+}
+
+/// Lengths of blocks, samples.
+const BLOCKS: [usize; 4] = [4, 16, 64, 256];
+/// Fewer blocks in a recording say little.
+const FEWEST_BLOCKS: usize = 12;
+
 /// Root mean square of the residuals of each output, in floors; 0 where none was measured.
 pub fn levels(evaluator: &Evaluator, residuals: &[f64]) -> Vec<f64> {
     let outputs = evaluator.problem.model.outputs.len();
@@ -78,6 +107,24 @@ mod tests {
             let exact = (1.0 + a) / (1.0 - a);
             assert!((found / exact - 1.0).abs() < 0.15, "{a}: {found} {exact}");
         }
+    }
+
+    #[test]
+    fn what_is_slow_and_small_shows_in_means_over_blocks() {
+        let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(2);
+        let mut noise = |_: usize| -> f64 { StandardNormal.sample(&mut random) };
+        let white: Vec<f64> = (0..20_000).map(&mut noise).collect();
+        assert!(slow_by(&[&white], 64).abs() < 4.0);
+        // A slow wave of a hundredth of the power: neighbours correlate by 0.01 only, blocks of 64 by much more.
+        let waving: Vec<f64> = white.iter().enumerate().map(|(i, e)| e + 0.141 * (i as f64 * std::f64::consts::TAU / 1000.0).sin()).collect();
+        let energy = waving.iter().map(|x| x * x).sum();
+        assert!(time_of(&waving, energy) < 1.1);
+        assert!(slow_by(&[&waving], 64) > 4.0, "{}", slow_by(&[&waving], 64));
+        // Differences of noise are not slow.
+        let differences: Vec<f64> = white.windows(2).map(|w| w[1] - w[0]).collect();
+        assert!(slow_by(&[&differences], 64) < 0.0);
+        // Too short for blocks.
+        assert_eq!(slow_by(&[&white[..500]], 64), 0.0);
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! What a search says: the verdict file, and the nominal model's file with what was found.
 
+use crate::clock::Moment;
 use crate::compare::nrmse;
 use crate::experiment::{excite, separate};
 use crate::fit::Evaluator;
@@ -13,7 +14,7 @@ use crate::structure::Role;
 use backdrive_plant::write::{patch, round_significant};
 use serde_json::{Value as Json, json};
 use std::collections::HashSet;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// A verdict, ready to be written.
 #[derive(Debug)]
@@ -140,7 +141,7 @@ pub fn verdict(problem: &Problem, search: &Search, model_name: &str) -> Result<V
         () if !is_excited(problem, search) => "cannot_tell",
         () => "nothing_missing",
     };
-    let until = Instant::now() + EXPERIMENT;
+    let until = Moment::now() + EXPERIMENT;
     let planned = match word {
         "ambiguous" => Some(separate(problem, &[&[best], alike.as_slice()].concat(), &search.floor, until)),
         "cannot_tell" => best.structure.model(problem, &best.fit.values).map(|model| {

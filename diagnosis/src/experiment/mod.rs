@@ -15,6 +15,7 @@ mod sensor;
 mod tests;
 mod words;
 
+use crate::clock::Moment;
 use crate::fit::{Evaluator, Fit};
 use crate::problem::Problem;
 use crate::search::Candidate;
@@ -25,7 +26,6 @@ use menu::{Stand, plays};
 use rayon::prelude::*;
 use rivals::{Rival, Scene, Sensors, Trial};
 use serde_json::{Value as Json, json};
-use std::time::Instant;
 use words::short;
 
 /// An experiment that was not made yet.
@@ -103,12 +103,12 @@ const FINALISTS: usize = 3;
 ///
 /// # Errors
 /// Says why when no excitation would: fewer than two structures, none that can be simulated, or a difference too small; then also which sensor would help.
-pub fn separate(problem: &Problem, candidates: &[&Candidate], floor: &[f64], until: Instant) -> Result<Experiment, Reason> {
+pub fn separate(problem: &Problem, candidates: &[&Candidate], floor: &[f64], until: Moment) -> Result<Experiment, Reason> {
     let fitted: Vec<(&Structure, &Fit)> = candidates.iter().map(|c| (&c.structure, &c.fit)).collect();
     separate_fitted(problem, &fitted, floor, until)
 }
 
-fn separate_fitted(problem: &Problem, fitted: &[(&Structure, &Fit)], floor: &[f64], until: Instant) -> Result<Experiment, Reason> {
+fn separate_fitted(problem: &Problem, fitted: &[(&Structure, &Fit)], floor: &[f64], until: Moment) -> Result<Experiment, Reason> {
     let mut names = std::collections::HashSet::new();
     let others = fitted.iter().filter(|(structure, _)| names.insert(ids(structure)));
     let rivals: Vec<Rival> = others.take(MOST_RIVALS).map(|(structure, fit)| Rival::of(problem, structure, fit)).collect();
@@ -136,7 +136,7 @@ fn separate_fitted(problem: &Problem, fitted: &[(&Structure, &Fit)], floor: &[f6
         let left = |p: &(usize, usize)| {
             let left = refitted(&fine, &rivals, trial, *p);
             // A refit that was cut short leaves too much.
-            (*p, if Instant::now() > until { left.min(e.of(*p)) } else { left })
+            (*p, if Moment::now() > until { left.min(e.of(*p)) } else { left })
         };
         let worst = open.iter().map(left).min_by(|a, b| a.1.total_cmp(&b.1))?;
         Some((e.show, worst.0, worst.1))
@@ -164,7 +164,7 @@ pub fn excite(
     values: &[f64],
     numbers: &[usize],
     floor: &[f64],
-    until: Instant,
+    until: Moment,
 ) -> Result<Experiment, Reason> {
     let numbers: Vec<usize> = numbers.iter().copied().filter(|j| structure.numbers.get(*j).is_some_and(|n| n.record.is_none())).collect();
     if numbers.is_empty() || values.len() != structure.numbers.len() {
@@ -188,7 +188,7 @@ pub fn excite(
     let gains: Vec<(usize, f64, Vec<f64>)> = shows
         .par_iter()
         .enumerate()
-        .filter(|_| Instant::now() < until)
+        .filter(|_| Moment::now() < until)
         .map(|(s, show)| {
             let jacobian = known.jacobian(&stage.scene, &show.trial, &known.own, &show.seen[0]);
             let after = known.deviations(Some(&jacobian));
@@ -264,7 +264,7 @@ fn same(a: &Structure, b: &Structure) -> bool {
 
 /// What is left between two rivals when either is refitted to the other, standard deviations; infinite where there is no time to say.
 fn refitted(scene: &Scene, rivals: &[Rival], trial: &Trial, (a, b): (usize, usize)) -> f64 {
-    if Instant::now() > scene.until {
+    if Moment::now() > scene.until {
         return f64::INFINITY;
     }
     let unit = rivals[a].unit.max(rivals[b].unit);
@@ -310,19 +310,19 @@ struct Stage<'a> {
     rate_hz: f64,
     longest: f64,
     /// When simulating, and when evaluating, comes to an end.
-    ends: (Instant, Instant),
+    ends: (Moment, Moment),
 }
 
 impl<'a> Stage<'a> {
-    fn new(problem: &'a Problem, floor: &[f64], until: Instant) -> Result<Stage<'a>, Reason> {
+    fn new(problem: &'a Problem, floor: &[f64], until: Moment) -> Result<Stage<'a>, Reason> {
         let stands: Vec<Option<Stand>> = (0..problem.model.inputs.len()).map(|i| Stand::of(problem, i)).collect();
         let lengths = problem.fit.iter().map(|r| (r.len as f64 * r.period, r.period));
         let longest = lengths.max_by(|a, b| a.0.total_cmp(&b.0));
         let Some((longest, period)) = longest.filter(|_| stands.iter().any(Option::is_some)) else {
             return Err(Reason("no input moves in any recording, so nothing says what the device stands".to_string()));
         };
-        let now = Instant::now();
-        let time = until.saturating_duration_since(now);
+        let now = Moment::now();
+        let time = until.since(now);
         let ends = (now + time.mul_f64(SHARES.0), now + time.mul_f64(SHARES.1));
         let scene = Scene { problem, sensors: Sensors::of(problem, floor), extra: Vec::new(), substeps: SUBSTEPS.0, until };
         Ok(Stage { scene, stands, rate_hz: round_significant(1.0 / period, 6), longest, ends })
@@ -332,7 +332,7 @@ impl<'a> Stage<'a> {
     fn shows(&self, rivals: &[Rival]) -> Vec<Show> {
         let plays = plays(self.scene.problem, &self.stands, 1.0 / self.rate_hz, self.longest);
         let one = |play: &menu::Play| {
-            if Instant::now() > self.ends.0 {
+            if Moment::now() > self.ends.0 {
                 return None;
             }
             let mut trial = self.scene.trial(play, &self.stands, self.rate_hz)?;
@@ -361,7 +361,7 @@ impl<'a> Stage<'a> {
         shows.sort_by(|a, b| promised(b).total_cmp(&promised(a)));
         let mut all: Vec<Evaluated> = Vec::new();
         let mut at = 0;
-        while at < shows.len() && (at == 0 || Instant::now() < self.ends.1) {
+        while at < shows.len() && (at == 0 || Moment::now() < self.ends.1) {
             let best = all.iter().filter(|e| e.pairs.iter().all(|p| p.1 >= least)).map(|e| e.score(pairs, shows)).fold(0.0, f64::max);
             if pairs.is_empty() || promised(&shows[at]) < best {
                 break;

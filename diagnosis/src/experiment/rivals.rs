@@ -1,6 +1,7 @@
 //! Fitted structures on an experiment that was not made yet: what each predicts, and how far one can imitate another.
 
 use super::menu::{Play, Stand, constant, scaled};
+use crate::clock::Moment;
 use crate::fit::{Effort, Evaluator, Fit, dot, measured, normal_equations};
 use crate::problem::{Problem, Record};
 use crate::simulate::predict;
@@ -12,7 +13,6 @@ use backdrive_plant::recording::Recording;
 use backdrive_plant::set::Initial;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
-use std::time::Instant;
 
 /// What is measured: how well, and what is compared. One for each output of the models that are simulated.
 #[derive(Debug, Clone)]
@@ -171,7 +171,7 @@ pub(super) struct Scene<'a> {
     /// Substeps per sample, at most.
     pub substeps: usize,
     /// When refits and searches come to an end.
-    pub until: Instant,
+    pub until: Moment,
 }
 
 /// An excitation as a recording without outputs.

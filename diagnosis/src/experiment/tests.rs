@@ -38,8 +38,8 @@ of = "mass"
 
 const RUB: &str = "\n[[elements]]\nname = \"rub\"\nkind = \"coulomb\"\nbetween = [\"mass\", \"ground\"]\nforce = 0.15\n";
 
-fn soon() -> Instant {
-    Instant::now() + Duration::from_secs(120)
+fn soon() -> Moment {
+    Moment::now() + Duration::from_secs(120)
 }
 
 /// What `truth` does under some inputs, with noise on its outputs, as a recording of `nominal`.
@@ -110,7 +110,7 @@ fn dry_and_viscous_friction_are_told_apart_by_as_much_as_was_said() {
         let mut problem = problem(MASS, &format!("{MASS}{RUB}"), sine(0.7, 1.0, 4.0), noise);
         let (right, wrong) = (fitted(&problem, &[truth]), fitted(&problem, &[rival]));
         let alike = (right.1.cost - wrong.1.cost).abs();
-        let began = Instant::now();
+        let began = Moment::now();
         let found = separate_fitted(&problem, &[(&right.0, &right.1), (&wrong.0, &wrong.1)], &problem.floor, soon()).unwrap();
         println!("{:.2} s, costs apart by {alike:.1}: {found:#?}", began.elapsed().as_secs_f64());
         assert!(alike < 0.3 * found.separation.powi(2), "the recording tells them apart already: {alike} of {}", found.separation.powi(2));

@@ -16,8 +16,9 @@ pub(super) const PHYSICS: Physics = Physics {
             let (travel, f) = (2.0 * site.displacement_peak, site.force);
             let new = new
                 .number("amplitude", even(-20.0 * f, 20.0 * f, 0.0))
-                // What does not come again within the travel is a spring, not a ripple.
-                .number("period", log(1e-4 * travel, travel))
+                // What does not come again within the travel is a spring, not a ripple. The travel is that of the refitted nominal model, which may
+                // fall short.
+                .number("period", log(1e-4 * travel, 1.5 * travel))
                 // More than a turn, so that no fit runs into an end.
                 .number("phase", any(-10.0, 10.0));
             // The force is linear in a cos(phase) and a sin(phase): two phases span it. What a period scan finds is a better start.
