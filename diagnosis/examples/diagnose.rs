@@ -36,7 +36,13 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             found.hypotheses, found.simulations, found.floor, found.levels_given
         );
         let nominal = &found.nominal;
-        eprintln!("nominal: {:.4} {:.3?} correlation {:.1} slow {:.1}", nominal.fit.cost / n, nominal.levels, nominal.correlation_time, nominal.slowness);
+        eprintln!(
+            "nominal: {:.4} {:.3?} correlation {:.1} slow {:.1}",
+            nominal.fit.cost / n,
+            nominal.levels,
+            nominal.correlation_time,
+            nominal.slowness
+        );
         for t in found.tried.iter().take(10) {
             eprintln!("   promised {:.3} taken {:.3?} {}", t.promised, t.taken, t.id);
         }

@@ -116,7 +116,8 @@ mod tests {
         let white: Vec<f64> = (0..20_000).map(&mut noise).collect();
         assert!(slow_by(&[&white], 64).abs() < 4.0);
         // A slow wave of a hundredth of the power: neighbours correlate by 0.01 only, blocks of 64 by much more.
-        let waving: Vec<f64> = white.iter().enumerate().map(|(i, e)| e + 0.141 * (i as f64 * std::f64::consts::TAU / 1000.0).sin()).collect();
+        let waving: Vec<f64> =
+            white.iter().enumerate().map(|(i, e)| e + 0.141 * (i as f64 * std::f64::consts::TAU / 1000.0).sin()).collect();
         let energy = waving.iter().map(|x| x * x).sum();
         assert!(time_of(&waving, energy) < 1.1);
         assert!(slow_by(&[&waving], 64) > 4.0, "{}", slow_by(&[&waving], 64));
