@@ -150,9 +150,9 @@ const FAR: f64 = 2.0;
 const SHOWS: f64 = 3.0;
 /// See [`SHOWS`].
 const SHARE: f64 = 0.3;
-/// Ways to be led, until enough is left over: how much looser than at first, and whether parts of the recordings are enough. On parts the
+/// Other ways to be led, until enough is left over: how much looser than at first, and whether parts of the recordings are enough. On parts the
 /// numbers of the nominal model may take on what differs from one part to the next.
-const LED: [(f64, bool); 6] = [(1.0, true), (0.2, true), (1.0, false), (0.2, false), (0.04, false), (0.008, false)];
+const LOOSER: [(f64, bool); 5] = [(0.2, true), (1.0, false), (0.2, false), (0.04, false), (0.008, false)];
 /// Samples in which ripples are looked for, at most.
 const LOCATED: usize = 12_000;
 /// Samples that screening is shown far from the noise, about.
@@ -229,25 +229,18 @@ pub fn search(
     // A motion that is prescribed leads the device by itself.
     let moved = problem.model.inputs.iter().any(|i| i.kind == InputKind::Motion);
     let guided = held || far && moved;
-    let mut attempts = LED.iter();
-    let (coarse, parts, base) = loop {
-        let Some(&(looser, in_parts)) = attempts.next() else { return Err(SearchError::RunsAway) };
+    let led = |from: &[f64], looser: f64, in_parts: bool| {
         let guide = held.then(|| firm.with(looser * firm.strength));
         let coarse = Evaluator { substeps: COARSE, widest: 8.0, guide, ..evaluator.clone() };
-        let from = if held { &start } else { &nominal.values };
-        let at = coarse.fit(&structure, from, Effort { steps: if held { 0 } else { 2 }, tolerance: 1.0 }).ok_or(SearchError::RunsAway)?;
+        let at = coarse.fit(&structure, from, Effort { steps: if held { 0 } else { 2 }, tolerance: 1.0 })?;
         // The parts where most is left over are enough for screening; along the measured path they begin as they were measured.
         let parts = if far && in_parts { Parts::of(&coarse, &structure, &at, SHOWN) } else { None };
         let on_parts = parts.as_ref().map_or_else(|| coarse.clone(), |p| p.evaluator(&coarse));
-        let led = if guided { on_parts.fit(&structure, &at.values, Effort { steps: 12, tolerance: 1.0 }) } else { None };
-        let base = led.unwrap_or(at);
-        // Where the nominal model explains the path as it is led there, every physics looks as good as any other.
-        let left = |fit: &Fit| fit.cost / fit.residuals.len().max(1) as f64;
-        let shows = left(&base) > SHOWS.min(SHARE * left(&nominal));
-        if !held || shows || attempts.len() == 0 {
-            break (coarse, parts, base);
-        }
+        let base = if guided { on_parts.fit(&structure, &at.values, Effort { steps: 12, tolerance: 1.0 }) } else { None };
+        Some((coarse, parts, base.unwrap_or(at)))
     };
+    let from = if held { &start } else { &nominal.values };
+    let (mut coarse, mut parts, mut base) = led(from, 1.0, true).ok_or(SearchError::RunsAway)?;
     if held
         && let Some(there) = middle.residuals(&structure, &base.values)
         && let Some(other) = worst_first(&middle, &structure, &base.values, &there, [8, 2])
@@ -256,6 +249,17 @@ pub fn search(
         && other.cost < nominal.cost
     {
         nominal = other;
+    }
+    // Where the nominal model explains the path as it is led there, every physics looks as good as any other.
+    let left = |fit: &Fit| fit.cost / fit.residuals.len().max(1) as f64;
+    let enough = SHOWS.min(SHARE * left(&nominal));
+    for (looser, in_parts) in if held { LOOSER.as_slice() } else { &[] } {
+        if left(&base) > enough {
+            break;
+        }
+        if let Some(other) = led(&base.values, *looser, *in_parts) {
+            (coarse, parts, base) = other;
+        }
     }
     let nominal = candidate(&evaluator, structure.clone(), nominal);
 

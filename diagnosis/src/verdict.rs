@@ -60,6 +60,9 @@ const ALIKE: f64 = 6.0;
 const NOISE_LEVEL: f64 = 1.05;
 /// See [`NOISE_LEVEL`].
 const NOISE_MEMORY: f64 = 1.2;
+/// Distance from white noise, standard deviations of chance, beyond which something is left over however small it is: fits of the right structure
+/// stay below 3, and 2 or 3 times that where they stop before their end.
+const WANDERS: f64 = 12.0;
 /// Level above which what is left over is no measuring error.
 const LEFT_OVER: f64 = 1.15;
 
@@ -131,12 +134,14 @@ pub fn verdict(problem: &Problem, search: &Search, model_name: &str) -> Result<V
     let bursts = bursts(problem, best);
     let alike = alike(search, best);
     let off = given_is_off(problem, search);
+    let nominal = &search.nominal;
+    let wanders = nominal.slowness > WANDERS && nominal.levels.iter().any(|l| *l > AT_FLOOR);
     let word = match () {
         () if added && (at_floor || explained > 0.99) && !alike.is_empty() => "ambiguous",
         () if added && (at_floor || explained > 0.99) => "missing",
         () if added => "unexplained",
         () if !bursts.is_empty() => "unexplained",
-        () if !at_floor && search.nominal.correlation_time > 3.0 => "unexplained",
+        () if !at_floor && nominal.correlation_time > 3.0 || wanders => "unexplained",
         () if off => "parameters",
         () if !is_excited(problem, search) => "cannot_tell",
         () => "nothing_missing",
