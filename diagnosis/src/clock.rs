@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 /// How many times longer than it was granted a search may last where others share the processors, or it cannot use them all.
 const LONGEST: f64 = 1.4;
 
-/// A point in computing time: processor time of this process per thread of the pool, or the share [`LONGEST`] of the time on the wall,
+/// A point in computing time: processor time of this process per thread of the pool, or the time on the wall divided by 1.4,
 /// whichever is more. With all processors for itself it is nearly the time on the wall.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Moment(Duration);
