@@ -42,6 +42,7 @@ pub fn distinct(seeds: &mut Vec<Seed>) {
 }
 
 /// What structures are fitted against, and from where.
+#[derive(Clone, Copy)]
 pub struct Course<'a> {
     /// The recordings.
     pub evaluator: &'a Evaluator<'a>,

@@ -294,6 +294,9 @@ pub fn search(
         nominal: &nominal,
         given: &given,
     };
+    // A simpler law that does as well is worth a little more than the time.
+    let longer = Evaluator { until: Some(began + settings.patience.mul_f64(0.92)), ..evaluator.clone() };
+    let to_the_end = Course { evaluator: &longer, ..course };
     let mut tried: Vec<Tried> = Vec::new();
     for promise in views.iter().flat_map(|v| v.simple.iter().chain(&v.rich)) {
         let id = &hypotheses[promise.hypothesis].id;
@@ -340,7 +343,7 @@ pub fn search(
     // Of a best with so many effects the simpler relatives were tried.
     let mut related = 0;
     for wave in waves {
-        if late(0.7) || (wave != Relatives && done(&found, &nominal, samples)) {
+        if late(if wave == Relatives { 0.85 } else { 0.7 }) || (wave != Relatives && done(&found, &nominal, samples)) {
             continue;
         }
         if wave == Relatives {
@@ -411,7 +414,7 @@ pub fn search(
         }
         let known: HashSet<String> = found.iter().map(|c| key_of(&c.structure.added)).collect();
         seeds.retain(|s| wave == Relatives || !known.contains(&key_of(s.effects.iter().map(|(h, _)| &hypotheses[*h]))));
-        found.extend(course.race(seeds, wave.keep()));
+        found.extend(if wave == Relatives { &to_the_end } else { &course }.race(seeds, wave.keep()));
         sort(&mut found, samples);
     }
     let stopped = late(1.0);
