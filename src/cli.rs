@@ -332,7 +332,7 @@ pub struct Diagnose {
     /// A physics that is not to be considered, and with it all that contain it as a special case; may be given several times.
     #[arg(long, value_name = "KIND", value_parser = physics)]
     pub without: Vec<String>,
-    /// How long to search, at most. On a busy machine it takes up to 1.4 times that, so that the result does not depend on what else runs.
+    /// How long to search, at most. On a busy machine it takes up to 1.4 times that, so that the result depends less on what else runs.
     #[arg(long, value_name = "SECONDS", value_parser = positive, default_value_t = 24.0, allow_negative_numbers = true)]
     pub patience: f64,
     /// Print the verdict as JSON.

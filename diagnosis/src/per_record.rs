@@ -6,8 +6,7 @@ use crate::fit::{Effort, Evaluator};
 use crate::intervals::Spread;
 use crate::numbers::name_of;
 use crate::problem::Problem;
-use crate::search::Candidate;
-use crate::statistics::{correlation_time, levels, slowness};
+use crate::search::{Candidate, candidate};
 use crate::structure::{Role, Structure};
 use rayon::prelude::*;
 use serde::Serialize;
@@ -66,10 +65,7 @@ pub fn fit_each(problem: &Problem, joint: &Candidate, floor: &[f64], stop: Optio
         let structure = Structure::new(problem, records, joint.structure.added.clone());
         let start = structure.values(problem, &stated, &added);
         let fit = evaluator.fit(&structure, &start, Effort { steps: 25, tolerance: 0.3 })?;
-        let correlation_time = correlation_time(&evaluator, &fit.residuals);
-        let levels = levels(&evaluator, &fit.residuals);
-        let slowness = slowness(&evaluator, &fit.residuals);
-        let candidate = Candidate { structure, fit, correlation_time, slowness, levels, unseen: None };
+        let candidate = candidate(&evaluator, structure, fit);
         let spread = Spread::of(&candidate);
         Some((record.name.clone(), candidate, spread))
     };

@@ -56,8 +56,12 @@ pub struct Candidate {
 impl Candidate {
     /// Whether what it leaves over is white noise, as far as chance can tell.
     pub fn is_white(&self) -> bool {
-        self.correlation_time < WHITE.0 && self.slowness < WHITE.1
+        white(self.correlation_time, self.slowness)
     }
+}
+
+fn white(correlation_time: f64, slowness: f64) -> bool {
+    correlation_time < WHITE.0 && slowness < WHITE.1
 }
 
 /// A hypothesis that was tried alone.
@@ -727,7 +731,7 @@ pub(crate) fn candidate(evaluator: &Evaluator, structure: Structure, fit: Fit) -
 /// Near the noise the end of a fit counts: what is left over short of it looks like missing physics.
 fn to_its_end(evaluator: &Evaluator, structure: &Structure, fit: Fit) -> Fit {
     let near = levels(evaluator, &fit.residuals).iter().all(|l| *l < FAR);
-    if !near || candidate(evaluator, structure.clone(), fit.clone()).is_white() {
+    if !near || white(correlation_time(evaluator, &fit.residuals), slowness(evaluator, &fit.residuals)) {
         return fit;
     }
     let ended = evaluator.fit_knowing(structure, &fit.values, Effort::FULL, Some((structure, &fit)));
