@@ -9,7 +9,7 @@ const LONGEST: f64 = 1.4;
 
 /// A point in computing time: processor time of this process per thread of the pool, or the share [`LONGEST`] of the time on the wall,
 /// whichever is more. With all processors for itself it is nearly the time on the wall.
-#[derive(Debug, Clone, Copy, PartialEq, PartialOrd)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Moment(Duration);
 
 impl Moment {

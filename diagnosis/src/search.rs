@@ -250,6 +250,7 @@ pub fn search(
     {
         nominal = other;
     }
+    nominal = to_its_end(&evaluator, &structure, nominal);
     // Where the nominal model explains the path as it is led there, every physics looks as good as any other.
     let left = |fit: &Fit| fit.cost / fit.residuals.len().max(1) as f64;
     let enough = SHOWS.min(SHARE * left(&nominal));
@@ -446,6 +447,7 @@ pub fn search(
     }
     let mut nominal = nominal;
     if let Some(fit) = better {
+        let fit = to_its_end(&last, &nominal.structure, fit);
         nominal = candidate(&evaluator, nominal.structure, fit);
     }
     // The best are held against the recordings that no fit has seen.
@@ -717,6 +719,16 @@ pub(crate) fn candidate(evaluator: &Evaluator, structure: Structure, fit: Fit) -
     let correlation_time = correlation_time(evaluator, &fit.residuals);
     let (levels, slowness) = (levels(evaluator, &fit.residuals), slowness(evaluator, &fit.residuals));
     Candidate { structure, fit, correlation_time, slowness, levels, unseen: None }
+}
+
+/// Near the noise the end of a fit counts: what is left over short of it looks like missing physics.
+fn to_its_end(evaluator: &Evaluator, structure: &Structure, fit: Fit) -> Fit {
+    let near = levels(evaluator, &fit.residuals).iter().all(|l| *l < FAR);
+    if !near || candidate(evaluator, structure.clone(), fit.clone()).is_white() {
+        return fit;
+    }
+    let ended = evaluator.fit_knowing(structure, &fit.values, Effort::FULL, Some((structure, &fit)));
+    ended.filter(|e| e.cost < fit.cost).unwrap_or(fit)
 }
 
 /// Sorts by price, with the correlation time of the one that costs least.

@@ -25,7 +25,7 @@ def signal(kind, amplitude, n, ts, band, rng):
         u = np.zeros(n)
         edges = np.linspace(0, n, int(rng.integers(4, 7)) + 1).astype(int)
         for a, b in zip(edges[:-1], edges[1:]):
-            f = log_uniform(rng, max(low, 2.0 / ((b - a) * ts)), high)
+            f = log_uniform(rng, min(max(low, 2.0 / ((b - a) * ts)), high), high)
             fade = np.minimum(1.0, np.minimum(np.arange(b - a), np.arange(b - a)[::-1]) / (0.06 * (b - a)))
             u[a:b] = amplitude * rng.uniform(0.3, 1) * fade * np.sin(2 * np.pi * f * t[: b - a])
         return u

@@ -85,7 +85,8 @@ impl BoucWen {
         let n = self.exponent;
         let ratio = (magnitude - known) / known;
         // The first term left out is below n⁶/720 of the ratio's sixth power; not a number at known = 0 fails, too.
-        if !(ratio.abs() * n < NEAR) {
+        let reach = ratio.abs() * n;
+        if reach.is_nan() || reach >= NEAR {
             return self.power(magnitude);
         }
         let series = 1.0 + (n - 4.0) * ratio / 5.0;
