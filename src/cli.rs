@@ -81,9 +81,15 @@ pub enum Command {
     /// Remove what dead runs left in shared memory and on disk; live runs are not touched.
     #[command(after_help = "Example:\n  backdrive clean")]
     Clean,
+    /// Conceal effects in a master, find them from the bags of a session, and show what that is worth on the graph.
+    #[command(after_help = PROVE_EXAMPLE)]
+    Prove(Prove),
     /// One node of a running graph; the supervisor starts it.
     #[command(hide = true)]
     Node(Node),
+    /// The master of a proof; the supervisor starts it.
+    #[command(hide = true)]
+    SealedMaster(SealedMaster),
 }
 
 /// Parts of a graph that are swapped.
@@ -537,4 +543,76 @@ pub struct Node {
     /// Name of the node.
     #[arg(long)]
     pub name: String,
+}
+
+const PROVE_EXAMPLE: &str = "Example: backdrive prove --seed 1 --effects 1 --out proof
+
+The truth is sealed first: its SHA-256 is printed before anything is recorded, and only the process of the hidden plant opens it
+until the verdict is written. Of several cases every fifth conceals nothing.
+Exit code 0 when all was found by family and place and nothing where nothing was, 1 when not.";
+
+/// `backdrive prove`
+#[derive(Debug, Args)]
+pub struct Prove {
+    /// What is concealed is drawn from this; further cases from the numbers after it.
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+    /// Effects concealed at once.
+    #[arg(long, default_value_t = 1, value_parser = at_most_three)]
+    pub effects: usize,
+    /// How many cases.
+    #[arg(long, default_value_t = 1, value_parser = some)]
+    pub cases: usize,
+    /// Conceal only what no linear model can imitate.
+    #[arg(long)]
+    pub nonlinear: bool,
+    /// Folder for the cases; a truth that is there already is not drawn anew.
+    #[arg(long, value_name = "DIR", default_value = "proof")]
+    pub out: PathBuf,
+    /// The nominal master.
+    #[arg(long, value_name = "FILE", default_value = "plant/models/impulse-engine-linear.toml")]
+    pub model: PathBuf,
+    /// The nominal grip.
+    #[arg(long, value_name = "FILE", default_value = "plant/grips/normal.toml")]
+    pub grip: PathBuf,
+    /// The shape of the second-order model that is fitted for comparison.
+    #[arg(long, value_name = "FILE", default_value = "plant/models/impulse-engine-second-order.toml")]
+    pub second_order: PathBuf,
+    /// The session that is recorded, a graph with experiments.
+    #[arg(long, value_name = "FILE", default_value = "launch/prove.toml")]
+    pub session: PathBuf,
+    /// The task in which the gain is raised.
+    #[arg(long, value_name = "FILE", default_value = "launch/contact.toml")]
+    pub contact: PathBuf,
+    /// Corner of the canceller's high-pass while the gain is raised, Hz.
+    #[arg(long, value_name = "HZ", default_value_t = 1.0)]
+    pub high_pass: f64,
+    /// How long a diagnosis searches, at most.
+    #[arg(long, value_name = "SECONDS", value_parser = positive, default_value_t = 24.0)]
+    pub patience: f64,
+    /// The program of the hidden plant; without this `backdrive-sealed` beside this program, or on the path.
+    #[arg(long, value_name = "FILE")]
+    pub plant: Option<PathBuf>,
+}
+
+/// `backdrive sealed-master`
+#[derive(Debug, Args)]
+pub struct SealedMaster {
+    /// The run's folder.
+    #[arg(long)]
+    pub run: PathBuf,
+    /// Name of the node.
+    #[arg(long)]
+    pub name: String,
+    /// The command line of the hidden plant, word by word.
+    #[arg(long, allow_hyphen_values = true)]
+    pub word: Vec<String>,
+}
+
+fn at_most_three(text: &str) -> Result<usize, String> {
+    text.parse().ok().filter(|n| *n <= 3).ok_or_else(|| "must be a whole number from 0 to 3".to_string())
+}
+
+fn some(text: &str) -> Result<usize, String> {
+    text.parse().ok().filter(|n| (1..=1000).contains(n)).ok_or_else(|| "must be a whole number from 1 to 1000".to_string())
 }

@@ -13,6 +13,7 @@ mod model;
 mod node;
 mod play;
 mod progress;
+mod prove;
 mod recordings;
 mod replay;
 mod run;
@@ -43,7 +44,9 @@ fn main() -> ExitCode {
         Command::Model(command) => model::model(&command),
         Command::Bag(command) => bag::bag(&command),
         Command::Clean => run::clean(),
+        Command::Prove(options) => prove::prove(&options),
         Command::Node(options) => return node::node(&options),
+        Command::SealedMaster(options) => return prove::sealed_master(&options),
     };
     match result {
         Ok(code) => ExitCode::from(code),
@@ -58,7 +61,10 @@ fn main() -> ExitCode {
 /// there a closed one must not end us.
 fn end_with_the_reader(command: &Command) {
     use nix::sys::signal::{SigHandler, Signal, signal};
-    if !matches!(command, Command::Run(_) | Command::Node(_) | Command::Bag(cli::Bag::Play { .. })) {
+    if !matches!(
+        command,
+        Command::Run(_) | Command::Prove(_) | Command::Node(_) | Command::SealedMaster(_) | Command::Bag(cli::Bag::Play { .. })
+    ) {
         // SAFETY: the default action replaces none of ours.
         let _ = unsafe { signal(Signal::SIGPIPE, SigHandler::SigDfl) };
     }

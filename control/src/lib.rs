@@ -9,6 +9,7 @@ pub mod guard;
 pub mod live_margin;
 pub mod margins;
 pub mod master;
+pub mod mechanism;
 pub mod operator;
 pub mod scaling;
 pub mod slave;

@@ -1,8 +1,8 @@
 //! The master plant as a node: the hand pulls at it, the reflected force drives its motor, its position is measured.
 
 use crate::core::{Core, Events, Port, Tick};
-use crate::device::Device;
 use crate::freshness::{Authority, Freshness};
+use crate::mechanism::Mechanism;
 use backdrive_msgs::{MAX_AXES, Sample, flag};
 
 /// Inputs `intent`, `force`; outputs `measured` (position; effort = the force applied from this step to the
@@ -12,7 +12,7 @@ use backdrive_msgs::{MAX_AXES, Sample, flag};
 /// motion from intent k-1 to intent k; then it is measured. So `measured` is a recording as the model file
 /// means it: the effort of sample k holds until sample k+1.
 pub struct Master {
-    device: Device,
+    device: Box<dyn Mechanism>,
     authority: Authority,
     force: Freshness,
     intent: Freshness,
@@ -30,7 +30,7 @@ pub struct Master {
 
 impl Master {
     /// A master that lets go of the force `stale_after_s` after its last sample.
-    pub fn new(device: Device, stale_after_s: f64, period_s: f64) -> Master {
+    pub fn new(device: Box<dyn Mechanism>, stale_after_s: f64, period_s: f64) -> Master {
         Master {
             device,
             authority: Authority::new(stale_after_s, period_s),
@@ -45,11 +45,6 @@ impl Master {
             was_decaying: false,
             was_finite: true,
         }
-    }
-
-    /// The device inside.
-    pub fn device(&self) -> &Device {
-        &self.device
     }
 
     fn next_force(&mut self, axis: usize, wanted: f64, period_s: f64) -> (f64, bool) {

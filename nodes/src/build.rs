@@ -192,7 +192,7 @@ fn cores(graph: &Graph, node: &Node) -> Result<Vec<Box<dyn Core>>, DeviceError> 
     Ok(match &node.settings {
         Settings::Operator(intents) => vec![Box::new(Operator::new(intents.clone()))],
         Settings::Master(files) => {
-            vec![Box::new(Master::new(needed(simulated(files, Role::Master)?)?, stale, period_s))]
+            vec![Box::new(Master::new(Box::new(needed(simulated(files, Role::Master)?)?), stale, period_s))]
         }
         Settings::Canceller(files, high_pass_hz) => {
             vec![Box::new(Canceller::new(simulated(files, Role::Master)?, *high_pass_hz, period_s))]

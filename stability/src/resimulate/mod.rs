@@ -13,10 +13,12 @@ pub mod sweep;
 use crate::collect::{Collector, Signal};
 use crate::outcome::{Outcome, Trace, judge};
 use crate::session::Session;
+use backdrive_control::core::Core;
 use backdrive_control::operator::Intent;
-use backdrive_nodes::build::{BuildError, plan};
-use backdrive_nodes::graph::{Graph, NodeKind, Settings};
+use backdrive_nodes::build::{BuildError, plan, plan_with};
+use backdrive_nodes::graph::{Graph, Node, NodeKind, Settings};
 use backdrive_nodes::sequence::{Sequence, SequenceError};
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Why a loop cannot be run again.
@@ -98,6 +100,14 @@ pub enum ResimulateError {
         /// Why, and what to do.
         why: String,
     },
+    /// A program of the user's own does not start.
+    #[error("node \"{node}\": {why}")]
+    Own {
+        /// The node.
+        node: String,
+        /// Why.
+        why: String,
+    },
     /// It was stopped before it was done.
     #[error("stopped before it was done")]
     Cancelled,
@@ -171,12 +181,17 @@ impl Run {
 /// Steps between looks at whether to end early.
 const CHUNK: u64 = 256;
 
+/// Brings the cores of a node that is a program of the user's own, for each run anew; the grip's forces are to be scaled by the number. `None`: as
+/// the graph says.
+pub type OwnCores = Arc<dyn Fn(&Graph, &Node, f64) -> Option<Result<Vec<Box<dyn Core>>, String>> + Send + Sync>;
+
 /// A loop with a script, ready to be run at any gain.
-#[derive(Debug, Clone)]
+#[derive(Clone)]
 pub struct Scenario {
     graph: Graph,
     steps: u64,
     script: String,
+    own: Option<OwnCores>,
 }
 
 impl Scenario {
@@ -221,10 +236,16 @@ impl Scenario {
                 *guard = false;
             }
         }
-        let scenario = Scenario { graph, steps, script: script.to_string() };
+        let scenario = Scenario { graph, steps, script: script.to_string(), own: None };
         // What cannot be built is told now, not in the middle of a sweep.
-        scenario.sequence(&scenario.graph)?;
+        scenario.sequence(&scenario.graph, 1.0)?;
         Ok(scenario)
+    }
+
+    /// The same with cores of the caller's own in the place of some nodes: a device that is not simulated here.
+    pub fn with_own_cores(mut self, own: OwnCores) -> Scenario {
+        self.own = Some(own);
+        self
     }
 
     /// The graph that is run.
@@ -285,7 +306,7 @@ impl Scenario {
                 _ => {}
             }
         }
-        let mut sequence = self.sequence(&graph)?;
+        let mut sequence = self.sequence(&graph, options.grip_scale)?;
         let mut collector = Collector::of(&graph, &self.graph.path.display().to_string());
         collector.reserve(self.steps as usize);
         let needed = |signal: Signal| match signal {
@@ -328,9 +349,14 @@ impl Scenario {
         Ok(Run { gain, outcome, beneath, contact_s, judged_s, steps: sequence.steps(), signals })
     }
 
-    fn sequence(&self, graph: &Graph) -> Result<Sequence, ResimulateError> {
+    fn sequence(&self, graph: &Graph, grip_scale: f64) -> Result<Sequence, ResimulateError> {
+        let planned = |node: &Node| match self.own.as_ref().and_then(|own| own(graph, node, grip_scale)) {
+            Some(Ok(cores)) => Ok(plan_with(graph, &node.name, cores)?),
+            Some(Err(why)) => Err(ResimulateError::Own { node: node.name.clone(), why }),
+            None => Ok(plan(graph, &node.name)?),
+        };
         let nodes = graph.nodes.iter().filter(|n| n.kind != NodeKind::Recorder);
-        let plans = nodes.map(|n| plan(graph, &n.name)).collect::<Result<Vec<_>, _>>()?;
+        let plans = nodes.map(planned).collect::<Result<Vec<_>, ResimulateError>>()?;
         Ok(Sequence::new(plans, &graph.timing)?)
     }
 }

@@ -1,0 +1,164 @@
+//! Draws a truth and seals it, or is the device that a truth describes.
+
+use backdrive_sealed::draw::{DrawOptions, draw};
+use backdrive_sealed::master::{MasterOptions, SealedMaster};
+use backdrive_sealed::network::{Grip, Network};
+use backdrive_sealed::process::serve;
+use backdrive_sealed::seal::seal;
+use backdrive_sealed::truth::Truth;
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs::{self, File, OpenOptions};
+use std::io::{self, Write};
+use std::os::fd::AsFd;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::str::FromStr;
+
+const USAGE: &str = "\
+The hidden plant: draws what a device hides and seals it, or is that device.
+
+backdrive-sealed draw --model FILE [--grip FILE] --seed N --out FILE [--effects N] [--nonlinear] [--masked PERCENT]
+                      [--grip-differs PERCENT] [--rate HZ]
+    Draws a truth from a seed, writes it, and prints its SHA-256 as sha256sum does. A file that is there is not replaced.
+    --effects       how many, 0 to 3 (1)
+    --nonlinear     only effects that no linear model can imitate
+    --masked        per cent, 0 to 50, by which nominal numbers are wrong at most (15)
+    --grip-differs  per cent, 0 to 50, by which the true grip differs from the nominal one at most (20)
+    --rate          samples of the graph per second (5000)
+
+backdrive-sealed run --model FILE [--grip FILE] --truth FILE [--number N] [--firmness FACTOR] [--rate HZ]
+    Is the device that a truth describes, over standard input and output: documentation of the library, `process`.
+    --number        which run it is: every one has sensor noise of its own (0)
+    --firmness      how firm the hand grips in this run: factor on the true grip (1)
+";
+
+/// What stands behind the verb: `--name value`, and names that stand alone.
+struct Options {
+    values: BTreeMap<String, String>,
+    alone: BTreeSet<String>,
+}
+
+impl Options {
+    /// Sorts the arguments; every name must be one of `named` (with a value) or `alone`.
+    fn sort(mut arguments: impl Iterator<Item = String>, named: &[&str], alone: &[&str]) -> Result<Options, Failure> {
+        let mut options = Options { values: BTreeMap::new(), alone: BTreeSet::new() };
+        while let Some(argument) = arguments.next() {
+            let name = argument.strip_prefix("--").unwrap_or_default().to_string();
+            if alone.contains(&name.as_str()) {
+                options.alone.insert(name);
+            } else if named.contains(&name.as_str()) {
+                let value = arguments.next().ok_or_else(|| misused(format!("--{name} needs a value")))?;
+                options.values.insert(name, value);
+            } else {
+                return Err(misused(format!("unknown argument \"{argument}\"")));
+            }
+        }
+        Ok(options)
+    }
+
+    fn path(&self, name: &str) -> Option<PathBuf> {
+        self.values.get(name).map(PathBuf::from)
+    }
+
+    fn need_path(&self, name: &str) -> Result<PathBuf, Failure> {
+        self.path(name).ok_or_else(|| misused(format!("--{name} is missing")))
+    }
+
+    fn number<T: FromStr>(&self, name: &str) -> Result<Option<T>, Failure> {
+        let wrong = |text: &String| misused(format!("--{name}: \"{text}\" is not a number that it takes"));
+        self.values.get(name).map(|text| text.parse().map_err(|_| wrong(text))).transpose()
+    }
+
+    /// s, from one sample to the next.
+    fn period(&self) -> Result<f64, Failure> {
+        Ok(1.0 / self.number("rate")?.unwrap_or(5000.0))
+    }
+
+    /// The nominal device, held by the nominal grip if there is one.
+    fn network(&self) -> Result<Network, Failure> {
+        let name = |path: &Path| path.display().to_string();
+        let model = self.need_path("model")?;
+        let free = Network::from_toml(&read(&model)?, &name(&model)).map_err(wrong)?;
+        match self.path("grip") {
+            None => Ok(free),
+            Some(path) => Ok(free.held(&Grip::from_toml(&read(&path)?, &name(&path)).map_err(wrong)?)),
+        }
+    }
+}
+
+/// A sentence and the exit code that it ends with: 2 for what was asked, 3 for what a file says, 5 for what the system says.
+struct Failure(String, u8);
+
+fn main() -> ExitCode {
+    let mut arguments = std::env::args().skip(1);
+    let done = match arguments.next().as_deref() {
+        Some("draw") => {
+            let named = ["model", "grip", "seed", "out", "effects", "masked", "grip-differs", "rate"];
+            Options::sort(arguments, &named, &["nonlinear"]).and_then(|options| draw_truth(&options))
+        }
+        Some("run") => {
+            let named = ["model", "grip", "truth", "number", "firmness", "rate"];
+            Options::sort(arguments, &named, &[]).and_then(|options| run(&options))
+        }
+        Some("--help" | "-h" | "help") => {
+            print!("{USAGE}");
+            Ok(())
+        }
+        _ => Err(misused("say draw or run")),
+    };
+    match done {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(Failure(sentence, code)) => {
+            eprintln!("{sentence}");
+            ExitCode::from(code)
+        }
+    }
+}
+
+fn misused(what: impl std::fmt::Display) -> Failure {
+    Failure(format!("{what}; backdrive-sealed --help says what there is"), 2)
+}
+
+fn wrong(error: impl std::fmt::Display) -> Failure {
+    Failure(error.to_string(), 3)
+}
+
+fn read(path: &Path) -> Result<String, Failure> {
+    fs::read_to_string(path).map_err(|error| Failure(format!("{}: cannot be read: {error}", path.display()), 3))
+}
+
+fn draw_truth(options: &Options) -> Result<(), Failure> {
+    let usual = DrawOptions::default();
+    let drawn = DrawOptions {
+        effects: options.number("effects")?.unwrap_or(usual.effects),
+        nonlinear_only: options.alone.contains("nonlinear"),
+        masked_percent: options.number("masked")?.unwrap_or(usual.masked_percent),
+        grip_percent: options.number("grip-differs")?.unwrap_or(usual.grip_percent),
+        period_s: options.period()?,
+        ..usual
+    };
+    let seed = options.number("seed")?.ok_or_else(|| misused("--seed is missing"))?;
+    let out = options.need_path("out")?;
+    let truth = draw(&options.network()?, seed, &drawn).map_err(wrong)?;
+    let (bytes, hash) = seal(&truth).map_err(wrong)?;
+    let written = OpenOptions::new().write(true).create_new(true).open(&out).and_then(|mut file| file.write_all(&bytes));
+    written.map_err(|error| Failure(format!("{}: cannot be written: {error}", out.display()), 5))?;
+    println!("{hash}  {}", out.display());
+    Ok(())
+}
+
+fn run(options: &Options) -> Result<(), Failure> {
+    let path = options.need_path("truth")?;
+    let how = MasterOptions {
+        period_s: options.period()?,
+        run: options.number("number")?.unwrap_or(0),
+        firmness: options.number("firmness")?.unwrap_or(1.0),
+    };
+    let network = options.network()?;
+    let truth = Truth::from_json(read(&path)?.as_bytes()).map_err(|error| wrong(format!("{}: {error}", path.display())))?;
+    let master = SealedMaster::new(&network, &truth, &how).map_err(wrong)?;
+    // Not through the standard output's own buffer, which would cut answers at every byte that is a line feed in text.
+    let output = io::stdout().as_fd().try_clone_to_owned().map(File::from);
+    let served = output.and_then(|output| serve(master, io::stdin().lock(), output));
+    served.map_err(|error| Failure(format!("the other end: {error}"), 5))
+}

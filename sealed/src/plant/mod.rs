@@ -1,0 +1,316 @@
+//! The hidden plant in time.
+//!
+//! The integrator is a splitting: drift (positions move with their speeds for half a substep), kick (speeds change at those
+//! positions), drift. For conservative forces that is the leapfrog, second order and symplectic, so the energy of a mode
+//! stays for any number of periods. Within the kick, damping is taken by the midpoint rule, which is stable at any size, and dry friction as
+//! what it is: a force within a box that brings the surfaces to rest if it can ([`kick`]). So stick is exact, no speed
+//! regularises anything, and no event is searched for; a reversal is late by at most a substep. Laws with a memory follow the
+//! positions of the kicks, exactly along each piece of their path.
+
+mod assemble;
+mod dense;
+mod drive;
+mod kick;
+mod sense;
+
+use crate::laws::{ForceLaw, Path};
+use crate::network::{Network, Place};
+use crate::truth::{Truth, TruthError};
+use drive::Drive;
+use kick::Kick;
+use sense::Sensor;
+use std::ops::Range;
+
+/// The substep resolves the fastest motion that the stiffnesses allow to this phase, rad: its frequency is then off by
+/// `phase^2/24`, 1e-4 of itself, and that of a mode ten times slower by 1e-6.
+const PHASE_PER_SUBSTEP: f64 = 0.05;
+
+/// Substeps of a period at least, for reversals, dead times and edges that fall inside it.
+const SUBSTEPS_AT_LEAST: usize = 20;
+
+/// Substeps of a period at most: more and a second takes minutes.
+const SUBSTEPS_AT_MOST: usize = 20_000;
+
+/// A plant that cannot be made.
+#[derive(Debug, thiserror::Error)]
+pub enum PlantError {
+    /// The truth does not fit the model.
+    #[error(transparent)]
+    Truth(#[from] TruthError),
+    /// The sampling period is not a time.
+    #[error("the sampling period is {0} s; give a time above 0")]
+    Period(f64),
+    /// Bodies or elements between them have no inertia.
+    #[error("device \"{0}\": a body moves freely without inertia; give it some, or an inerter")]
+    NoInertia(String),
+    /// A dead time would fill the memory.
+    #[error("signal \"{signal}\" is delayed by {delay_s} s, more than {most} sampling periods; shorten it")]
+    Delay {
+        /// Name of the input or output.
+        signal: String,
+        /// s.
+        delay_s: f64,
+        /// Sampling periods.
+        most: usize,
+    },
+    /// The substep would be too short.
+    #[error(
+        "device \"{device}\" moves at up to {rad_per_s:.0} rad/s, which a period of {period_s} s cannot be divided for; \
+         soften its springs, add inertia or sample faster"
+    )]
+    TooStiff {
+        /// Its name.
+        device: String,
+        /// Bound of its fastest motion.
+        rad_per_s: f64,
+        /// The sampling period.
+        period_s: f64,
+    },
+}
+
+/// A step that cannot be made.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum StepError {
+    /// Too few or too many inputs.
+    #[error("{found} inputs were given, the device has {expected}")]
+    Inputs {
+        /// How many were given.
+        found: usize,
+        /// How many there are.
+        expected: usize,
+    },
+    /// An input is not a number.
+    #[error("input {0} is not a finite number; hold the last one or send 0")]
+    NotFinite(usize),
+    /// The device ran away beyond all numbers.
+    #[error("the device ran away; the inputs or the loop around it are not stable")]
+    RanAway,
+}
+
+/// A joint of the network, ready to step.
+struct Joint {
+    between: [Place; 2],
+    force: Box<dyn ForceLaw>,
+    memory: Range<usize>,
+    /// Element whose force loads its friction.
+    loaded_by: Option<usize>,
+    /// m, where its memory stands.
+    last: f64,
+    /// N, what its path sets in this substep.
+    path_force: f64,
+    /// N s/m, in this substep.
+    damping: f64,
+    /// Index among the dry joints.
+    dry: Option<usize>,
+}
+
+impl Joint {
+    fn relative(&self, values: &[f64]) -> f64 {
+        self.between[0].map_or(0.0, |body| values[body]) - self.between[1].map_or(0.0, |body| values[body])
+    }
+
+    /// Adds the force `f` (N), positive when stretched, to the bodies' forces.
+    fn push(&self, f: f64, forces: &mut [f64]) {
+        if let Some(body) = self.between[0] {
+            forces[body] -= f;
+        }
+        if let Some(body) = self.between[1] {
+            forces[body] += f;
+        }
+    }
+}
+
+/// The true device, stepped one sampling period at a time. Deterministic: the same truth and inputs give the same bits.
+pub struct SealedPlant {
+    names: Names,
+    joints: Vec<Joint>,
+    drives: Vec<Drive>,
+    sensors: Vec<Sensor>,
+    kick: Kick,
+    memory: Vec<f64>,
+    scratch: Vec<f64>,
+    positions: Vec<f64>,
+    middle: Vec<f64>,
+    speeds: Vec<f64>,
+    accelerations: Vec<f64>,
+    applied: Vec<f64>,
+    element_forces: Vec<f64>,
+    reactions: Vec<f64>,
+    exact: Vec<f64>,
+    measured: Vec<f64>,
+    substeps: usize,
+    substep_s: f64,
+}
+
+/// What the device calls its parts.
+struct Names {
+    bodies: Vec<String>,
+    elements: Vec<String>,
+    inputs: Vec<String>,
+    outputs: Vec<String>,
+}
+
+impl SealedPlant {
+    /// The device that `truth` makes of the nominal model (with its grip attached, [`Network::held`]), at rest, its outputs measured
+    /// once. `period_s` is the time from one step to the next.
+    ///
+    /// # Errors
+    ///
+    /// [`PlantError`]: the truth is not about this model, or the device cannot be simulated.
+    pub fn new(nominal: &Network, truth: &Truth, period_s: f64) -> Result<SealedPlant, PlantError> {
+        SealedPlant::with_substeps(nominal, truth, period_s, 1)
+    }
+
+    /// The same with at least `substeps` substeps of a period. For checks of convergence.
+    ///
+    /// # Errors
+    ///
+    /// As [`SealedPlant::new`].
+    pub fn with_substeps(nominal: &Network, truth: &Truth, period_s: f64, substeps: usize) -> Result<SealedPlant, PlantError> {
+        if !(period_s.is_finite() && period_s > 0.0) {
+            return Err(PlantError::Period(period_s));
+        }
+        let device = truth.device(nominal)?;
+        let mut plant = assemble::assemble(&device, truth, period_s, substeps)?;
+        plant.measure();
+        Ok(plant)
+    }
+
+    /// Takes the first samples of the inputs as where motions begin: the moved bodies stand there, everything else rests
+    /// at 0. Forces do not act yet. Measures again, so call it before the first step or not at all.
+    ///
+    /// # Errors
+    ///
+    /// [`StepError::Inputs`] and [`StepError::NotFinite`].
+    pub fn start(&mut self, inputs: &[f64]) -> Result<(), StepError> {
+        self.check(inputs)?;
+        for (drive, sample) in self.drives.iter_mut().zip(inputs) {
+            drive.start(*sample);
+            if drive.is_motion() {
+                self.positions[drive.body()] = drive.position(1.0);
+            }
+        }
+        for joint in &mut self.joints {
+            joint.last = joint.relative(&self.positions);
+        }
+        self.measure();
+        Ok(())
+    }
+
+    /// Carries the device on by one period. A force with zero hold acts with this value through the period; any
+    /// other input goes from its last value to this one, which it has at the period's end.
+    ///
+    /// # Errors
+    ///
+    /// [`StepError`]; nothing has moved when the inputs are refused.
+    pub fn step(&mut self, inputs: &[f64]) -> Result<(), StepError> {
+        self.check(inputs)?;
+        for (drive, sample) in self.drives.iter_mut().zip(inputs) {
+            drive.begin(*sample);
+        }
+        for number in 0..self.substeps {
+            self.substep(number);
+        }
+        if !self.positions.iter().chain(&self.speeds).all(|value| value.is_finite()) {
+            return Err(StepError::RanAway);
+        }
+        self.measure();
+        Ok(())
+    }
+
+    fn check(&self, inputs: &[f64]) -> Result<(), StepError> {
+        if inputs.len() != self.drives.len() {
+            return Err(StepError::Inputs { found: inputs.len(), expected: self.drives.len() });
+        }
+        match inputs.iter().position(|value| !value.is_finite()) {
+            Some(index) => Err(StepError::NotFinite(index)),
+            None => Ok(()),
+        }
+    }
+
+    fn substep(&mut self, number: usize) {
+        let h = self.substep_s;
+        let share = |substeps: f64| (number as f64 + substeps) / self.substeps as f64;
+        // Drift to the middle.
+        for body in 0..self.positions.len() {
+            self.middle[body] = self.positions[body] + 0.5 * h * self.speeds[body];
+        }
+        self.applied.fill(0.0);
+        for drive in &mut self.drives {
+            let body = drive.body();
+            if drive.is_motion() {
+                self.middle[body] = drive.position(share(0.5));
+                self.speeds[body] = drive.speed(share(0.0));
+                self.kick.set_moved_speed(body, drive.speed(share(1.0)));
+            } else {
+                self.applied[body] += drive.mean_force(number as f64 * h, (number + 1) as f64 * h);
+            }
+        }
+        // Kick.
+        for index in 0..self.joints.len() {
+            let joint = &mut self.joints[index];
+            let path = Path { from: joint.last, to: joint.relative(&self.middle), speed: joint.relative(&self.speeds), duration: h };
+            joint.path_force = joint.force.path_force(&path, &mut self.memory[joint.memory.clone()]);
+            joint.last = path.to;
+            joint.push(joint.path_force, &mut self.applied);
+        }
+        self.kick.strike(&mut self.joints, &mut self.memory, &self.middle, &mut self.speeds, &self.applied);
+        // Drift to the end.
+        for body in 0..self.positions.len() {
+            self.positions[body] = self.middle[body] + 0.5 * h * self.speeds[body];
+        }
+        for drive in self.drives.iter().filter(|drive| drive.is_motion()) {
+            self.positions[drive.body()] = drive.position(share(1.0));
+        }
+    }
+
+    /// Names of the inputs, in the order of [`SealedPlant::step`].
+    pub fn input_names(&self) -> &[String] {
+        &self.names.inputs
+    }
+
+    /// Names of the outputs, in the order of [`SealedPlant::outputs`].
+    pub fn output_names(&self) -> &[String] {
+        &self.names.outputs
+    }
+
+    /// What the sensors say after the last step: with gain, delay, offset, noise and encoder steps, in this order.
+    pub fn outputs(&self) -> &[f64] {
+        &self.measured
+    }
+
+    /// The same before noise and encoder steps.
+    pub fn exact_outputs(&self) -> &[f64] {
+        &self.exact
+    }
+
+    /// Index of a body of the true device, which has the nominal ones in their order and perhaps more.
+    pub fn body(&self, name: &str) -> Option<usize> {
+        self.names.bodies.iter().position(|body| body == name)
+    }
+
+    /// Index of an element of the true device.
+    pub fn element(&self, name: &str) -> Option<usize> {
+        self.names.elements.iter().position(|element| element == name)
+    }
+
+    /// m, of a body by its index; 0 where there is none.
+    pub fn position(&self, body: usize) -> f64 {
+        self.positions.get(body).copied().unwrap_or(0.0)
+    }
+
+    /// m/s, of a body by its index; 0 where there is none.
+    pub fn speed(&self, body: usize) -> f64 {
+        self.speeds.get(body).copied().unwrap_or(0.0)
+    }
+
+    /// N, of an element by its index, positive when stretched; 0 where there is none.
+    pub fn force(&self, element: usize) -> f64 {
+        self.element_forces.get(element).copied().unwrap_or(0.0)
+    }
+
+    /// Substeps of a period.
+    pub fn substeps(&self) -> usize {
+        self.substeps
+    }
+}

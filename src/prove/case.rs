@@ -1,0 +1,248 @@
+//! One proof: draw and seal, record, diagnose, raise the gain, and only then look at the truth.
+
+use super::edges::{Canceller, Loop};
+use super::hidden::{Hidden, program};
+use super::score::{Finding, Mark, findings, is_nonlinear, mark, name_of};
+use super::absolute;
+use crate::cli;
+use crate::failure::Failure;
+use backdrive_sealed::seal::hash;
+use backdrive_sealed::truth::Truth;
+use serde_json::{Value, json};
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::sync::atomic::{AtomicBool, Ordering};
+use toml_edit::{Array, DocumentMut, Item, value};
+
+/// What a proof gave.
+pub struct Case {
+    /// SHA-256 of the truth, as printed before anything was recorded.
+    pub sealed: String,
+    /// The verdict's word and sentence.
+    pub word: String,
+    sentence: String,
+    /// What was found.
+    pub findings: Vec<Finding>,
+    /// What was concealed.
+    concealed: Vec<String>,
+    /// How right that is, effect by effect.
+    pub marks: Vec<Mark>,
+    /// Whether something nonlinear was concealed.
+    pub nonlinear: bool,
+    /// Error on recordings that no fit has seen, as shares of their deviation: as given, refitted, diagnosed.
+    held_out: [Option<f64>; 3],
+    /// Stable mu*lambda by canceller; the second: whether it ends the range that was searched.
+    gains: Vec<(&'static str, f64, bool)>,
+}
+
+/// Runs one case; its files stay in `folder`.
+pub fn prove(options: &cli::Prove, folder: &Path, seed: u64, effects: usize, stop: &AtomicBool) -> Result<Case, Failure> {
+    let sealed = folder.join("sealed");
+    if sealed.exists() {
+        return Err(Failure::input(format!("{}: is there already; a truth is sealed once, so name another folder with --out", sealed.display())));
+    }
+    std::fs::create_dir_all(&sealed).map_err(|e| Failure::write(&sealed, e))?;
+    let template: DocumentMut = read(&options.session)?.parse().map_err(|e| Failure::input(format!("{}: {e}", options.session.display())))?;
+    let rate_hz = template.get("rate_hz").and_then(|i| i.as_float().or(i.as_integer().map(|n| n as f64))).unwrap_or(5000.0);
+    let hidden = Hidden {
+        program: options.plant.clone().unwrap_or_else(program),
+        model: PathBuf::from(absolute(&options.model)?),
+        grip: Some(PathBuf::from(absolute(&options.grip)?)),
+        truth: PathBuf::from(absolute(&sealed.join("truth.json"))?),
+        rate_hz,
+    };
+    let digest = draw(options, &hidden, seed, effects)?;
+    println!("{}: sealed, SHA-256 {digest}", folder.display());
+
+    // From here to the verdict only the hidden plant's process opens the truth.
+    let graph = folder.join("session.toml");
+    write(&graph, &session(template, options, &hidden, &digest)?)?;
+    let session = folder.join("session");
+    ours(folder, "run", &[&"run", &graph, &"--out", &session])?;
+    let found = folder.join("diagnosis");
+    let patience = options.patience.to_string();
+    ours(folder, "diagnose", &[&"diagnose", &session, &"--out", &found, &"--patience", &patience])?;
+    let verdict: Value = serde_json::from_str(&read(&found.join("verdict.json"))?).map_err(Failure::input)?;
+
+    let cancellers = cancellers(options, folder, &session, &found)?;
+    let the_loop = Loop { graph: &options.contact, high_pass_hz: options.high_pass, hidden: &hidden };
+    let mut gains = Vec::new();
+    for canceller in &cancellers {
+        let edge = the_loop.edge(canceller, 1.0, stop)?;
+        gains.push((canceller.name, edge.at_least, edge.critical_gain.is_none() && edge.limited_from.is_none()));
+        if stop.load(Ordering::SeqCst) {
+            break;
+        }
+    }
+
+    let bytes = std::fs::read(&hidden.truth).map_err(|e| Failure::input(format!("{}: {e}", hidden.truth.display())))?;
+    if hash(&bytes) != digest {
+        return Err(Failure::input(format!("{}: is not what was sealed", hidden.truth.display())));
+    }
+    let truth = Truth::from_json(&bytes).map_err(Failure::input)?;
+    let (word, findings) = (verdict["verdict"].as_str().unwrap_or_default().to_string(), findings(&verdict));
+    let error = |key: &str| verdict["held_out"][key].as_f64();
+    Ok(Case {
+        sealed: digest,
+        sentence: verdict["sentence"].as_str().unwrap_or_default().to_string(),
+        concealed: truth.effects.iter().map(name_of).collect(),
+        marks: truth.effects.iter().map(|e| mark(e, &word, &findings, false)).collect(),
+        nonlinear: is_nonlinear(&truth),
+        held_out: ["nrmse_before", "nrmse_refit", "nrmse_after"].map(error),
+        word,
+        findings,
+        gains,
+    })
+}
+
+impl Case {
+    /// The stable gain with the diagnosed canceller over the better of the two linear ones.
+    pub fn ratio(&self) -> Option<f64> {
+        let gain = |name: &str| self.gains.iter().find(|g| g.0 == name).map(|g| g.1);
+        let linear = gain("second order")?.max(gain("linear, refitted")?);
+        Some(gain("diagnosed")? / linear).filter(|r| r.is_finite())
+    }
+
+    /// Whether everything concealed was found by its family and place, and nothing where nothing was.
+    pub fn is_right(&self) -> bool {
+        if self.marks.is_empty() { self.findings.is_empty() } else { self.marks.iter().all(|m| m.family) }
+    }
+
+    /// A few lines for a person.
+    pub fn text(&self) -> String {
+        let list = |names: &[String]| if names.is_empty() { "nothing".to_string() } else { names.join(", ") };
+        let found: Vec<String> = self.findings.iter().map(|f| format!("{} {}", f.physics, f.place.join("-"))).collect();
+        let percent = |x: Option<f64>| x.map_or("-".to_string(), |x| format!("{:.2} %", 100.0 * x));
+        let gains: Vec<String> =
+            self.gains.iter().map(|(name, gain, open)| format!("{name} {}{gain:.2}", if *open { "above " } else { "" })).collect();
+        let [given, refitted, diagnosed] = self.held_out.map(percent);
+        format!(
+            "  concealed   {}\n  found       {} ({})\n  held out    {given} as given, {refitted} refitted, {diagnosed} diagnosed\n  stable to   {}",
+            list(&self.concealed),
+            list(&found),
+            self.word,
+            gains.join(", "),
+        )
+    }
+
+    /// For programs.
+    pub fn json(&self) -> Value {
+        let gains: serde_json::Map<String, Value> =
+            self.gains.iter().map(|(name, gain, open)| (name.to_string(), json!({ "stable_to": gain, "whole_range": open }))).collect();
+        json!({
+            "sealed": self.sealed, "verdict": self.word, "sentence": self.sentence, "findings": self.findings, "concealed": self.concealed,
+            "marks": self.marks, "nonlinear": self.nonlinear, "held_out": self.held_out, "stable_gain": gains, "ratio": self.ratio(),
+        })
+    }
+}
+
+/// Draws and seals; the digest.
+fn draw(options: &cli::Prove, hidden: &Hidden, seed: u64, effects: usize) -> Result<String, Failure> {
+    let mut command = Command::new(&hidden.program);
+    command.arg("draw").arg("--model").arg(&hidden.model);
+    if let Some(grip) = &hidden.grip {
+        command.arg("--grip").arg(grip);
+    }
+    command.args(["--seed", &seed.to_string(), "--effects", &effects.to_string(), "--rate", &hidden.rate_hz.to_string()]);
+    if options.nonlinear {
+        command.arg("--nonlinear");
+    }
+    command.arg("--out").arg(&hidden.truth);
+    let name = hidden.program.display();
+    let output = command.output().map_err(|e| Failure::machine(format!("{name}: cannot be started ({e}); build it with `cargo build --release`")))?;
+    if !output.status.success() {
+        return Err(Failure::input(format!("{name}: {}", String::from_utf8_lossy(&output.stderr).trim())));
+    }
+    let said = String::from_utf8_lossy(&output.stdout);
+    said.split_whitespace().next().map(str::to_string).ok_or_else(|| Failure::machine(format!("{name}: printed no digest")))
+}
+
+/// The session's graph with the hidden plant in the master's place. It names the digest, and where the truth lies, which only that process opens.
+fn session(mut graph: DocumentMut, options: &cli::Prove, hidden: &Hidden, digest: &str) -> Result<String, Failure> {
+    graph["title"] = value(format!("A session with a sealed master, SHA-256 {digest}"));
+    let beside = PathBuf::from(absolute(&options.session)?).parent().map(Path::to_path_buf).unwrap_or_default();
+    let exe = std::env::current_exe().map_err(Failure::machine)?;
+    let nodes = graph.get_mut("nodes").and_then(Item::as_array_of_tables_mut);
+    for node in nodes.into_iter().flat_map(|n| n.iter_mut()) {
+        for key in ["model", "environment", "grip"] {
+            let path = node.get(key).and_then(Item::as_str).filter(|p| *p != "none").map(|p| beside.join(p));
+            if let Some(path) = path {
+                node[key] = value(absolute(&path)?);
+            }
+        }
+        let kind = node.get("kind").and_then(Item::as_str).unwrap_or_default().to_string();
+        if matches!(kind.as_str(), "master" | "canceller") {
+            node["model"] = value(hidden.model.display().to_string());
+            if let Some(grip) = &hidden.grip {
+                node["grip"] = value(grip.display().to_string());
+            }
+        }
+        if kind == "master" {
+            let mut words = Array::new();
+            words.push(exe.display().to_string());
+            words.push("sealed-master");
+            for word in hidden.words(1, 1.0) {
+                words.push(format!("--word={word}"));
+            }
+            node["command"] = value(words);
+        }
+    }
+    Ok(graph.to_string())
+}
+
+/// The cancellers that are compared: none, the nominal model, the two linear models fitted to the session, and the diagnosed one.
+fn cancellers(options: &cli::Prove, folder: &Path, session: &Path, found: &Path) -> Result<Vec<Canceller>, Failure> {
+    let second = folder.join("second-order.toml");
+    let still = still(options, session)?;
+    ours(folder, "fit-second-order", &[&"fit", &options.second_order, &still, &"--out", &second])?;
+    let refitted = folder.join("refitted.toml");
+    ours(folder, "fit-nominal", &[&"fit", &session.join("model.toml"), &session, &"--out", &refitted])?;
+    let holds = |name, model: PathBuf| Canceller { name, model: Some(model), grip: None };
+    Ok(vec![
+        Canceller { name: "none", model: None, grip: None },
+        Canceller { name: "nominal", model: Some(options.model.clone()), grip: Some(options.grip.clone()) },
+        holds("second order", second),
+        holds("linear, refitted", refitted),
+        holds("diagnosed", found.join("model.diagnosed.toml")),
+    ])
+}
+
+/// The recordings in which the hand holds still as a set of their own: a model of second order has no hand that could move.
+fn still(options: &cli::Prove, session: &Path) -> Result<PathBuf, Failure> {
+    let bad = |path: &Path, e: toml_edit::TomlError| Failure::input(format!("{}: {e}", path.display()));
+    let graph: DocumentMut = read(&options.session)?.parse().map_err(|e| bad(&options.session, e))?;
+    let experiments = graph.get("experiments").and_then(Item::as_array_of_tables);
+    let still = |e: &&toml_edit::Table| !e.contains_key("operator") && e.get("held_out").and_then(Item::as_bool) != Some(true);
+    let names = experiments.into_iter().flatten().filter(still).filter_map(|e| e.get("name").and_then(Item::as_str));
+    let files: Array = names.map(|name| format!("{name}.mcap")).collect();
+    let path = session.join("set.toml");
+    let mut set: DocumentMut = read(&path)?.parse().map_err(|e| bad(&path, e))?;
+    set["fit"] = value(files);
+    let still = session.join("still.toml");
+    write(&still, &set.to_string())?;
+    Ok(still)
+}
+
+/// Runs this program again as a process of its own, its output in a file beside the case.
+fn ours(folder: &Path, name: &str, arguments: &[&dyn AsRef<std::ffi::OsStr>]) -> Result<(), Failure> {
+    let exe = std::env::current_exe().map_err(Failure::machine)?;
+    let log = folder.join(format!("{name}.log"));
+    let file = std::fs::File::create(&log).map_err(|e| Failure::write(&log, e))?;
+    let errors = file.try_clone().map_err(Failure::machine)?;
+    let mut command = Command::new(exe);
+    command.args(arguments).stdin(Stdio::null()).stdout(file).stderr(errors);
+    let status = command.status().map_err(Failure::machine)?;
+    // 1 is a negative answer, which is one.
+    match status.code() {
+        Some(0 | 1 | 7) => Ok(()),
+        _ => Err(Failure::input(format!("{name} ended with {status}; {} says why", log.display()))),
+    }
+}
+
+fn read(path: &Path) -> Result<String, Failure> {
+    std::fs::read_to_string(path).map_err(|e| Failure::input(format!("{}: cannot be read: {e}", path.display())))
+}
+
+fn write(path: &Path, text: &str) -> Result<(), Failure> {
+    std::fs::write(path, text).map_err(|e| Failure::write(path, e))
+}

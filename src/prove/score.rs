@@ -1,0 +1,86 @@
+//! What was found against what was concealed. Nothing here is read before the verdict is written.
+
+use backdrive_sealed::effects::{Effect, Site};
+use backdrive_sealed::truth::Truth;
+use serde::Serialize;
+use serde_json::Value;
+
+/// A finding of a verdict.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Finding {
+    /// Name of the physics.
+    pub physics: String,
+    /// Bodies, or a signal.
+    pub place: Vec<String>,
+    /// 0 to 1.
+    pub confidence: f64,
+}
+
+/// How right a verdict is about an effect.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct Mark {
+    /// A finding sits where the effect does.
+    pub place: bool,
+    /// One there is of its family.
+    pub family: bool,
+    /// One there is the effect itself.
+    pub exact: bool,
+}
+
+/// The findings of a verdict file.
+pub fn findings(verdict: &Value) -> Vec<Finding> {
+    let list = verdict["findings"].as_array().map_or(&[][..], Vec::as_slice);
+    list.iter()
+        .map(|f| {
+            let names = |v: &Value| v.as_array().map(|a| a.iter().filter_map(|n| n.as_str().map(str::to_string)).collect());
+            let place = names(&f["between"]).or_else(|| f["signal"].as_str().map(|s| vec![s.to_string()])).unwrap_or_default();
+            Finding {
+                physics: f["physics"].as_str().unwrap_or_default().to_string(),
+                place,
+                confidence: f["confidence"].as_f64().unwrap_or(0.0),
+            }
+        })
+        .collect()
+}
+
+fn sits_at(finding: &Finding, site: &Site) -> bool {
+    let place: Vec<&str> = finding.place.iter().map(String::as_str).collect();
+    match site {
+        Site::Between([a, b]) => place == [a.as_str(), b] || place == [b.as_str(), a],
+        Site::Signal(name) => place == [name.as_str()],
+    }
+}
+
+/// Marks a verdict's findings for an effect. An inertia may as well be found in the numbers.
+pub fn mark(effect: &Effect, word: &str, findings: &[Finding], hand_hidden: bool) -> Mark {
+    if word == "parameters" && effect.physics.name() == "inertia" {
+        return Mark { place: true, family: true, exact: true };
+    }
+    let right = |f: &Finding| {
+        effect.accept.iter().any(|answer| {
+            let beside = |name: &String| findings.iter().any(|other| other.physics == *name && sits_at(other, &answer.site));
+            (hand_hidden || !answer.hand_hidden)
+                && sits_at(f, &answer.site)
+                && answer.physics.contains(&f.physics)
+                && answer.together_with.iter().all(beside)
+        })
+    };
+    let exact = findings.iter().any(right);
+    let there: Vec<&Finding> =
+        findings.iter().filter(|f| sits_at(f, &effect.site) || effect.accept.iter().any(|a| sits_at(f, &a.site))).collect();
+    Mark { place: exact || !there.is_empty(), family: exact || there.iter().any(|f| effect.family.contains(&f.physics)), exact }
+}
+
+/// The effect in words: `stribeck drum-ground`.
+pub fn name_of(effect: &Effect) -> String {
+    let place = match &effect.site {
+        Site::Between(ends) => ends.join("-"),
+        Site::Signal(name) => name.clone(),
+    };
+    format!("{} {place}", effect.physics.name())
+}
+
+/// Whether any concealed effect is nonlinear.
+pub fn is_nonlinear(truth: &Truth) -> bool {
+    truth.effects.iter().any(|e| e.nonlinear)
+}
