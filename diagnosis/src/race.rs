@@ -108,8 +108,11 @@ impl Course<'_> {
             running = running
                 .into_par_iter()
                 .map(|(structure, fit)| {
-                    // Beside one that leaves nothing over, others only have to show that they do no better.
+                    // Beside one that leaves nothing over, others only have to show that they do no better; those far behind have.
                     let beaten = stage == 2 && lead < 1.1 * floor && hopeful(&fit) > lead;
+                    if beaten && hopeful(&fit) > margin * lead {
+                        return (structure, fit);
+                    }
                     let effort = if beaten { Effort { steps: 6, ..effort } } else { effort };
                     let next = held_against.fit_knowing(&structure, &fit.values, effort, Some((&structure, &fit))).unwrap_or(fit);
                     (structure, next)

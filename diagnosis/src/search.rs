@@ -145,10 +145,14 @@ pub(crate) const MIDDLE: usize = 4;
 const NOMINAL_END: f64 = 5.0;
 /// Level above which fits start along the measured path, floors.
 const FAR: f64 = 2.0;
-/// Mean squared residual that the nominal model has to leave along the measured path, squares of the floor; and guides tried for it, each looser.
+/// Mean squared residual that the nominal model has to leave along the measured path, squares of the floor, or this share of what it leaves
+/// over without it.
 const SHOWS: f64 = 3.0;
 /// See [`SHOWS`].
-const LOOSER: usize = 4;
+const SHARE: f64 = 0.3;
+/// Ways to be led, until enough is left over: how much looser than at first, and whether parts of the recordings are enough. On parts the
+/// numbers of the nominal model may take on what differs from one part to the next.
+const LED: [(f64, bool); 6] = [(1.0, true), (0.2, true), (1.0, false), (0.2, false), (0.04, false), (0.008, false)];
 /// Samples in which ripples are looked for, at most.
 const LOCATED: usize = 12_000;
 /// Samples that screening is shown far from the noise, about.
@@ -220,28 +224,29 @@ pub fn search(
     let level = levels(&evaluator, &nominal.residuals).into_iter().fold(0.0, f64::max);
     let strength = if level > 3.0 * FAR { 1.0 } else { 0.3 };
     let far = level > FAR;
-    let mut loose = Guide::new(problem, &problem.fit, &scales, &evaluator.floor, strength);
-    let held = far && !loose.is_empty();
+    let firm = Guide::new(problem, &problem.fit, &scales, &evaluator.floor, strength);
+    let held = far && !firm.is_empty();
     // A motion that is prescribed leads the device by itself.
     let moved = problem.model.inputs.iter().any(|i| i.kind == InputKind::Motion);
     let guided = held || far && moved;
-    let mut attempts = 0;
+    let mut attempts = LED.iter();
     let (coarse, parts, base) = loop {
-        let coarse = Evaluator { substeps: COARSE, widest: 8.0, guide: held.then(|| loose.clone()), ..evaluator.clone() };
+        let Some(&(looser, in_parts)) = attempts.next() else { return Err(SearchError::RunsAway) };
+        let guide = held.then(|| firm.with(looser * firm.strength));
+        let coarse = Evaluator { substeps: COARSE, widest: 8.0, guide, ..evaluator.clone() };
         let from = if held { &start } else { &nominal.values };
         let at = coarse.fit(&structure, from, Effort { steps: if held { 0 } else { 2 }, tolerance: 1.0 }).ok_or(SearchError::RunsAway)?;
         // The parts where most is left over are enough for screening; along the measured path they begin as they were measured.
-        let parts = if far { Parts::of(&coarse, &structure, &at, SHOWN) } else { None };
+        let parts = if far && in_parts { Parts::of(&coarse, &structure, &at, SHOWN) } else { None };
         let on_parts = parts.as_ref().map_or_else(|| coarse.clone(), |p| p.evaluator(&coarse));
         let led = if guided { on_parts.fit(&structure, &at.values, Effort { steps: 12, tolerance: 1.0 }) } else { None };
         let base = led.unwrap_or(at);
-        // Led so firmly that nothing is left over, every physics looks as good as any other.
-        let shows = base.cost > SHOWS * base.residuals.len() as f64;
-        attempts += 1;
-        if !held || shows || attempts >= LOOSER {
+        // Where the nominal model explains the path as it is led there, every physics looks as good as any other.
+        let left = |fit: &Fit| fit.cost / fit.residuals.len().max(1) as f64;
+        let shows = left(&base) > SHOWS.min(SHARE * left(&nominal));
+        if !held || shows || attempts.len() == 0 {
             break (coarse, parts, base);
         }
-        loose = loose.with(0.2 * loose.strength);
     };
     if held
         && let Some(there) = middle.residuals(&structure, &base.values)
