@@ -78,7 +78,7 @@ pub fn fit(options: &cli::Fit) -> Result<u8, Failure> {
 }
 
 fn fitted(problem: &Problem, patience: Duration, stop: &AtomicBool, report: &(dyn Fn(&str) + Sync)) -> Result<Fitted, Failure> {
-    let until = Instant::now() + patience;
+    let until = Moment::now() + patience;
     // With every physics withheld a search is the refit of the nominal model alone.
     let without = PHYSICS.iter().map(|p| p.name.to_string()).collect();
     let settings = Settings { without, patience, ..Settings::default() };
