@@ -61,7 +61,7 @@ pub fn diagnose(options: &cli::Diagnose) -> Result<u8, Failure> {
         eprintln!("note: {note}");
     }
     let patience = Duration::from_secs_f64(options.patience);
-    let settings = Settings { without: options.without.clone(), patience, ..Settings::default() };
+    let settings = Settings { without: options.without.clone(), effects: usize::from(options.effects), patience };
     let Diagnosed { found, written } = diagnose_into(opened, &settings, &options.out, !options.no_report, &stop)?;
     let seconds = began.elapsed().as_secs_f64();
     let path = options.out.join("time.txt");
