@@ -141,6 +141,8 @@ const SIMPLE: usize = 6;
 pub(crate) const COARSE: usize = 2;
 /// See [`COARSE`].
 pub(crate) const MIDDLE: usize = 4;
+/// Residuals beyond this many times the size of most of them count by their size, not their square, where dry friction acts on a prescribed body.
+const FAR_OFF: f64 = 6.0;
 /// Substeps per sample, at most, whatever the model asks for.
 const FINEST: usize = 64;
 /// Share of what is left over, in squares, that too few substeps may make up.
@@ -202,7 +204,7 @@ pub fn search(
     evaluator.stop = stop;
     evaluator.until = Some(began + settings.patience.mul_f64(0.75));
     if friction_on_prescribed(problem) {
-        evaluator.robust = 6.0;
+        evaluator.robust = FAR_OFF;
     }
     report("refitting the nominal model");
     let structure = Structure::new(problem, &problem.fit, Vec::new());
@@ -214,6 +216,10 @@ pub fn search(
     // What a fit leaves over shows the measuring error better than the signal does.
     let before = evaluator.floor.clone();
     evaluator.floor = floors(&evaluator, &quick.residuals);
+    if evaluator.robust.is_finite() {
+        // Large is what is large beside the rest, which far from the noise is far from the noise itself.
+        evaluator.robust = FAR_OFF * bulk(&quick.residuals, &before, &evaluator).max(1.0);
+    }
     let rescaled = |residuals: &[f64]| -> Vec<f64> {
         levels(&evaluator, residuals).iter().zip(before.iter().zip(&evaluator.floor)).map(|(l, (b, f))| l * b / f).collect()
     };
@@ -568,6 +574,18 @@ impl Course<'_> {
         let place = |h: &Hypothesis| self.hypotheses.iter().position(|other| other.id == h.id);
         structure.added.iter().zip(structure.added_of(values)).filter_map(|(h, v)| Some((place(h)?, v))).collect()
     }
+}
+
+/// Size of most of the residuals, floors, that a fit with the floors `before` left over; a few that are far off do not count.
+fn bulk(residuals: &[f64], before: &[f64], evaluator: &Evaluator) -> f64 {
+    let mut sizes: Vec<f64> = Vec::with_capacity(residuals.len());
+    for (_, output, range) in evaluator.layout() {
+        let scale = before[output] / evaluator.floor[output];
+        sizes.extend(residuals.get(range).unwrap_or(&[]).iter().map(|r| scale * r.abs()));
+    }
+    let middle = sizes.len() / 2;
+    // The median of white noise is 0.6745 of its standard deviation.
+    if sizes.is_empty() { 1.0 } else { 1.4826 * *sizes.select_nth_unstable_by(middle, f64::total_cmp).1 }
 }
 
 /// Fewest substeps per sample with which a simulation errs by less than a structure leaves over.
