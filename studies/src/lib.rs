@@ -9,7 +9,11 @@ pub mod filter;
 pub mod run;
 pub mod table;
 
+mod brfd_friction_damper;
 mod emps;
+mod kuka_kr300;
+mod odrive_cogging;
+mod piezo_p885;
 mod silverbox;
 
 use data::Data;
@@ -36,10 +40,13 @@ pub struct Context<'a> {
     pub data: &'a Path,
     /// The folder for its results, which is there.
     pub out: &'a Path,
+    /// Whether only what takes less than a minute is wanted.
+    pub quick: bool,
 }
 
 /// Every study; a new one has its line here.
-pub const STUDIES: &[&Study] = &[&emps::STUDY, &silverbox::STUDY];
+pub const STUDIES: &[&Study] =
+    &[&brfd_friction_damper::STUDY, &emps::STUDY, &kuka_kr300::STUDY, &odrive_cogging::STUDY, &piezo_p885::STUDY, &silverbox::STUDY];
 
 /// Why a study has no result.
 #[derive(Debug, thiserror::Error)]
@@ -81,16 +88,16 @@ pub fn study_named(name: &str) -> Result<&'static Study, StudyError> {
 }
 
 impl Study {
-    /// Runs the study; its results go into a folder of its name in `out`, beside a `table.md`.
+    /// Runs the study, or of a long one its short part; its results go into a folder of its name in `out`, beside a `table.md`.
     ///
     /// # Errors
     /// [`StudyError::NoData`] where the recordings are not here; else when a file or the diagnosis fails.
-    pub fn run(&self, data: &Data, out: &Path) -> Result<Report, StudyError> {
+    pub fn run(&self, data: &Data, out: &Path, quick: bool) -> Result<Report, StudyError> {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join(self.name);
         let recordings = data.folder(self)?;
         let out = out.join(self.name);
         std::fs::create_dir_all(&out).map_err(|e| StudyError::File(format!("{}: cannot be made: {e}", out.display())))?;
-        let report = (self.run)(&Context { folder: &folder, data: &recordings, out: &out })?;
+        let report = (self.run)(&Context { folder: &folder, data: &recordings, out: &out, quick })?;
         run::write(&out.join("table.md"), &report.markdown())?;
         Ok(report)
     }

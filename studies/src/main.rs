@@ -19,6 +19,9 @@ struct Options {
     /// Say which studies there are.
     #[arg(long)]
     list: bool,
+    /// Only what takes less than a minute.
+    #[arg(long)]
+    quick: bool,
     /// Folder with a folder of recordings per device; BACKDRIVE_DATA comes before it, and without both it is ../shared/data beside the project.
     #[arg(long, value_name = "DIR")]
     data: Option<PathBuf>,
@@ -40,7 +43,7 @@ fn main() -> ExitCode {
     let names: Vec<String> = if options.all { all } else { options.names };
     let mut failed = false;
     for name in names {
-        match study_named(&name).and_then(|study| study.run(&data, &options.out)) {
+        match study_named(&name).and_then(|study| study.run(&data, &options.out, options.quick)) {
             Ok(report) => {
                 println!("{}", report.text());
                 println!("wrote {}", options.out.join(&name).display());

@@ -3,6 +3,7 @@
 use crate::{Context, StudyError};
 use backdrive::diagnose::{Diagnosed, Found, MODEL, diagnose_into};
 use backdrive::recordings;
+use backdrive_diagnosis::hypothesis::PHYSICS;
 use backdrive_diagnosis::search::Settings;
 use backdrive_plant::model::Model;
 use serde_json::Value;
@@ -22,6 +23,8 @@ pub struct Ask<'a> {
     pub model: &'a str,
     /// Physics that are withheld.
     pub without: &'a [&'a str],
+    /// How many physics may be missing at once, at most.
+    pub effects: usize,
     /// How long to search, at most, s.
     pub patience: f64,
 }
@@ -34,21 +37,39 @@ pub struct Ask<'a> {
 pub fn diagnose(context: &Context, ask: &Ask) -> Result<Found, StudyError> {
     let out = if ask.name.is_empty() { context.out.to_path_buf() } else { context.out.join(ask.name) };
     std::fs::create_dir_all(&out).map_err(|e| StudyError::File(format!("{}: cannot be made: {e}", out.display())))?;
-    let given = context.folder.join(ask.model);
-    let given = if given.is_file() { given } else { context.out.join(ask.model) };
-    write(&out.join("model.toml"), &read(&given)?)?;
-    let resolved = resolve(&read(&context.folder.join(ask.set))?, &[context.out, context.data])
-        .map_err(|e| StudyError::File(format!("{}: {e}", ask.set)))?;
+    // What the study made itself, a set of what it simulated or a model that it found, lies with its results.
+    let given = |name: &str| {
+        let own = context.folder.join(name);
+        read(&if own.is_file() { own } else { context.out.join(name) })
+    };
+    write(&out.join("model.toml"), &given(ask.model)?)?;
+    let resolved = resolve(&given(ask.set)?, &[context.out, context.data]).map_err(|e| StudyError::File(format!("{}: {e}", ask.set)))?;
     let set = out.join("set.toml");
     write(&set, &resolved)?;
     let opened = recordings::open(std::slice::from_ref(&set), None)?;
     let settings = Settings {
         without: ask.without.iter().map(|s| s.to_string()).collect(),
+        effects: ask.effects,
         patience: Duration::from_secs_f64(ask.patience),
-        ..Settings::default()
     };
     let Diagnosed { found, .. } = diagnose_into(opened, &settings, &out, true, &AtomicBool::new(false))?;
     Ok(found)
+}
+
+/// The nominal model refitted, its structure as it is, as `backdrive fit` does: no physics is considered.
+///
+/// # Errors
+/// As [`diagnose`].
+pub fn refit(context: &Context, ask: &Ask) -> Result<Found, StudyError> {
+    let all: Vec<&str> = PHYSICS.iter().map(|p| p.name).collect();
+    diagnose(context, &Ask { without: &all, ..ask.clone() })
+}
+
+/// A number of the nominal structure as the refit has it, by its path; NaN where the model states none.
+pub fn refitted(found: &Found, path: &str) -> f64 {
+    let (problem, nominal) = (&found.problem, &found.search.nominal);
+    let values = nominal.structure.stated_of(problem, &nominal.fit.values);
+    problem.stated.iter().zip(values).find(|(s, _)| s.path == path).map_or(f64::NAN, |(_, v)| v)
 }
 
 /// The model that a diagnosis wrote.

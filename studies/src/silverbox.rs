@@ -44,7 +44,7 @@ fn run(context: &Context) -> Result<Report, StudyError> {
         let t: Vec<f64> = (0..rows.len()).map(|i| i as f64 / RATE).collect();
         csv_columns::write(&context.out.join(name), &["t", "u", "y"], &[&t, &u[rows.clone()], &y[rows]])?;
     }
-    let ask = Ask { name: "", set: "set.toml", model: "model.toml", without: &[], patience: 60.0 };
+    let ask = Ask { name: "", set: "set.toml", model: "model.toml", without: &[], effects: 3, patience: 60.0 };
     let found = diagnose(context, &ask)?;
     let json = &found.said.json;
     let model = diagnosed_model(context, &ask)?;

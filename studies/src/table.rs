@@ -68,8 +68,8 @@ impl Report {
     pub fn markdown(&self) -> String {
         let mut out = format!("# {}\n\n| | measured | published | source | bar |\n|---|---|---|---|---|\n", self.title);
         for line in &self.lines {
-            let bar = within(line.within, "");
-            let _ = writeln!(out, "| {} | {} | {} | {} | {bar} |", line.what, line.measured, line.published, line.source);
+            let met = bar(line.within);
+            let _ = writeln!(out, "| {} | {} | {} | {} | {met} |", line.what, line.measured, line.published, line.source);
         }
         for note in &self.notes {
             let _ = write!(out, "\n{note}\n");
@@ -83,7 +83,7 @@ impl Report {
         for line in &self.lines {
             let cells = [&line.what, &line.measured, &line.published, &line.source].map(String::clone);
             let [a, b, c, d] = cells;
-            rows.push([a, b, c, d, within(line.within, "").to_string()]);
+            rows.push([a, b, c, d, bar(line.within).to_string()]);
         }
         let width = |c: usize| rows.iter().map(|r| r[c].chars().count()).max().unwrap_or(0);
         let widths: Vec<usize> = (0..5).map(width).collect();
@@ -100,11 +100,11 @@ impl Report {
     }
 }
 
-fn within(within: Option<bool>, otherwise: &'static str) -> &'static str {
+fn bar(within: Option<bool>) -> &'static str {
     match within {
         Some(true) => "met",
         Some(false) => "missed",
-        None => otherwise,
+        None => "",
     }
 }
 
