@@ -338,6 +338,9 @@ pub struct Diagnose {
     /// A physics that is not to be considered, and with it all that contain it as a special case; may be given several times.
     #[arg(long, value_name = "KIND", value_parser = physics)]
     pub without: Vec<String>,
+    /// How many physics may be missing at once, at most; more take more time.
+    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u8).range(1..=8))]
+    pub effects: u8,
     /// How long to search, at most. On a busy machine it takes up to 1.4 times that, so that the result depends less on what else runs.
     #[arg(long, value_name = "SECONDS", value_parser = positive, default_value_t = 24.0, allow_negative_numbers = true)]
     pub patience: f64,

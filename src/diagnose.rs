@@ -5,7 +5,7 @@ use crate::diagnose_page::{Shown, page};
 use crate::diagnose_text::text;
 use crate::failure::{Failure, code};
 use crate::progress;
-use crate::recordings;
+use crate::recordings::{self, Opened};
 use backdrive_diagnosis::audit::{self, Remark};
 use backdrive_diagnosis::clock::Moment;
 use backdrive_diagnosis::evidence;
@@ -21,7 +21,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 /// Name of the model file that is written.
-const MODEL: &str = "model.diagnosed.toml";
+pub const MODEL: &str = "model.diagnosed.toml";
 /// How long each record is fitted by itself, at most.
 const PER_RECORD: Duration = Duration::from_secs(4);
 /// And at least, where the search has taken all of its time.
@@ -60,14 +60,44 @@ pub fn diagnose(options: &cli::Diagnose) -> Result<u8, Failure> {
     for note in &opened.notes {
         eprintln!("note: {note}");
     }
-    // A folder that cannot be written is told before the work, not after it.
-    std::fs::create_dir_all(&options.out).map_err(|e| Failure::write(&options.out, e))?;
     let patience = Duration::from_secs_f64(options.patience);
-    let settings = Settings { without: options.without.clone(), patience, ..Settings::default() };
-    let found = progress::at_most(patience, |report| find(opened.problem, &settings, &stop, report))?;
+    let settings = Settings { without: options.without.clone(), effects: usize::from(options.effects), patience };
+    let Diagnosed { found, written } = diagnose_into(opened, &settings, &options.out, !options.no_report, &stop)?;
+    let seconds = began.elapsed().as_secs_f64();
+    let path = options.out.join("time.txt");
+    std::fs::write(&path, format!("{seconds:.2}\n")).map_err(|e| Failure::write(&path, e))?;
+    if options.json {
+        println!("{}", serde_json::to_string_pretty(&found.said.json).map_err(Failure::input)?);
+    } else {
+        println!("{}", text(&found));
+        println!("wrote     {}: {} ({seconds:.1} s)", shown(&options.out), written.join(", "));
+    }
+    if stop.load(Ordering::SeqCst) {
+        return Err(Failure { code: code::INTERRUPTED, message: "stopped; what was found until then is written".to_string() });
+    }
+    Ok(exit_code(&found.said.json))
+}
+
+/// A diagnosis, and the files that were written of it.
+pub struct Diagnosed {
+    /// Everything that was found.
+    pub found: Found,
+    /// Names of the files, in the folder that was given.
+    pub written: Vec<&'static str>,
+}
+
+/// Diagnoses what was opened and writes verdict, model, next experiment and, where wanted, the report into a folder; makes the folder if it is
+/// not there.
+///
+/// # Errors
+/// When the folder cannot be written, or the nominal model cannot be simulated on the recordings.
+pub fn diagnose_into(opened: Opened, settings: &Settings, out: &Path, with_report: bool, stop: &AtomicBool) -> Result<Diagnosed, Failure> {
+    // A folder that cannot be written is told before the work, not after it.
+    std::fs::create_dir_all(out).map_err(|e| Failure::write(out, e))?;
+    let found = progress::at_most(settings.patience, |report| find(opened.problem, settings, stop, report))?;
 
     let write = |name: &str, text: &str| {
-        let path = options.out.join(name);
+        let path = out.join(name);
         std::fs::write(&path, text).map_err(|e| Failure::write(&path, e))
     };
     let json = serde_json::to_string_pretty(&found.said.json).map_err(Failure::input)?;
@@ -78,24 +108,13 @@ pub fn diagnose(options: &cli::Diagnose) -> Result<u8, Failure> {
         write(EXPERIMENT_FILE, experiment)?;
         written.push(EXPERIMENT_FILE);
     }
-    if !options.no_report {
+    if with_report {
         let shown = Shown { found: &found, name: &opened.name, notes: &opened.notes };
-        let path = options.out.join("report.html");
+        let path = out.join("report.html");
         page(&shown).write(&path).map_err(|e| Failure::write(&path, e))?;
         written.push("report.html");
     }
-    let seconds = began.elapsed().as_secs_f64();
-    write("time.txt", &format!("{seconds:.2}\n"))?;
-    if options.json {
-        println!("{json}");
-    } else {
-        println!("{}", text(&found));
-        println!("wrote     {}: {} ({seconds:.1} s)", shown(&options.out), written.join(", "));
-    }
-    if stop.load(Ordering::SeqCst) {
-        return Err(Failure { code: code::INTERRUPTED, message: "stopped; what was found until then is written".to_string() });
-    }
-    Ok(exit_code(&found.said.json))
+    Ok(Diagnosed { found, written })
 }
 
 fn shown(folder: &Path) -> String {

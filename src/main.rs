@@ -1,71 +1,7 @@
-//! The command line: parses, dispatches, and maps errors to exit codes.
+//! The program; see the library beside it.
 
-mod bag;
-mod cli;
-mod diagnose;
-mod diagnose_page;
-mod diagnose_text;
-mod experiments;
-mod failure;
-mod fit;
-mod graph;
-mod model;
-mod node;
-mod play;
-mod progress;
-mod prove;
-mod recordings;
-mod replay;
-mod run;
-mod simulate;
-mod stability;
-mod stability_page;
-mod summary;
-
-use clap::Parser;
-use cli::{Cli, Command};
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    // A file that reaches the size a user is allowed is an error of its writer, with a name, and no end without a word.
-    // SAFETY: ignoring a signal runs no code of ours.
-    let _ = unsafe { nix::sys::signal::signal(nix::sys::signal::Signal::SIGXFSZ, nix::sys::signal::SigHandler::SigIgn) };
-    let command = Cli::parse().command;
-    end_with_the_reader(&command);
-    let result = match command {
-        Command::Run(options) => run::run(&options),
-        Command::Replay(options) => replay::replay(&options),
-        Command::Stability(options) => stability::stability(&options),
-        Command::Diagnose(options) => diagnose::diagnose(&options),
-        Command::Fit(options) => fit::fit(&options),
-        Command::Check(options) => graph::check(&options),
-        Command::Graph(options) => graph::draw(&options),
-        Command::Simulate(options) => simulate::simulate(&options),
-        Command::Model(command) => model::model(&command),
-        Command::Bag(command) => bag::bag(&command),
-        Command::Clean => run::clean(),
-        Command::Prove(options) => prove::prove(&options),
-        Command::Node(options) => return node::node(&options),
-        Command::SealedMaster(options) => return prove::sealed_master(&options),
-    };
-    match result {
-        Ok(code) => ExitCode::from(code),
-        Err(failure) => {
-            eprintln!("error: {}", failure.message);
-            ExitCode::from(failure.code)
-        }
-    }
-}
-
-/// `backdrive ... | head` ends quietly when the reader has enough. Not where other processes hang on pipes of ours:
-/// there a closed one must not end us.
-fn end_with_the_reader(command: &Command) {
-    use nix::sys::signal::{SigHandler, Signal, signal};
-    if !matches!(
-        command,
-        Command::Run(_) | Command::Prove(_) | Command::Node(_) | Command::SealedMaster(_) | Command::Bag(cli::Bag::Play { .. })
-    ) {
-        // SAFETY: the default action replaces none of ours.
-        let _ = unsafe { signal(Signal::SIGPIPE, SigHandler::SigDfl) };
-    }
+    backdrive::main()
 }

@@ -336,7 +336,7 @@ fn arriving(input: &Input, samples: &[f64], period: f64) -> Vec<f64> {
     let late = input.delay / period;
     let keep = if input.bandwidth.is_finite() { (-std::f64::consts::TAU * input.bandwidth * period).exp() } else { 0.0 };
     let at = |place: f64| -> f64 {
-        let place = place.max(0.0);
+        let place = place.clamp(0.0, samples.len().saturating_sub(1) as f64);
         let (k, part) = (place.floor() as usize, place.fract());
         let of = |k: usize| samples.get(k).copied().unwrap_or(0.0);
         let value = if part > 0.0 { of(k) + part * (of(k + 1) - of(k)) } else { of(k) };

@@ -5,7 +5,7 @@ use backdrive_bags::{BagError, Reader, recording as bag_recording};
 use backdrive_plant::model::{Hold, InputKind, Model, OutputKind};
 use backdrive_plant::recording::{Columns, Jitter, Recording, RecordingError, signals_of};
 use backdrive_plant::set::{Condition, Initial, RecordingSet};
-use backdrive_plant::stepper::{CompileError, Options, Plant, Segment, segments};
+use backdrive_plant::stepper::{CompileError, Options, Plant, Segment, ahead, segments};
 use backdrive_plant::tomlfile::{FileError, read_text};
 use std::path::{Path, PathBuf};
 
@@ -132,7 +132,8 @@ impl Problem {
         initial: Initial,
     ) -> Result<Problem, ProblemError> {
         let first = fit.first().ok_or_else(|| ProblemError::Set("there are no recordings to fit".to_string()))?;
-        Plant::new(&model, first.period, &Options::default())?;
+        let caught_up = ahead(&model, &first.inputs, first.period);
+        Plant::new(caught_up.as_ref().map_or(&model, |(model, _)| model), first.period, &Options::default())?;
         let measured = |output: usize| fit.iter().any(|r| r.outputs.get(output).is_some_and(Option::is_some));
         if !(0..model.outputs.len()).any(measured) {
             return Err(ProblemError::Set(format!(

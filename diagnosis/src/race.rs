@@ -4,7 +4,7 @@ use crate::fit::{Effort, Evaluator, Fit};
 use crate::hypothesis::Hypothesis;
 use crate::problem::Record;
 use crate::screen::{Promise, worst_records};
-use crate::search::{COARSE, Candidate, MIDDLE, candidate, key_of};
+use crate::search::{Candidate, MIDDLE, candidate, key_of};
 use crate::structure::Structure;
 use backdrive_plant::set::Initial;
 use rayon::prelude::*;
@@ -54,6 +54,8 @@ pub struct Course<'a> {
     pub nominal: &'a Candidate,
     /// The stated numbers as given.
     pub given: &'a [f64],
+    /// Substeps per sample of the first steps, at most.
+    pub coarse: usize,
 }
 
 impl Course<'_> {
@@ -66,7 +68,7 @@ impl Course<'_> {
             || problem.initial == Initial::Free
             || problem.fit.iter().any(|r| !r.conditions.is_empty());
         let some: Vec<Record> = if whole { problem.fit.clone() } else { few.iter().map(|r| problem.fit[*r].clone()).collect() };
-        let coarse = Evaluator { substeps: COARSE, records: &some, widest: 1.0, ..evaluator.clone() };
+        let coarse = Evaluator { substeps: self.coarse, records: &some, widest: 1.0, ..evaluator.clone() };
         let nominal_there = if whole { self.nominal.fit.clone() } else { restricted(evaluator, &self.nominal.fit, &few) };
         let entries = self.entries(&seeds, keep[0] + 2);
         let mut running: Vec<(Structure, Fit)> = entries
@@ -83,7 +85,7 @@ impl Course<'_> {
                 Some((structure, best))
             })
             .collect();
-        let middle = Evaluator { substeps: MIDDLE, widest: 8.0, ..evaluator.clone() };
+        let middle = Evaluator { substeps: MIDDLE.max(self.coarse), widest: 8.0, ..evaluator.clone() };
         let stages = [
             (if self.along.is_some() { 0 } else { keep[0] + 4 }, &coarse, Effort { steps: 3, tolerance: 2.0 }),
             (keep[0], &middle, Effort { steps: 5, tolerance: 1.0 }),

@@ -145,6 +145,14 @@ const SIMPLE: usize = 6;
 pub(crate) const COARSE: usize = 2;
 /// See [`COARSE`].
 pub(crate) const MIDDLE: usize = 4;
+/// Residuals beyond this many times the size of most of them count by their size, not their square, where dry friction acts on a prescribed body.
+const FAR_OFF: f64 = 6.0;
+/// Substeps per sample, at most, whatever the model asks for.
+const FINEST: usize = 64;
+/// Share of what is left over, in squares, that too few substeps may make up.
+const BLUR: f64 = 0.02;
+/// Share of the time for screening beside a structure that was found.
+const ANEW: f64 = 0.06;
 /// Level above which the nominal model's refit is brought to its end after the search only, floors.
 const NOMINAL_END: f64 = 5.0;
 /// Level above which fits start along the measured path, floors.
@@ -200,7 +208,7 @@ pub fn search(
     evaluator.stop = stop;
     evaluator.until = Some(began + settings.patience.mul_f64(0.75));
     if friction_on_prescribed(problem) {
-        evaluator.robust = 6.0;
+        evaluator.robust = FAR_OFF;
     }
     report("refitting the nominal model");
     let structure = Structure::new(problem, &problem.fit, Vec::new());
@@ -212,6 +220,10 @@ pub fn search(
     // What a fit leaves over shows the measuring error better than the signal does.
     let before = evaluator.floor.clone();
     evaluator.floor = floors(&evaluator, &quick.residuals);
+    if evaluator.robust.is_finite() {
+        // Large is what is large beside the rest, which far from the noise is far from the noise itself.
+        evaluator.robust = FAR_OFF * bulk(&quick.residuals, &before, &evaluator).max(1.0);
+    }
     let rescaled = |residuals: &[f64]| -> Vec<f64> {
         levels(&evaluator, residuals).iter().zip(before.iter().zip(&evaluator.floor)).map(|(l, (b, f))| l * b / f).collect()
     };
@@ -297,6 +309,7 @@ pub fn search(
         hypotheses: &hypotheses,
         nominal: &nominal,
         given: &given,
+        coarse: COARSE,
     };
     // A simpler law that does as well is worth a little more than the time.
     let longer = Evaluator { until: Some(began + settings.patience.mul_f64(0.92)), ..evaluator.clone() };
@@ -337,13 +350,15 @@ pub fn search(
     let mut waves = vec![First, Laws, Singles, Relatives];
     if !quiet {
         waves.extend([Pairs, Laws, Exchanges, Richer, MoreSingles, MorePairs, Laws, Exchanges]);
-        if settings.effects > 2 {
-            waves.extend([Triples, Exchanges]);
+        for _ in 2..settings.effects {
+            waves.extend([More, Anew, Exchanges]);
         }
         waves.push(Relatives);
     }
     let mut singles = singles.into_iter();
     let mut effects = 1;
+    // Substeps that blur less than what is left over.
+    let mut fine = COARSE;
     // Of a best with so many effects the simpler relatives were tried.
     let mut related = 0;
     for wave in waves {
@@ -407,9 +422,16 @@ pub fn search(
                 let best = found.iter().find(|c| c.structure.added.len() == effects);
                 best.map_or_else(Vec::new, |best| course.exchanges(view, best, 4))
             }
-            Triples => {
-                effects = 3;
-                distinct_structures(&found, 2).take(3).flat_map(|base| course.extensions(view, base, 5)).collect()
+            More => {
+                effects += 1;
+                distinct_structures(&found, effects - 1).take(3).flat_map(|base| course.extensions(view, base, 5)).collect()
+            }
+            Anew => {
+                let base = distinct_structures(&found, effects - 1).next();
+                base.map_or_else(Vec::new, |base| {
+                    fine = substeps_for(&view.evaluator, base);
+                    course.anew(&Evaluator { substeps: fine, ..view.evaluator.clone() }, base, settings.patience.mul_f64(ANEW))
+                })
             }
         };
         // Relatives start anew beside the numbers of the best, even those whose own race went wrong.
@@ -418,7 +440,13 @@ pub fn search(
         }
         let known: HashSet<String> = found.iter().map(|c| key_of(&c.structure.added)).collect();
         seeds.retain(|s| wave == Relatives || !known.contains(&key_of(s.effects.iter().map(|(h, _)| &hypotheses[*h]))));
-        found.extend(if wave == Relatives { &to_the_end } else { &course }.race(seeds, wave.keep()));
+        // What only shows beside a law that was found shows little along the path of the nominal model.
+        let raced = match wave {
+            Anew => Course { along: None, coarse: fine, ..course }.race(seeds, wave.keep()),
+            Relatives => to_the_end.race(seeds, wave.keep()),
+            _ => course.race(seeds, wave.keep()),
+        };
+        found.extend(raced);
         sort(&mut found, samples);
     }
     let stopped = late(1.0);
@@ -522,6 +550,22 @@ impl Course<'_> {
             .collect()
     }
 
+    /// A structure with each of what promises most added, screened beside it: an offset shows as one only where the spring behind it is bent, a law
+    /// at low speed only where the friction at speed is right.
+    fn anew(&self, evaluator: &Evaluator, base: &Candidate, time: Duration) -> Vec<Seed> {
+        let problem = self.evaluator.problem;
+        let Some(fit) = evaluator.fit(&base.structure, &base.fit.values, Effort { steps: 4, tolerance: 2.0 }) else { return Vec::new() };
+        let screen = Screen::new(evaluator, &base.structure, &fit, self.hypotheses, time);
+        let own = self.effects_of(&base.structure, &fit.values);
+        let stated = base.structure.stated_of(problem, &fit.values);
+        let fits = |h: usize| self.hypotheses[h].parameters.len() <= SIMPLE;
+        let mut used = HashSet::new();
+        let next = screen.look(&fit, &fits).into_iter().filter(|p| used.insert(p.hypothesis));
+        next.take(6)
+            .map(|p| Seed { effects: [own.clone(), vec![(p.hypothesis, p.values)]].concat(), stated: stated.clone(), guided: false })
+            .collect()
+    }
+
     /// A structure with each of its effects exchanged for what promises most in its place.
     fn exchanges(&self, view: &View, best: &Candidate, count: usize) -> Vec<Seed> {
         let problem = self.evaluator.problem;
@@ -546,6 +590,30 @@ impl Course<'_> {
     }
 }
 
+/// Size of most of the residuals, floors, that a fit with the floors `before` left over; a few that are far off do not count.
+fn bulk(residuals: &[f64], before: &[f64], evaluator: &Evaluator) -> f64 {
+    let mut sizes: Vec<f64> = Vec::with_capacity(residuals.len());
+    for (_, output, range) in evaluator.layout() {
+        let scale = before[output] / evaluator.floor[output];
+        sizes.extend(residuals.get(range).unwrap_or(&[]).iter().map(|r| scale * r.abs()));
+    }
+    let middle = sizes.len() / 2;
+    // The median of white noise is 0.6745 of its standard deviation.
+    if sizes.is_empty() { 1.0 } else { 1.4826 * *sizes.select_nth_unstable_by(middle, f64::total_cmp).1 }
+}
+
+/// Fewest substeps per sample with which a simulation errs by less than a structure leaves over.
+fn substeps_for(evaluator: &Evaluator, candidate: &Candidate) -> usize {
+    let of = |substeps: usize| Evaluator { substeps, ..evaluator.clone() }.residuals(&candidate.structure, &candidate.fit.values);
+    let Some(exact) = of(FINEST) else { return MIDDLE };
+    let size: f64 = exact.iter().map(|x| x * x).sum();
+    let errs = |substeps: &usize| {
+        let off = of(*substeps).map_or(f64::INFINITY, |r| r.iter().zip(&exact).map(|(a, b)| (a - b) * (a - b)).sum());
+        off > BLUR * size
+    };
+    [COARSE, MIDDLE, 2 * MIDDLE, 4 * MIDDLE].into_iter().find(|s| !errs(s)).unwrap_or(FINEST)
+}
+
 /// What is tried next.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Wave {
@@ -558,7 +626,8 @@ enum Wave {
     Richer,
     MoreSingles,
     MorePairs,
-    Triples,
+    More,
+    Anew,
 }
 
 impl Wave {
@@ -572,7 +641,8 @@ impl Wave {
             Wave::Richer => "fitting richer laws",
             Wave::MoreSingles => "fitting more single effects",
             Wave::MorePairs => "fitting more pairs",
-            Wave::Triples => "fitting triples",
+            Wave::More => "fitting more effects at once",
+            Wave::Anew => "screening beside the best",
         }
     }
 
@@ -580,10 +650,10 @@ impl Wave {
     fn keep(self) -> [usize; 2] {
         match self {
             Wave::First | Wave::Laws | Wave::Relatives => [3, 3],
-            Wave::Singles | Wave::Exchanges | Wave::MoreSingles => [4, 2],
+            Wave::Singles | Wave::Exchanges | Wave::MoreSingles | Wave::Anew => [4, 2],
             Wave::Pairs | Wave::MorePairs => [5, 3],
             Wave::Richer => [2, 1],
-            Wave::Triples => [4, 3],
+            Wave::More => [4, 3],
         }
     }
 }

@@ -4,7 +4,7 @@ use crate::guide::Guide;
 use crate::problem::Record;
 use backdrive_plant::model::Model;
 use backdrive_plant::set::Condition;
-use backdrive_plant::stepper::{Options, Plant, Segment};
+use backdrive_plant::stepper::{Options, Plant, Segment, ahead, segments};
 
 /// As a number of substeps: twice as many as the model asks for.
 pub const TWICE: usize = usize::MAX;
@@ -88,25 +88,30 @@ fn run(
         }
         None => model,
     };
+    let caught_up = ahead(model, &record.inputs, record.period);
+    let (model, columns) = caught_up.as_ref().map_or((model, &record.inputs), |(model, columns)| (model, columns));
+    let late: Option<Vec<Vec<Segment>>> =
+        caught_up.as_ref().map(|_| model.inputs.iter().zip(columns).map(|(i, c)| segments(i.hold, c, record.period)).collect());
+    let driven = late.as_ref().unwrap_or(&record.segments);
     let mut plant = Plant::new(model, record.period, &Options::default()).ok()?;
     let wanted = if substeps == TWICE { 2 * plant.substeps() } else { plant.substeps().min(substeps) };
     if wanted != plant.substeps() {
         plant = Plant::new(model, record.period, &Options { substeps: Some(wanted), ..Options::default() }).ok()?;
     }
-    let mut first: Vec<f64> = record.inputs.iter().map(|samples| samples.first().copied().unwrap_or(0.0)).collect();
+    let mut first: Vec<f64> = columns.iter().map(|samples| samples.first().copied().unwrap_or(0.0)).collect();
     first.extend(moved.iter().map(|path| path.first().map_or(0.0, |s| s.c[0])));
     plant.start_at(&first);
     for (body, position, velocity) in record.begins.iter().chain(starts) {
         plant.set_motion(*body, *position, *velocity);
     }
-    let mut now = vec![Segment::default(); record.segments.len() + moved.len()];
+    let mut now = vec![Segment::default(); driven.len() + moved.len()];
     for sample in 0..samples.min(record.len) {
         show(&mut plant, sample);
         if sample % 256 == 0 && !plant.is_finite() {
             return None;
         }
         if sample + 1 < samples.min(record.len) {
-            let columns = record.segments.iter().chain(moved.iter().map(|path| path.as_ref()));
+            let columns = driven.iter().chain(moved.iter().map(|path| path.as_ref()));
             for (segment, column) in now.iter_mut().zip(columns) {
                 *segment = column[sample];
             }

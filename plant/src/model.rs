@@ -95,7 +95,7 @@ pub struct Input {
     pub gain: f64,
     /// Then the limit of its magnitude, N or N m; infinite when there is none.
     pub saturation: f64,
-    /// Then a delay, s.
+    /// Then a delay, s. Of a motion it may be negative: the body was ahead of what the recording says; see [`crate::stepper::ahead`].
     pub delay: f64,
     /// Then a first-order lag of this corner, Hz; infinite when there is none.
     pub bandwidth: f64,

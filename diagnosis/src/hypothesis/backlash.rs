@@ -20,7 +20,9 @@ pub(super) const PHYSICS: Physics = Physics {
                 .number("gap", even(0.0, 4.0 * site.displacement_peak, 0.0))
                 .number("stiffness", even(0.0, 1000.0 * k.max(typical), k))
                 .number("damping", even(0.0, 1000.0 * b.max(site.force / site.speed), b));
-            Some(new.starts(vec![vec![0.2 * x, k, b], vec![0.02 * x, k, b], vec![x, k, b], vec![2.0 * site.displacement_peak, 3.0 * k, b]]))
+            // The spring as refitted has the joint's deflection at the forces that act: of that a gap takes a share, and the shaft is as much stiffer.
+            let shared = |share: f64| vec![2.0 * share * site.displacement_peak, k / (1.0 - share), b];
+            Some(new.starts(vec![vec![0.2 * x, k, b], shared(0.5), vec![0.02 * x, k, b], shared(0.8), vec![x, k, b]]))
         };
         sites.near().filter_map(one).collect()
     },

@@ -1,7 +1,7 @@
 //! How far, how fast and how hard things move: what parameters are measured against.
 
 use backdrive_plant::model::{InputKind, Model};
-use backdrive_plant::stepper::{CompileError, Options, Plant, Segment, segments};
+use backdrive_plant::stepper::{CompileError, Options, Plant, Segment, ahead, segments};
 
 /// Root mean square and peak of a quantity.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -65,6 +65,8 @@ impl Scales {
                 return Err(CompileError::MissingInput(missing.name.clone()));
             }
             let samples = columns.iter().map(Vec::len).min().unwrap_or(0);
+            let caught_up = ahead(model, columns, *period);
+            let (model, columns) = caught_up.as_ref().map_or((model, columns), |(model, columns)| (model, columns));
             let mut plant = Plant::new(model, *period, &Options::default())?;
             shortest = shortest.min(*period);
             longest = longest.max(samples as f64 * period);

@@ -227,6 +227,24 @@ fn an_output_keeps_the_element_that_it_reads() {
 }
 
 #[test]
+fn play_takes_a_share_of_the_deflection_that_the_joint_has() {
+    let text = "name = 'a'\n[bodies]\na = 1.0\nb = 1.0\n[[elements]]\nname = 'k'\nkind = 'spring'\nbetween = ['a', 'b']\nstiffness = 900.0\n\
+        [[elements]]\nname = 'g'\nkind = 'spring'\nbetween = ['b', 'ground']\nstiffness = 500.0\n[[inputs]]\nname = 'u'\nkind = 'force'\non = 'a'\n\
+        [[outputs]]\nname = 'y'\nkind = 'position'\nof = 'a'\n";
+    let model = Model::from_toml(text, "a").expect("a model");
+    let runs = [run(&model)];
+    let scales = Scales::of(&model, &runs).expect("the device moves");
+    let peak = scales.motion([Some(0), Some(1)])[0].peak;
+    let hypotheses = all(&model, &scales);
+    let backlash = hypotheses.iter().find(|h| h.id == "backlash@a-b").expect("proposed");
+    // Two of the starts push as hard at the largest deflection as the spring did, one with half of it in the gap, one with most of it.
+    let same = |start: &&Vec<f64>| ((peak - 0.5 * start[0]) * start[1] / (900.0 * peak) - 1.0).abs() < 1e-9;
+    let gaps: Vec<f64> = backlash.starts.iter().filter(same).map(|start| start[0] / (2.0 * peak)).collect();
+    assert_eq!(gaps.len(), 2, "{gaps:?}");
+    assert!((gaps[0] - 0.5).abs() < 1e-9 && (gaps[1] - 0.8).abs() < 1e-9, "{gaps:?}");
+}
+
+#[test]
 fn withholding_takes_what_contains_it_along() {
     let gone = withheld(&["coulomb"]);
     for name in ["coulomb", "stribeck", "dahl", "lugre", "asymmetric_coulomb"] {

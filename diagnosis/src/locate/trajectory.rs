@@ -2,7 +2,7 @@
 
 use super::{LocateError, Run};
 use backdrive_plant::model::Model;
-use backdrive_plant::stepper::{Options, Plant, Segment, segments};
+use backdrive_plant::stepper::{Options, Plant, Segment, ahead, segments};
 
 /// A simulated run beside its recording.
 pub(super) struct Trajectory {
@@ -31,9 +31,11 @@ impl Trajectory {
         if len < SHORTEST {
             return Err(LocateError::TooShort { run: run.name.to_string(), samples: len });
         }
+        let caught_up = ahead(model, run.inputs, run.period);
+        let (model, inputs) = caught_up.as_ref().map_or((model, run.inputs), |(model, columns)| (model, columns.as_slice()));
         let mut plant = Plant::new(model, run.period, &Options::default())?;
-        let driven: Vec<Vec<Segment>> = model.inputs.iter().zip(run.inputs).map(|(i, c)| segments(i.hold, &c[..len], run.period)).collect();
-        plant.start_at(&run.inputs.iter().map(|c| c.first().copied().unwrap_or(0.0)).collect::<Vec<_>>());
+        let driven: Vec<Vec<Segment>> = model.inputs.iter().zip(inputs).map(|(i, c)| segments(i.hold, &c[..len], run.period)).collect();
+        plant.start_at(&inputs.iter().map(|c| c.first().copied().unwrap_or(0.0)).collect::<Vec<_>>());
         let bodies = model.bodies.len();
         let mut position = vec![Vec::with_capacity(len); bodies];
         let mut velocity = vec![Vec::with_capacity(len); bodies];
@@ -68,7 +70,7 @@ impl Trajectory {
         if rows.is_empty() {
             return Err(LocateError::NothingMeasured { run: run.name.to_string() });
         }
-        let drive = model.inputs.iter().zip(run.inputs).map(|(i, c)| c[..len].iter().map(|u| i.gain * u).collect()).collect();
+        let drive = model.inputs.iter().zip(inputs).map(|(i, c)| c[..len].iter().map(|u| i.gain * u).collect()).collect();
         Ok(Trajectory { period: run.period, len, position, velocity, drive, rows, predicted, residual })
     }
 

@@ -1,5 +1,6 @@
 //! Numbers of a model by their path: `bodies.drum`, `elements.cable.stiffness`, `inputs.feedback_force.delay`.
 
+use super::signals::delay_range;
 use crate::elements::Range;
 use crate::model::{Model, Output};
 use crate::tomlfile::{check_range, unknown};
@@ -72,7 +73,8 @@ impl Model {
                 self.elements[element].law = (kind.build)(&all).map_err(|e| format!("{path}: {e}"))?;
             }
             Spot::Input(input, key) => {
-                let x = one(INPUT_KEYS[key].1, INPUT_KEYS[key].2)?;
+                let range = if INPUT_KEYS[key].0 == "delay" { delay_range(self.inputs[input].kind) } else { INPUT_KEYS[key].1 };
+                let x = one(range, INPUT_KEYS[key].2)?;
                 let i = &mut self.inputs[input];
                 *[&mut i.gain, &mut i.saturation, &mut i.delay, &mut i.bandwidth, &mut i.back_emf][key] = x;
             }

@@ -31,6 +31,15 @@ fn body(table: &mut Table, key: &str, model: &Model) -> Result<usize, FileError>
     }
 }
 
+/// A force acts when it is commanded or later. The recording of a motion may also come late, or the force recorded beside it be a command that
+/// acts later: then the motion was ahead of its samples, and its delay is negative.
+pub(super) fn delay_range(kind: InputKind) -> Range {
+    match kind {
+        InputKind::Force => Range::NonNegative,
+        InputKind::Motion => Range::Any,
+    }
+}
+
 pub(super) fn read_input(table: &mut Table, model: &Model) -> Result<Input, FileError> {
     let name = signal_name(table, model)?;
     let kind = table.need_one_of("kind", &[("force", InputKind::Force), ("motion", InputKind::Motion)])?;
@@ -47,7 +56,7 @@ pub(super) fn read_input(table: &mut Table, model: &Model) -> Result<Input, File
         hold: table.one_of("hold", &holds)?.unwrap_or(default_hold),
         gain: table.number_or("gain", Range::Any, 1.0)?,
         saturation: table.number("saturation", Range::Positive)?.unwrap_or(f64::INFINITY),
-        delay: table.number_or("delay", Range::NonNegative, 0.0)?,
+        delay: table.number_or("delay", delay_range(kind), 0.0)?,
         bandwidth: table.number("bandwidth", Range::Positive)?.unwrap_or(f64::INFINITY),
         back_emf: table.number_or("back_emf", Range::Any, 0.0)?,
     };

@@ -134,7 +134,11 @@ fn check(model: &Model) -> Result<(), CompileError> {
         }
         number(place, "gain", input.gain, "a finite number", input.gain.is_finite())?;
         number(place, "saturation", input.saturation, "at least 0", input.saturation >= 0.0)?;
-        number(place, "delay", input.delay, "at least 0 and finite", input.delay >= 0.0 && input.delay.is_finite())?;
+        let expected = match input.kind {
+            InputKind::Force => "at least 0 and finite",
+            InputKind::Motion => "at least 0 where the motion to come is not known",
+        };
+        number(place, "delay", input.delay, expected, input.delay >= 0.0 && input.delay.is_finite())?;
         number(place, "bandwidth", input.bandwidth, "above 0", input.bandwidth > 0.0)?;
         number(place, "back_emf", input.back_emf, "a finite number", input.back_emf.is_finite())?;
     }

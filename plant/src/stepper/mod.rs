@@ -11,6 +11,7 @@
 //!   joins the friction contacts in their implicit solution.
 
 mod advance;
+mod ahead;
 mod compile;
 mod constraints;
 mod dense;
@@ -22,6 +23,7 @@ mod sense;
 mod simulate;
 mod spline;
 
+pub use ahead::ahead;
 pub use energy::Energy;
 pub use simulate::simulate;
 pub use spline::segments;

@@ -1,6 +1,6 @@
 //! A model driven by whole recordings.
 
-use super::{CompileError, Options, Plant, Segment, segments};
+use super::{CompileError, Options, Plant, Segment, ahead, segments};
 use crate::model::Model;
 
 /// Outputs of a model, one column of N samples each, driven by `inputs`: one column of samples for each input of the
@@ -10,6 +10,9 @@ use crate::model::Model;
 /// # Errors
 /// When the model cannot be stepped or a column is missing.
 pub fn simulate(model: &Model, inputs: &[impl AsRef<[f64]>], period_s: f64, options: &Options) -> Result<Vec<Vec<f64>>, CompileError> {
+    if let Some((model, columns)) = ahead(model, inputs, period_s) {
+        return simulate(&model, &columns, period_s, options);
+    }
     let mut plant = Plant::new(model, period_s, options)?;
     if let Some(missing) = model.inputs.get(inputs.len()) {
         return Err(CompileError::MissingInput(missing.name.clone()));

@@ -1,0 +1,172 @@
+//! A diagnosis as `backdrive diagnose` makes it, from a set whose recordings lie elsewhere.
+
+use crate::{Context, StudyError};
+use backdrive::diagnose::{Diagnosed, Found, MODEL, diagnose_into};
+use backdrive::recordings;
+use backdrive_diagnosis::hypothesis::PHYSICS;
+use backdrive_diagnosis::search::Settings;
+use backdrive_plant::model::Model;
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
+use std::time::Duration;
+use toml_edit::{DocumentMut, Item};
+
+/// How a diagnosis is made.
+#[derive(Debug, Clone)]
+pub struct Ask<'a> {
+    /// Name of the folder of results; empty for the study's own.
+    pub name: &'a str,
+    /// The set, a file in the study's folder.
+    pub set: &'a str,
+    /// The nominal model, a file in the study's folder.
+    pub model: &'a str,
+    /// Physics that are withheld.
+    pub without: &'a [&'a str],
+    /// How many physics may be missing at once, at most.
+    pub effects: usize,
+    /// How long to search, at most, s.
+    pub patience: f64,
+}
+
+/// Diagnoses a set of the study: verdict.json, report.html, model.diagnosed.toml, the nominal model and a set.toml that `backdrive diagnose`
+/// takes as it is go into the folder of results.
+///
+/// # Errors
+/// When a file cannot be read or written, or the diagnosis fails.
+pub fn diagnose(context: &Context, ask: &Ask) -> Result<Found, StudyError> {
+    let out = if ask.name.is_empty() { context.out.to_path_buf() } else { context.out.join(ask.name) };
+    std::fs::create_dir_all(&out).map_err(|e| StudyError::File(format!("{}: cannot be made: {e}", out.display())))?;
+    // What the study made itself, a set of what it simulated or a model that it found, lies with its results.
+    let given = |name: &str| {
+        let own = context.folder.join(name);
+        read(&if own.is_file() { own } else { context.out.join(name) })
+    };
+    write(&out.join("model.toml"), &given(ask.model)?)?;
+    let resolved = resolve(&given(ask.set)?, &[context.out, context.data]).map_err(|e| StudyError::File(format!("{}: {e}", ask.set)))?;
+    let set = out.join("set.toml");
+    write(&set, &resolved)?;
+    let opened = recordings::open(std::slice::from_ref(&set), None)?;
+    let settings = Settings {
+        without: ask.without.iter().map(|s| s.to_string()).collect(),
+        effects: ask.effects,
+        patience: Duration::from_secs_f64(ask.patience),
+    };
+    let Diagnosed { found, .. } = diagnose_into(opened, &settings, &out, true, &AtomicBool::new(false))?;
+    Ok(found)
+}
+
+/// The nominal model refitted, its structure as it is, as `backdrive fit` does: no physics is considered.
+///
+/// # Errors
+/// As [`diagnose`].
+pub fn refit(context: &Context, ask: &Ask) -> Result<Found, StudyError> {
+    let all: Vec<&str> = PHYSICS.iter().map(|p| p.name).collect();
+    diagnose(context, &Ask { without: &all, ..ask.clone() })
+}
+
+/// A number of the nominal structure as the refit has it, by its path; NaN where the model states none.
+pub fn refitted(found: &Found, path: &str) -> f64 {
+    let (problem, nominal) = (&found.problem, &found.search.nominal);
+    let values = nominal.structure.stated_of(problem, &nominal.fit.values);
+    problem.stated.iter().zip(values).find(|(s, _)| s.path == path).map_or(f64::NAN, |(_, v)| v)
+}
+
+/// The model that a diagnosis wrote.
+///
+/// # Errors
+/// When it cannot be read.
+pub fn diagnosed_model(context: &Context, ask: &Ask) -> Result<Model, StudyError> {
+    Ok(Model::load(&context.out.join(ask.name).join(MODEL))?)
+}
+
+/// The text of a set with its model beside it and its recordings where they are: the first folder that holds each. Files under `[files]`
+/// follow.
+fn resolve(text: &str, folders: &[&Path]) -> Result<String, String> {
+    let mut document: DocumentMut = text.parse().map_err(|e| format!("{e}"))?;
+    let place = |name: &str| -> String {
+        let found: Option<PathBuf> = folders.iter().map(|f| f.join(name)).find(|p| p.is_file());
+        found.map_or(name.to_string(), |p| p.canonicalize().unwrap_or(p).display().to_string())
+    };
+    document["model"] = toml_edit::value("model.toml");
+    for key in ["fit", "held_out"] {
+        if let Some(list) = document.get_mut(key).and_then(Item::as_array_mut) {
+            for at in 0..list.len() {
+                if let Some(name) = list.get(at).and_then(|v| v.as_str()).map(place) {
+                    list.replace(at, name);
+                }
+            }
+        }
+    }
+    if let Some(files) = document.get_mut("files").and_then(Item::as_table_like_mut) {
+        let names: Vec<String> = files.iter().map(|(name, _)| name.to_string()).collect();
+        for name in names {
+            if let Some(rules) = files.remove(&name) {
+                files.insert(&place(&name), rules);
+            }
+        }
+    }
+    Ok(document.to_string())
+}
+
+/// Names of the physics of a verdict's findings, most important first, each with its place.
+pub fn findings(verdict: &Value) -> Vec<(String, String)> {
+    let one = |finding: &Value| {
+        let ends = finding["between"].as_array().map(|ends| ends.iter().filter_map(Value::as_str).collect::<Vec<_>>().join("-"));
+        let place = ends.or_else(|| finding["signal"].as_str().map(str::to_string)).unwrap_or_default();
+        (finding["physics"].as_str().unwrap_or("").to_string(), place)
+    };
+    verdict["findings"].as_array().into_iter().flatten().map(one).collect()
+}
+
+/// What a verdict says, in one line: its word and the physics it names.
+pub fn said(verdict: &Value) -> String {
+    let named: Vec<String> = findings(verdict).into_iter().map(|(physics, place)| format!("{physics} at {place}")).collect();
+    let word = verdict["verdict"].as_str().unwrap_or("").replace('_', " ");
+    if named.is_empty() { word } else { format!("{word}: {}", named.join(", ")) }
+}
+
+/// Value and 95 % interval of a finding's parameter; `None` where it is a list or not there.
+pub fn parameter(verdict: &Value, physics: &str, key: &str) -> Option<(f64, [f64; 2])> {
+    let finding = verdict["findings"].as_array()?.iter().find(|f| f["physics"] == physics)?;
+    let p = &finding["parameters"][key];
+    Some((p["value"].as_f64()?, [p["ci95"][0].as_f64()?, p["ci95"][1].as_f64()?]))
+}
+
+/// Reads a text file.
+///
+/// # Errors
+/// When it cannot be read.
+pub fn read(path: &Path) -> Result<String, StudyError> {
+    std::fs::read_to_string(path).map_err(|e| StudyError::File(format!("{}: cannot be read: {e}", path.display())))
+}
+
+/// Writes a text file.
+///
+/// # Errors
+/// When it cannot be written.
+pub fn write(path: &Path, text: &str) -> Result<(), StudyError> {
+    std::fs::write(path, text).map_err(|e| StudyError::File(format!("{}: cannot be written: {e}", path.display())))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use backdrive_plant::set::RecordingSet;
+
+    #[test]
+    fn a_set_finds_recordings_that_lie_elsewhere() {
+        let (data, out) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+        std::fs::write(data.path().join("a.csv"), "t,x\n0,1\n1,2\n").unwrap();
+        std::fs::write(out.path().join("prepared.csv"), "t,x\n0,1\n1,2\n").unwrap();
+        std::fs::write(out.path().join("model.toml"), "").unwrap();
+        let text = "model = 'other.toml'\nfit = ['prepared.csv']\nheld_out = ['a.csv']\n[files.'a.csv']\nrows = [0, 2]\n";
+        let resolved = resolve(text, &[out.path(), data.path()]).unwrap();
+        let set = out.path().join("set.toml");
+        std::fs::write(&set, resolved).unwrap();
+        let set = RecordingSet::open(&set).unwrap();
+        assert!(set.path_of(&set.held_out[0]).starts_with(data.path().canonicalize().unwrap()));
+        assert_eq!(set.rules_of(&set.held_out[0]).piece.rows, Some([0, 2]));
+        assert!(set.path_of(&set.fit[0]).ends_with("prepared.csv"));
+    }
+}
