@@ -182,7 +182,8 @@ fn state(verdict: &Value, location: Option<&Location>) -> Option<String> {
 fn located(problem: &Problem, search: &Search) -> Option<Location> {
     let nominal = &search.nominal;
     let model = nominal.structure.model(problem, &nominal.fit.values)?;
-    let runs: Vec<locate::Run> = problem.fit.iter().map(locate::Run::from).collect();
+    let records = nominal.structure.with_unknown(problem, &problem.fit, &nominal.fit.values);
+    let runs: Vec<locate::Run> = records.iter().map(locate::Run::from).collect();
     locate(&model, &runs, &search.floor, &locate::Options::quick()).ok()
 }
 

@@ -100,7 +100,16 @@ fn of_files(paths: &[PathBuf]) -> Result<RecordingSet, Failure> {
     }
     let fit = paths.iter().map(|p| p.to_string_lossy().into_owned()).collect();
     let (model, held_out, files) = (None, Vec::new(), Vec::new());
-    Ok(RecordingSet { folder: PathBuf::new(), model, fit, held_out, initial: Initial::Rest, columns: Columns::new(), files })
+    Ok(RecordingSet {
+        folder: PathBuf::new(),
+        model,
+        fit,
+        held_out,
+        initial: Initial::Rest,
+        unknown: Vec::new(),
+        columns: Columns::new(),
+        files,
+    })
 }
 
 /// The error, with what to do about it where that is not plain.

@@ -36,7 +36,7 @@ impl Ready {
 pub fn predictions(problem: &Problem, records: &[Record], structure: &Structure, values: &[f64]) -> Option<Vec<Predicted>> {
     let Ready { fixed, own, values } = Ready::of(problem, records, structure, values)?;
     let one = |(r, record): (usize, &Record)| {
-        let columns = own.predict(&fixed.model, &values, record, r, 64)?;
+        let columns = own.predict(&fixed, &fixed.model, &values, record, r, 64)?;
         let mut of_outputs: Predicted = vec![None; record.outputs.len()];
         for (column, output) in columns.chunks_exact(record.len.max(1)).zip(measured(record)) {
             *of_outputs.get_mut(output)? = Some(column.to_vec());

@@ -127,15 +127,16 @@ pub fn evidence(problem: &Problem, best: &Candidate, floor: &[f64], which: usize
     let without = structure.model(problem, &structure.values(problem, &best.structure.stated_of(problem, values), &other_values))?;
     let with = best.structure.model(problem, values)?;
 
-    let changed: Vec<Model> = problem.fit.iter().map(|r| under(&without, r)).collect();
+    let records = best.structure.with_unknown(problem, &problem.fit, values);
+    let changed: Vec<Model> = records.iter().map(|r| under(&without, r)).collect();
     let runs: Vec<locate::Run> =
-        problem.fit.iter().zip(&changed).map(|(r, m)| locate::Run { model: Some(m), ..locate::Run::from(r) }).collect();
+        records.iter().zip(&changed).map(|(r, m)| locate::Run { model: Some(m), ..locate::Run::from(r) }).collect();
     let options = locate::Options { most_samples: SAMPLES, only: Some(finding.place.clone()), ..locate::Options::quick() };
     let location = locate(&without, &runs, floor, &options).ok()?;
     let found = location.ranking.into_iter().find(|c| c.place.same(&finding.place))?;
     let against = against(finding.physics);
     let scene = Scene { without: &without, with: &with, finding, place: &found.place, against };
-    let traces = problem.fit.iter().zip(&found.courses).filter_map(|(record, course)| scene.trace(record, course)).collect();
+    let traces = records.iter().zip(&found.courses).filter_map(|(record, course)| scene.trace(record, course)).collect();
     let (variable_unit, displacement_unit, force_unit) = scene.units(problem);
     Some(Evidence {
         id: finding.id.clone(),

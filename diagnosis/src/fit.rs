@@ -2,9 +2,10 @@
 
 use crate::guide::Guide;
 use crate::problem::{Problem, Record};
-use crate::structure::{Number, Structure};
+use crate::structure::{Number, Role, Structure};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
+use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
@@ -130,7 +131,7 @@ impl<'a> Evaluator<'a> {
     ) -> Option<Vec<f64>> {
         let record = self.records.get(r)?;
         self.simulations.fetch_add(1, Ordering::Relaxed);
-        let mut columns = structure.predict_along(model, values, record, r, self.substeps, self.guide.as_ref())?;
+        let mut columns = structure.predict_along(self.problem, model, values, record, r, self.substeps, self.guide.as_ref())?;
         for (column, output) in columns.chunks_exact_mut(record.len).zip(measured(record)) {
             let samples = record.outputs.get(output)?.as_deref()?;
             let (floor, lag) = (
@@ -176,17 +177,22 @@ impl<'a> Evaluator<'a> {
                 Some(from..*at)
             })
             .collect();
-        let jobs: Vec<(usize, usize)> = which
-            .iter()
-            .enumerate()
-            .flat_map(|(at, j)| match structure.numbers[*j].record {
-                Some(r) => vec![(at, r)],
-                None => (0..self.records.len()).map(|r| (at, r)).collect(),
-            })
-            .collect();
+        let mut jobs: Vec<(usize, usize)> = Vec::new();
+        // Weights of unknown curves that are far from each other are moved at the same time.
+        let mut together: BTreeMap<(usize, usize, usize), Vec<usize>> = BTreeMap::new();
+        for (at, j) in which.iter().enumerate() {
+            match (&structure.numbers[*j].role, structure.numbers[*j].record) {
+                (Role::Knot(unknown, knot, r), _) => together.entry((*unknown, *r, knot % APART)).or_default().push(at),
+                (_, Some(r)) => jobs.push((at, r)),
+                (_, None) => jobs.extend((0..self.records.len()).map(|r| (at, r))),
+            }
+        }
         let moved: Vec<Option<(Vec<f64>, backdrive_plant::model::Model, f64)>> = which
             .iter()
             .map(|j| {
+                if matches!(structure.numbers[*j].role, Role::Knot(..)) {
+                    return None;
+                }
                 let (values, step) = moved_values(structure, own, *j, stretch);
                 Some((values.clone(), structure.model(self.problem, &values)?, step))
             })
@@ -210,7 +216,54 @@ impl<'a> Evaluator<'a> {
                 jacobian[*j][spans[*r].clone()].copy_from_slice(&part);
             }
         }
+        self.knots(structure, own, residuals, (which, &together, &spans), stretch, &mut jacobian);
         jacobian
+    }
+
+    /// Derivatives by the weights of unknown curves (Curtis, Powell & Reid 1974): what a weight does is over when the next that is moved along
+    /// with it begins, but for what the device never forgets.
+    fn knots(
+        &self,
+        structure: &Structure,
+        own: &[f64],
+        residuals: &[f64],
+        (which, together, spans): (&[usize], &BTreeMap<(usize, usize, usize), Vec<usize>>, &[std::ops::Range<usize>]),
+        stretch: f64,
+        jacobian: &mut [Vec<f64>],
+    ) {
+        let Some(model) = structure.model(self.problem, &outward(structure, own)).filter(|_| !together.is_empty()) else { return };
+        let groups: Vec<(&(usize, usize, usize), &Vec<usize>)> = together.iter().collect();
+        let one = |((unknown, r, _), ats): &(&(usize, usize, usize), &Vec<usize>)| {
+            if self.is_late() {
+                return None;
+            }
+            let (mut values, mut steps) = (outward(structure, own), Vec::new());
+            for at in ats.iter() {
+                let (changed, step) = moved_values(structure, own, which[*at], stretch);
+                values[which[*at]] = changed[which[*at]];
+                steps.push(step);
+            }
+            let part = self.record_residuals(structure, &model, &values, *r)?;
+            let record = self.records.get(*r)?;
+            let before = residuals.get(spans[*r].clone())?;
+            let mut columns = vec![vec![0.0; part.len()]; ats.len()];
+            for ((at, step), column) in ats.iter().zip(&steps).zip(&mut columns) {
+                let Role::Knot(_, knot, _) = structure.numbers[which[*at]].role else { continue };
+                let window = self.problem.unknown.get(*unknown)?.window(knot, APART, record);
+                for from in (0..part.len()).step_by(record.len.max(1)) {
+                    for i in window.start + from..window.end + from {
+                        column[i] = (part[i] - before[i]) / step;
+                    }
+                }
+            }
+            Some(columns)
+        };
+        let parts: Vec<Option<Vec<Vec<f64>>>> = groups.par_iter().map(one).collect();
+        for (((_, r, _), ats), columns) in groups.iter().zip(parts) {
+            for (at, column) in ats.iter().zip(columns.unwrap_or_default()) {
+                jacobian[*at][spans[*r].clone()].copy_from_slice(&column);
+            }
+        }
     }
 
     /// Fits a structure from `start` on; `None` where it cannot be simulated there.
@@ -226,9 +279,15 @@ impl<'a> Evaluator<'a> {
         let numbers = &structure.numbers;
         let mut own: Vec<f64> = numbers.iter().zip(start).map(|(n, v)| n.inward(*v)).collect();
         let outward = |own: &[f64]| numbers.iter().zip(own).map(|(n, x)| n.outward(*x)).collect::<Vec<f64>>();
+        // A weight that a part of a recording says nothing of stays where it is.
+        let priors: Vec<Option<(f64, f64)>> = numbers
+            .iter()
+            .zip(&own)
+            .map(|(n, x)| n.prior.map(|(centre, spread)| (if matches!(n.role, Role::Knot(..)) { *x } else { centre }, spread)))
+            .collect();
         let prior = |own: &[f64]| -> f64 {
-            let one = |(n, x): (&Number, &f64)| n.prior.map_or(0.0, |(centre, spread)| ((x - centre) / spread).powi(2));
-            numbers.iter().zip(own).map(one).sum()
+            let one = |(p, x): (&Option<(f64, f64)>, &f64)| p.map_or(0.0, |(centre, spread)| ((x - centre) / spread).powi(2));
+            priors.iter().zip(own).map(one).sum()
         };
         let mut residuals = self.residuals(structure, &outward(&own))?;
         let mut cost = self.cost(&residuals) + prior(&own);
@@ -243,8 +302,8 @@ impl<'a> Evaluator<'a> {
         loop {
             let weights = self.weights(&residuals);
             let (mut matrix, mut slope) = normal_equations(&jacobian, &residuals, weights.as_deref());
-            for (j, number) in numbers.iter().enumerate() {
-                if let Some((centre, spread)) = number.prior {
+            for (j, prior) in priors.iter().enumerate() {
+                if let Some((centre, spread)) = *prior {
                     matrix[(j, j)] += 1.0 / (spread * spread);
                     slope[j] += (own[j] - centre) / (spread * spread);
                 }
@@ -343,6 +402,14 @@ impl<'a> Evaluator<'a> {
     }
 }
 
+/// How many weights of an unknown curve apart those are that are moved at the same time: each has an effect over four knots, and two more to die.
+const APART: usize = 6;
+
+/// The values in the model of a fit's own.
+fn outward(structure: &Structure, own: &[f64]) -> Vec<f64> {
+    structure.numbers.iter().zip(own).map(|(n, x)| n.outward(*x)).collect()
+}
+
 /// Outputs that a record has.
 pub fn measured(record: &Record) -> impl Iterator<Item = usize> + '_ {
     record.outputs.iter().enumerate().filter(|(_, samples)| samples.is_some()).map(|(output, _)| output)
@@ -378,14 +445,32 @@ fn may_move(number: &Number, own: f64, slope: f64, curvature: f64) -> bool {
 /// `J' W J` and `J' W r`.
 pub fn normal_equations(jacobian: &[Vec<f64>], residuals: &[f64], weights: Option<&[f64]>) -> (DMatrix<f64>, DVector<f64>) {
     let n = jacobian.len();
-    let dot = |a: &[f64], b: &[f64]| match weights {
-        None => dot(a, b),
-        Some(w) => a.iter().zip(b).zip(w).map(|((a, b), w)| w * a * b).sum(),
+    let dot = |a: &[f64], b: &[f64], range: std::ops::Range<usize>| {
+        let (a, b) = (&a[range.clone()], &b[range.clone()]);
+        match weights {
+            None => dot(a, b),
+            Some(w) => a.iter().zip(b).zip(&w[range]).map(|((a, b), w)| w * a * b).sum(),
+        }
     };
-    let rows: Vec<Vec<f64>> = (0..n).into_par_iter().map(|i| (0..=i).map(|j| dot(&jacobian[i], &jacobian[j])).collect()).collect();
+    // What moves one record only is 0 in all others.
+    let spans: Vec<std::ops::Range<usize>> = jacobian.iter().map(|column| span(column)).collect();
+    let product = |i: usize, j: usize| {
+        let (from, to) = (spans[i].start.max(spans[j].start), spans[i].end.min(spans[j].end));
+        if from < to { dot(&jacobian[i], &jacobian[j], from..to) } else { 0.0 }
+    };
+    let rows: Vec<Vec<f64>> = (0..n).into_par_iter().map(|i| (0..=i).map(|j| product(i, j)).collect()).collect();
     let matrix = DMatrix::from_fn(n, n, |i, j| if j <= i { rows[i][j] } else { rows[j][i] });
-    let slope = DVector::from_iterator(n, jacobian.iter().map(|column| dot(column, residuals)));
+    let slope = DVector::from_iterator(n, jacobian.iter().zip(&spans).map(|(column, span)| dot(column, residuals, span.clone())));
     (matrix, slope)
+}
+
+/// From the first to behind the last value that is not 0.
+fn span(column: &[f64]) -> std::ops::Range<usize> {
+    let is_something = |x: &f64| *x != 0.0;
+    match (column.iter().position(is_something), column.iter().rposition(is_something)) {
+        (Some(from), Some(last)) => from..last + 1,
+        _ => 0..0,
+    }
 }
 
 /// Sum of products, in four chains so that it is not the latency of one that counts.

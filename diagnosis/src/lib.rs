@@ -26,4 +26,5 @@ pub mod search;
 pub mod simulate;
 pub mod statistics;
 pub mod structure;
+pub mod unknown;
 pub mod verdict;

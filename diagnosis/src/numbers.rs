@@ -6,7 +6,7 @@ use crate::search::Candidate;
 use crate::structure::Role;
 use backdrive_plant::describe::unit_for;
 use backdrive_plant::elements::KINDS;
-use backdrive_plant::model::OutputKind;
+use backdrive_plant::model::{InputKind, OutputKind};
 use backdrive_plant::write::{Edit, PatchError, Value, patch, round_significant};
 use serde::Serialize;
 
@@ -49,7 +49,9 @@ const UNSURE: f64 = 0.7;
 
 /// Every number of a fit.
 pub fn rows(problem: &Problem, candidate: &Candidate, spread: &Spread) -> Vec<Row> {
+    // The weights of a curve that nobody measured are no numbers of the device.
     let numbers = candidate.structure.numbers.iter().zip(&candidate.fit.values).enumerate();
+    let numbers = numbers.filter(|(_, (number, _))| !matches!(number.role, Role::Knot(..)));
     let row = |(index, (number, value)): (usize, (&crate::structure::Number, &f64))| {
         let given = match &number.role {
             Role::Stated(i) => problem.stated.get(*i).map(|s| s.given),
@@ -116,6 +118,10 @@ pub fn name_of(problem: &Problem, candidate: &Candidate, index: usize) -> String
         Role::Condition(path, r) => format!("{path} in {}", record(*r)),
         Role::Position(b, r) => format!("start of {} in {}", body(*b), record(*r)),
         Role::Velocity(b, r) => format!("start speed of {} in {}", body(*b), record(*r)),
+        Role::Knot(u, k, r) => {
+            let input = problem.unknown.get(*u).and_then(|u| problem.model.inputs.get(u.input)).map_or("?", |i| i.name.as_str());
+            format!("{input}, weight {k}, in {}", record(*r))
+        }
     }
 }
 
@@ -131,6 +137,10 @@ fn unit_of(problem: &Problem, candidate: &Candidate, index: usize) -> String {
         Some(Role::Condition(path, _)) => of_path(path),
         Some(Role::Position(..)) => unit_for(motion, "m"),
         Some(Role::Velocity(..)) => unit_for(motion, "m/s"),
+        Some(Role::Knot(u, ..)) => {
+            let input = problem.unknown.get(*u).and_then(|u| problem.model.inputs.get(u.input));
+            unit_for(motion, if input.is_some_and(|i| i.kind == InputKind::Motion) { "m" } else { "N" })
+        }
         None => String::new(),
     }
 }

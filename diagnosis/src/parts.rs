@@ -50,10 +50,11 @@ impl Parts {
                 if early { 0..length } else { from..from + length }
             })
             .collect();
+        let seen = structure.with_unknown(problem, records, &fit.values);
         let cut = |(r, range): (usize, &Range<usize>)| {
             let begins = match range.start {
                 0 => Vec::new(),
-                at => motion_at(&model, &records[r], &[], evaluator.substeps, firm.as_ref().map(|g| (g, r)), at)?,
+                at => motion_at(&model, &seen[r], (&[], &[]), evaluator.substeps, firm.as_ref().map(|g| (g, r)), at)?,
             };
             let skip = if range.start == 0 { 0 } else { (FORGOTTEN * range.len() as f64) as usize };
             Some(records[r].part(range.clone(), begins, skip))

@@ -1,6 +1,7 @@
 //! What is to be explained: a nominal model, recordings to fit and recordings to be kept aside, and the numbers that may be off.
 
 use crate::floor;
+use crate::unknown::Unknown;
 use backdrive_bags::{BagError, Reader, recording as bag_recording};
 use backdrive_plant::model::{Hold, InputKind, Model, OutputKind};
 use backdrive_plant::recording::{Columns, Jitter, Recording, RecordingError, signals_of};
@@ -54,6 +55,8 @@ pub struct Record {
     pub begins: Vec<(usize, f64, f64)>,
     /// Samples at its start that do not count, for the same reason.
     pub skip: usize,
+    /// Samples of the recording before it, where it is a part of one.
+    pub before: usize,
 }
 
 /// A number that the nominal file states, and that may be off.
@@ -88,6 +91,8 @@ pub struct Problem {
     pub stated: Vec<Stated>,
     /// How the device starts in each file.
     pub initial: Initial,
+    /// Inputs that nobody measured.
+    pub unknown: Vec<Unknown>,
     /// Standard deviation of the measuring error of each output, in its unit; see [`floor`].
     pub floor: Vec<f64>,
     /// Samples over which each output's displacement is compared instead of its position; 0 where the position itself is.
@@ -114,9 +119,10 @@ impl Problem {
         let text = read_text(&model_path)?;
         let model = Model::load(&model_path)?;
         set.check_conditions(&model)?;
-        let read = |files: &[String]| files.iter().map(|file| record(set, file, &model)).collect::<Result<Vec<_>, _>>();
+        let unknown = unknown_of(set, &model)?;
+        let read = |files: &[String]| files.iter().map(|file| record(set, file, &model, &unknown)).collect::<Result<Vec<_>, _>>();
         let (fit, held_out) = (read(&set.fit)?, read(&set.held_out)?);
-        Problem::new(text, model_path, model, fit, held_out, set.initial)
+        Ok(Problem { unknown, ..Problem::new(text, model_path, model, fit, held_out, set.initial)? })
     }
 
     /// The same from recordings at hand.
@@ -144,7 +150,7 @@ impl Problem {
         let stated = stated_numbers(&model, &text);
         let floor = (0..model.outputs.len()).map(|output| floor::of_signal(&model, &fit, output)).collect();
         let lag = (0..model.outputs.len()).map(|output| lag_of(&model, &fit, output)).collect();
-        Ok(Problem { text, model_path, model, fit, held_out, stated, initial, floor, lag })
+        Ok(Problem { text, model_path, model, fit, held_out, stated, initial, unknown: Vec::new(), floor, lag })
     }
 }
 
@@ -152,14 +158,31 @@ fn names<'a>(all: impl Iterator<Item = &'a str>) -> String {
     all.collect::<Vec<_>>().join(", ")
 }
 
+/// The inputs that a set says nobody measured.
+fn unknown_of(set: &RecordingSet, model: &Model) -> Result<Vec<Unknown>, ProblemError> {
+    let one = |(name, bandwidth_hz): &(String, f64)| {
+        let place = set.folder.join("set.toml");
+        let Some(input) = model.inputs.iter().position(|i| i.name == *name) else {
+            let all = names(model.inputs.iter().map(|i| i.name.as_str()));
+            return Err(ProblemError::Set(format!("{}, unknown.{name}: the model has no such input; it has {all}", place.display())));
+        };
+        if set.columns.iter().any(|(signal, _)| signal == name) {
+            let place = place.display();
+            return Err(ProblemError::Set(format!("{place}, unknown.{name}: has a column too; an input is recorded or unknown")));
+        }
+        Ok(Unknown { input, bandwidth_hz: *bandwidth_hz })
+    };
+    set.unknown.iter().map(one).collect()
+}
+
 /// Reads one file of a set onto a regular grid.
-fn record(set: &RecordingSet, file: &str, model: &Model) -> Result<Record, ProblemError> {
+fn record(set: &RecordingSet, file: &str, model: &Model, unknown: &[Unknown]) -> Result<Record, ProblemError> {
     let path = set.path_of(file);
     let rules = set.rules_of(file);
     let is_bag = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("mcap"));
     let recording =
         if is_bag { from_bag(&path, model, &set.columns, &rules.piece)? } else { from_csv(&path, model, &set.columns, &rules.piece)? };
-    Record::new(&recording, model, rules.condition)
+    Record::knowing(&recording, model, rules.condition, unknown)
 }
 
 fn from_csv(path: &Path, model: &Model, columns: &Columns, piece: &backdrive_plant::recording::Piece) -> Result<Recording, ProblemError> {
@@ -189,6 +212,16 @@ impl Record {
     /// # Errors
     /// When an input is missing, or there are too few samples.
     pub fn new(recording: &Recording, model: &Model, conditions: Vec<(String, Condition)>) -> Result<Record, ProblemError> {
+        Record::knowing(recording, model, conditions, &[])
+    }
+
+    /// The same where some inputs are unknown: they rest.
+    fn knowing(
+        recording: &Recording,
+        model: &Model,
+        conditions: Vec<(String, Condition)>,
+        unknown: &[Unknown],
+    ) -> Result<Record, ProblemError> {
         let jitter = recording.jitter.clone();
         let recording = recording.regular_for(model)?;
         if recording.len() < FEWEST_SAMPLES {
@@ -198,13 +231,17 @@ impl Record {
                 recording.name
             )));
         }
-        let inputs: Vec<Vec<f64>> = recording.inputs_of(model)?.into_iter().map(<[f64]>::to_vec).collect();
+        let input = |(index, input): (usize, &backdrive_plant::model::Input)| match unknown.iter().any(|u| u.input == index) {
+            true => Ok(vec![0.0; recording.len()]),
+            false => recording.need_signal(&input.name).map(<[f64]>::to_vec),
+        };
+        let inputs: Vec<Vec<f64>> = model.inputs.iter().enumerate().map(input).collect::<Result<_, _>>()?;
         let outputs: Vec<Option<Vec<f64>>> = model.outputs.iter().map(|o| recording.signal(&o.name).map(<[f64]>::to_vec)).collect();
         let period = recording.period;
         let segments = model.inputs.iter().zip(&inputs).map(|(input, samples)| segments(input.hold, samples, period)).collect();
         let spread = outputs.iter().map(|o| o.as_deref().map_or(1.0, spread)).collect();
         let (name, len, begins) = (recording.name.clone(), recording.len(), Vec::new());
-        Ok(Record { name, period, len, jitter, inputs, segments, outputs, spread, conditions, begins, skip: 0 })
+        Ok(Record { name, period, len, jitter, inputs, segments, outputs, spread, conditions, begins, skip: 0, before: 0 })
     }
 
     /// A part of the recording, with the motion that the bodies begin with and the samples that do not count.
@@ -217,6 +254,7 @@ impl Record {
             outputs: self.outputs.iter().map(|o| o.as_ref().map(of)).collect(),
             begins,
             skip,
+            before: self.before + range.start,
             ..self.clone()
         }
     }

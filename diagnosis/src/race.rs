@@ -66,6 +66,7 @@ impl Course<'_> {
         let few = worst_records(evaluator, &self.nominal.fit.residuals, 2);
         let whole = few.len() == evaluator.records.len()
             || problem.initial == Initial::Free
+            || !problem.unknown.is_empty()
             || problem.fit.iter().any(|r| !r.conditions.is_empty());
         let some: Vec<Record> = if whole { problem.fit.clone() } else { few.iter().map(|r| problem.fit[*r].clone()).collect() };
         let coarse = Evaluator { substeps: self.coarse, records: &some, widest: 1.0, ..evaluator.clone() };

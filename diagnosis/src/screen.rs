@@ -141,7 +141,11 @@ impl Screen {
             with.push(hypotheses[index].clone());
             Structure::new(problem, evaluator.records, with)
         };
-        if evaluator.records.len() > few.len() && problem.initial == backdrive_plant::set::Initial::Rest && jobs.len() > most {
+        if evaluator.records.len() > few.len()
+            && problem.initial == backdrive_plant::set::Initial::Rest
+            && problem.unknown.is_empty()
+            && jobs.len() > most
+        {
             let layout = evaluator.layout();
             let kept: Vec<usize> = layout.iter().filter(|l| few.contains(&l.0)).flat_map(|l| l.2.clone()).step_by(stride).collect();
             let pick = |all: &[f64]| kept.iter().filter_map(|i| all.get(*i).copied()).collect::<Vec<f64>>();

@@ -235,7 +235,8 @@ pub fn search(
     let mut nominal = evaluator.fit(&structure, &quick.values, effort).ok_or(SearchError::RunsAway)?;
     // Far from the noise the measured path shows better than a simulation what is missing, and leads the numbers out of wrong basins.
     let model = structure.model(problem, &nominal.values).ok_or(SearchError::RunsAway)?;
-    let runs: Vec<(Vec<Vec<f64>>, f64)> = problem.fit.iter().map(|r| (r.inputs.clone(), r.period)).collect();
+    let seen = structure.with_unknown(problem, &problem.fit, &nominal.values);
+    let runs: Vec<(Vec<Vec<f64>>, f64)> = seen.iter().map(|r| (r.inputs.clone(), r.period)).collect();
     let scales = Scales::of(&model, &runs)?;
     let level = levels(&evaluator, &nominal.residuals).into_iter().fold(0.0, f64::max);
     let strength = if level > 3.0 * FAR { 1.0 } else { 0.3 };
@@ -289,7 +290,7 @@ pub fn search(
     });
 
     report("looking for ripples");
-    ripples(problem, &model, &evaluator.floor, &mut hypotheses);
+    ripples(&seen, &model, &evaluator.floor, &mut hypotheses);
     report("screening");
     let share = if far { 0.08 } else { 0.2 };
     let mut views = vec![View::of(&coarse, parts.as_ref(), (&structure, base), &hypotheses, settings.patience.mul_f64(share), guided)];
@@ -712,8 +713,8 @@ impl<'a> View<'a> {
 }
 
 /// A ripple shows in a force over displacement, at whatever period, but fits only start from a few: where locating finds one, a fit starts there.
-fn ripples(problem: &Problem, model: &Model, floor: &[f64], hypotheses: &mut [Hypothesis]) {
-    let runs: Vec<locate::Run> = problem.fit.iter().map(locate::Run::from).collect();
+fn ripples(records: &[Record], model: &Model, floor: &[f64], hypotheses: &mut [Hypothesis]) {
+    let runs: Vec<locate::Run> = records.iter().map(locate::Run::from).collect();
     let options = locate::Options { most_samples: LOCATED, laws_of_a_form: 0, ..locate::Options::quick() };
     // Where the model cannot be located in, fits start from the usual periods.
     let Ok(location) = locate::locate(model, &runs, floor, &options) else { return };

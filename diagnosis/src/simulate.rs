@@ -15,21 +15,24 @@ pub type Start = (usize, f64, f64);
 /// Predictions of a record's measured outputs, one column after the other in the order of the model, `record.len` samples each.
 /// At most `substeps` per sample. `None` where the model cannot be simulated or its motion leaves all bounds.
 pub fn predict(model: &Model, record: &Record, starts: &[Start], substeps: usize) -> Option<Vec<f64>> {
-    predict_along(model, record, starts, substeps, None)
+    predict_along(model, record, (starts, &[]), substeps, None)
 }
 
-/// The same, led by a guide: which, and the record's place in it.
+/// An input and its samples, in the place of those of a record.
+pub type Curve = (usize, Vec<f64>);
+
+/// The same with inputs of its own, led by a guide: which, and the record's place in it.
 pub fn predict_along(
     model: &Model,
     record: &Record,
-    starts: &[Start],
+    own: (&[Start], &[Curve]),
     substeps: usize,
     guide: Option<(&Guide, usize)>,
 ) -> Option<Vec<f64>> {
     let measured: Vec<usize> = (0..model.outputs.len()).filter(|o| record.outputs.get(*o).is_some_and(Option::is_some)).collect();
     let mut columns = vec![0.0; measured.len() * record.len];
     let mut values = vec![0.0; model.outputs.len()];
-    run(model, record, starts, substeps, guide, record.len, &mut |plant, sample| {
+    run(model, record, own, substeps, guide, record.len, &mut |plant, sample| {
         plant.outputs(&mut values);
         for (column, output) in measured.iter().enumerate() {
             columns[column * record.len + sample] = values[*output];
@@ -42,13 +45,13 @@ pub fn predict_along(
 pub fn motion_at(
     model: &Model,
     record: &Record,
-    starts: &[Start],
+    own: (&[Start], &[Curve]),
     substeps: usize,
     guide: Option<(&Guide, usize)>,
     at: usize,
 ) -> Option<Vec<Start>> {
     let mut motion = Vec::new();
-    run(model, record, starts, substeps, guide, at + 1, &mut |plant, sample| {
+    run(model, record, own, substeps, guide, at + 1, &mut |plant, sample| {
         if sample == at {
             motion = (0..model.bodies.len()).map(|body| (body, plant.position(body), plant.velocity(body))).collect();
         }
@@ -60,7 +63,7 @@ pub fn motion_at(
 fn run(
     model: &Model,
     record: &Record,
-    starts: &[Start],
+    (starts, curves): (&[Start], &[Curve]),
     substeps: usize,
     guide: Option<(&Guide, usize)>,
     samples: usize,
@@ -88,11 +91,20 @@ fn run(
         }
         None => model,
     };
-    let caught_up = ahead(model, &record.inputs, record.period);
-    let (model, columns) = caught_up.as_ref().map_or((model, &record.inputs), |(model, columns)| (model, columns));
+    let (mut own_inputs, mut own_segments) = (Vec::new(), Vec::new());
+    if !curves.is_empty() {
+        (own_inputs, own_segments) = (record.inputs.clone(), record.segments.clone());
+        for (input, samples) in curves {
+            *own_inputs.get_mut(*input)? = samples.clone();
+            *own_segments.get_mut(*input)? = segments(model.inputs.get(*input)?.hold, samples, record.period);
+        }
+    }
+    let (recorded, pieces) = if curves.is_empty() { (&record.inputs, &record.segments) } else { (&own_inputs, &own_segments) };
+    let caught_up = ahead(model, recorded, record.period);
+    let (model, columns) = caught_up.as_ref().map_or((model, recorded), |(model, columns)| (model, columns));
     let late: Option<Vec<Vec<Segment>>> =
         caught_up.as_ref().map(|_| model.inputs.iter().zip(columns).map(|(i, c)| segments(i.hold, c, record.period)).collect());
-    let driven = late.as_ref().unwrap_or(&record.segments);
+    let driven = late.as_ref().unwrap_or(pieces);
     let mut plant = Plant::new(model, record.period, &Options::default()).ok()?;
     let wanted = if substeps == TWICE { 2 * plant.substeps() } else { plant.substeps().min(substeps) };
     if wanted != plant.substeps() {

@@ -3,9 +3,11 @@
 use crate::guide::Guide;
 use crate::hypothesis::Hypothesis;
 use crate::problem::{Problem, Record, Stated};
-use crate::simulate::{Start, predict_along};
+use crate::simulate::{Curve, Start, predict_along};
+use crate::unknown::Unknown;
 use backdrive_plant::model::Model;
 use backdrive_plant::set::{Condition, Initial};
+use backdrive_plant::stepper::segments;
 
 /// What a number of a fit is.
 #[derive(Debug, Clone, PartialEq)]
@@ -20,6 +22,8 @@ pub enum Role {
     Position(usize, usize),
     /// Velocity with which a body starts in a record, m/s.
     Velocity(usize, usize),
+    /// A weight of the curve of an input that nobody measured: which of [`Problem::unknown`], which weight, which record.
+    Knot(usize, usize, usize),
 }
 
 /// A number that a fit may move.
@@ -132,6 +136,7 @@ impl Structure {
             if problem.initial == Initial::Free {
                 numbers.extend(start_numbers(problem, record, r));
             }
+            numbers.extend(knots(problem, record, r));
         }
         Structure { added, numbers }
     }
@@ -142,7 +147,7 @@ impl Structure {
             Role::Stated(i) => stated.get(*i).copied().or_else(|| problem.stated.get(*i).map(|s| s.given)),
             Role::Added(h, p) => added.get(*h).and_then(|values| values.get(*p)).copied(),
             Role::Condition(path, _) => problem.model.values_at(path).ok().and_then(|v| v.first().copied()),
-            Role::Position(..) | Role::Velocity(..) => Some(0.0),
+            Role::Position(..) | Role::Velocity(..) | Role::Knot(..) => Some(0.0),
         };
         self.numbers.iter().map(|n| value(n).unwrap_or(0.0).clamp(n.range.0, n.range.1)).collect()
     }
@@ -186,13 +191,22 @@ impl Structure {
     }
 
     /// Predictions of one of `records`; see [`crate::simulate::predict`].
-    pub fn predict(&self, model: &Model, values: &[f64], record: &Record, index: usize, substeps: usize) -> Option<Vec<f64>> {
-        self.predict_along(model, values, record, index, substeps, None)
+    pub fn predict(
+        &self,
+        problem: &Problem,
+        model: &Model,
+        values: &[f64],
+        record: &Record,
+        index: usize,
+        substeps: usize,
+    ) -> Option<Vec<f64>> {
+        self.predict_along(problem, model, values, record, index, substeps, None)
     }
 
     /// The same, led by a guide of these records.
     pub fn predict_along(
         &self,
+        problem: &Problem,
         model: &Model,
         values: &[f64],
         record: &Record,
@@ -210,10 +224,34 @@ impl Structure {
                     Some(start) => start.2 = *value,
                     None => starts.push((*body, 0.0, *value)),
                 },
-                Role::Stated(_) | Role::Added(..) => {}
+                Role::Stated(_) | Role::Added(..) | Role::Knot(..) => {}
             }
         }
-        predict_along(changed.as_ref().unwrap_or(model), record, &starts, substeps, guide.map(|g| (g, index)))
+        let curve =
+            |(u, unknown): (usize, &Unknown)| (unknown.input, unknown.curve(&self.weights(values, u, index).collect::<Vec<_>>(), record));
+        let curves: Vec<Curve> = problem.unknown.iter().enumerate().map(curve).collect();
+        predict_along(changed.as_ref().unwrap_or(model), record, (&starts, &curves), substeps, guide.map(|g| (g, index)))
+    }
+
+    /// Records with the curves that values give the inputs which nobody measured.
+    pub fn with_unknown(&self, problem: &Problem, records: &[Record], values: &[f64]) -> Vec<Record> {
+        let mut seen = records.to_vec();
+        for (r, record) in seen.iter_mut().enumerate() {
+            for (index, unknown) in problem.unknown.iter().enumerate() {
+                let weights: Vec<f64> = self.weights(values, index, r).collect();
+                let samples = unknown.curve(&weights, record);
+                let Some(input) = problem.model.inputs.get(unknown.input) else { continue };
+                record.segments[unknown.input] = segments(input.hold, &samples, record.period);
+                record.inputs[unknown.input] = samples;
+            }
+        }
+        seen
+    }
+
+    /// Weights of an unknown input in a record, in order.
+    fn weights<'a>(&'a self, values: &'a [f64], unknown: usize, record: usize) -> impl Iterator<Item = f64> + 'a {
+        let here = move |n: &Number| matches!(n.role, Role::Knot(u, _, r) if u == unknown && r == record);
+        self.numbers.iter().zip(values).filter(move |(n, _)| here(n)).map(|(_, value)| *value)
     }
 
     /// What the structure adds, such as `coulomb@drum-ground`; `nominal` where it adds nothing.
@@ -231,6 +269,25 @@ fn stated_number(index: usize, stated: &Stated) -> Number {
     let spread = if log { PRIOR_SPREAD } else { 2.0 * stated.given.abs() };
     let step = if log { 1e-3 } else { 1e-3 * stated.given.abs() };
     Number { role: Role::Stated(index), range, log, step, coarse: false, record: None, prior: Some((centre, spread)) }
+}
+
+/// How far an unknown input may go, in sizes of what was measured; a fit moves it by a hundredth of that without surprise.
+const UNKNOWN_REACH: f64 = 100.0;
+
+/// The weights of the unknown inputs in a record.
+fn knots<'a>(problem: &'a Problem, record: &'a Record, r: usize) -> impl Iterator<Item = Number> + 'a {
+    problem.unknown.iter().enumerate().flat_map(move |(index, unknown)| {
+        let size = unknown.scale(problem);
+        (0..unknown.knots(record)).map(move |k| Number {
+            role: Role::Knot(index, k, r),
+            range: (-UNKNOWN_REACH * size, UNKNOWN_REACH * size),
+            log: false,
+            step: 1e-3 * size,
+            coarse: false,
+            record: Some(r),
+            prior: Some((0.0, 0.01 * UNKNOWN_REACH * size)),
+        })
+    })
 }
 
 /// Positions and velocities of the free bodies at a record's start, in the range of what the record shows.

@@ -11,6 +11,7 @@ use crate::problem::Problem;
 use crate::search::{AT_FLOOR, Candidate, Search, advantage_over};
 use crate::statistics::advantage;
 use crate::structure::Role;
+use crate::unknown::{Estimated, Unknown, estimated};
 use backdrive_plant::write::{patch, round_significant};
 use serde_json::{Value as Json, json};
 use std::collections::HashSet;
@@ -173,11 +174,23 @@ pub fn verdict(problem: &Problem, search: &Search, model_name: &str) -> Result<V
         "where": place_in_signals(problem, search, &bursts),
         "parameters": parameters,
         "held_out": held,
+        "unknown_inputs": unknown_inputs(problem, best),
         "model_after": model_name,
         "next_experiment": next,
         "detectable": if added { Json::Null } else { detectable(search) },
     });
     Ok(Verdict { json, model, sentence, experiment })
+}
+
+/// What was found of the inputs that nobody measured.
+fn unknown_inputs(problem: &Problem, best: &Candidate) -> Vec<Estimated> {
+    let records = best.structure.with_unknown(problem, &problem.fit, &best.fit.values);
+    let one = |unknown: &Unknown| {
+        let name = problem.model.inputs.get(unknown.input).map_or("", |i| i.name.as_str());
+        let curves: Vec<(Vec<f64>, f64)> = records.iter().map(|r| (r.inputs[unknown.input].clone(), r.period)).collect();
+        estimated(name, unknown, &curves)
+    };
+    problem.unknown.iter().map(one).collect()
 }
 
 /// Samples a burst may span, and how many spreads away it starts.

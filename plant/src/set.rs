@@ -46,6 +46,8 @@ pub struct RecordingSet {
     pub held_out: Vec<String>,
     /// How the device starts.
     pub initial: Initial,
+    /// Inputs of the model that nobody measured: name, and Hz up to which they vary. They are no columns of the files.
+    pub unknown: Vec<(String, f64)>,
     /// Names and units in the files.
     pub columns: Columns,
     /// What is particular to a file, by its name in `fit` or `held_out`.
@@ -73,6 +75,7 @@ impl RecordingSet {
                     fit,
                     held_out: Vec::new(),
                     initial: Initial::Rest,
+                    unknown: Vec::new(),
                     columns: Columns::new(),
                     files: Vec::new(),
                 })
@@ -162,6 +165,14 @@ fn read(mut top: Table, folder: PathBuf) -> Result<RecordingSet, FileError> {
         return Err(top.error("names no recordings; expected fit = [\"a.csv\", ...]"));
     }
     let initial = top.one_of("initial", &[("rest", Initial::Rest), ("free", Initial::Free)])?.unwrap_or_default();
+    let mut unknown_inputs = Vec::new();
+    if let Some(mut table) = top.table("unknown")? {
+        for name in table.keys() {
+            let mut below = table.table(&name)?.ok_or_else(|| table.missing(&name))?;
+            unknown_inputs.push((name, below.need_number("bandwidth_hz", Range::Positive)?));
+            below.finish()?;
+        }
+    }
     let columns = top.table("columns")?.map(read_columns).transpose()?.unwrap_or_default();
     let mut files = Vec::new();
     if let Some(mut table) = top.table("files")? {
@@ -175,7 +186,7 @@ fn read(mut top: Table, folder: PathBuf) -> Result<RecordingSet, FileError> {
         }
     }
     top.finish()?;
-    Ok(RecordingSet { model: model.map(|name| folder.join(name)), folder, fit, held_out, initial, columns, files })
+    Ok(RecordingSet { model: model.map(|name| folder.join(name)), folder, fit, held_out, initial, unknown: unknown_inputs, columns, files })
 }
 
 fn shown(folder: &Path) -> String {

@@ -1,9 +1,9 @@
 //! One proof: draw and seal, record, diagnose, raise the gain, and only then look at the truth.
 
-use super::edges::{Canceller, Loop};
-use super::hidden::{Hidden, program};
-use super::score::{Finding, Mark, findings, is_nonlinear, mark, name_of};
 use super::absolute;
+use super::edges::{Canceller, Loop};
+use super::hidden::{Hidden, Opened, program};
+use super::score::{Finding, Mark, findings, is_nonlinear, mark, name_of};
 use crate::cli;
 use crate::failure::Failure;
 use backdrive_sealed::seal::hash;
@@ -11,6 +11,7 @@ use backdrive_sealed::truth::Truth;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use toml_edit::{Array, DocumentMut, Item, value};
 
@@ -39,10 +40,14 @@ pub struct Case {
 pub fn prove(options: &cli::Prove, folder: &Path, seed: u64, effects: usize, stop: &AtomicBool) -> Result<Case, Failure> {
     let sealed = folder.join("sealed");
     if sealed.exists() {
-        return Err(Failure::input(format!("{}: is there already; a truth is sealed once, so name another folder with --out", sealed.display())));
+        return Err(Failure::input(format!(
+            "{}: is there already; a truth is sealed once, so name another folder with --out",
+            sealed.display()
+        )));
     }
     std::fs::create_dir_all(&sealed).map_err(|e| Failure::write(&sealed, e))?;
-    let template: DocumentMut = read(&options.session)?.parse().map_err(|e| Failure::input(format!("{}: {e}", options.session.display())))?;
+    let template: DocumentMut =
+        read(&options.session)?.parse().map_err(|e| Failure::input(format!("{}: {e}", options.session.display())))?;
     let rate_hz = template.get("rate_hz").and_then(|i| i.as_float().or(i.as_integer().map(|n| n as f64))).unwrap_or(5000.0);
     let hidden = Hidden {
         program: options.plant.clone().unwrap_or_else(program),
@@ -65,21 +70,25 @@ pub fn prove(options: &cli::Prove, folder: &Path, seed: u64, effects: usize, sto
     let verdict: Value = serde_json::from_str(&read(&found.join("verdict.json"))?).map_err(Failure::input)?;
 
     let cancellers = cancellers(options, folder, &session, &found)?;
-    let the_loop = Loop { graph: &options.contact, high_pass_hz: options.high_pass, hidden: &hidden };
-    let mut gains = Vec::new();
-    for canceller in &cancellers {
-        let edge = the_loop.edge(canceller, 1.0, stop)?;
-        gains.push((canceller.name, edge.at_least, edge.critical_gain.is_none() && edge.limited_from.is_none()));
-        if stop.load(Ordering::SeqCst) {
-            break;
-        }
-    }
 
+    // The verdict is written; now the truth is opened.
     let bytes = std::fs::read(&hidden.truth).map_err(|e| Failure::input(format!("{}: {e}", hidden.truth.display())))?;
     if hash(&bytes) != digest {
         return Err(Failure::input(format!("{}: is not what was sealed", hidden.truth.display())));
     }
     let truth = Truth::from_json(&bytes).map_err(Failure::input)?;
+    let device = Arc::new(Opened::new(&hidden, &truth).map_err(Failure::input)?);
+    let the_loop =
+        Loop { graph: &options.contact, high_pass_hz: options.high_pass, model: &hidden.model, grip: hidden.grip.as_deref(), device };
+    let mut gains = Vec::new();
+    for canceller in &cancellers {
+        let edge = the_loop.edge(canceller, 1.0, stop)?;
+        eprintln!("{} {} {}", canceller.name, edge.reason, edge.evaluations);
+        gains.push((canceller.name, edge.at_least, edge.critical_gain.is_none() && edge.limited_from.is_none()));
+        if stop.load(Ordering::SeqCst) {
+            break;
+        }
+    }
     let (word, findings) = (verdict["verdict"].as_str().unwrap_or_default().to_string(), findings(&verdict));
     let error = |key: &str| verdict["held_out"][key].as_f64();
     Ok(Case {
@@ -149,7 +158,9 @@ fn draw(options: &cli::Prove, hidden: &Hidden, seed: u64, effects: usize) -> Res
     }
     command.arg("--out").arg(&hidden.truth);
     let name = hidden.program.display();
-    let output = command.output().map_err(|e| Failure::machine(format!("{name}: cannot be started ({e}); build it with `cargo build --release`")))?;
+    let output = command
+        .output()
+        .map_err(|e| Failure::machine(format!("{name}: cannot be started ({e}); build it with `cargo build --release`")))?;
     if !output.status.success() {
         return Err(Failure::input(format!("{name}: {}", String::from_utf8_lossy(&output.stderr).trim())));
     }

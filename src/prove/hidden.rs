@@ -1,12 +1,14 @@
-//! The hidden plant as a master of a graph: its process at the other end of two pipes.
+//! The hidden plant as a master of a graph: its process at the other end of two pipes, or, once the verdict is written, beside the loop.
 
 use backdrive_control::core::Core;
 use backdrive_control::master::Master;
 use backdrive_control::mechanism::Mechanism;
 use backdrive_nodes::graph::{Graph, Node, NodeKind, Settings};
 use backdrive_plant::model::Axis;
-use backdrive_sealed::master::Reading;
+use backdrive_sealed::master::{MasterOptions, Reading, SealedMaster};
+use backdrive_sealed::network::{Grip, Network};
 use backdrive_sealed::process::RemoteMaster;
+use backdrive_sealed::truth::Truth;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -50,44 +52,99 @@ pub fn program() -> PathBuf {
 
 /// The core of a master whose device is the process that `words` start.
 pub fn core(graph: &Graph, node: &Node, words: &[String]) -> Result<Vec<Box<dyn Core>>, String> {
+    let (program, arguments) = words.split_first().ok_or("no program is named")?;
+    let mut command = Command::new(program);
+    command.args(arguments);
+    let mut process = RemoteMaster::start_process(command).map_err(|e| e.to_string())?;
+    let axes = process.axes();
+    let ask = move |force: &[f64], hand: &[f64], into: &mut Vec<Reading>| {
+        // A loop that ran away gets no answer: what is no number ends the process.
+        let said = force.iter().chain(hand).all(|x| x.is_finite()).then(|| process.step(force, hand).ok()).flatten();
+        into.clear();
+        into.extend_from_slice(said.unwrap_or(&[]));
+    };
+    master(graph, node, axes, Box::new(ask))
+}
+
+/// A truth that may be looked at, with the nominal device held as a session holds it: the scorer's hidden plant, without a process and its pipes.
+pub struct Opened {
+    held: Network,
+    truth: Truth,
+    period_s: f64,
+}
+
+impl Opened {
+    /// The device that `truth` makes of the files that `hidden` names.
+    pub fn new(hidden: &Hidden, truth: &Truth) -> Result<Opened, String> {
+        let read = |path: &Path| std::fs::read_to_string(path).map_err(|e| format!("{}: cannot be read: {e}", path.display()));
+        let name = |path: &Path| path.display().to_string();
+        let free = Network::from_toml(&read(&hidden.model)?, &name(&hidden.model)).map_err(|e| e.to_string())?;
+        let held = match &hidden.grip {
+            None => free,
+            Some(path) => free.held(&Grip::from_toml(&read(path)?, &name(path)).map_err(|e| e.to_string())?),
+        };
+        Ok(Opened { held, truth: truth.clone(), period_s: 1.0 / hidden.rate_hz })
+    }
+
+    /// Puts what the sensors do to a position into the master's model: what is noise is no oscillation.
+    pub fn tell_sensors(&self, graph: &mut Graph) {
+        for node in graph.nodes.iter_mut().filter(|n| n.kind == NodeKind::Master) {
+            let Settings::Master(files) = &mut node.settings else { continue };
+            for output in files.model.iter_mut().flat_map(|m| m.outputs.iter_mut()) {
+                if let Some(sensor) = self.truth.sensors.iter().find(|s| s.output == output.name) {
+                    (output.resolution, output.noise) = (sensor.resolution, sensor.noise);
+                }
+            }
+        }
+    }
+
+    /// The core of a master that is this device, in a run with sensor noise of its own.
+    pub fn core(&self, graph: &Graph, node: &Node, run: u32, firmness: f64) -> Result<Vec<Box<dyn Core>>, String> {
+        let options = MasterOptions { period_s: self.period_s, run, firmness };
+        let mut plant = SealedMaster::new(&self.held, &self.truth, &options).map_err(|e| e.to_string())?;
+        let axes = plant.axes();
+        let mut started = false;
+        let ask = move |force: &[f64], hand: &[f64], into: &mut Vec<Reading>| {
+            let done = if started { plant.step(force, hand) } else { plant.start(hand) };
+            started = true;
+            into.clear();
+            if done.is_ok() {
+                into.extend((0..axes).filter_map(|axis| plant.reading(axis)));
+            }
+        };
+        master(graph, node, axes, Box::new(ask))
+    }
+}
+
+/// Asks a device for its next readings under forces and with hands; none where it does not answer any more.
+type Ask = Box<dyn FnMut(&[f64], &[f64], &mut Vec<Reading>) + Send>;
+
+fn master(graph: &Graph, node: &Node, has: usize, ask: Ask) -> Result<Vec<Box<dyn Core>>, String> {
     let axes = match (&node.kind, &node.settings) {
         (NodeKind::Master, Settings::Master(files)) => files.model.as_ref().map(|m| m.axes.clone()),
         _ => None,
     };
     let axes = axes.ok_or_else(|| format!("node \"{}\" is no master with a model: its axes and their limits are not known", node.name))?;
-    let device = Remote::start(words, axes)?;
+    if has != axes.len() {
+        return Err(format!("the hidden plant has {has} axes and the model of \"{}\" {}", node.name, axes.len()));
+    }
+    let device = Hiding { axes, ask, readings: Vec::new(), answers: true };
     Ok(vec![Box::new(Master::new(Box::new(device), graph.stale_after_s, graph.period_s()))])
 }
 
-/// A device that another process has.
-struct Remote {
+/// A device of which only what a graph carries can be read.
+struct Hiding {
     axes: Vec<Axis>,
-    process: RemoteMaster,
+    ask: Ask,
     readings: Vec<Reading>,
     answers: bool,
 }
 
-impl Remote {
-    fn start(words: &[String], axes: Vec<Axis>) -> Result<Remote, String> {
-        let (program, arguments) = words.split_first().ok_or("no program is named")?;
-        let mut command = Command::new(program);
-        command.args(arguments);
-        let process = RemoteMaster::start_process(command).map_err(|e| e.to_string())?;
-        if process.axes() != axes.len() {
-            return Err(format!("{program} has {} axes and the model {}", process.axes(), axes.len()));
-        }
-        Ok(Remote { axes, process, readings: Vec::new(), answers: true })
-    }
-
+impl Hiding {
     fn ask(&mut self, force: &[f64], hand: &[f64]) {
-        // What is no number ends the process, and so does a loop that ran away.
-        self.answers &= force.iter().chain(hand).all(|x| x.is_finite());
-        if !self.answers {
-            return;
-        }
-        match self.process.step(force, hand) {
-            Ok(readings) => self.readings = readings.to_vec(),
-            Err(_) => self.answers = false,
+        if self.answers {
+            (self.ask)(force, hand, &mut self.readings);
+            self.answers = self.readings.len() == self.axes.len();
         }
     }
 
@@ -96,7 +153,7 @@ impl Remote {
     }
 }
 
-impl Mechanism for Remote {
+impl Mechanism for Hiding {
     fn axes(&self) -> usize {
         self.axes.len()
     }

@@ -87,6 +87,7 @@ impl Collector {
                 name: master.and_then(|n| n.axis_names.get(index).cloned()).unwrap_or_else(|| format!("axis{index}")),
                 travel: axis.and_then(|a| a.travel),
                 resolution: axis.zip(output).map_or(0.0, |(a, o)| a.scale.abs() * o.resolution),
+                noise: axis.zip(output).map_or(0.0, |(a, o)| a.scale.abs() * o.noise),
                 ..AxisSignals::default()
             }
         });
@@ -203,6 +204,7 @@ impl Collector {
             clamped: clamped.clone(),
             travel: axis.travel,
             resolution: axis.resolution,
+            noise: axis.noise,
         };
         self.axes.iter().zip(&self.blank.axes).map(trace).collect()
     }

@@ -228,6 +228,7 @@ fn blank(graph: &Graph, master: usize, axis: usize, rows: usize) -> AxisSignals 
         clamped: vec![false; rows],
         travel: known.and_then(|(axis, _)| axis.travel),
         resolution: known.map_or(0.0, |(axis, output)| axis.scale.abs() * output.resolution),
+        noise: known.map_or(0.0, |(axis, output)| axis.scale.abs() * output.noise),
         ..AxisSignals::default()
     }
 }

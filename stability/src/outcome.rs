@@ -11,6 +11,7 @@
 //! | otherwise | a limit cycle |
 //! | slow wandering | the last quarter spans more than 20 um and four encoder steps, and does not settle |
 //! | limited | a clamp acted in more than 1 % of the contact, or the master left its travel |
+//! | a noisy sensor | its noise adds 5 standard deviations to what an amplitude and 10 to what a span must exceed |
 //! | a dither plays | what it explains (coherence) does not count: less than half of the motion unexplained is no oscillation |
 
 use crate::oscillation::{Oscillation, oscillation};
@@ -38,6 +39,8 @@ pub struct Trace {
     pub travel: Option<[f64; 2]>,
     /// Step of the position sensor, m or rad; 0 for an ideal one.
     pub resolution: f64,
+    /// Standard deviation of that sensor's noise, m or rad.
+    pub noise: f64,
 }
 
 /// The verdict on a run.
@@ -121,6 +124,9 @@ const LEAST_HOLD_S: f64 = 0.3;
 /// An oscillation below this is not felt and not counted, m or rad.
 const LEAST_AMPLITUDE: f64 = 2e-6;
 
+/// Half the span of thousands of samples of noise stays below this, standard deviations.
+const NOISE: f64 = 5.0;
+
 /// A master that moves less than this while the hand holds still is at rest, m or rad.
 const WANDER: f64 = 20e-6;
 
@@ -147,7 +153,7 @@ fn judge_hold(trace: &Trace, from: usize, to: usize) -> Option<Outcome> {
         return Some(judge_drift(trace, from, to));
     }
     let found = oscillation(&trace.position[from..to], trace.period_s, LOWEST_HZ)?;
-    let (fast, slow) = (judge_fast(&found, trace.resolution), judge_slow(trace, from, to));
+    let (fast, slow) = (judge_fast(&found, trace), judge_slow(trace, from, to));
     // The edges of a slow wandering have lines at every frequency, the strongest of them at the lowest.
     let spills_over = found.frequency_hz < 1.5 * LOWEST_HZ && slow != Outcome::Stable;
     Some(if fast == Outcome::Stable || spills_over { slow } else { fast })
@@ -176,7 +182,10 @@ fn judge_drift(trace: &Trace, from: usize, to: usize) -> Outcome {
     let quarter = piece.len() / 4;
     let mean = |i: usize| piece[i * quarter..(i + 1) * quarter].iter().sum::<f64>() / quarter as f64;
     let (second, third) = ((mean(2) - mean(1)).abs(), (mean(3) - mean(2)).abs());
-    if third > WANDER.max(4.0 * trace.resolution) && third > 1.5 * second && (mean(3) > mean(2)) == (mean(2) > mean(1)) {
+    if third > WANDER.max(4.0 * trace.resolution) + 2.0 * NOISE * trace.noise
+        && third > 1.5 * second
+        && (mean(3) > mean(2)) == (mean(2) > mean(1))
+    {
         let time = quarter as f64 * trace.period_s;
         return Outcome::Unstable { growth_per_s: (third / second.max(WANDER)).ln() / time };
     }
@@ -193,7 +202,7 @@ fn judge_slow(trace: &Trace, from: usize, to: usize) -> Outcome {
         high - low
     };
     let (third, last) = (range(&piece[2 * quarter..3 * quarter]), range(&piece[3 * quarter..]));
-    let floor = WANDER.max(4.0 * trace.resolution);
+    let floor = WANDER.max(4.0 * trace.resolution) + 2.0 * NOISE * trace.noise;
     let turns = turns(&piece[quarter..], floor);
     if last <= floor || (last < 0.5 * third && turns == 0) {
         return Outcome::Stable;
@@ -222,8 +231,8 @@ fn turns(signal: &[f64], least: f64) -> usize {
     turns
 }
 
-fn judge_fast(found: &Oscillation, resolution: f64) -> Outcome {
-    let floor = LEAST_AMPLITUDE.max(4.0 * resolution);
+fn judge_fast(found: &Oscillation, trace: &Trace) -> Outcome {
+    let floor = LEAST_AMPLITUDE.max(4.0 * trace.resolution) + NOISE * trace.noise;
     let grows = found.amplitude > 1.5 * found.amplitude_before && found.growth_per_s > 0.2;
     let dies = found.amplitude < 0.7 * found.amplitude_before && found.growth_per_s < -0.2;
     if found.amplitude <= floor || dies {
@@ -285,6 +294,7 @@ mod tests {
             clamped: vec![false; 10_000],
             travel: Some([-0.05, 0.05]),
             resolution: 2e-6,
+            noise: 0.0,
         }
     }
 

@@ -47,6 +47,8 @@ pub struct AxisSignals {
     pub travel: Option<[f64; 2]>,
     /// Step of the master's position sensor, m or rad; 0 for an ideal one.
     pub resolution: f64,
+    /// Standard deviation of that sensor's noise, m or rad; 0 where there is none or nobody says.
+    pub noise: f64,
 }
 
 impl Session {

@@ -376,6 +376,7 @@ fn recorded_outcome(session: &Session) -> Option<Outcome> {
         clamped: axis.clamped.clone(),
         travel: axis.travel,
         resolution: axis.resolution,
+        noise: axis.noise,
     };
     // What is missing in a recording is no run-away.
     let whole = |t: &Trace| t.position.iter().chain(&t.contact).all(|x| x.is_finite());

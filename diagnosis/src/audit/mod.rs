@@ -80,7 +80,10 @@ pub fn audit(problem: &Problem) -> Vec<Remark> {
     let mut all = Vec::new();
     for record in problem.fit.iter().chain(&problem.held_out) {
         clock(record, &mut all);
-        for (input, samples) in problem.model.inputs.iter().zip(&record.inputs) {
+        for (index, (input, samples)) in problem.model.inputs.iter().zip(&record.inputs).enumerate() {
+            if problem.unknown.iter().any(|u| u.input == index) {
+                continue;
+            }
             constant(record, &input.name, samples, &mut all);
             if input.kind == InputKind::Force {
                 clipped(record, &input.name, samples, "its source may be limited", &mut all);

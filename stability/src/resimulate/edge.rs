@@ -20,11 +20,13 @@ pub struct Search {
     /// Whether the grid is run beyond its first gain that is not stable: only then it is seen whether the loop is stable again
     /// above, and from where on a clamp acts.
     pub whole_grid: bool,
+    /// Whether the verdict is looked at again about the edge: only then flickering is seen.
+    pub around: bool,
 }
 
 impl Default for Search {
     fn default() -> Search {
-        Search { lowest: 0.05, highest: 50.0, tolerance: 0.005, per_decade: 40, whole_grid: true }
+        Search { lowest: 0.05, highest: 50.0, tolerance: 0.005, per_decade: 40, whole_grid: true, around: true }
     }
 }
 
@@ -136,7 +138,7 @@ pub fn edge(
         }
     }
     let mut flickers = None;
-    if low > 0.0 && beyond.is_unstable() {
+    if search.around && low > 0.0 && beyond.is_unstable() {
         let middle = (low * high).sqrt();
         let probe = |factor: &f64| Ok((middle * factor, scenario.run(scenario.gain(middle * factor), &options, cancel)?));
         let probes = AROUND.par_iter().map(probe).collect::<Result<Vec<(f64, Run)>, ResimulateError>>()?;
