@@ -30,16 +30,18 @@ fn walk(folder: &std::path::Path) -> Vec<String> {
         .collect()
 }
 
-fn falls(report: &Report, effects: usize, to: f64) {
-    let [before, after] = ["before", "after"].map(|which| report.figure_named(&format!("effects {effects} {which}")));
+fn falls(report: &Report, to: f64) {
+    let [before, after] = ["before", "after"].map(|which| report.figure_named(&format!("effects-1 {which}")));
     assert!(after < to * before, "{before} -> {after}");
 }
 
 #[test]
 fn the_ball_screw_remembers_every_reversal() {
     let report = report("paper_000");
-    assert!(report.figure_named("steps found") == 1.0, "{}", report.word_named("effects 1"));
-    falls(&report, 1, 0.5);
+    // Four sliders do not reach the noise of a device that has seven: it may be claimed or be the nearest.
+    let said = report.word_named("effects-1");
+    assert!(said.contains("maxwell_slip at screw-ground"), "{said}");
+    falls(&report, 0.3);
 }
 
 #[test]

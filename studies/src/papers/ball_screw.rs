@@ -61,10 +61,22 @@ fn run(context: &Context) -> Result<Report, StudyError> {
     }
     // Motions that turn within turns, as the paper's Fig. 6, below and beyond the way within which friction lets go; its 0.2 Hz tail.
     let drives = [
-        Drive { name: "small", held_out: false, inputs: vec!["multisine:peak=0.25,from=0.1,to=1,period=10,periods=1,seed=1"] },
-        Drive { name: "large", held_out: false, inputs: vec!["multisine:peak=3,from=0.1,to=0.6,period=10,periods=1,seed=2"] },
-        Drive { name: "tail", held_out: false, inputs: vec!["sines:amplitude=0.1/0.5/2,frequency=0.2,cycles=1"] },
-        Drive { name: "other", held_out: true, inputs: vec!["multisine:peak=1,from=0.1,to=1,period=10,periods=1,seed=3"] },
+        Drive {
+            name: "small",
+            held_out: false,
+            inputs: ["multisine:peak=0.25,from=0.1,to=1,period=10,periods=1,seed=1"].map(String::from).to_vec(),
+        },
+        Drive {
+            name: "large",
+            held_out: false,
+            inputs: ["multisine:peak=3,from=0.1,to=0.6,period=10,periods=1,seed=2"].map(String::from).to_vec(),
+        },
+        Drive { name: "tail", held_out: false, inputs: ["sines:amplitude=0.1/0.5/2,frequency=0.2,cycles=1"].map(String::from).to_vec() },
+        Drive {
+            name: "other",
+            held_out: true,
+            inputs: ["multisine:peak=1,from=0.1,to=1,period=10,periods=1,seed=3"].map(String::from).to_vec(),
+        },
     ];
     let story = Story { truth, first: &first, rate: 200.0, drives: &drives, steps: STEPS };
     story.record(context.out)?;

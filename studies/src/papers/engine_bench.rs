@@ -121,19 +121,17 @@ fn run(context: &Context) -> Result<Report, StudyError> {
         Drive {
             name: "broad",
             held_out: false,
-            inputs: vec![
-                "multisine:rms=60,from=1,to=80,period=2,periods=1,seed=1",
-                "multisine:rms=60,from=1,to=80,period=2,periods=1,seed=2",
-            ],
+            inputs: ["multisine:rms=60,from=1,to=80,period=2,periods=1,seed=1", "multisine:rms=60,from=1,to=80,period=2,periods=1,seed=2"]
+                .map(String::from)
+                .to_vec(),
         },
-        Drive { name: "sweep", held_out: false, inputs: vec!["sweep:amplitude=100,from=1,to=60,duration=3", ""] },
+        Drive { name: "sweep", held_out: false, inputs: ["sweep:amplitude=100,from=1,to=60,duration=3", ""].map(String::from).to_vec() },
         Drive {
             name: "broad-other",
             held_out: true,
-            inputs: vec![
-                "multisine:rms=50,from=1,to=80,period=2,periods=1,seed=3",
-                "multisine:rms=70,from=1,to=80,period=2,periods=1,seed=4",
-            ],
+            inputs: ["multisine:rms=50,from=1,to=80,period=2,periods=1,seed=3", "multisine:rms=70,from=1,to=80,period=2,periods=1,seed=4"]
+                .map(String::from)
+                .to_vec(),
         },
     ];
     let seeds = if context.quick { &SEEDS[..1] } else { &SEEDS[..] };

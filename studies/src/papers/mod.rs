@@ -43,7 +43,7 @@ pub(super) struct Drive {
     /// Whether no fit sees it.
     pub held_out: bool,
     /// For each input of the model an excitation as a command line has it; empty for one that stays at 0.
-    pub inputs: Vec<&'static str>,
+    pub inputs: Vec<String>,
 }
 
 /// A device, what it is taken for, and how it is driven.
