@@ -1,8 +1,8 @@
 //! Paper 001, the steering compensator: from the linear design to friction with parasitic damping, then backlash; and what leaving the
 //! backlash out does to the stiffness.
 
-use super::{Drive, SET, Step, Story, Walk, device, score, walk};
-use crate::run::{Ask, refit, refitted, write};
+use super::{Drive, SET, Step, Story, Walk, device, score, told, walk};
+use crate::run::{Ask, diagnose, parameter, refit, refitted, write};
 use crate::table::Report;
 use crate::{Context, Study, StudyError};
 use backdrive::diagnose::MODEL;
@@ -83,6 +83,7 @@ fn run(context: &Context) -> Result<Report, StudyError> {
     let found = Model::load(&context.out.join(&walked.best).join(MODEL))?;
     bias(&mut report, &first, &found, context.out, "4, 2 and 1 mm")?;
     bias(&mut report, &first, &found, &shorter, "2, 1 and 0.5 mm")?;
+    between(&mut report, &shorter)?;
     score(&mut report, context.out, PAPER, &walked)?;
     Ok(report)
 }
@@ -108,6 +109,23 @@ fn parasitic(report: &mut Report, found: &Path) -> Result<(), StudyError> {
             None,
         );
         report.figure(what, value);
+    }
+    Ok(())
+}
+
+/// The paper's model between, handed over as the first one: its next step is the backlash.
+fn between(report: &mut Report, out: &Path) -> Result<(), StudyError> {
+    let set = out.join(SET);
+    let here = Context { folder: &set, data: &set, out, quick: false };
+    let ask = Ask { name: "from-friction", set: "set.toml", model: "friction.toml", without: &[], effects: 1, patience: 60.0 };
+    let json = diagnose(&here, &ask)?.said.json;
+    told(report, "from-friction", &json);
+    for (what, key, published) in [("gap", "gap", "3.36e-4 m"), ("stiffness", "stiffness", "861000 N/m")] {
+        if let Some((value, [low, high])) = parameter(&json, "backlash", key) {
+            let measured = format!("{value:.4e} (95 %: {low:.4e} to {high:.4e})");
+            report.line(&format!("from-friction, {what}"), measured, published, PAPER, None);
+            report.figure(&format!("from-friction {what}"), value);
+        }
     }
     Ok(())
 }
