@@ -24,7 +24,7 @@ const STIFFNESS: &str = "elements.gearbox.stiffness";
 const STEPS: &[Step] = &[
     Step {
         paper: "dry friction, 18.7 N at rest and 16.4 N in motion",
-        accept: &["coulomb", "stribeck", "asymmetric_coulomb", "dahl", "lugre", "maxwell_slip"],
+        accept: &["coulomb", "stribeck", "asymmetric_coulomb", "dahl", "lugre", "maxwell_slip", "friction_deficit"],
         places: &[["disc", "ground"]],
     },
     Step {
