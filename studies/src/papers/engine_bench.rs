@@ -143,7 +143,11 @@ fn run(context: &Context) -> Result<Report, StudyError> {
         let story = Story { truth, first: &first, rate: 1000.0, drives: &drives, steps: &steps };
         story.record(&out)?;
         report.line(&format!("seed {seed}"), "", "", "", None);
-        let walked = walk(&mut report, &out, &Walk { effects: &[1], again: if context.quick { 0 } else { 1 }, patience: 30.0 })?;
+        let walked = walk(
+            &mut report,
+            &out,
+            &Walk { effects: &[1], again: if context.quick { 0 } else { 1 }, patience: if context.quick { 30.0 } else { 75.0 } },
+        )?;
         hits += score(&mut report, &out, PAPER, &walked)?;
     }
     report.figure("hits", hits as f64);
