@@ -250,7 +250,12 @@ impl Record {
         Record {
             len: range.len(),
             inputs: self.inputs.iter().map(of).collect(),
-            segments: self.segments.iter().map(|s| s.get(range.clone()).map(<[Segment]>::to_vec).unwrap_or_default()).collect(),
+            // One fewer than samples where the input runs on from one to the next.
+            segments: self
+                .segments
+                .iter()
+                .map(|s| s.get(range.start..range.end.min(s.len())).map(<[Segment]>::to_vec).unwrap_or_default())
+                .collect(),
             outputs: self.outputs.iter().map(|o| o.as_ref().map(of)).collect(),
             begins,
             skip,
@@ -364,4 +369,22 @@ fn is_held(model: &Model, body: usize) -> bool {
         }
     }
     false
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_part_to_the_very_end_keeps_its_inputs() {
+        let text = "name = 'cart'\n[bodies]\ncart = 2.0\n[[inputs]]\nname = 'f'\nkind = 'force'\non = 'cart'\n\
+                    [[outputs]]\nname = 'x'\nkind = 'position'\nof = 'cart'\n";
+        let model = Model::from_toml(text, "cart.toml").unwrap();
+        let t: Vec<f64> = (0..100).map(|i| 0.01 * f64::from(i)).collect();
+        let signals = vec![("f".to_string(), t.clone()), ("x".to_string(), t.clone())];
+        let record = Record::new(&Recording::new("r", t, signals).unwrap(), &model, Vec::new()).unwrap();
+        let part = record.part(60..100, Vec::new(), 0);
+        assert_eq!((part.len, part.segments[0].len()), (40, 39));
+        assert_eq!(record.part(20..60, Vec::new(), 0).segments[0].len(), 40);
+    }
 }

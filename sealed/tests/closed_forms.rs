@@ -51,7 +51,7 @@ fn an_undamped_oscillator_keeps_frequency_and_energy_for_1000_periods() {
 
 #[test]
 fn coulomb_friction_takes_4c_over_k_from_the_amplitude_in_each_cycle_and_then_holds() {
-    let (k, c, force) = (200.0, 0.3, 4.0);
+    let (k, c, force) = (200.0, 0.15, 4.0);
     let text = MASS.to_string() + &element("spring", "mass", &format!("kind = \"spring\"\nstiffness = {k}"));
     let network = device(&(text + &element("friction", "mass", &format!("kind = \"coulomb\"\nforce = {c}"))));
     let mut plant = nominal(&network, 1e-4);
@@ -76,7 +76,7 @@ fn bristles(static_ratio: f64) -> BristleField {
 fn a_bristle_field_follows_its_virgin_curve_and_slides_at_its_force() {
     let network = device(RAM);
     let truth = hiding(&network, vec![grounded("ram", Law::BristleField(bristles(1.0)))]);
-    let mut plant = SealedPlant::new(&network, &truth, 1e-3).unwrap();
+    let mut plant = SealedPlant::with_substeps(&network, &truth, 1e-3, 200).unwrap();
     let field = bristles(1.0).bristles();
     near(field.stiffness.iter().sum(), 4000.0, 1e-12);
     near(field.force.iter().sum(), 2.0, 1e-12);
@@ -91,12 +91,14 @@ fn a_bristle_field_follows_its_virgin_curve_and_slides_at_its_force() {
     }
     assert!(curved > 50, "the spread bends the curve over a wide stretch: {curved}");
     near(plant.exact_outputs()[0], 2.0, 1e-12);
-    // Back from sliding, the same curve twice as large and from there (Masing).
+    // Back from sliding, the same curve twice as large and from there (Masing). The corner of the path is cut by half a substep.
     let turn = x;
+    let cut = 4000.0 * 1e-5 / plant.substeps() as f64;
     for _ in 0..200 {
         x -= 1e-5;
         plant.step(&[x]).unwrap();
-        near(plant.exact_outputs()[0], 2.0 - 2.0 * virgin(0.5 * (turn - x)), 1e-9);
+        let (found, expected) = (plant.exact_outputs()[0], 2.0 - 2.0 * virgin(0.5 * (turn - x)));
+        assert!((found - expected).abs() <= cut, "found {found}, expected {expected} within {cut} N");
     }
 }
 
@@ -189,7 +191,8 @@ of = "block"
     let mut plant = SealedPlant::new(&network, &truth, 1e-3).unwrap();
     // 1000 N/m x (1 - 0.6) = 0.4 N at 1 mm.
     let rows = run(&mut plant, 1500, 1e-3, |t| vec![1e-3 * (t + 1e-3)]);
-    assert_eq!(rows[995][0], 0.0);
+    // Held to rounding: the rope pulls with 1 N.
+    assert!(rows[995][0].abs() < 1e-18, "{}", rows[995][0]);
     assert!(rows[1010][0] > 0.0);
 }
 

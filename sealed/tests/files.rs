@@ -65,7 +65,7 @@ fn errors_name_file_line_and_key() {
         ("stiffness = 39500.0", "stiffness = \"a\"", "expected a finite number"),
         ("stiffness = 39500.0", "stiffness = 1.0\nstif = 2", "stif: unknown key"),
         ("kind = \"spring\"", "kind = \"sprng\"", "does not know \"sprng\""),
-        ("kind = \"spring\"", "kind = \"dahl\"", "does not know \"dahl\""),
+        ("kind = \"spring\"", "kind = \"bouc_wen\"", "does not know \"bouc_wen\""),
         ("[\"motor\", \"drum\"]", "[\"motor\", \"dram\"]", "there is no body \"dram\""),
         ("[\"motor\", \"drum\"]", "[\"motor\", \"motor\"]", "two different places"),
         ("[\"motor\", \"drum\"]", "[\"motor\"]", "expected two names"),

@@ -61,7 +61,8 @@ fn nobody_gains_energy_by_moving_a_law_about() {
             (least, most) = (least.min(given), most.max(given));
         }
         assert!(least >= -2e-3 * most && most > 0.0, "{}: {least} of {most} J", law.kind());
-        assert!(!law.takes_energy() || given > 0.5 * most, "{} took only {given} of {most} J", law.kind());
+        let gives_back = matches!(law, Law::Spring(_) | Law::CubicSpring(_) | Law::Backlash(_) | Law::RoundedGap(_));
+        assert!(gives_back || given > 0.5 * most, "{} took only {given} of {most} J", law.kind());
     }
 }
 
@@ -73,7 +74,7 @@ fn a_device_with_friction_under_load_comes_to_rest() {
     let mut plant = SealedPlant::new(&network, &hiding(&network, vec![grounded("mass", Law::LoadFriction(law))]), 1e-4).unwrap();
     run(&mut plant, 200, 1e-4, |_| vec![20.0]);
     let energy = |row: &[f64]| 0.5 * 0.5 * row[1] * row[1] + 0.5 * 800.0 * row[0] * row[0];
-    let rows = run(&mut plant, 20_000, 1e-4, |_| vec![0.0]);
+    let rows = run(&mut plant, 60_000, 1e-4, |_| vec![0.0]);
     for pair in rows.windows(2) {
         // The leapfrog's own ripple of energy is (w h)^2/8 of it.
         assert!(energy(&pair[1]) <= energy(&pair[0]) * (1.0 + 1e-6), "{pair:?}");

@@ -68,7 +68,7 @@ mod tests {
 
     #[test]
     fn absent_recordings_are_told_with_what_to_do() {
-        for study in crate::STUDIES {
+        for study in crate::STUDIES.iter().filter(|s| !s.needs.1.is_empty()) {
             let error = Data::of(None, Some(Path::new("/nowhere"))).folder(study).unwrap_err();
             assert!(matches!(&error, StudyError::NoData(text) if text.contains(study.name) && text.contains("--data")), "{error}");
         }

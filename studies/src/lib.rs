@@ -13,6 +13,7 @@ mod brfd_friction_damper;
 mod emps;
 mod kuka_kr300;
 mod odrive_cogging;
+mod papers;
 mod piezo_p885;
 mod silverbox;
 
@@ -26,7 +27,7 @@ pub struct Study {
     pub name: &'static str,
     /// What it shows, in one line.
     pub about: &'static str,
-    /// Folder of its recordings in the data folder, and the files it needs from there.
+    /// Folder of its recordings in the data folder, and the files it needs from there; none where it makes its recordings itself.
     pub needs: (&'static str, &'static [&'static str]),
     /// Runs it: where its recordings are, where its results go.
     run: fn(&Context) -> Result<Report, StudyError>,
@@ -45,8 +46,18 @@ pub struct Context<'a> {
 }
 
 /// Every study; a new one has its line here.
-pub const STUDIES: &[&Study] =
-    &[&brfd_friction_damper::STUDY, &emps::STUDY, &kuka_kr300::STUDY, &odrive_cogging::STUDY, &piezo_p885::STUDY, &silverbox::STUDY];
+pub const STUDIES: &[&Study] = &[
+    &brfd_friction_damper::STUDY,
+    &emps::STUDY,
+    &kuka_kr300::STUDY,
+    &odrive_cogging::STUDY,
+    &piezo_p885::STUDY,
+    &silverbox::STUDY,
+    &papers::ball_screw::STUDY,
+    &papers::steering_compensator::STUDY,
+    &papers::impulse_engine::STUDY,
+    &papers::engine_bench::STUDY,
+];
 
 /// Why a study has no result.
 #[derive(Debug, thiserror::Error)]

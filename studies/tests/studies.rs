@@ -33,7 +33,7 @@ fn a_study_without_its_recordings_says_so() {
         println!("skipped: {} names a folder", backdrive_studies::data::VARIABLE);
         return;
     }
-    for study in backdrive_studies::STUDIES {
+    for study in backdrive_studies::STUDIES.iter().filter(|s| !s.needs.1.is_empty()) {
         let result = study.run(&Data::find(Some(nowhere.path())), out.path(), true);
         assert!(matches!(result, Err(StudyError::NoData(_))), "{}", study.name);
     }

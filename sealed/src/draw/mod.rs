@@ -1,6 +1,6 @@
 //! A truth drawn from a seed.
 //!
-//! Sizes come from what the nominal device does under its working force ([`ranges`]), never from what some program would find.
+//! Sizes come from what the nominal device does under its working force (`ranges`), never from what some program would find.
 
 mod candidates;
 mod mask;

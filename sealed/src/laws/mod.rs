@@ -134,11 +134,8 @@ pub enum Law {
 impl Law {
     /// Whether it takes energy out of what moves.
     pub fn takes_energy(&self) -> bool {
-        match self {
-            Law::Spring(_) | Law::Inerter(_) | Law::Bias(_) | Law::CubicSpring(_) | Law::Cogging(_) => false,
-            Law::Backlash(_) | Law::RoundedGap(_) => false,
-            _ => true,
-        }
+        let conserves = matches!(self, Law::Spring(_) | Law::Inerter(_) | Law::Bias(_) | Law::CubicSpring(_) | Law::Cogging(_));
+        !conserves && !matches!(self, Law::Backlash(_) | Law::RoundedGap(_))
     }
 
     /// Whether it is dry friction, or friction that bends before it slides.

@@ -48,7 +48,7 @@ impl Kick {
         let bodies = mass.len().isqrt();
         let mut moved = vec![true; bodies];
         free.iter().for_each(|body| moved[*body] = false);
-        Kick {
+        let mut kick = Kick {
             mass,
             bodies,
             moved,
@@ -67,7 +67,10 @@ impl Kick {
             free_speeds: vec![0.0; dry],
             free,
             mass_inverse,
-        }
+        };
+        // A device without joints has no damping that could change.
+        kick.factor(joints);
+        kick
     }
 
     /// m/s, of a moved body at the end of this substep.

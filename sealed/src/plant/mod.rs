@@ -3,7 +3,7 @@
 //! The integrator is a splitting: drift (positions move with their speeds for half a substep), kick (speeds change at those
 //! positions), drift. For conservative forces that is the leapfrog, second order and symplectic, so the energy of a mode
 //! stays for any number of periods. Within the kick, damping is taken by the midpoint rule, which is stable at any size, and dry friction as
-//! what it is: a force within a box that brings the surfaces to rest if it can ([`kick`]). So stick is exact, no speed
+//! what it is: a force within a box that brings the surfaces to rest if it can (`kick`). So stick is exact, no speed
 //! regularises anything, and no event is searched for; a reversal is late by at most a substep. Laws with a memory follow the
 //! positions of the kicks, exactly along each piece of their path.
 

@@ -1,0 +1,52 @@
+//! The papers' stories: the first step of each in its short form, the whole path where BACKDRIVE_LONG is 1.
+
+use backdrive_studies::data::Data;
+use backdrive_studies::study_named;
+use backdrive_studies::table::Report;
+
+fn long() -> bool {
+    std::env::var_os("BACKDRIVE_LONG").is_some_and(|v| v == "1")
+}
+
+fn report(name: &str) -> Report {
+    let out = tempfile::tempdir().unwrap();
+    let report = study_named(name).unwrap().run(&Data::find(None), out.path(), !long()).unwrap();
+    println!("{}", report.text());
+    // What is true lies outside of what the diagnosis is given.
+    let sets = walk(out.path());
+    assert!(sets.iter().any(|path| path.ends_with("truth.json")));
+    assert!(!sets.iter().any(|path| path.contains("/set/") && path.contains("truth")));
+    report
+}
+
+/// Every file below a folder.
+fn walk(folder: &std::path::Path) -> Vec<String> {
+    std::fs::read_dir(folder)
+        .unwrap()
+        .flat_map(|entry| {
+            let path = entry.unwrap().path();
+            if path.is_dir() { walk(&path) } else { vec![path.display().to_string()] }
+        })
+        .collect()
+}
+
+fn falls(report: &Report, to: f64) {
+    let [before, after] = ["before", "after"].map(|which| report.figure_named(&format!("effects-1 {which}")));
+    assert!(after < to * before, "{before} -> {after}");
+}
+
+#[test]
+fn the_ball_screw_remembers_every_reversal() {
+    let report = report("paper_000");
+    // Four sliders do not reach the noise of a device that has seven: it may be claimed or be the nearest.
+    let said = report.word_named("effects-1");
+    assert!(said.contains("maxwell_slip at screw-ground"), "{said}");
+    falls(&report, 0.3);
+}
+
+#[test]
+fn the_bench_shows_what_a_seed_hides() {
+    let report = report("paper_003");
+    let [hits, seeds] = ["hits", "seeds"].map(|name| report.figure_named(name));
+    assert!(hits >= 0.75 * seeds, "{hits} of {seeds}");
+}
