@@ -59,7 +59,7 @@ const SOURCE: &str = "read off the same records";
 fn run(context: &Context) -> Result<Report, StudyError> {
     let mut dead = Vec::new();
     for (theirs, ours) in FILES {
-        let columns = csv_columns::read(&context.data.join(theirs), &["disp_in", "force_kip"])?;
+        let columns = csv_columns::read_at_least(&context.data.join(theirs), &["disp_in", "force_kip"], 4096)?;
         let mean = |c: &[f64], scale: f64| -> Vec<f64> {
             c.chunks_exact(TOGETHER).map(|b| scale * b.iter().sum::<f64>() / TOGETHER as f64).collect()
         };
@@ -70,7 +70,7 @@ fn run(context: &Context) -> Result<Report, StudyError> {
             dead.extend(dead_zones(&x, &f));
         }
     }
-    let patience = if context.quick { 60.0 } else { 150.0 };
+    let patience = if context.quick { 25.0 } else { 150.0 };
     let ask = Ask { name: "", set: "set.toml", model: "model.toml", without: &[], effects: 3, patience };
     let found = diagnose(context, &ask)?;
     let json = &found.said.json;
