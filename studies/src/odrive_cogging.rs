@@ -1,6 +1,5 @@
 //! A motor turned slowly: cogging, one harmonic of the turn after the other.
 
-use crate::filter::LowPass;
 use crate::run::{Ask, diagnose, findings, parameter, said};
 use crate::table::Report;
 use crate::{Context, Study, StudyError, csv_columns};
@@ -17,13 +16,6 @@ pub(crate) const STUDY: Study = Study {
 const COUNTS: f64 = 8192.0;
 /// Torque constant, N m/A: 0.4 A for 15 rad/s2 at 0.00025 kg m2, of the author's notes.
 const TORQUE: f64 = 15.0 * 2.5e-4 / 0.4;
-/// Rate of the grid onto which the host's irregular samples are put, Hz; corner of the zero-phase filter on both columns, Hz: an angle is
-/// differentiated twice on its way to a torque, and the 84th harmonic of a turn passes at 8 Hz; every so manieth sample is kept.
-const RATE: f64 = 400.0;
-/// See [`RATE`].
-const CORNER: f64 = 15.0;
-/// See [`RATE`].
-const KEPT: usize = 4;
 /// What the rotor does before this time brings it to its start, s.
 const START: f64 = 1.0;
 /// Which run of which file becomes which recording: all without compensation, and with the other motor as it was for the map.
@@ -52,13 +44,7 @@ fn run(context: &Context) -> Result<Report, StudyError> {
         let columns = csv_columns::read_at_least(&context.data.join(theirs), &["run", "time_s", "pos_counts", "iq_A"], 1000)?;
         let rows: Vec<usize> = (0..columns[0].len()).filter(|i| columns[0][*i] == run && columns[1][*i] >= START).collect();
         let of = |c: usize, scale: f64| -> Vec<f64> { rows.iter().map(|i| scale * columns[c][*i]).collect() };
-        let t = of(1, 1.0);
-        let smooth = |y: Vec<f64>| -> Vec<f64> {
-            LowPass::butterworth(4, CORNER, RATE).both_ways(&regular(&t, &y, RATE)).into_iter().step_by(KEPT).collect()
-        };
-        let (angle, torque) = (smooth(of(2, TAU / COUNTS)), smooth(of(3, TORQUE)));
-        let t: Vec<f64> = (0..angle.len()).map(|i| (i * KEPT) as f64 / RATE).collect();
-        csv_columns::write(&context.out.join(ours), &["t", "angle", "torque"], &[&t, &angle, &torque])?;
+        csv_columns::write(&context.out.join(ours), &["t", "angle", "torque"], &[&of(1, 1.0), &of(2, TAU / COUNTS), &of(3, TORQUE)])?;
     }
     let maps =
         csv_columns::read_at_least(&context.data.join("cogging_maps.csv"), &["iq_A_a_4_interp", "iq_A_iso_16_interp"], COUNTS as usize)?;
@@ -126,23 +112,6 @@ fn run(context: &Context) -> Result<Report, StudyError> {
     Ok(report)
 }
 
-/// Samples at increasing times, put onto a regular grid by straight lines.
-fn regular(t: &[f64], y: &[f64], rate: f64) -> Vec<f64> {
-    let (Some(first), Some(last)) = (t.first(), t.last()) else { return Vec::new() };
-    let count = ((last - first) * rate).max(0.0) as usize;
-    let mut after = 1;
-    let at = |i: usize| {
-        let time = first + i as f64 / rate;
-        while after + 1 < t.len() && t[after] < time {
-            after += 1;
-        }
-        let Some((t1, y1)) = t.get(after).zip(y.get(after)) else { return y.first().copied().unwrap_or(0.0) };
-        let (t0, y0) = (t[after - 1], y[after - 1]);
-        if *t1 > t0 { y0 + (y1 - y0) * (time - t0) / (t1 - t0) } else { *y1 }
-    };
-    (0..=count).map(at).collect()
-}
-
 /// Amplitude of each harmonic of a turn, from a map of equal steps over one turn.
 fn harmonics(map: &[f64]) -> Vec<f64> {
     let n = map.len().max(1) as f64;
@@ -161,16 +130,6 @@ fn harmonics(map: &[f64]) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn a_straight_line_stays_one_on_the_grid() {
-        let t = [0.0, 0.0023, 0.0061, 0.0062, 0.02];
-        let y = t.map(|t| 3.0 - 2.0 * t);
-        let grid = regular(&t, &y, 1000.0);
-        assert_eq!(grid.len(), 21);
-        assert!(grid.iter().enumerate().all(|(i, g)| (g - (3.0 - 2e-3 * i as f64)).abs() < 1e-12), "{grid:?}");
-        assert!(regular(&[], &[], 100.0).is_empty());
-    }
 
     #[test]
     fn harmonics_of_a_drawn_map_are_those_drawn() {
