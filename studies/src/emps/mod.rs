@@ -37,7 +37,7 @@ fn run(context: &Context) -> Result<Report, StudyError> {
     if context.quick {
         return Ok(report);
     }
-    let symmetric = Ask { name: "symmetric", set: "set.toml", model: "symmetric.toml", without: &[], effects: 5, patience: 150.0 };
+    let symmetric = Ask { name: "symmetric", set: "set.toml", model: "symmetric.toml", without: &[], effects: 4, patience: 150.0 };
     told(&mut report, context, &symmetric, &train, &pulses)?;
     let linear = Ask { name: "linear", model: "linear.toml", ..symmetric.clone() };
     told(&mut report, context, &linear, &train, &pulses)?;
