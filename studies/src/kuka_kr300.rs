@@ -38,7 +38,7 @@ fn run(context: &Context) -> Result<Report, StudyError> {
         }
         let skew = skews.iter().sum::<f64>() / skews.len() as f64;
         let (name, set, model) = (format!("axis-{axis}"), format!("set-{axis}.toml"), format!("axis-{axis}.toml"));
-        let patience = if context.quick { 60.0 } else { 90.0 };
+        let patience = if context.quick { 20.0 } else { 90.0 };
         let found = diagnose(context, &Ask { name: &name, set: &set, model: &model, without: &[], effects: 3, patience })?;
         let json = &found.said.json;
         let named = findings(json);
@@ -106,7 +106,7 @@ fn unseen(found: &Found, structure: &Structure, values: &[f64]) -> Result<Vec<(S
 fn prepare(context: &Context, axis: usize, run: &str) -> Result<f64, StudyError> {
     let names = [format!("posmot_deg_{axis}"), format!("posse_deg_{axis}"), format!("torque_abs_Nm_{axis}")];
     let names: Vec<&str> = names.iter().map(String::as_str).collect();
-    let mut columns = csv_columns::read(&context.data.join(format!("traj_{run}.csv")), &names)?;
+    let mut columns = csv_columns::read_at_least(&context.data.join(format!("traj_{run}.csv")), &names, 2000)?;
     let ratio = RATIOS.get(axis - 1).copied().unwrap_or(1.0);
     let filter = LowPass::butterworth(4, CORNER, RATE);
     for (i, column) in columns.iter_mut().enumerate() {

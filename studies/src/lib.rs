@@ -17,6 +17,7 @@ mod papers;
 mod piezo_p885;
 mod silverbox;
 
+use backdrive::failure::{Failure, code};
 use data::Data;
 use std::path::Path;
 use table::Report;
@@ -41,8 +42,10 @@ pub struct Context<'a> {
     pub data: &'a Path,
     /// The folder for its results, which is there.
     pub out: &'a Path,
-    /// Whether only what takes less than a minute is wanted.
+    /// Whether only the short part is wanted, less than half a minute on a machine that is free.
     pub quick: bool,
+    /// How many times longer than usual each search may last.
+    pub longer: f64,
 }
 
 /// Every study; a new one has its line here.
@@ -68,20 +71,38 @@ pub enum StudyError {
     /// There is no study of this name.
     #[error("there is no study \"{0}\"; there are {names}", names = names())]
     Unknown(String),
-    /// A file cannot be read or written.
+    /// A file cannot be read, or does not hold what is needed.
     #[error("{0}")]
     File(String),
+    /// A file or folder of results cannot be written.
+    #[error("{0}")]
+    Write(String),
     /// A file of the format of models, sets or recordings is wrong.
     #[error(transparent)]
     Format(#[from] backdrive_plant::tomlfile::FileError),
     /// The diagnosis failed.
     #[error("{0}")]
     Diagnosis(String),
+    /// What `backdrive diagnose` would fail with.
+    #[error("{}", .0.message)]
+    Failure(Failure),
 }
 
-impl From<backdrive::failure::Failure> for StudyError {
-    fn from(failure: backdrive::failure::Failure) -> StudyError {
-        StudyError::Diagnosis(failure.message)
+impl StudyError {
+    /// The exit code of `study`, as `backdrive` has them ([`code`]).
+    pub fn code(&self) -> u8 {
+        match self {
+            StudyError::NoData(_) | StudyError::Diagnosis(_) => code::CANNOT_TELL,
+            StudyError::Unknown(_) | StudyError::File(_) | StudyError::Format(_) => code::BAD_INPUT,
+            StudyError::Write(_) => code::MACHINE,
+            StudyError::Failure(failure) => failure.code,
+        }
+    }
+}
+
+impl From<Failure> for StudyError {
+    fn from(failure: Failure) -> StudyError {
+        StudyError::Failure(failure)
     }
 }
 
@@ -99,16 +120,17 @@ pub fn study_named(name: &str) -> Result<&'static Study, StudyError> {
 }
 
 impl Study {
-    /// Runs the study, or of a long one its short part; its results go into a folder of its name in `out`, beside a `table.md`.
+    /// Runs the study, or of a long one its short part; its results go into a folder of its name in `out`, beside a `table.md`. Each search may
+    /// last `longer` times as long as usual, above 0.
     ///
     /// # Errors
     /// [`StudyError::NoData`] where the recordings are not here; else when a file or the diagnosis fails.
-    pub fn run(&self, data: &Data, out: &Path, quick: bool) -> Result<Report, StudyError> {
+    pub fn run(&self, data: &Data, out: &Path, quick: bool, longer: f64) -> Result<Report, StudyError> {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join(self.name);
         let recordings = data.folder(self)?;
         let out = out.join(self.name);
-        std::fs::create_dir_all(&out).map_err(|e| StudyError::File(format!("{}: cannot be made: {e}", out.display())))?;
-        let report = (self.run)(&Context { folder: &folder, data: &recordings, out: &out, quick })?;
+        std::fs::create_dir_all(&out).map_err(|e| StudyError::Write(format!("{}: cannot be made: {e}", out.display())))?;
+        let report = (self.run)(&Context { folder: &folder, data: &recordings, out: &out, quick, longer })?;
         run::write(&out.join("table.md"), &report.markdown())?;
         Ok(report)
     }

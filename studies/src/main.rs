@@ -1,17 +1,18 @@
 //! `study`: runs a study and prints its table.
 
+use backdrive::failure::code;
 use backdrive_studies::data::Data;
-use backdrive_studies::{STUDIES, StudyError, study_named};
+use backdrive_studies::{STUDIES, Study, StudyError, study_named};
 use clap::Parser;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
 /// Diagnose recordings of a real device and hold the result against what was published.
 #[derive(Parser)]
-#[command(name = "study", version)]
+#[command(name = "study", version, after_help = CODES)]
 struct Options {
     /// Which study; several run one after the other.
-    #[arg(required_unless_present_any = ["list", "all"])]
+    #[arg(required_unless_present_any = ["list", "all"], conflicts_with_all = ["list", "all"])]
     names: Vec<String>,
     /// Every study.
     #[arg(long)]
@@ -19,9 +20,12 @@ struct Options {
     /// Say which studies there are.
     #[arg(long)]
     list: bool,
-    /// Only what takes less than a minute.
+    /// Only the short part of each: less than half a minute on a machine that is free.
     #[arg(long)]
     quick: bool,
+    /// How many times longer than usual each search may last: for a machine that is busy or slow.
+    #[arg(long, value_name = "FACTOR", default_value_t = 1.0, value_parser = factor)]
+    longer: f64,
     /// Folder with a folder of recordings per device; BACKDRIVE_DATA comes before it, and without both it is ../shared/data beside the project.
     #[arg(long, value_name = "DIR")]
     data: Option<PathBuf>,
@@ -30,30 +34,59 @@ struct Options {
     out: PathBuf,
 }
 
+fn factor(text: &str) -> Result<f64, String> {
+    text.parse().ok().filter(|x| (0.1..=100.0).contains(x)).ok_or_else(|| "a number from 0.1 to 100".to_string())
+}
+
+/// What the exit code says.
+const CODES: &str = "Exit code: 0 every bar of the tables is met, 1 a bar is missed, 2 usage, 3 a file is missing, broken or of another kind, or there is \
+                     no such study, 5 this machine does not let it, 7 none of the recordings are here.";
+
 fn main() -> ExitCode {
     let options = Options::parse();
     if options.list {
         for study in STUDIES {
-            println!("{:<10} {}", study.name, study.about);
+            println!("{:<22} {}", study.name, study.about);
         }
         return ExitCode::SUCCESS;
     }
+    // A name that is wrong is told before the first study takes its minutes.
+    let asked: Result<Vec<&Study>, StudyError> =
+        if options.all { Ok(STUDIES.to_vec()) } else { options.names.iter().map(|name| study_named(name)).collect() };
+    match asked {
+        Ok(studies) => ExitCode::from(run(&studies, &options)),
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::from(error.code())
+        }
+    }
+}
+
+/// Runs one after the other; a study that fails does not keep the next one from its turn.
+fn run(studies: &[&Study], options: &Options) -> u8 {
     let data = Data::find(options.data.as_deref());
-    let all = STUDIES.iter().map(|s| s.name.to_string()).collect();
-    let names: Vec<String> = if options.all { all } else { options.names };
-    let mut failed = false;
-    for name in names {
-        match study_named(&name).and_then(|study| study.run(&data, &options.out, options.quick)) {
+    let (mut failed, mut missed, mut skipped) = (None, false, 0);
+    for study in studies {
+        match study.run(&data, &options.out, options.quick, options.longer) {
             Ok(report) => {
                 println!("{}", report.text());
-                println!("wrote {}", options.out.join(&name).display());
+                println!("wrote {}", options.out.join(study.name).display());
+                missed |= report.missed() > 0;
             }
-            Err(StudyError::NoData(message)) => println!("skipped {message}"),
+            Err(StudyError::NoData(message)) => {
+                println!("skipped {message}");
+                skipped += 1;
+            }
             Err(error) => {
-                eprintln!("error: {error}");
-                failed = true;
+                eprintln!("error: {}: {error}", study.name);
+                failed = failed.or(Some(error.code()));
             }
         }
     }
-    if failed { ExitCode::FAILURE } else { ExitCode::SUCCESS }
+    match failed {
+        Some(code) => code,
+        None if missed => code::NEGATIVE,
+        None if skipped == studies.len() => code::CANNOT_TELL,
+        None => 0,
+    }
 }

@@ -41,12 +41,13 @@ struct Ripple {
 
 fn run(context: &Context) -> Result<Report, StudyError> {
     for (theirs, run, ours) in RUNS {
-        let columns = csv_columns::read(&context.data.join(theirs), &["run", "time_s", "pos_counts", "iq_A"])?;
+        let columns = csv_columns::read_at_least(&context.data.join(theirs), &["run", "time_s", "pos_counts", "iq_A"], 1000)?;
         let rows: Vec<usize> = (0..columns[0].len()).filter(|i| columns[0][*i] == run && columns[1][*i] >= START).collect();
         let of = |c: usize, scale: f64| -> Vec<f64> { rows.iter().map(|i| scale * columns[c][*i]).collect() };
         csv_columns::write(&context.out.join(ours), &["t", "angle", "torque"], &[&of(1, 1.0), &of(2, TAU / COUNTS), &of(3, TORQUE)])?;
     }
-    let maps = csv_columns::read(&context.data.join("cogging_maps.csv"), &["iq_A_a_4_interp", "iq_A_iso_16_interp"])?;
+    let maps =
+        csv_columns::read_at_least(&context.data.join("cogging_maps.csv"), &["iq_A_a_4_interp", "iq_A_iso_16_interp"], COUNTS as usize)?;
 
     let mut report = Report::new("Outrunner motor, from a rotor with friction, one diagnosis after the other");
     let mut ripples: Vec<Ripple> = Vec::new();
@@ -54,7 +55,17 @@ fn run(context: &Context) -> Result<Report, StudyError> {
     let (mut first, mut last) = (f64::NAN, f64::NAN);
     for round in 1..=if context.quick { 1 } else { ROUNDS } {
         let name = format!("round-{round}");
-        let found = diagnose(context, &Ask { name: &name, set: "set.toml", model: &model, without: &[], effects: 2, patience: 30.0 })?;
+        let found = diagnose(
+            context,
+            &Ask {
+                name: &name,
+                set: "set.toml",
+                model: &model,
+                without: &[],
+                effects: 2,
+                patience: if context.quick { 15.0 } else { 30.0 },
+            },
+        )?;
         let json = &found.said.json;
         report.word(&name, &said(json));
         report.line(&format!("round {round}"), said(json), "", "", None);

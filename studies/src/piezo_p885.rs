@@ -22,9 +22,9 @@ const HYSTERESIS: [&str; 5] = ["bouc_wen", "hysteretic_spring", "maxwell_slip", 
 const LAG: [&str; 3] = ["delay", "bandwidth", "damper"];
 
 fn run(context: &Context) -> Result<Report, StudyError> {
-    let train = csv_columns::read(&context.data.join("model.csv"), &["u_V", "y_um"])?;
-    let ramps = csv_columns::read(&context.data.join("test.csv"), &["u_V", "y_um"])?;
-    let patience = if context.quick { 50.0 } else { 150.0 };
+    let train = csv_columns::read_at_least(&context.data.join("model.csv"), &["u_V", "y_um"], 1000)?;
+    let ramps = csv_columns::read_at_least(&context.data.join("test.csv"), &["u_V", "y_um"], 1000)?;
+    let patience = if context.quick { 25.0 } else { 150.0 };
     let ask = Ask { name: "", set: "set.toml", model: "model.toml", without: &[], effects: 3, patience };
     let found = diagnose(context, &ask)?;
     let json = &found.said.json;

@@ -36,7 +36,7 @@ pub struct Ask<'a> {
 /// When a file cannot be read or written, or the diagnosis fails.
 pub fn diagnose(context: &Context, ask: &Ask) -> Result<Found, StudyError> {
     let out = if ask.name.is_empty() { context.out.to_path_buf() } else { context.out.join(ask.name) };
-    std::fs::create_dir_all(&out).map_err(|e| StudyError::File(format!("{}: cannot be made: {e}", out.display())))?;
+    std::fs::create_dir_all(&out).map_err(|e| StudyError::Write(format!("{}: cannot be made: {e}", out.display())))?;
     // What the study made itself, a set of what it simulated or a model that it found, lies with its results.
     let given = |name: &str| {
         let own = context.folder.join(name);
@@ -50,7 +50,7 @@ pub fn diagnose(context: &Context, ask: &Ask) -> Result<Found, StudyError> {
     let settings = Settings {
         without: ask.without.iter().map(|s| s.to_string()).collect(),
         effects: ask.effects,
-        patience: Duration::from_secs_f64(ask.patience),
+        patience: Duration::from_secs_f64(ask.patience * context.longer),
     };
     let Diagnosed { found, .. } = diagnose_into(opened, &settings, &out, true, &AtomicBool::new(false))?;
     Ok(found)
@@ -146,7 +146,7 @@ pub fn read(path: &Path) -> Result<String, StudyError> {
 /// # Errors
 /// When it cannot be written.
 pub fn write(path: &Path, text: &str) -> Result<(), StudyError> {
-    std::fs::write(path, text).map_err(|e| StudyError::File(format!("{}: cannot be written: {e}", path.display())))
+    std::fs::write(path, text).map_err(|e| StudyError::Write(format!("{}: cannot be written: {e}", path.display())))
 }
 
 #[cfg(test)]

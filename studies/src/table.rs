@@ -64,6 +64,11 @@ impl Report {
         self.words.iter().find(|w| w.0 == name).map_or("", |w| &w.1)
     }
 
+    /// How many bars are missed.
+    pub fn missed(&self) -> usize {
+        self.lines.iter().filter(|l| l.within == Some(false)).count()
+    }
+
     /// The table in Markdown.
     pub fn markdown(&self) -> String {
         let mut out = format!("# {}\n\n| | measured | published | source | bar |\n|---|---|---|---|---|\n", self.title);
@@ -121,6 +126,7 @@ mod tests {
         let text = report.text();
         assert!(text.contains("error  7 %       3 %         the paper  missed"), "{text}");
         assert!(report.markdown().contains("| mass | 95.1 kg | 95.1089 kg | the paper | met |"));
+        assert_eq!(report.missed(), 1);
         assert_eq!(report.figure_named("error"), 0.07);
         assert!(report.figure_named("other").is_nan());
     }

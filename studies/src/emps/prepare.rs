@@ -37,7 +37,7 @@ pub(super) struct Record {
 impl Record {
     /// Reads a file of the benchmark.
     pub fn read(path: &Path) -> Result<Record, StudyError> {
-        let mut columns = csv_columns::read(path, &["u_V", "q_m", "qref_m"])?.into_iter();
+        let mut columns = csv_columns::read_at_least(path, &["u_V", "q_m", "qref_m"], 20_000)?.into_iter();
         let mut next = || columns.next().unwrap_or_default();
         let (u, q, asked) = (next(), next(), next());
         // Only the record with the pulses has that column.
@@ -62,18 +62,27 @@ impl Record {
         marks.windows(2).map(|w| (w[0].1, w[1].0)).filter(|(a, b)| *b >= a + SHORTEST).collect()
     }
 
+    /// Writes the record in one piece as `NAME.csv`, its ends left out: what the published numbers were fitted to, reversals and all.
+    pub fn write_whole(&self, out: &Path, name: &str) -> Result<(), StudyError> {
+        self.write_piece(out, &format!("{name}.csv"), ENDS, self.position.len().saturating_sub(ENDS))
+    }
+
     /// Writes each stroke as `NAME-1.csv` and so on; the names.
     pub fn write_strokes(&self, out: &Path, name: &str) -> Result<Vec<String>, StudyError> {
         let mut names = Vec::new();
         for (from, to) in self.strokes() {
             let file = format!("{name}-{}.csv", names.len() + 1);
-            let thin = |column: &[f64]| column[from..to].iter().step_by(THIN).copied().collect::<Vec<f64>>();
-            let (position, force) = (thin(&self.position), thin(&self.force));
-            let t: Vec<f64> = (0..position.len()).map(|i| (i * THIN) as f64 / RATE).collect();
-            csv_columns::write(&out.join(&file), &["t", "position", "force"], &[&t, &position, &force])?;
+            self.write_piece(out, &file, from, to)?;
             names.push(file);
         }
         Ok(names)
+    }
+
+    fn write_piece(&self, out: &Path, file: &str, from: usize, to: usize) -> Result<(), StudyError> {
+        let thin = |column: &[f64]| column[from..to].iter().step_by(THIN).copied().collect::<Vec<f64>>();
+        let (position, force) = (thin(&self.position), thin(&self.force));
+        let t: Vec<f64> = (0..position.len()).map(|i| (i * THIN) as f64 / RATE).collect();
+        csv_columns::write(&out.join(file), &["t", "position", "force"], &[&t, &position, &force])
     }
 }
 
