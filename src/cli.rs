@@ -593,9 +593,35 @@ pub struct Prove {
     /// How long a diagnosis searches, at most.
     #[arg(long, value_name = "SECONDS", value_parser = positive, default_value_t = 24.0)]
     pub patience: f64,
+    /// Whether the bags hold what the hand wants: in a real session nobody measures it.
+    #[arg(long, value_name = "WHICH", value_enum, default_value_t = Operator::Half)]
+    pub operator: Operator,
+    /// Hz, up to which a hand moves that nobody measured.
+    #[arg(long, value_name = "HZ", value_parser = positive, default_value_t = 5.0)]
+    pub hand_bandwidth: f64,
+    /// How firmly the hand grips in further runs at each gain: factors on the grip of the session.
+    #[arg(long, value_name = "FACTORS", value_delimiter = ',', value_parser = positive, default_values_t = [0.8, 0.9, 0.95, 1.05, 1.1, 1.2])]
+    pub grips: Vec<f64>,
+    /// Only the grip of the session.
+    #[arg(long, conflicts_with = "grips")]
+    pub same_grip: bool,
+    /// Where the report goes; without this proof.html in the folder of the cases.
+    #[arg(long, value_name = "FILE")]
+    pub html: Option<PathBuf>,
     /// The program of the hidden plant; without this `backdrive-sealed` beside this program, or on the path.
     #[arg(long, value_name = "FILE")]
     pub plant: Option<PathBuf>,
+}
+
+/// Which cases hide what the hand wants.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub enum Operator {
+    /// None.
+    Shown,
+    /// All.
+    Hidden,
+    /// Every second one.
+    Half,
 }
 
 /// `backdrive sealed-master`

@@ -22,6 +22,7 @@ mod recorder;
 mod recover;
 mod signals;
 mod table;
+mod without;
 mod writer;
 
 pub use cdr::{FieldPath, Schema};
@@ -36,3 +37,4 @@ pub use recorder::{Health, Recorder, RecorderOptions, WhenFull};
 pub use recover::{RecoverReport, recover};
 pub use signals::{Alignment, Signal, Signals, recording, signals};
 pub use table::{ColumnMap, ImportOptions, ImportReport, Quantity, export_csv, import_csv};
+pub use without::without;

@@ -1,13 +1,16 @@
 //! One proof: draw and seal, record, diagnose, raise the gain, and only then look at the truth.
 
 use super::absolute;
-use super::edges::{Canceller, Loop};
+use super::chosen::choose;
+use super::edges::{Canceller, Loop, Moved};
 use super::hidden::{Hidden, Opened, program};
 use super::score::{Finding, Mark, findings, is_nonlinear, mark, name_of};
+use super::session::hand_over;
 use crate::cli;
 use crate::failure::Failure;
 use backdrive_sealed::seal::hash;
 use backdrive_sealed::truth::Truth;
+use serde::Serialize;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -15,29 +18,66 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use toml_edit::{Array, DocumentMut, Item, value};
 
+/// Factor on the time for a search where the hand is not shown: its curve makes every fit longer.
+const LONGER: f64 = 2.5;
+
+/// Cancellers that are compared at other grips than the session's.
+const AT_OTHER_GRIPS: [&str; 5] = ["none", "second order", "linear, refitted", "diagnosed", "chosen"];
+
+/// A stable gain that was measured.
+#[derive(Debug, Clone, Serialize)]
+pub struct Gain {
+    /// Which canceller.
+    pub canceller: &'static str,
+    /// Factor on the true grip of the session.
+    pub grip: f64,
+    /// Highest mu*lambda found stable; 0 where not even the lowest of the search was.
+    pub stable_to: f64,
+    /// What ends the stable range, or that nothing does.
+    pub because: String,
+    /// Whether nothing ended it.
+    pub whole_range: bool,
+}
+
+/// What is drawn and how it is shown.
+pub struct Draw {
+    /// Of what is concealed.
+    pub seed: u64,
+    /// How many effects.
+    pub effects: usize,
+    /// Whether the bags hold what the hand wants.
+    pub shows_hand: bool,
+}
+
 /// What a proof gave.
 pub struct Case {
+    /// Its folder's name.
+    pub name: String,
+    /// Whether the bags hold what the hand wants.
+    pub shows_hand: bool,
     /// SHA-256 of the truth, as printed before anything was recorded.
     pub sealed: String,
     /// The verdict's word and sentence.
     pub word: String,
-    sentence: String,
+    pub sentence: String,
     /// What was found.
     pub findings: Vec<Finding>,
     /// What was concealed.
-    concealed: Vec<String>,
+    pub concealed: Vec<String>,
     /// How right that is, effect by effect.
     pub marks: Vec<Mark>,
     /// Whether something nonlinear was concealed.
     pub nonlinear: bool,
     /// Error on recordings that no fit has seen, as shares of their deviation: as given, refitted, diagnosed.
-    held_out: [Option<f64>; 3],
-    /// Stable mu*lambda by canceller; the second: whether it ends the range that was searched.
-    gains: Vec<(&'static str, f64, bool)>,
+    pub held_out: [Option<f64>; 3],
+    /// Stable mu*lambda by canceller and grip.
+    pub gains: Vec<Gain>,
+    /// Share of the diagnosed estimate that was chosen where the grip is uncertain; 0 for no canceller.
+    pub share: f64,
 }
 
 /// Runs one case; its files stay in `folder`.
-pub fn prove(options: &cli::Prove, folder: &Path, seed: u64, effects: usize, stop: &AtomicBool) -> Result<Case, Failure> {
+pub fn prove(options: &cli::Prove, folder: &Path, drawn: &Draw, stop: &AtomicBool) -> Result<Case, Failure> {
     let sealed = folder.join("sealed");
     if sealed.exists() {
         return Err(Failure::input(format!(
@@ -56,20 +96,25 @@ pub fn prove(options: &cli::Prove, folder: &Path, seed: u64, effects: usize, sto
         truth: PathBuf::from(absolute(&sealed.join("truth.json"))?),
         rate_hz,
     };
-    let digest = draw(options, &hidden, seed, effects)?;
-    println!("{}: sealed, SHA-256 {digest}", folder.display());
+    let digest = draw(options, &hidden, drawn)?;
+    let hand = if drawn.shows_hand { "" } else { "; nobody measures the hand" };
+    println!("{}: sealed, SHA-256 {digest}{hand}", folder.display());
 
     // From here to the verdict only the hidden plant's process opens the truth.
     let graph = folder.join("session.toml");
     write(&graph, &session(template, options, &hidden, &digest)?)?;
-    let session = folder.join("session");
-    ours(folder, "run", &[&"run", &graph, &"--out", &session])?;
+    let (recorded, session) = (folder.join("recorded"), folder.join("session"));
+    ours(folder, "run", &[&"run", &graph, &"--out", &recorded])?;
+    hand_over(&recorded, &session, drawn.shows_hand, options.hand_bandwidth)?;
     let found = folder.join("diagnosis");
-    let patience = options.patience.to_string();
+    let patience = (options.patience * if drawn.shows_hand { 1.0 } else { LONGER }).to_string();
     ours(folder, "diagnose", &[&"diagnose", &session, &"--out", &found, &"--patience", &patience])?;
     let verdict: Value = serde_json::from_str(&read(&found.join("verdict.json"))?).map_err(Failure::input)?;
 
-    let cancellers = cancellers(options, folder, &session, &found)?;
+    let mut cancellers = cancellers(options, folder, &session, &found)?;
+    let (diagnosed, scaled) = (found.join("model.diagnosed.toml"), folder.join("chosen.toml"));
+    let chosen = choose(&diagnosed, &scaled, &options.contact, options.high_pass, stop)?;
+    cancellers.push(Canceller { name: "chosen", model: (chosen.share > 0.0).then_some(scaled), grip: None });
 
     // The verdict is written; now the truth is opened.
     let bytes = std::fs::read(&hidden.truth).map_err(|e| Failure::input(format!("{}: {e}", hidden.truth.display())))?;
@@ -78,24 +123,30 @@ pub fn prove(options: &cli::Prove, folder: &Path, seed: u64, effects: usize, sto
     }
     let truth = Truth::from_json(&bytes).map_err(Failure::input)?;
     let device = Arc::new(Opened::new(&hidden, &truth).map_err(Failure::input)?);
-    let the_loop =
-        Loop { graph: &options.contact, high_pass_hz: options.high_pass, model: &hidden.model, grip: hidden.grip.as_deref(), device };
+    let master = Moved::Hidden(&hidden.model, hidden.grip.as_deref(), device);
+    let the_loop = Loop { graph: &options.contact, high_pass_hz: options.high_pass, master };
+    let further: &[f64] = if options.same_grip { &[] } else { &options.grips };
     let mut gains = Vec::new();
-    for canceller in &cancellers {
-        let edge = the_loop.edge(canceller, 1.0, stop)?;
-        eprintln!("{} {} {}", canceller.name, edge.reason, edge.evaluations);
-        gains.push((canceller.name, edge.at_least, edge.critical_gain.is_none() && edge.limited_from.is_none()));
-        if stop.load(Ordering::SeqCst) {
-            break;
+    for grip in [1.0].iter().chain(further) {
+        for canceller in cancellers.iter().filter(|c| *grip == 1.0 || AT_OTHER_GRIPS.contains(&c.name)) {
+            if stop.load(Ordering::SeqCst) {
+                break;
+            }
+            let edge = the_loop.edge(canceller, *grip, stop)?;
+            let whole_range = edge.critical_gain.is_none() && edge.limited_from.is_none() && edge.at_least > 0.0;
+            gains.push(Gain { canceller: canceller.name, grip: *grip, stable_to: edge.at_least, because: edge.reason, whole_range });
         }
     }
     let (word, findings) = (verdict["verdict"].as_str().unwrap_or_default().to_string(), findings(&verdict));
     let error = |key: &str| verdict["held_out"][key].as_f64();
     Ok(Case {
+        name: folder.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned()),
+        shows_hand: drawn.shows_hand,
+        share: chosen.share,
         sealed: digest,
         sentence: verdict["sentence"].as_str().unwrap_or_default().to_string(),
         concealed: truth.effects.iter().map(name_of).collect(),
-        marks: truth.effects.iter().map(|e| mark(e, &word, &findings, false)).collect(),
+        marks: truth.effects.iter().map(|e| mark(e, &word, &findings, !drawn.shows_hand)).collect(),
         nonlinear: is_nonlinear(&truth),
         held_out: ["nrmse_before", "nrmse_refit", "nrmse_after"].map(error),
         word,
@@ -105,11 +156,26 @@ pub fn prove(options: &cli::Prove, folder: &Path, seed: u64, effects: usize, sto
 }
 
 impl Case {
-    /// The stable gain with the diagnosed canceller over the better of the two linear ones.
-    pub fn ratio(&self) -> Option<f64> {
-        let gain = |name: &str| self.gains.iter().find(|g| g.0 == name).map(|g| g.1);
-        let linear = gain("second order")?.max(gain("linear, refitted")?);
-        Some(gain("diagnosed")? / linear).filter(|r| r.is_finite())
+    /// The stable gain with a canceller and a grip.
+    pub fn gain(&self, canceller: &str, grip: f64) -> Option<f64> {
+        self.gains.iter().find(|g| g.canceller == canceller && g.grip == grip).map(|g| g.stable_to)
+    }
+
+    /// The stable gain with a canceller over that with the better of the two linear ones.
+    pub fn ratio(&self, canceller: &str, grip: f64) -> Option<f64> {
+        let linear = self.gain("second order", grip)?.max(self.gain("linear, refitted", grip)?);
+        Some(self.gain(canceller, grip)? / linear).filter(|r| r.is_finite())
+    }
+
+    /// The grips at which gains were measured, the session's first.
+    pub fn grips(&self) -> Vec<f64> {
+        let mut grips = Vec::new();
+        for gain in &self.gains {
+            if !grips.contains(&gain.grip) {
+                grips.push(gain.grip);
+            }
+        }
+        grips
     }
 
     /// Whether everything concealed was found by its family and place, and nothing where nothing was.
@@ -122,8 +188,9 @@ impl Case {
         let list = |names: &[String]| if names.is_empty() { "nothing".to_string() } else { names.join(", ") };
         let found: Vec<String> = self.findings.iter().map(|f| format!("{} {}", f.physics, f.place.join("-"))).collect();
         let percent = |x: Option<f64>| x.map_or("-".to_string(), |x| format!("{:.2} %", 100.0 * x));
+        let here = self.gains.iter().filter(|g| g.grip == 1.0);
         let gains: Vec<String> =
-            self.gains.iter().map(|(name, gain, open)| format!("{name} {}{gain:.2}", if *open { "above " } else { "" })).collect();
+            here.map(|g| format!("{} {}{:.2}", g.canceller, if g.whole_range { "above " } else { "" }, g.stable_to)).collect();
         let [given, refitted, diagnosed] = self.held_out.map(percent);
         format!(
             "  concealed   {}\n  found       {} ({})\n  held out    {given} as given, {refitted} refitted, {diagnosed} diagnosed\n  stable to   {}",
@@ -136,23 +203,22 @@ impl Case {
 
     /// For programs.
     pub fn json(&self) -> Value {
-        let gains: serde_json::Map<String, Value> =
-            self.gains.iter().map(|(name, gain, open)| (name.to_string(), json!({ "stable_to": gain, "whole_range": open }))).collect();
         json!({
-            "sealed": self.sealed, "verdict": self.word, "sentence": self.sentence, "findings": self.findings, "concealed": self.concealed,
-            "marks": self.marks, "nonlinear": self.nonlinear, "held_out": self.held_out, "stable_gain": gains, "ratio": self.ratio(),
+            "case": self.name, "sealed": self.sealed, "shows_hand": self.shows_hand, "verdict": self.word, "sentence": self.sentence,
+            "findings": self.findings, "concealed": self.concealed, "marks": self.marks, "nonlinear": self.nonlinear,
+            "held_out": self.held_out, "stable_gain": self.gains, "share": self.share, "ratio": self.ratio("diagnosed", 1.0),
         })
     }
 }
 
 /// Draws and seals; the digest.
-fn draw(options: &cli::Prove, hidden: &Hidden, seed: u64, effects: usize) -> Result<String, Failure> {
+fn draw(options: &cli::Prove, hidden: &Hidden, drawn: &Draw) -> Result<String, Failure> {
     let mut command = Command::new(&hidden.program);
     command.arg("draw").arg("--model").arg(&hidden.model);
     if let Some(grip) = &hidden.grip {
         command.arg("--grip").arg(grip);
     }
-    command.args(["--seed", &seed.to_string(), "--effects", &effects.to_string(), "--rate", &hidden.rate_hz.to_string()]);
+    command.args(["--seed", &drawn.seed.to_string(), "--effects", &drawn.effects.to_string(), "--rate", &hidden.rate_hz.to_string()]);
     if options.nonlinear {
         command.arg("--nonlinear");
     }
@@ -229,6 +295,8 @@ fn still(options: &cli::Prove, session: &Path) -> Result<PathBuf, Failure> {
     let path = session.join("set.toml");
     let mut set: DocumentMut = read(&path)?.parse().map_err(|e| bad(&path, e))?;
     set["fit"] = value(files);
+    // No hand moves it, so there is none to be unknown.
+    set.remove("unknown");
     let still = session.join("still.toml");
     write(&still, &set.to_string())?;
     Ok(still)

@@ -1,10 +1,11 @@
-//! The stable gain of a loop whose master is the hidden plant, with one canceller after another. The verdict is written by then.
+//! The stable gain of a loop with one canceller after another: its master is the diagnosed model, or, once the verdict is written, the hidden plant.
 
 use super::hidden::Opened;
 use crate::failure::Failure;
-use backdrive_nodes::graph::{Graph, NodeKind, Overrides};
+use backdrive_nodes::graph::{Graph, NodeKind, Overrides, Settings};
+use backdrive_plant::model::InputKind;
 use backdrive_stability::resimulate::edge::{Edge, Search, edge};
-use backdrive_stability::resimulate::{OwnCores, RunOptions, Scenario};
+use backdrive_stability::resimulate::{OwnCores, RunOptions, Scenario, grips};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
@@ -23,27 +24,35 @@ pub struct Canceller {
     pub grip: Option<PathBuf>,
 }
 
+/// What the loop moves.
+pub enum Moved<'a> {
+    /// A model that holds the hand.
+    Model(&'a Path),
+    /// The hidden plant, with the nominal model that has its axes and limits, and the nominal grip.
+    Hidden(&'a Path, Option<&'a Path>, Arc<Opened>),
+}
+
 /// The loop in which the gain is raised.
 pub struct Loop<'a> {
     /// The graph file with the contact script.
     pub graph: &'a Path,
     /// Corner of the canceller's high-pass, Hz.
     pub high_pass_hz: f64,
-    /// The nominal master: its axes and limits are known.
-    pub model: &'a Path,
-    /// The nominal grip.
-    pub grip: Option<&'a Path>,
     /// The master.
-    pub device: Arc<Opened>,
+    pub master: Moved<'a>,
 }
 
 impl Loop<'_> {
     /// The edge with a canceller, the hand gripping `firmness` times as firmly as when it was recorded.
     pub fn edge(&self, canceller: &Canceller, firmness: f64, cancel: &AtomicBool) -> Result<Edge, Failure> {
         let none = || PathBuf::from("none");
+        let (model, grip) = match &self.master {
+            Moved::Model(model) => (*model, None),
+            Moved::Hidden(model, grip, _) => (*model, *grip),
+        };
         let changes = Overrides {
-            master: Some(self.model.to_path_buf()),
-            grip: Some(self.grip.map_or_else(none, Path::to_path_buf)),
+            master: Some(model.to_path_buf()),
+            grip: Some(grip.map_or_else(none, Path::to_path_buf)),
             canceller: Some(canceller.model.clone().unwrap_or_else(none)),
             canceller_grip: Some(canceller.grip.clone().unwrap_or_else(none)),
             high_pass_hz: Some(self.high_pass_hz),
@@ -51,14 +60,36 @@ impl Loop<'_> {
             ..Overrides::default()
         };
         let mut graph = Graph::load(self.graph, &changes)?;
-        self.device.tell_sensors(&mut graph);
-        let scenario = Scenario::new(graph, None, None).map_err(Failure::input)?;
-        let device = self.device.clone();
-        let runs = AtomicU32::new(1000);
-        let own: OwnCores = Arc::new(move |graph, node, firmness| {
-            (node.kind == NodeKind::Master).then(|| device.core(graph, node, runs.fetch_add(1, Ordering::Relaxed), firmness))
-        });
+        let device = match &self.master {
+            Moved::Model(_) => {
+                firmer(&mut graph, firmness);
+                None
+            }
+            Moved::Hidden(.., device) => {
+                device.tell_sensors(&mut graph);
+                Some(device.clone())
+            }
+        };
+        let mut scenario = Scenario::new(graph, None, None).map_err(Failure::input)?;
+        if let Some(device) = device {
+            let runs = AtomicU32::new(1000);
+            let own: OwnCores = Arc::new(move |graph, node, firmness| {
+                (node.kind == NodeKind::Master).then(|| device.core(graph, node, runs.fetch_add(1, Ordering::Relaxed), firmness))
+            });
+            scenario = scenario.with_own_cores(own);
+        }
         let options = RunOptions { grip_scale: firmness, ..RunOptions::default() };
-        edge(&scenario.with_own_cores(own), &SEARCH, &options, &|_, _| {}, cancel).map_err(Failure::input)
+        edge(&scenario, &SEARCH, &options, &|_, _| {}, cancel).map_err(Failure::input)
+    }
+}
+
+/// The hand of a master whose model holds it grips `factor` times as firmly.
+fn firmer(graph: &mut Graph, factor: f64) {
+    for node in graph.nodes.iter_mut().filter(|n| n.kind == NodeKind::Master) {
+        let Settings::Master(files) = &mut node.settings else { continue };
+        let Some(model) = &mut files.model else { continue };
+        let hands: Vec<usize> = model.inputs.iter().filter(|i| i.kind == InputKind::Motion).map(|i| i.on).collect();
+        let of_hand = |between: &[Option<usize>; 2]| between.iter().flatten().any(|body| hands.contains(body));
+        model.elements.iter_mut().filter(|e| of_hand(&e.between)).for_each(|e| grips::scale_element(e, factor));
     }
 }

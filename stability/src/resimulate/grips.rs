@@ -4,7 +4,7 @@ use super::edge::{Edge, Search, edge};
 use super::{ResimulateError, RunOptions, Scenario};
 use crate::outcome::Outcome;
 use backdrive_nodes::graph::{Graph, NodeKind, Settings};
-use backdrive_plant::model::Fragment;
+use backdrive_plant::model::{Element, Fragment};
 use std::sync::atomic::AtomicBool;
 
 /// The grips over which an answer is given: factors on the stiffness and damping of the master's grip.
@@ -63,19 +63,22 @@ pub fn grip(graph: &Graph) -> Option<&Fragment> {
 
 /// Scales every force of a fragment: of a spring its stiffness, of a damper its damping, of friction its level. Masses stay.
 pub fn scale(fragment: &mut Fragment, factor: f64) {
-    for element in &mut fragment.network.elements {
-        let kind = element.law.kind();
-        let mut values = element.law.values();
-        for (parameter, values) in kind.parameters.iter().zip(&mut values) {
-            // Forces per anything: N, N/m, N s/m, N/m^1.5; lengths, rates, exponents and masses are no forces.
-            if parameter.unit == "N" || parameter.unit.starts_with("N ") || parameter.unit.starts_with("N/") {
-                values.iter_mut().for_each(|v| *v *= factor);
-            }
+    fragment.network.elements.iter_mut().for_each(|element| scale_element(element, factor));
+}
+
+/// The same for one element.
+pub fn scale_element(element: &mut Element, factor: f64) {
+    let kind = element.law.kind();
+    let mut values = element.law.values();
+    for (parameter, values) in kind.parameters.iter().zip(&mut values) {
+        // Forces per anything: N, N/m, N s/m, N/m^1.5; lengths, rates, exponents and masses are no forces.
+        if parameter.unit == "N" || parameter.unit.starts_with("N ") || parameter.unit.starts_with("N/") {
+            values.iter_mut().for_each(|v| *v *= factor);
         }
-        // Relations between forces hold at any scale, so this cannot fail; where it did, the element would stay as it is.
-        if let Ok(law) = (kind.build)(&values) {
-            element.law = law;
-        }
+    }
+    // Relations between forces hold at any scale, so this cannot fail; where it did, the element would stay as it is.
+    if let Ok(law) = (kind.build)(&values) {
+        element.law = law;
     }
 }
 

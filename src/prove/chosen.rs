@@ -1,0 +1,63 @@
+//! How much of a diagnosed model's estimate is subtracted where the grip is uncertain. No truth is needed: the diagnosed model is the master.
+//!
+//! A hand that grips more firmly than the model says moves less, so that the whole estimate takes out too much and the loop runs away
+//! where it would not have without any canceller. Of several shares of the estimate, and of no canceller, that one is chosen whose stable gain
+//! is largest for the worst of the grips.
+
+use super::edges::{Canceller, Loop, Moved};
+use crate::failure::Failure;
+use backdrive_plant::model::Model;
+use std::path::Path;
+use std::sync::atomic::AtomicBool;
+
+/// Shares of the estimate that are tried, the largest first: it wins a tie.
+const SHARES: [f64; 5] = [1.0, 0.9, 0.75, 0.5, 0.25];
+/// How firmly the hand may grip: factors on the grip of the session.
+pub const GRIPS: [f64; 3] = [0.8, 1.0, 1.2];
+/// A share must be better by this factor than a larger one.
+const BETTER: f64 = 1.05;
+
+/// What was chosen.
+pub struct Chosen {
+    /// Share of the estimate that is subtracted; 0 for no canceller.
+    pub share: f64,
+    /// Its stable gain for the worst of the grips, of the diagnosed model.
+    pub worst: f64,
+}
+
+/// Chooses, and writes the model with its outputs scaled to `path`. The hand holds the diagnosed model `model`.
+pub fn choose(model: &Path, path: &Path, graph: &Path, high_pass_hz: f64, stop: &AtomicBool) -> Result<Chosen, Failure> {
+    let text = std::fs::read_to_string(model).map_err(|e| Failure::input(format!("{}: cannot be read: {e}", model.display())))?;
+    let the_loop = Loop { graph, high_pass_hz, master: Moved::Model(model) };
+    let worst = |canceller: &Canceller| -> Result<f64, Failure> {
+        let mut worst = f64::INFINITY;
+        for grip in GRIPS {
+            worst = the_loop.edge(canceller, grip, stop)?.at_least.min(worst);
+        }
+        Ok(worst)
+    };
+    let mut best = Chosen { share: 0.0, worst: worst(&Canceller { name: "none", model: None, grip: None })? };
+    for share in SHARES {
+        write_scaled(&text, model, path, share)?;
+        let worst = worst(&Canceller { name: "chosen", model: Some(path.to_path_buf()), grip: None })?;
+        let enough = if best.share > 0.0 { BETTER * best.worst } else { best.worst };
+        if worst > enough {
+            best = Chosen { share, worst };
+        }
+    }
+    write_scaled(&text, model, path, best.share)?;
+    Ok(best)
+}
+
+/// The model file with every output's gain scaled.
+fn write_scaled(text: &str, model: &Path, path: &Path, share: f64) -> Result<(), Failure> {
+    use toml_edit::{DocumentMut, Item, value};
+    let bad = |e: &dyn std::fmt::Display| Failure::input(format!("{}: {e}", model.display()));
+    let parsed = Model::from_toml(text, &model.display().to_string()).map_err(|e| bad(&e))?;
+    let mut document: DocumentMut = text.parse().map_err(|e| bad(&e))?;
+    let outputs = document.get_mut("outputs").and_then(Item::as_array_of_tables_mut);
+    for (output, known) in outputs.into_iter().flat_map(|t| t.iter_mut()).zip(&parsed.outputs) {
+        output["gain"] = value(share * known.gain);
+    }
+    std::fs::write(path, document.to_string()).map_err(|e| Failure::write(path, e))
+}

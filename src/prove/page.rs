@@ -1,0 +1,168 @@
+//! The report of a proof: what was concealed beside what was found, and what that is worth.
+
+use super::case::Case;
+use super::summary::{Summary, Worth};
+use crate::cli;
+use backdrive_report::{Cell, Figure, Page, Plot, Series, Table, Tone, number, percent};
+
+/// The cancellers in tables, in this order.
+const CANCELLERS: [&str; 6] = ["none", "nominal", "second order", "linear, refitted", "diagnosed", "chosen"];
+
+/// The report over cases.
+pub fn page(options: &cli::Prove, cases: &[Case]) -> Page {
+    let mut page = Page::new("Concealed effects, and what was found");
+    let summary = Summary::of(cases);
+    if cases.len() == 1 {
+        cases.iter().for_each(|case| lead(&mut page, case));
+    } else {
+        let all_right = cases.iter().all(Case::is_right);
+        let tone = if all_right { Tone::Good } else { Tone::Warning };
+        page.lead(
+            tone,
+            &format!(
+                "{} cases: place {}, family {}, exact {}; false alarms {}.",
+                cases.len(),
+                summary.place,
+                summary.family,
+                summary.exact,
+                summary.false_alarms
+            ),
+        );
+        page.figure(ratios(cases), "Stable mu*lambda with the diagnosed and with the chosen canceller, over that with the better of the two linear ones; above 1 is better. Cases in their order.");
+        page.section("What was found");
+        page.table(table(cases));
+        page.section("What was taken for what");
+        page.table(confusion(&summary));
+        page.section("What it is worth");
+        for (name, worths) in [("Nonlinear effects", &summary.nonlinear), ("Linear effects", &summary.linear)] {
+            if !worths.is_empty() {
+                page.text(name);
+                page.table(worth(worths));
+            }
+        }
+    }
+    for case in cases {
+        let fill = |page: &mut Page| one(page, case);
+        if cases.len() == 1 {
+            fill(&mut page);
+        } else {
+            page.details(&format!("{}: {}", case.name, concealed(case)), fill);
+        }
+    }
+    page.section("How this was done");
+    page.text(&format!(
+        "A master hides effects drawn from a seed (--seed {}). The file that says which was sealed first: its SHA-256 is printed before anything is \
+         recorded, and stands in the title of every bag. Only the process of the hidden plant opens it, and, after verdict.json is written, the scorer. \
+         The diagnosis is a process of its own that gets the nominal model and the bags. The stable gain is that of the contact script {}, searched up \
+         to 50 in steps that end at 3 %, the canceller behind a high-pass of {} Hz; \"linear, refitted\" is the nominal model with its numbers fitted to \
+         the session, \"second order\" one mass on a spring and a damper fitted to the recordings in which the hand holds still, \"chosen\" the diagnosed \
+         model with that share of its estimate whose worst stable gain over grips 20 % softer to 20 % firmer is best when the diagnosed model itself is \
+         the master.",
+        options.seed,
+        options.contact.display(),
+        options.high_pass
+    ));
+    page.text("To check a seal: sha256sum case-NNN/sealed/truth.json gives the digest of the bags' title.");
+    page
+}
+
+fn concealed(case: &Case) -> String {
+    if case.concealed.is_empty() { "nothing".to_string() } else { case.concealed.join(", ") }
+}
+
+fn found(case: &Case) -> String {
+    let names: Vec<String> = case.findings.iter().map(|f| format!("{} {}", f.physics, f.place.join("-"))).collect();
+    if names.is_empty() { format!("nothing ({})", case.word) } else { format!("{} ({})", names.join(", "), case.word) }
+}
+
+fn lead(page: &mut Page, case: &Case) {
+    let tone = if case.is_right() { Tone::Good } else { Tone::Warning };
+    page.lead(tone, &format!("Concealed: {}. Found: {}.", concealed(case), found(case)));
+}
+
+fn one(page: &mut Page, case: &Case) {
+    page.figure(gains(case), "Highest stable mu*lambda against how firmly the hand grips, 1 being its grip in the session.");
+    let mut table = Table::new(["canceller", "grip", "stable to", "because"]);
+    for gain in &case.gains {
+        let stable = if gain.whole_range { format!("above {}", number(gain.stable_to)) } else { number(gain.stable_to) };
+        table.push([gain.canceller.to_string(), number(gain.grip), stable, gain.because.clone()]);
+    }
+    let [given, refitted, diagnosed] = case.held_out.map(|x| x.map_or("-".to_string(), percent));
+    page.text(&format!("Concealed: {}. Found: {}. {}", concealed(case), found(case), case.sentence));
+    page.text(&format!("Error on recordings that no fit has seen: {given} as given, {refitted} refitted, {diagnosed} diagnosed."));
+    let hand = if case.shows_hand { "The bags hold what the hand wants." } else { "Nobody measured the hand: it was found with the rest." };
+    page.text(&format!("{hand} Share of the estimate that was chosen: {}. Seal: {}.", number(case.share), case.sealed));
+    page.table(table);
+    page.text(&format!("The diagnosis itself: {}/diagnosis/report.html", case.name));
+}
+
+/// Stable gain over grip, a line for each canceller; bars where there is one grip only.
+fn gains(case: &Case) -> Figure {
+    let mut grips = case.grips();
+    grips.sort_by(f64::total_cmp);
+    let lowest = 0.05;
+    let mut plot = Plot::new("Stable gain").y_axis("mu*lambda", "").y_log();
+    if grips.len() > 1 {
+        plot = plot.x_axis("grip, over that of the session", "");
+        for canceller in CANCELLERS {
+            let known: Vec<(f64, f64)> = grips.iter().filter_map(|g| Some((*g, case.gain(canceller, *g)?.max(lowest)))).collect();
+            let (x, y): (Vec<f64>, Vec<f64>) = known.into_iter().unzip();
+            plot = if x.len() > 1 { plot.line(canceller, &x, &y) } else { plot.points(canceller, &x, &y) };
+        }
+    } else {
+        plot = plot.x_axis("canceller", "");
+        for (index, canceller) in CANCELLERS.iter().enumerate() {
+            let stable = case.gain(canceller, 1.0).unwrap_or(lowest).max(lowest);
+            plot = plot.series(Series::bars(canceller, &[index as f64 + 1.0], &[stable]));
+        }
+    }
+    plot.into()
+}
+
+fn ratios(cases: &[Case]) -> Figure {
+    let mut plot =
+        Plot::new("Stable gain over that of the better linear canceller").x_axis("case", "").y_axis("ratio", "").y_log().include_y(1.0);
+    for canceller in ["diagnosed", "chosen"] {
+        let known = cases.iter().enumerate().filter_map(|(i, c)| Some((i as f64 + 1.0, c.ratio(canceller, 1.0)?)));
+        let (x, y): (Vec<f64>, Vec<f64>) = known.filter(|(_, r)| *r > 0.0).unzip();
+        plot = plot.points(canceller, &x, &y);
+    }
+    plot.into()
+}
+
+fn table(cases: &[Case]) -> Table {
+    let headers = ["case", "hand", "concealed", "found", "family", "held out: refitted", "diagnosed"];
+    let mut table = Table::new(headers.into_iter().map(str::to_string).chain(CANCELLERS.iter().map(|c| format!("stable: {c}"))));
+    for case in cases {
+        let right = case.is_right();
+        let error = |i: usize| case.held_out[i].map_or("-".to_string(), percent);
+        let hand = if case.shows_hand { "recorded" } else { "unknown" };
+        let mark = Cell::tone(if right { "yes" } else { "no" }, if right { Tone::Good } else { Tone::Bad });
+        let mut row: Vec<Cell> =
+            vec![case.name.clone().into(), hand.into(), concealed(case).into(), found(case).into(), mark, error(1).into(), error(2).into()];
+        row.extend(CANCELLERS.iter().map(|c| Cell::from(case.gain(c, 1.0).map_or("-".to_string(), number))));
+        table.push(row);
+    }
+    table
+}
+
+fn confusion(summary: &Summary) -> Table {
+    let mut table = Table::new(["concealed", "said", "times"]);
+    for (concealed, said, count) in &summary.confusion {
+        let tone = if concealed == said || concealed == "nothing" && said == "none" { Tone::Good } else { Tone::Neutral };
+        table.push([Cell::from(concealed.clone()), Cell::tone(said.clone(), tone), Cell::from(count.to_string())]);
+    }
+    table
+}
+
+fn worth(worths: &[Worth]) -> Table {
+    let headers =
+        ["grip", "diagnosed over better linear, median", "chosen over better linear, median", "diagnosed below none", "chosen below none"];
+    let mut table = Table::new(headers);
+    for worth in worths {
+        let of = |x: Option<f64>| x.map_or("-".to_string(), number);
+        let (diagnosed, chosen) = (of(worth.diagnosed), of(worth.chosen));
+        table.push([number(worth.grip), diagnosed, chosen, worth.diagnosed_below_none.to_string(), worth.chosen_below_none.to_string()]);
+    }
+    table
+}
