@@ -335,6 +335,9 @@ pub struct Diagnose {
     /// The nominal model; without this the set's own.
     #[arg(long, value_name = "FILE")]
     pub model: Option<PathBuf>,
+    /// The grip that holds the nominal model, where it holds no hand itself.
+    #[arg(long, value_name = "FILE")]
+    pub grip: Option<PathBuf>,
     /// A physics that is not to be considered, and with it all that contain it as a special case; may be given several times.
     #[arg(long, value_name = "KIND", value_parser = physics)]
     pub without: Vec<String>,
@@ -360,6 +363,9 @@ pub struct Fit {
     /// A folder with set.toml, a set.toml, a folder of recordings, or recordings (CSV or MCAP).
     #[arg(required = true, value_name = "SET")]
     pub set: Vec<PathBuf>,
+    /// The grip that holds the model, where it holds no hand itself.
+    #[arg(long, value_name = "FILE")]
+    pub grip: Option<PathBuf>,
     /// Write the refitted model, with what was given and the intervals in comments.
     #[arg(long, value_name = "FILE")]
     pub out: Option<PathBuf>,
@@ -548,10 +554,14 @@ pub struct Node {
     pub name: String,
 }
 
-const PROVE_EXAMPLE: &str = "Example: backdrive prove --seed 1 --effects 1 --out proof
+const PROVE_EXAMPLE: &str = "Examples:
+  backdrive prove --seed 1 --out proof
+  backdrive prove --cases 30 --same-grip --out proofs
 
-The truth is sealed first: its SHA-256 is printed before anything is recorded, and only the process of the hidden plant opens it
-until the verdict is written. Of several cases every fifth conceals nothing.
+The hidden plant is a program of its own: `cargo build --release --workspace` puts backdrive-sealed beside this one. The truth is sealed
+first: its SHA-256 is printed before anything is recorded, and only that program opens it until the verdict is written. Of several cases
+every fifth conceals nothing, and in every second one nobody measures the hand; its search may take 2.5 times as long. Each case has a
+folder: sealed/, session/ (bags and set), diagnosis/, and logs; proof.json and proof.html are about all of them.
 Exit code 0 when all was found by family and place and nothing where nothing was, 1 when not.";
 
 /// `backdrive prove`

@@ -56,7 +56,7 @@ pub fn diagnose(options: &cli::Diagnose) -> Result<u8, Failure> {
     };
     ctrlc::set_handler(handler).map_err(Failure::machine)?;
 
-    let opened = recordings::open(&options.set, options.model.as_deref())?;
+    let opened = recordings::open(&options.set, options.model.as_deref(), options.grip.as_deref())?;
     for note in &opened.notes {
         eprintln!("note: {note}");
     }

@@ -95,14 +95,14 @@ impl Device {
             let (input, output) = (&model.inputs[axis.feedback].name, &model.outputs[axis.measured].name);
             columns.push((input.clone(), topic.clone(), format!("effort[{number}]")));
             columns.push((output.clone(), topic.clone(), format!("position[{number}]")));
-            let Some(fragment) = files.fragment.as_ref().filter(|_| !axis.holds_user) else { continue };
-            let several = model.axes.len() > 1;
-            let prefix = if several { format!("{}{number}", fragment.network.name) } else { fragment.network.name.clone() };
-            let attached = held.attach(fragment, axis.user, &prefix);
-            if let (Some(hand), Some(intent)) = (attached.hand_input, intent) {
+        }
+        if let Some(grip) = &files.fragment {
+            let hands;
+            (held, hands) = model.held_by(grip);
+            for (number, hand) in hands {
+                let Some(intent) = intent else { continue };
                 columns.push((held.inputs[hand].name.clone(), graph.topic_of(intent, "intent").name, format!("position[{number}]")));
             }
-            held.axes[number].holds_user = true;
         }
         // Only what is recorded can be compared.
         let recorded: Vec<usize> = model.axes.iter().map(|a| a.measured).collect();

@@ -43,7 +43,7 @@ pub fn fit(options: &cli::Fit) -> Result<u8, Failure> {
         }
     };
     ctrlc::set_handler(handler).map_err(Failure::machine)?;
-    let opened = recordings::open(&options.set, Some(&options.model))?;
+    let opened = recordings::open(&options.set, Some(&options.model), options.grip.as_deref())?;
     for note in &opened.notes {
         eprintln!("note: {note}");
     }

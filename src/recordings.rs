@@ -4,6 +4,7 @@ use crate::failure::Failure;
 use backdrive_bags::Reader;
 use backdrive_diagnosis::audit;
 use backdrive_diagnosis::problem::{Problem, ProblemError};
+use backdrive_plant::model::{Fragment, Model};
 use backdrive_plant::recording::{Columns, RecordingError};
 use backdrive_plant::set::{Initial, RecordingSet};
 use std::path::{Path, PathBuf};
@@ -19,7 +20,8 @@ pub struct Opened {
 }
 
 /// Opens a set, a folder of recordings, or recordings. Where nothing says what is held out, the last of several recordings is.
-pub fn open(paths: &[PathBuf], model: Option<&Path>) -> Result<Opened, Failure> {
+/// A grip is put on the axes of the model.
+pub fn open(paths: &[PathBuf], model: Option<&Path>, grip: Option<&Path>) -> Result<Opened, Failure> {
     let mut notes = Vec::new();
     let (mut set, told) = match paths {
         [one] if is_recording(one) => (of_files(paths)?, false),
@@ -57,10 +59,29 @@ pub fn open(paths: &[PathBuf], model: Option<&Path>) -> Result<Opened, Failure> 
         }
     }
     notes.extend(set.fit.iter().chain(&set.held_out).filter_map(|file| unfinished(&set.folder.join(file))));
-    let problem = Problem::of_set(&set, model).map_err(|e| told_failure(&e, model, &set))?;
+    let problem = match grip {
+        None => Problem::of_set(&set, model),
+        Some(grip) => {
+            let path = model.map(Path::to_path_buf).or_else(|| set.model.clone()).unwrap_or_default();
+            let held = held(&path, grip)?;
+            Problem::of_text(&set, held, path)
+        }
+    };
+    let problem = problem.map_err(|e| told_failure(&e, model, &set))?;
     audit::usable(&problem).map_err(Failure::input)?;
     let name = paths.first().map_or(String::new(), |p| p.file_name().map_or(p.display().to_string(), |n| n.to_string_lossy().into_owned()));
     Ok(Opened { problem, name, notes })
+}
+
+/// The text of a model with a grip on its axes.
+fn held(model: &Path, grip: &Path) -> Result<String, Failure> {
+    let (free, grip_name) = (Model::load(model)?, grip.display());
+    let (held, _) = free.held_by(&Fragment::load(grip)?);
+    if held == free {
+        let why = if free.axes.is_empty() { "has no [[axes]]" } else { "holds the user's hand already" };
+        return Err(Failure::input(format!("{}: {why}, so {grip_name} cannot be put on it; leave --grip out", model.display())));
+    }
+    Ok(held.to_toml())
 }
 
 /// What is wrong with a bag whose recording did not come to its end; `None` where nothing is, and for what is no bag. What cannot be read

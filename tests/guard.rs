@@ -122,6 +122,7 @@ impl Guarded {
             clamped: self.trace.clamped[from..].to_vec(),
             travel: None,
             resolution: 0.0,
+            noise: 0.0,
         })
     }
 }

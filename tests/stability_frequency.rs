@@ -46,6 +46,7 @@ fn session(graph: &Graph, lambda: f64, dither: &str) -> Session {
         clamped: signals.clamped,
         travel: None,
         resolution: 0.0,
+        noise: 0.0,
     };
     Session { name: "live".into(), period_s: PERIOD, axes: vec![axis], mu: vec![1.0; n], lambda: vec![lambda; n], notes: Vec::new() }
 }

@@ -131,7 +131,7 @@ impl<'a> Evaluator<'a> {
     ) -> Option<Vec<f64>> {
         let record = self.records.get(r)?;
         self.simulations.fetch_add(1, Ordering::Relaxed);
-        let mut columns = structure.predict_along(self.problem, model, values, record, r, self.substeps, self.guide.as_ref())?;
+        let mut columns = structure.predict_along(self.problem, model, values, (record, r), self.substeps, self.guide.as_ref())?;
         for (column, output) in columns.chunks_exact_mut(record.len).zip(measured(record)) {
             let samples = record.outputs.get(output)?.as_deref()?;
             let (floor, lag) = (
@@ -179,7 +179,7 @@ impl<'a> Evaluator<'a> {
             .collect();
         let mut jobs: Vec<(usize, usize)> = Vec::new();
         // Weights of unknown curves that are far from each other are moved at the same time.
-        let mut together: BTreeMap<(usize, usize, usize), Vec<usize>> = BTreeMap::new();
+        let mut together: BTreeMap<Set, Vec<usize>> = BTreeMap::new();
         for (at, j) in which.iter().enumerate() {
             match (&structure.numbers[*j].role, structure.numbers[*j].record) {
                 (Role::Knot(unknown, knot, r), _) => together.entry((*unknown, *r, knot % APART)).or_default().push(at),
@@ -216,7 +216,13 @@ impl<'a> Evaluator<'a> {
                 jacobian[*j][spans[*r].clone()].copy_from_slice(&part);
             }
         }
-        self.knots(structure, own, residuals, (which, &together, &spans), stretch, &mut jacobian);
+        let together: Vec<(Set, Vec<usize>)> = together.into_iter().collect();
+        let parts = self.knots(structure, own, residuals, which, (&together, &spans), stretch);
+        for (((_, r, _), ats), columns) in together.iter().zip(parts) {
+            for (at, column) in ats.iter().zip(columns.unwrap_or_default()) {
+                jacobian[*at][spans[*r].clone()].copy_from_slice(&column);
+            }
+        }
         jacobian
     }
 
@@ -227,13 +233,14 @@ impl<'a> Evaluator<'a> {
         structure: &Structure,
         own: &[f64],
         residuals: &[f64],
-        (which, together, spans): (&[usize], &BTreeMap<(usize, usize, usize), Vec<usize>>, &[std::ops::Range<usize>]),
+        which: &[usize],
+        (together, spans): (&[(Set, Vec<usize>)], &[Span]),
         stretch: f64,
-        jacobian: &mut [Vec<f64>],
-    ) {
-        let Some(model) = structure.model(self.problem, &outward(structure, own)).filter(|_| !together.is_empty()) else { return };
-        let groups: Vec<(&(usize, usize, usize), &Vec<usize>)> = together.iter().collect();
-        let one = |((unknown, r, _), ats): &(&(usize, usize, usize), &Vec<usize>)| {
+    ) -> Vec<Option<Vec<Vec<f64>>>> {
+        let Some(model) = structure.model(self.problem, &outward(structure, own)).filter(|_| !together.is_empty()) else {
+            return Vec::new();
+        };
+        let one = |((unknown, r, _), ats): &(Set, Vec<usize>)| {
             if self.is_late() {
                 return None;
             }
@@ -258,12 +265,7 @@ impl<'a> Evaluator<'a> {
             }
             Some(columns)
         };
-        let parts: Vec<Option<Vec<Vec<f64>>>> = groups.par_iter().map(one).collect();
-        for (((_, r, _), ats), columns) in groups.iter().zip(parts) {
-            for (at, column) in ats.iter().zip(columns.unwrap_or_default()) {
-                jacobian[*at][spans[*r].clone()].copy_from_slice(&column);
-            }
-        }
+        together.par_iter().map(one).collect()
     }
 
     /// Fits a structure from `start` on; `None` where it cannot be simulated there.
@@ -401,6 +403,13 @@ impl<'a> Evaluator<'a> {
         self.robust.is_finite().then(|| residuals.iter().map(|r| (self.robust / r.abs().max(1e-300)).min(1.0)).collect())
     }
 }
+
+/// Weights of an unknown curve that are moved at the same time: which unknown input, which record, and what is left of their number when
+/// divided by [`APART`].
+type Set = (usize, usize, usize);
+
+/// The residuals of a record.
+type Span = std::ops::Range<usize>;
 
 /// How many weights of an unknown curve apart those are that are moved at the same time: each has an effect over four knots, and two more to die.
 const APART: usize = 6;

@@ -117,7 +117,15 @@ impl Problem {
             || ProblemError::Set(format!("{}: no model is named; say model = \"...\" in set.toml or give one", set.folder.display()));
         let model_path = model.map(Path::to_path_buf).or_else(|| set.model.clone()).ok_or_else(no_model)?;
         let text = read_text(&model_path)?;
-        let model = Model::load(&model_path)?;
+        Problem::of_text(set, text, model_path)
+    }
+
+    /// The same of a set at hand and a model's text; `model_path` is where it would lie.
+    ///
+    /// # Errors
+    /// As [`Problem::open`].
+    pub fn of_text(set: &RecordingSet, text: String, model_path: PathBuf) -> Result<Problem, ProblemError> {
+        let model = Model::from_toml(&text, &model_path.display().to_string())?;
         set.check_conditions(&model)?;
         let unknown = unknown_of(set, &model)?;
         let read = |files: &[String]| files.iter().map(|file| record(set, file, &model, &unknown)).collect::<Result<Vec<_>, _>>();

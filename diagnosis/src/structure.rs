@@ -200,7 +200,7 @@ impl Structure {
         index: usize,
         substeps: usize,
     ) -> Option<Vec<f64>> {
-        self.predict_along(problem, model, values, record, index, substeps, None)
+        self.predict_along(problem, model, values, (record, index), substeps, None)
     }
 
     /// The same, led by a guide of these records.
@@ -209,8 +209,7 @@ impl Structure {
         problem: &Problem,
         model: &Model,
         values: &[f64],
-        record: &Record,
-        index: usize,
+        (record, index): (&Record, usize),
         substeps: usize,
         guide: Option<&Guide>,
     ) -> Option<Vec<f64>> {

@@ -35,6 +35,18 @@ impl PortForce {
 }
 
 impl Model {
+    /// The model with a grip on every axis that a hand can hold, and for each of these axes the input that is its hand.
+    pub fn held_by(&self, grip: &Fragment) -> (Model, Vec<(usize, usize)>) {
+        let (mut held, mut hands) = (self.clone(), Vec::new());
+        for (number, axis) in self.axes.iter().enumerate().filter(|(_, axis)| !axis.holds_user) {
+            let name = &grip.network.name;
+            let prefix = if self.axes.len() > 1 { format!("{name}{number}") } else { name.clone() };
+            hands.extend(held.attach(grip, axis.user, &prefix).hand_input.map(|hand| (number, hand)));
+            held.axes[number].holds_user = true;
+        }
+        (held, hands)
+    }
+
     /// Adds a fragment's bodies, elements, inputs and outputs, its port being body `user` of this model.
     ///
     /// Names are prefixed: `grip.spring`. Where `prefix` is taken already, `prefix2`, `prefix3`, ... is

@@ -36,7 +36,7 @@ pub fn page(options: &cli::Prove, cases: &[Case]) -> Page {
         page.section("What it is worth");
         for (name, worths) in [("Nonlinear effects", &summary.nonlinear), ("Linear effects", &summary.linear)] {
             if !worths.is_empty() {
-                page.text(name);
+                page.text(&format!("{name}: median of the stable gain over that of the better linear canceller, and in how many cases it is below that without one."));
                 page.table(worth(worths));
             }
         }
@@ -131,8 +131,8 @@ fn ratios(cases: &[Case]) -> Figure {
 }
 
 fn table(cases: &[Case]) -> Table {
-    let headers = ["case", "hand", "concealed", "found", "family", "held out: refitted", "diagnosed"];
-    let mut table = Table::new(headers.into_iter().map(str::to_string).chain(CANCELLERS.iter().map(|c| format!("stable: {c}"))));
+    let headers = ["case", "hand", "concealed", "found", "right", "error: refitted", "diagnosed"];
+    let mut table = Table::new(headers.into_iter().map(str::to_string).chain(CANCELLERS.iter().map(|c| format!("gain: {c}"))));
     for case in cases {
         let right = case.is_right();
         let error = |i: usize| case.held_out[i].map_or("-".to_string(), percent);
@@ -156,8 +156,7 @@ fn confusion(summary: &Summary) -> Table {
 }
 
 fn worth(worths: &[Worth]) -> Table {
-    let headers =
-        ["grip", "diagnosed over better linear, median", "chosen over better linear, median", "diagnosed below none", "chosen below none"];
+    let headers = ["grip", "diagnosed / linear", "chosen / linear", "diagnosed below none", "chosen below none"];
     let mut table = Table::new(headers);
     for worth in worths {
         let of = |x: Option<f64>| x.map_or("-".to_string(), number);

@@ -10,7 +10,7 @@ fn long() -> bool {
 
 fn report(name: &str) -> Report {
     let out = tempfile::tempdir().unwrap();
-    let report = study_named(name).unwrap().run(&Data::find(None), out.path(), !long()).unwrap();
+    let report = study_named(name).unwrap().run(&Data::find(None), out.path(), !long(), 1.0).unwrap();
     println!("{}", report.text());
     // What is true lies outside of what the diagnosis is given.
     let sets = walk(out.path());

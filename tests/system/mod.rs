@@ -87,6 +87,11 @@ impl Place {
         Running::start(self, command).end()
     }
 
+    /// The same for what may take longer.
+    pub fn run_for(&self, arguments: &[&str], patience: Duration) -> Ended {
+        self.start(arguments).end_within(patience)
+    }
+
     /// Starts the program.
     pub fn start(&self, arguments: &[&str]) -> Running {
         let mut command = self.command(env!("CARGO_BIN_EXE_backdrive"));
@@ -159,13 +164,18 @@ impl Running {
     }
 
     /// Waits for its end; kills it where that does not come.
-    pub fn end(mut self) -> Ended {
+    pub fn end(self) -> Ended {
+        self.end_within(PATIENCE)
+    }
+
+    /// The same with another patience.
+    pub fn end_within(mut self, patience: Duration) -> Ended {
         let begun = Instant::now();
         let status = loop {
             if let Some(status) = self.child.try_wait().unwrap() {
                 break status;
             }
-            if begun.elapsed() > PATIENCE {
+            if begun.elapsed() > patience {
                 let _ = self.child.kill();
                 let _ = self.child.wait();
                 panic!("does not end; standard error so far: {}", std::fs::read_to_string(&self.stderr).unwrap_or_default());

@@ -194,6 +194,12 @@ pub struct Scenario {
     own: Option<OwnCores>,
 }
 
+impl std::fmt::Debug for Scenario {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Scenario").field("script", &self.script).field("steps", &self.steps).finish_non_exhaustive()
+    }
+}
+
 impl Scenario {
     /// Of a graph with the command line's changes already in it, moved by `intents` (one per axis) for `steps` steps; by the
     /// graph's own operator where there are no intents, for as long as it says where there are no steps.

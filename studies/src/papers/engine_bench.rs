@@ -145,7 +145,7 @@ fn run(context: &Context) -> Result<Report, StudyError> {
         report.line(&format!("seed {seed}"), "", "", "", None);
         let walked = walk(
             &mut report,
-            &out,
+            &Context { out: &out, ..*context },
             &Walk { effects: &[1], again: if context.quick { 0 } else { 1 }, patience: if context.quick { 30.0 } else { 75.0 } },
         )?;
         hits += score(&mut report, &out, PAPER, &walked)?;

@@ -76,7 +76,7 @@ fn run(context: &Context) -> Result<Report, StudyError> {
     story.record(context.out)?;
     let mut report = Report::new("Paper 002, told blind: linear master, held in a comfortable grasp");
     let (effects, patience): (&[usize], _) = if context.quick { (&[1], 60.0) } else { (&[1, 3], 120.0) };
-    let walked = walk(&mut report, context.out, &Walk { effects, again: if context.quick { 0 } else { 2 }, patience })?;
+    let walked = walk(&mut report, context, &Walk { effects, again: if context.quick { 0 } else { 2 }, patience })?;
     score(&mut report, context.out, PAPER, &walked)?;
     Ok(report)
 }

@@ -163,9 +163,10 @@ pub(super) struct Walked {
 
 /// The set of `out` diagnosed from the first model; then from the found one that predicts the unseen records best, and so on until nothing is
 /// missing.
-pub(super) fn walk(report: &mut Report, out: &Path, walk: &Walk) -> Result<Walked, StudyError> {
+pub(super) fn walk(report: &mut Report, outer: &Context, walk: &Walk) -> Result<Walked, StudyError> {
+    let out = outer.out;
     let set = out.join(SET);
-    let context = Context { folder: &set, data: &set, out, quick: false };
+    let context = Context { folder: &set, data: &set, out, quick: false, longer: outer.longer };
     let mut stage = |name: &str, model: &str, effects: usize| -> Result<Value, StudyError> {
         let ask = Ask { name, set: "set.toml", model, without: &[], effects, patience: walk.patience };
         let json = diagnose(&context, &ask)?.said.json;

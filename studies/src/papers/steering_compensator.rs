@@ -78,12 +78,12 @@ fn run(context: &Context) -> Result<Report, StudyError> {
     Story { truth, first: &first, rate: 500.0, drives: &whole, steps: STEPS }.record(context.out)?;
     let mut report = Report::new("Paper 001, told blind: the linear design of the compensator");
     let (effects, patience): (&[usize], _) = if context.quick { (&[3], 60.0) } else { (&[1, 3], 240.0) };
-    let walked = walk(&mut report, context.out, &Walk { effects, again: if context.quick { 0 } else { 1 }, patience })?;
+    let walked = walk(&mut report, context, &Walk { effects, again: if context.quick { 0 } else { 1 }, patience })?;
     parasitic(&mut report, &context.out.join(&walked.best).join(MODEL))?;
     let found = Model::load(&context.out.join(&walked.best).join(MODEL))?;
-    bias(&mut report, &first, &found, context.out, "4, 2 and 1 mm")?;
-    bias(&mut report, &first, &found, &shorter, "2, 1 and 0.5 mm")?;
-    between(&mut report, &shorter)?;
+    bias(&mut report, &first, &found, context, "4, 2 and 1 mm")?;
+    bias(&mut report, &first, &found, &Context { out: &shorter, ..*context }, "2, 1 and 0.5 mm")?;
+    between(&mut report, &Context { out: &shorter, ..*context })?;
     score(&mut report, context.out, PAPER, &walked)?;
     Ok(report)
 }
@@ -114,9 +114,10 @@ fn parasitic(report: &mut Report, found: &Path) -> Result<(), StudyError> {
 }
 
 /// The paper's model between, handed over as the first one: its next step is the backlash.
-fn between(report: &mut Report, out: &Path) -> Result<(), StudyError> {
+fn between(report: &mut Report, outer: &Context) -> Result<(), StudyError> {
+    let out = outer.out;
     let set = out.join(SET);
-    let here = Context { folder: &set, data: &set, out, quick: false };
+    let here = Context { folder: &set, data: &set, out, quick: false, longer: outer.longer };
     let ask = Ask { name: "from-friction", set: "set.toml", model: "friction.toml", without: &[], effects: 1, patience: 60.0 };
     let json = diagnose(&here, &ask)?.said.json;
     told(report, "from-friction", &json);
@@ -132,12 +133,13 @@ fn between(report: &mut Report, out: &Path) -> Result<(), StudyError> {
 
 /// The stiffness of the paper's model between, with friction and parasitic damping but without backlash, fitted to the set in `out`, beside the
 /// found one's.
-fn bias(report: &mut Report, first: &Model, found: &Model, out: &Path, strokes: &str) -> Result<(), StudyError> {
+fn bias(report: &mut Report, first: &Model, found: &Model, outer: &Context, strokes: &str) -> Result<(), StudyError> {
+    let out = outer.out;
     let set = out.join(SET);
     let friction = "\n[[elements]]\nname = \"friction\"\nkind = \"coulomb\"\nbetween = [\"disc\", \"ground\"]\nforce = 17.0\n\
                     \n[[elements]]\nname = \"parasitic_damping\"\nkind = \"damper\"\nbetween = [\"disc\", \"ground\"]\ndamping = 1000.0\n";
     write(&set.join("friction.toml"), &format!("{}{friction}", first.to_toml()))?;
-    let here = Context { folder: &set, data: &set, out, quick: false };
+    let here = Context { folder: &set, data: &set, out, quick: false, longer: outer.longer };
     let ask = Ask { name: "without-backlash", set: "set.toml", model: "friction.toml", without: &[], effects: 1, patience: 60.0 };
     let fitted = refit(&here, &ask)?;
     let without = refitted(&fitted, STIFFNESS);

@@ -1,0 +1,97 @@
+//! `backdrive prove`: the seal, what the bags do not tell, and that the diagnosis does not need the truth.
+
+mod system;
+
+use backdrive_bags::Reader;
+use sha2::{Digest, Sha256};
+use std::path::{Path, PathBuf};
+use system::{Place, file};
+
+/// The hidden plant's program, which a build of the workspace puts beside ours; a message and nothing else where it is not built.
+fn hidden_plant() -> Option<PathBuf> {
+    let path = Path::new(env!("CARGO_BIN_EXE_backdrive")).with_file_name("backdrive-sealed");
+    if !path.is_file() {
+        println!("skipped: there is no {}; cargo build -p backdrive-sealed makes it", path.display());
+    }
+    Some(path).filter(|p| p.is_file())
+}
+
+fn prove(place: &Place, more: &[&str]) -> system::Ended {
+    let inputs = [
+        ("--model", "plant/models/impulse-engine-linear.toml"),
+        ("--grip", "plant/grips/normal.toml"),
+        ("--second-order", "plant/models/impulse-engine-second-order.toml"),
+        ("--session", "launch/prove.toml"),
+        ("--contact", "launch/contact.toml"),
+    ];
+    let files: Vec<(&str, String)> = inputs.iter().map(|(option, path)| (*option, file(path))).collect();
+    let mut arguments = vec!["prove", "--same-grip", "--nonlinear"];
+    arguments.extend(files.iter().flat_map(|(option, path)| [*option, path.as_str()]));
+    arguments.extend(more);
+    place.run_for(&arguments, std::time::Duration::from_secs(600))
+}
+
+#[test]
+fn a_sealed_effect_is_diagnosed_without_its_truth() {
+    if hidden_plant().is_none() {
+        return;
+    }
+    let place = Place::new();
+    let ended = prove(&place, &["--seed", "13", "--operator", "hidden", "--patience", "10", "--out", "proof"]);
+    assert!([Some(0), Some(1)].contains(&ended.code), "{ended:?}");
+    let case = place.path("proof/case-001");
+
+    // The digest was said first, and is the truth's.
+    let truth = std::fs::read(case.join("sealed/truth.json")).unwrap();
+    let digest: String = Sha256::digest(&truth).iter().map(|byte| format!("{byte:02x}")).collect();
+    assert!(ended.stdout.lines().next().unwrap().contains(&digest), "{}", ended.stdout);
+
+    // The bags hold the digest and the nominal model, and neither the truth, nor how the hidden plant was run, nor the hand.
+    for name in ["sweep", "touch", "touch-again"] {
+        let reader = Reader::open(&case.join(format!("session/{name}.mcap"))).unwrap();
+        let header = reader.header().unwrap();
+        assert!(header.title.contains(&digest), "{}", header.title);
+        assert!(header.files.iter().any(|(name, _)| name.ends_with("impulse-engine-linear.toml")));
+        let text = format!("{}{}", header.graph_toml, header.files.iter().map(|f| f.1.as_str()).collect::<String>());
+        assert!(!text.contains("truth") && !text.contains("sealed-master") && !text.contains("waypoints"), "{text}");
+        let topics: Vec<&str> = header.topics.iter().map(|t| t.topic.name.as_str()).collect();
+        assert!(!topics.iter().any(|t| t.starts_with("/operator") || t.ends_with("/user_js")), "{topics:?}");
+        assert!(reader.completeness().is_some_and(|c| c.topics.iter().all(|t| t.lost == 0)));
+    }
+
+    let proof: serde_json::Value = serde_json::from_str(&std::fs::read_to_string(place.path("proof/proof.json")).unwrap()).unwrap();
+    let found = &proof["cases"][0];
+    assert_eq!(found["sealed"], digest.as_str());
+    assert_eq!(found["shows_hand"], false);
+    let gain = |canceller: &str| {
+        let all = found["stable_gain"].as_array().unwrap();
+        all.iter().find(|g| g["canceller"] == canceller).and_then(|g| g["stable_to"].as_f64()).unwrap()
+    };
+    assert!(gain("none") > 0.05 && gain("diagnosed") > 0.0 && gain("chosen") >= 0.94 * gain("none").min(gain("diagnosed")));
+    assert!(place.path("proof/proof.html").is_file());
+
+    // Once more where nobody could look: the truth is gone, and the diagnosis does as before.
+    std::fs::rename(case.join("sealed"), place.path("elsewhere")).unwrap();
+    let (session, out) = (case.join("session"), place.path("again"));
+    let (session, out) = (session.display().to_string(), out.display().to_string());
+    let again = place.run_for(&["diagnose", &session, "--out", &out, "--patience", "10", "--no-report"], std::time::Duration::from_secs(300));
+    assert!([Some(0), Some(1), Some(7)].contains(&again.code), "{again:?}");
+    let read = |path: PathBuf| serde_json::from_str::<serde_json::Value>(&std::fs::read_to_string(path).unwrap()).unwrap();
+    let verdict = read(place.path("again/verdict.json"));
+    assert_eq!(verdict["unknown_inputs"][0]["input"], "normal.hand");
+    let error = |v: &serde_json::Value| v["held_out"]["nrmse_before"].as_f64().unwrap();
+    assert!((error(&verdict) / error(&read(case.join("diagnosis/verdict.json"))) - 1.0).abs() < 1e-6);
+}
+
+#[test]
+fn what_cannot_be_proven_is_told_in_one_line() {
+    let place = Place::new();
+    let of = |arguments: &[&str]| place.run_for(arguments, std::time::Duration::from_secs(60));
+    let ended = of(&["prove", "--plant", "no-such-program", "--session", &file("launch/prove.toml")]);
+    assert_eq!(ended.code, Some(5), "{ended:?}");
+    assert!(ended.stderr.contains("no-such-program") && ended.stderr.contains("cargo build"), "{}", ended.stderr);
+    let ended = of(&["prove", "--effects", "7"]);
+    assert!(ended.code == Some(2) && ended.stderr.contains("from 0 to 3"), "{ended:?}");
+    let ended = of(&["prove", "--session", "nothing.toml", "--out", "other"]);
+    assert!(ended.code == Some(3) && ended.stderr.contains("nothing.toml"), "{ended:?}");
+}
