@@ -74,7 +74,8 @@ fn a_sealed_effect_is_diagnosed_without_its_truth() {
     std::fs::rename(case.join("sealed"), place.path("elsewhere")).unwrap();
     let (session, out) = (case.join("session"), place.path("again"));
     let (session, out) = (session.display().to_string(), out.display().to_string());
-    let again = place.run_for(&["diagnose", &session, "--out", &out, "--patience", "10", "--no-report"], std::time::Duration::from_secs(300));
+    let again =
+        place.run_for(&["diagnose", &session, "--out", &out, "--patience", "10", "--no-report"], std::time::Duration::from_secs(300));
     assert!([Some(0), Some(1), Some(7)].contains(&again.code), "{again:?}");
     let read = |path: PathBuf| serde_json::from_str::<serde_json::Value>(&std::fs::read_to_string(path).unwrap()).unwrap();
     let verdict = read(place.path("again/verdict.json"));

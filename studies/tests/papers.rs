@@ -1,11 +1,11 @@
-//! The papers' stories: the first step of each in its short form, the whole path where BACKDRIVE_LONG is 1.
+//! The papers' stories: the first step of each in its short form, the whole path where BACKDRIVE_STUDIES is 1.
 
 use backdrive_studies::data::Data;
 use backdrive_studies::study_named;
 use backdrive_studies::table::Report;
 
 fn long() -> bool {
-    std::env::var_os("BACKDRIVE_LONG").is_some_and(|v| v == "1")
+    std::env::var_os("BACKDRIVE_STUDIES").is_some_and(|v| v == "1")
 }
 
 fn report(name: &str) -> Report {

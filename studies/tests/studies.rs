@@ -1,5 +1,5 @@
 //! Each study where its recordings are: what it names, and its figures with margins. Where they are not, a message and nothing else.
-//! The short parts; with BACKDRIVE_LONG=1 whole studies, which take up to a quarter of an hour together.
+//! The short parts; with BACKDRIVE_STUDIES=1 whole studies, which take up to a quarter of an hour together.
 
 use backdrive_studies::data::Data;
 use backdrive_studies::table::Report;
@@ -11,7 +11,7 @@ static TURN: Mutex<()> = Mutex::new(());
 
 /// Whether the long parts are wanted, too.
 fn long() -> bool {
-    std::env::var_os("BACKDRIVE_LONG").is_some_and(|v| v == "1")
+    std::env::var_os("BACKDRIVE_STUDIES").is_some_and(|v| v == "1")
 }
 
 /// A study's report; `None` with a message where its recordings are not here.
@@ -59,7 +59,7 @@ fn emps() {
 #[test]
 fn emps_from_its_published_models() {
     if !long() {
-        println!("skipped: BACKDRIVE_LONG=1 asks for it");
+        println!("skipped: BACKDRIVE_STUDIES=1 asks for it");
         return;
     }
     let Some(report) = report("emps") else { return };
