@@ -13,7 +13,7 @@ use backdrive_diagnosis::locate::{self, Location, locate};
 use backdrive_diagnosis::per_record::{PerRecord, fit_each};
 use backdrive_diagnosis::problem::Problem;
 use backdrive_diagnosis::search::{Search, Settings, search};
-use backdrive_diagnosis::verdict::{EXPERIMENT_FILE, Verdict, verdict};
+use backdrive_diagnosis::verdict::{EXPERIMENT_FILE, Verdict, rival_file, verdict};
 use serde_json::{Value, json};
 use std::path::Path;
 use std::sync::Arc;
@@ -104,6 +104,13 @@ pub fn diagnose_into(opened: Opened, settings: &Settings, out: &Path, with_repor
     write("verdict.json", &format!("{json}\n"))?;
     write(MODEL, &found.said.model)?;
     let mut written = vec!["verdict.json", MODEL];
+    // Rivals of an earlier diagnosis are none of this one.
+    for number in 1..=9 {
+        let _ = std::fs::remove_file(out.join(rival_file(number)));
+    }
+    for (index, rival) in found.said.rivals.iter().enumerate() {
+        write(&rival_file(index + 1), rival)?;
+    }
     if let Some(experiment) = &found.said.experiment {
         write(EXPERIMENT_FILE, experiment)?;
         written.push(EXPERIMENT_FILE);

@@ -24,6 +24,8 @@ pub struct Verdict {
     pub json: Json,
     /// The model file with what was found.
     pub model: String,
+    /// Models of other explanations that leave over little more, the nearest first: what is built on the verdict has to stand with these too.
+    pub rivals: Vec<String>,
     /// In one sentence.
     pub sentence: String,
     /// The excitation file of the next experiment, to be written as [`EXPERIMENT_FILE`]; `None` where none is needed or can be had.
@@ -32,6 +34,16 @@ pub struct Verdict {
 
 /// Name of the file of the next experiment.
 pub const EXPERIMENT_FILE: &str = "next-experiment.toml";
+/// Name of the file of a rival's model, from 1.
+pub fn rival_file(number: usize) -> String {
+    format!("model.rival-{number}.toml")
+}
+
+/// Rivals whose models are written, at most.
+const RIVALS: usize = 3;
+/// What a rival leaves over, in squares of what the claimed explanation does, at most.
+const NEARLY: f64 = 2.0;
+
 /// How long the next experiment is looked for.
 const EXPERIMENT: Duration = Duration::from_secs(2);
 
@@ -167,6 +179,7 @@ pub fn verdict(problem: &Problem, search: &Search, model_name: &str) -> Result<V
     let model = model_text(problem, best, &spread, off || added)?;
     let parameters = if off || added { moved(problem, best, &spread) } else { json!({}) };
     let sentence = sentence(word, best);
+    let rivals = rival_models(problem, search, best);
     let json = json!({
         "schema": 1,
         "verdict": word,
@@ -176,10 +189,11 @@ pub fn verdict(problem: &Problem, search: &Search, model_name: &str) -> Result<V
         "held_out": held,
         "unknown_inputs": unknown_inputs(problem, best),
         "model_after": model_name,
+        "rival_models": (1..=rivals.len()).map(rival_file).collect::<Vec<_>>(),
         "next_experiment": next,
         "detectable": if added { Json::Null } else { detectable(search) },
     });
-    Ok(Verdict { json, model, sentence, experiment })
+    Ok(Verdict { json, model, rivals, sentence, experiment })
 }
 
 /// What was found of the inputs that nobody measured.
@@ -439,6 +453,22 @@ fn model_text(problem: &Problem, best: &Candidate, spread: &Spread, use_best: bo
         model = hypothesis.apply(&model, &rounded)?;
     }
     Ok(patch(&problem.text, &edits)?)
+}
+
+/// Models of other structures that explain nearly as much of what was fitted and of what no fit has seen.
+fn rival_models(problem: &Problem, search: &Search, best: &Candidate) -> Vec<String> {
+    let names = |c: &Candidate| c.structure.added.iter().map(|h| h.id.clone()).collect::<Vec<_>>();
+    let near = |c: &&Candidate| {
+        let unseen = match (best.unseen, c.unseen) {
+            (Some(a), Some(b)) => b <= NEARLY * a,
+            _ => true,
+        };
+        unseen && c.fit.cost <= NEARLY * best.fit.cost && names(c) != names(best)
+    };
+    let mut rivals: Vec<&Candidate> = search.found.iter().chain([&search.nominal]).filter(near).collect();
+    rivals.sort_by(|a, b| a.fit.cost.total_cmp(&b.fit.cost));
+    let models = rivals.into_iter().filter_map(|c| c.structure.model(problem, &c.fit.values));
+    models.take(RIVALS).map(|model| model.to_toml()).collect()
 }
 
 /// When and at which frequencies the refitted nominal model leaves most over.

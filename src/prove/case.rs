@@ -1,7 +1,7 @@
 //! One proof: draw and seal, record, diagnose, raise the gain, and only then look at the truth.
 
 use super::absolute;
-use super::chosen::choose;
+use super::chosen::{Task, choose};
 use super::edges::{Canceller, Loop, Moved};
 use super::hidden::{Hidden, Opened, program};
 use super::score::{Finding, Mark, findings, is_nonlinear, mark, name_of};
@@ -113,7 +113,9 @@ pub fn prove(options: &cli::Prove, folder: &Path, drawn: &Draw, stop: &AtomicBoo
 
     let mut cancellers = cancellers(options, folder, &session, &found)?;
     let (diagnosed, scaled) = (found.join("model.diagnosed.toml"), folder.join("chosen.toml"));
-    let chosen = choose(&diagnosed, &scaled, &options.contact, options.high_pass, stop)?;
+    let rivals = verdict["rival_models"].as_array().into_iter().flatten().filter_map(Value::as_str).map(|name| found.join(name));
+    let task = Task { graph: &options.contact, high_pass_hz: options.high_pass };
+    let chosen = choose(&diagnosed, &rivals.collect::<Vec<_>>(), &scaled, &task, stop)?;
     cancellers.push(Canceller { name: "chosen", model: (chosen.share > 0.0).then_some(scaled), grip: None });
 
     // The verdict is written; now the truth is opened.

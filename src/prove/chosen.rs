@@ -1,13 +1,14 @@
-//! How much of a diagnosed model's estimate is subtracted where the grip is uncertain. No truth is needed: the diagnosed model is the master.
+//! How much of a diagnosed model's estimate is subtracted where the grip is uncertain, and the explanation too. No truth is needed: the diagnosed
+//! model is the master, and so are its rivals, which explain the recordings nearly as well.
 //!
 //! A hand that grips more firmly than the model says moves less, so that the whole estimate takes out too much and the loop runs away
 //! where it would not have without any canceller. Of several shares of the estimate, and of no canceller, that one is chosen whose stable gain
-//! is largest for the worst of the grips.
+//! is largest for the worst of the grips and explanations.
 
 use super::edges::{Canceller, Loop, Moved};
 use crate::failure::Failure;
 use backdrive_plant::model::Model;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
 /// Shares of the estimate that are tried, the largest first: it wins a tie.
@@ -21,32 +22,48 @@ const BETTER: f64 = 1.05;
 pub struct Chosen {
     /// Share of the estimate that is subtracted; 0 for no canceller.
     pub share: f64,
-    /// Its stable gain for the worst of the grips, of the diagnosed model.
+    /// Its stable gain for the worst of the grips and explanations.
     pub worst: f64,
 }
 
-/// Chooses, and writes the model with its outputs scaled to `path`. The hand holds the diagnosed model `model`.
-pub fn choose(model: &Path, path: &Path, graph: &Path, high_pass_hz: f64, stop: &AtomicBool) -> Result<Chosen, Failure> {
+/// Chooses, and writes the model with its outputs scaled to `path`. The hand holds the diagnosed model `model`, and every one of its `rivals`: the
+/// loop has to be stable whichever of them the device is.
+pub fn choose(model: &Path, rivals: &[PathBuf], path: &Path, task: &Task, stop: &AtomicBool) -> Result<Chosen, Failure> {
     let text = std::fs::read_to_string(model).map_err(|e| Failure::input(format!("{}: cannot be read: {e}", model.display())))?;
-    let the_loop = Loop { graph, high_pass_hz, master: Moved::Model(model) };
-    let worst = |canceller: &Canceller| -> Result<f64, Failure> {
+    let masters: Vec<&Path> = std::iter::once(model).chain(rivals.iter().map(PathBuf::as_path)).collect();
+    // Below `enough` it does not matter by how much.
+    let worst = |canceller: &Canceller, enough: f64| -> Result<f64, Failure> {
         let mut worst = f64::INFINITY;
-        for grip in GRIPS {
-            worst = the_loop.edge(canceller, grip, stop)?.at_least.min(worst);
+        for master in &masters {
+            let the_loop = Loop { graph: task.graph, high_pass_hz: task.high_pass_hz, master: Moved::Model(master) };
+            for grip in GRIPS {
+                worst = the_loop.edge(canceller, grip, stop)?.at_least.min(worst);
+                if worst <= enough {
+                    return Ok(worst);
+                }
+            }
         }
         Ok(worst)
     };
-    let mut best = Chosen { share: 0.0, worst: worst(&Canceller { name: "none", model: None, grip: None })? };
+    let mut best = Chosen { share: 0.0, worst: worst(&Canceller { name: "none", model: None, grip: None }, 0.0)? };
     for share in SHARES {
         write_scaled(&text, model, path, share)?;
-        let worst = worst(&Canceller { name: "chosen", model: Some(path.to_path_buf()), grip: None })?;
         let enough = if best.share > 0.0 { BETTER * best.worst } else { best.worst };
+        let worst = worst(&Canceller { name: "chosen", model: Some(path.to_path_buf()), grip: None }, enough)?;
         if worst > enough {
             best = Chosen { share, worst };
         }
     }
     write_scaled(&text, model, path, best.share)?;
     Ok(best)
+}
+
+/// The task in which the gain is raised.
+pub struct Task<'a> {
+    /// Its graph file.
+    pub graph: &'a Path,
+    /// Corner of the canceller's high-pass, Hz.
+    pub high_pass_hz: f64,
 }
 
 /// The model file with every output's gain scaled.

@@ -56,8 +56,8 @@ pub fn page(options: &cli::Prove, cases: &[Case]) -> Page {
          The diagnosis is a process of its own that gets the nominal model and the bags. The stable gain is that of the contact script {}, searched up \
          to 50 in steps that end at 3 %, the canceller behind a high-pass of {} Hz; \"linear, refitted\" is the nominal model with its numbers fitted to \
          the session, \"second order\" one mass on a spring and a damper fitted to the recordings in which the hand holds still, \"chosen\" the diagnosed \
-         model with that share of its estimate whose worst stable gain over grips 20 % softer to 20 % firmer is best when the diagnosed model itself is \
-         the master.",
+         model with that share of its estimate whose worst stable gain over grips 20 % softer to 20 % firmer is best when the diagnosed model itself, or \
+         one of its rivals that explain the recordings nearly as well, is the master.",
         options.seed,
         options.contact.display(),
         options.high_pass
