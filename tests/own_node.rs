@@ -14,7 +14,7 @@ fn own_master() -> &'static Path {
     BUILT.get_or_init(|| {
         let beside = Path::new(BACKDRIVE).parent().unwrap();
         let mut build = Command::new(env!("CARGO"));
-        build.args(["build", "--quiet", "--example", "own_master"]).args(beside.ends_with("release").then_some("--release"));
+        build.args(["build", "--quiet", "--workspace", "--example", "own_master"]).args(beside.ends_with("release").then_some("--release"));
         build.env("CARGO_TARGET_DIR", beside.parent().unwrap()).current_dir(ROOT);
         assert!(build.status().unwrap().success());
         beside.join("examples/own_master")
