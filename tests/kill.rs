@@ -160,7 +160,10 @@ fn operator() {
     let rows = samples(&killed.bag, "/master/measured_js");
     let (last, end) = (last_step(&killed.bag, "/operator/setpoint_js", |_| true), rows.last().unwrap());
     assert!(end.step > last + 300 && end.effort[0] < -0.3 && end.flags & flag::STALE == 0, "{last} {end:?}");
-    assert!(events(&killed.bag, "slave").iter().all(|(_, kind, _)| kind != "slave_holds"));
+    // A machine that stalls may make the slave hold for a moment; it follows again.
+    let told = events(&killed.bag, "slave");
+    let last = told.iter().rev().find(|(_, kind, _)| kind == "slave_holds" || kind == "slave_follows");
+    assert!(last.is_none_or(|(_, kind, _)| kind == "slave_follows"), "{told:?}");
 }
 
 /// Time from the last sample in a bag, once recovered, to a moment, s.
