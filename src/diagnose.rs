@@ -4,6 +4,7 @@ use crate::cli;
 use crate::diagnose_page::{Shown, page};
 use crate::diagnose_text::text;
 use crate::failure::{Failure, code};
+use crate::interrupt;
 use crate::progress;
 use crate::recordings::{self, Opened};
 use backdrive_diagnosis::audit::{self, Remark};
@@ -16,7 +17,6 @@ use backdrive_diagnosis::search::{Search, Settings, search};
 use backdrive_diagnosis::verdict::{EXPERIMENT_FILE, Verdict, rival_file, verdict};
 use serde_json::{Value, json};
 use std::path::Path;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
@@ -46,15 +46,7 @@ pub struct Found {
 /// Diagnoses, writes, and says what was found.
 pub fn diagnose(options: &cli::Diagnose) -> Result<u8, Failure> {
     let began = Instant::now();
-    let stop = Arc::new(AtomicBool::new(false));
-    let heard = stop.clone();
-    // A second Ctrl-C ends at once.
-    let handler = move || {
-        if heard.swap(true, Ordering::SeqCst) {
-            std::process::exit(i32::from(code::INTERRUPTED))
-        }
-    };
-    ctrlc::set_handler(handler).map_err(Failure::machine)?;
+    let stop = interrupt::heard()?;
 
     let opened = recordings::open(&options.set, options.model.as_deref(), options.grip.as_deref())?;
     for note in &opened.notes {

@@ -2,6 +2,7 @@
 
 use crate::cli;
 use crate::failure::{Failure, code};
+use crate::interrupt;
 use crate::progress;
 use crate::recordings::{self, file_name};
 use backdrive_diagnosis::clock::Moment;
@@ -15,7 +16,6 @@ use backdrive_diagnosis::search::{Search, Settings, search};
 use backdrive_report::{number, percent};
 use serde_json::json;
 use std::fmt::Write as _;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
@@ -34,15 +34,7 @@ struct Fitted {
 
 /// Fits, writes, and says how sure the numbers are.
 pub fn fit(options: &cli::Fit) -> Result<u8, Failure> {
-    let stop = Arc::new(AtomicBool::new(false));
-    let heard = stop.clone();
-    // A second Ctrl-C ends at once.
-    let handler = move || {
-        if heard.swap(true, Ordering::SeqCst) {
-            std::process::exit(i32::from(code::INTERRUPTED))
-        }
-    };
-    ctrlc::set_handler(handler).map_err(Failure::machine)?;
+    let stop = interrupt::heard()?;
     let opened = recordings::open(&options.set, Some(&options.model), options.grip.as_deref())?;
     for note in &opened.notes {
         eprintln!("note: {note}");

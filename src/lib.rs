@@ -9,6 +9,7 @@ mod experiments;
 pub mod failure;
 mod fit;
 mod graph;
+mod interrupt;
 mod model;
 mod node;
 mod play;

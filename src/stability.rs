@@ -2,6 +2,7 @@
 
 use crate::cli;
 use crate::failure::{Failure, code};
+use crate::interrupt;
 use crate::progress;
 use crate::summary::graph_of;
 use backdrive_bags::Reader;
@@ -18,7 +19,6 @@ use backdrive_stability::session::Session;
 use backdrive_stability::verdict::{Answer, AnswerError, Question, Swapped, Word, answer};
 use serde_json::{Value, json};
 use std::fmt::Write as _;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// One gain of a sweep.
@@ -26,15 +26,7 @@ pub type Point = (f64, Run);
 
 /// Answers.
 pub fn stability(options: &cli::Stability) -> Result<u8, Failure> {
-    let cancel = Arc::new(AtomicBool::new(false));
-    let heard = cancel.clone();
-    // A second Ctrl-C ends at once.
-    let handler = move || {
-        if heard.swap(true, Ordering::SeqCst) {
-            std::process::exit(i32::from(code::INTERRUPTED))
-        }
-    };
-    ctrlc::set_handler(handler).map_err(Failure::machine)?;
+    let cancel = interrupt::heard()?;
 
     let loaded = Loaded::read(options)?;
     let question = loaded.question(options)?;

@@ -316,7 +316,11 @@ fn ours(folder: &Path, name: &str, arguments: &[&dyn AsRef<std::ffi::OsStr>]) ->
     // 1 is a negative answer, which is one.
     match status.code() {
         Some(0 | 1 | 7) => Ok(()),
-        _ => Err(Failure::input(format!("{name} ended with {status}; {} says why", log.display()))),
+        _ => {
+            let said = std::fs::read_to_string(&log).unwrap_or_default();
+            let why = said.lines().rev().find_map(|line| line.strip_prefix("error: ")).unwrap_or("its output says why");
+            Err(Failure::input(format!("{name} ended with {status}: {why} ({})", log.display())))
+        }
     }
 }
 

@@ -11,11 +11,11 @@ mod summary;
 
 use crate::cli;
 use crate::failure::{Failure, code};
+use crate::interrupt;
 use case::{Case, Draw};
 use std::path::Path;
 use std::process::ExitCode;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::Ordering;
 use summary::Summary;
 
 /// Every fifth of several cases hides nothing.
@@ -23,15 +23,7 @@ const NULLS: usize = 5;
 
 /// Proves as many cases as are asked for.
 pub fn prove(options: &cli::Prove) -> Result<u8, Failure> {
-    let stop = Arc::new(AtomicBool::new(false));
-    let heard = stop.clone();
-    // A second Ctrl-C ends at once.
-    let handler = move || {
-        if heard.swap(true, Ordering::SeqCst) {
-            std::process::exit(i32::from(code::INTERRUPTED))
-        }
-    };
-    ctrlc::set_handler(handler).map_err(Failure::machine)?;
+    let stop = interrupt::heard()?;
     let mut cases = Vec::new();
     for index in 0..options.cases {
         let several = options.cases > 1;

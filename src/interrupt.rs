@@ -1,0 +1,18 @@
+//! Ctrl-C in long work: the first ends it with what is done, a second one at once.
+
+use crate::failure::{Failure, code};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Becomes true with the first Ctrl-C. To be asked for once in a process.
+pub fn heard() -> Result<Arc<AtomicBool>, Failure> {
+    let stop = Arc::new(AtomicBool::new(false));
+    let heard = stop.clone();
+    let handler = move || {
+        if heard.swap(true, Ordering::SeqCst) {
+            std::process::exit(i32::from(code::INTERRUPTED))
+        }
+    };
+    ctrlc::set_handler(handler).map_err(Failure::machine)?;
+    Ok(stop)
+}
