@@ -1,5 +1,6 @@
 //! A simulated device: a model with what is attached to it, stepped at the graph's rate, seen through its axes.
 
+use crate::observer::DesignError;
 use backdrive_msgs::MAX_AXES;
 use backdrive_plant::model::{Axis, Fragment, InputKind, Model};
 use backdrive_plant::stepper::{CompileError, Options, Plant, Segment};
@@ -21,6 +22,9 @@ pub enum DeviceError {
         /// The input.
         input: String,
     },
+    /// What a node's controller knows or needs is not there.
+    #[error(transparent)]
+    Controller(#[from] crate::controller::ControllerError),
     /// A force input is needed and a motion input is there, or the other way round.
     #[error("model \"{model}\", axis \"{axis}\": as a {role} its feedback must be a {needed} input")]
     WrongFeedback {
@@ -33,6 +37,19 @@ pub enum DeviceError {
         /// `force` or `motion`.
         needed: &'static str,
     },
+    /// An input or output that a shaft needs.
+    #[error(
+        "model \"{model}\" has no input or output \"{signal}\"; a shaft has the torques engine_torque and dyno_torque as inputs, and engine_speed, dyno_speed and shaft_torque as outputs"
+    )]
+    NoSignal {
+        /// The model.
+        model: String,
+        /// What is not there.
+        signal: String,
+    },
+    /// The gains of an observer cannot be found.
+    #[error("model \"{0}\": {1}")]
+    Observer(String, DesignError),
     /// The network cannot be stepped.
     #[error("model \"{0}\": {1}")]
     Compile(String, CompileError),
@@ -67,7 +84,7 @@ pub struct Device {
 pub enum Role {
     /// Its feedback is a force.
     Master,
-    /// Its feedback is a commanded motion.
+    /// Its feedback is a commanded motion, or a force that a controller commands; of all its axes the same.
     Slave,
 }
 
@@ -104,7 +121,10 @@ impl Device {
             let kind = model.inputs[axis.feedback].kind;
             let (role_name, needed, fits) = match role {
                 Role::Master => ("master", "force", kind == InputKind::Force),
-                Role::Slave => ("slave", "motion", kind == InputKind::Motion),
+                Role::Slave => match model.inputs[model.axes[0].feedback].kind {
+                    InputKind::Motion => ("slave that follows commands", "motion", kind == InputKind::Motion),
+                    InputKind::Force => ("slave that is driven by forces", "force", kind == InputKind::Force),
+                },
             };
             if !fits {
                 return Err(DeviceError::WrongFeedback { model: name, axis: axis.name.clone(), role: role_name, needed });
@@ -116,6 +136,10 @@ impl Device {
             if !axes.iter().any(|a| a.feedback == index || a.hand == Some(index)) {
                 return Err(DeviceError::UndrivenInput { model: name, input: input.name.clone() });
             }
+        }
+        // A negative delay says by how much the recordings had a motion too late; in a loop a motion is known when it happens.
+        for input in model.inputs.iter_mut().filter(|i| i.kind == InputKind::Motion) {
+            input.delay = input.delay.max(0.0);
         }
         let options = Options { substeps: options.substeps, add_noise: options.noise_seed, quantise: options.quantise };
         let plant = Plant::new(&model, period_s, &options).map_err(|e| DeviceError::Compile(name, e))?;
@@ -139,6 +163,11 @@ impl Device {
     /// Counts energies from the next start on: [`Plant::track_energy`].
     pub fn track_energy(&mut self) {
         self.plant.track_energy();
+    }
+
+    /// Whether its feedback is a force.
+    pub fn is_driven_by_force(&self) -> bool {
+        self.axes.first().is_some_and(|axis| self.model.inputs[axis.feedback].kind == InputKind::Force)
     }
 
     /// Number of axes.

@@ -1,17 +1,22 @@
-//! The slave with its environment as a node: its servo follows the command, what it touches pushes back.
+//! The slave with its environment as a node: its servo follows the command, or a controller's force drives it; what it touches pushes back.
 
 use crate::core::{Core, Events, Port, Tick};
 use crate::device::Device;
 use crate::freshness::Freshness;
+use crate::motor::Motor;
 use backdrive_msgs::{MAX_AXES, Sample, flag};
 
-/// Input `command` (position); output `measured` (position and velocity of the tip, effort = force of the environment
-/// on the tip, negative when it pushes against +x).
+/// Inputs `command` (position) or `force` (effort on the motor), as the model's feedback is a motion or a force; output `measured`
+/// (position and velocity of the tip, effort = force of the environment on the tip, negative when it pushes against +x).
 ///
-/// Without a new command it holds the last one. The command is cut to the device's travel and speed.
+/// Without a new command it holds the last one. The command is cut to the device's travel and speed. A force is that of the motor: at step k
+/// the plant is first carried from k-1 to k under the force of step k-1, then measured, so that topics are a recording as model files
+/// mean it; without a new force the last one is taken away as [`crate::master::Master`] does.
 pub struct Slave {
     device: Device,
     command: Freshness,
+    /// Where a force drives it.
+    motor: Option<Motor>,
     target: [f64; MAX_AXES],
     stale_steps: u64,
     started: bool,
@@ -23,6 +28,7 @@ impl Slave {
     /// A slave that says that it holds when no command has come for `stale_after_s`.
     pub fn new(device: Device, stale_after_s: f64, period_s: f64) -> Slave {
         Slave {
+            motor: device.is_driven_by_force().then(|| Motor::new(stale_after_s, period_s)),
             device,
             command: Freshness::default(),
             target: [0.0; MAX_AXES],
@@ -33,18 +39,25 @@ impl Slave {
         }
     }
 
-    /// The device inside.
-    pub fn device(&self) -> &Device {
-        &self.device
+    /// Carries the device under the force of the step before, then hears the new one.
+    fn drive(&mut self, tick: &Tick, force: &Port, events: &mut Events) -> u32 {
+        let axes = self.device.axes();
+        let Some(motor) = &mut self.motor else { return 0 };
+        if self.started {
+            self.device.step(&motor.applied()[..axes], &[]);
+        } else {
+            self.device.start(&[], &[]);
+            self.started = true;
+        }
+        motor.step(force, tick.period_s, events, |axis| self.device.axis(axis), axes)
     }
-}
 
-impl Core for Slave {
-    fn step(&mut self, tick: &Tick, inputs: &[Port], outputs: &mut [Sample], events: &mut Events) {
+    /// Carries the device along the command.
+    fn follow(&mut self, tick: &Tick, command: &Port, events: &mut Events) -> u32 {
         let axes = self.device.axes();
         let mut flags = 0;
         let begun = self.command.begun();
-        if let Some(command) = self.command.new_sample(&inputs[0], |s| s.position[0]) {
+        if let Some(command) = self.command.new_sample(command, |s| s.position[0]) {
             for axis in 0..axes {
                 let wanted = command.position[axis];
                 if !wanted.is_finite() {
@@ -73,13 +86,29 @@ impl Core for Slave {
         if holding {
             flags |= flag::STALE;
         }
-
         if self.started {
             self.device.step(&self.target[..axes], &[]);
         } else {
             self.device.start(&self.target[..axes], &[]);
             self.started = true;
         }
+        flags
+    }
+
+    /// The device inside.
+    pub fn device(&self) -> &Device {
+        &self.device
+    }
+}
+
+impl Core for Slave {
+    fn step(&mut self, tick: &Tick, inputs: &[Port], outputs: &mut [Sample], events: &mut Events) {
+        let axes = self.device.axes();
+        let flags = match (self.motor.is_some(), inputs) {
+            (false, [command, ..]) => self.follow(tick, command, events),
+            (true, [_, force, ..]) => self.drive(tick, force, events),
+            _ => 0,
+        };
         let finite = self.device.is_finite();
         if !finite && self.was_finite {
             events.push("state_not_finite", tick.time_s, 2);

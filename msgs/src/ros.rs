@@ -7,6 +7,7 @@
 //!
 //! Every payload is a 4-byte encapsulation header, `00 01 00 00`, and little-endian CDR.
 
+pub mod live;
 mod twins;
 
 use crate::topic::Kind;
@@ -106,22 +107,25 @@ pub fn encode(message: &Message, axis_names: &[String], payload: &mut Vec<u8>) -
 ///
 /// Errors: a wrong encapsulation header, CDR that ends early, a JointState that is not ours.
 pub fn decode(kind: Kind, payload: &[u8]) -> Result<Message, RosError> {
-    let little_endian = match payload {
-        [0, 1, _, _, ..] => true,
-        [0, 0, _, _, ..] => false,
-        _ => return Err(RosError::Encapsulation { found: payload.iter().take(4).copied().collect() }),
-    };
-    let cdr = &payload[ENCAPSULATION.len()..];
-    fn read<'a, T: serde::Deserialize<'a>>(kind: Kind, cdr: &'a [u8], little_endian: bool) -> Result<T, RosError> {
-        let result =
-            if little_endian { cdr_encoding::from_bytes::<T, LittleEndian>(cdr) } else { cdr_encoding::from_bytes::<T, BigEndian>(cdr) };
-        result.map(|(value, _)| value).map_err(|source| RosError::Cdr { type_name: schema(kind).0, source })
-    }
     Ok(match kind {
-        Kind::Sample => Message::Sample(Sample::try_from(read::<JointStateIn>(kind, cdr, little_endian)?)?),
-        Kind::Gains => Message::Gains(read::<GainsTwin>(kind, cdr, little_endian)?.into()),
-        Kind::Event => Message::Event(read::<EventTwin>(kind, cdr, little_endian)?.into()),
-        Kind::Status => Message::Status(read::<StatusTwin>(kind, cdr, little_endian)?.into()),
-        Kind::Margin => Message::Margin(read::<MarginTwin>(kind, cdr, little_endian)?.into()),
+        Kind::Sample => Message::Sample(Sample::try_from(read::<JointStateIn>(schema(kind).0, payload)?)?),
+        Kind::Gains => Message::Gains(read::<GainsTwin>(schema(kind).0, payload)?.into()),
+        Kind::Event => Message::Event(read::<EventTwin>(schema(kind).0, payload)?.into()),
+        Kind::Status => Message::Status(read::<StatusTwin>(schema(kind).0, payload)?.into()),
+        Kind::Margin => Message::Margin(read::<MarginTwin>(schema(kind).0, payload)?.into()),
     })
+}
+
+/// Reads the CDR of a payload, in either byte order.
+fn read<'a, T: serde::Deserialize<'a>>(type_name: &'static str, payload: &'a [u8]) -> Result<T, RosError> {
+    match payload {
+        [0, order @ (0 | 1), _, _, cdr @ ..] => read_cdr(type_name, *order == 1, cdr),
+        _ => Err(RosError::Encapsulation { found: payload.iter().take(4).copied().collect() }),
+    }
+}
+
+fn read_cdr<'a, T: serde::Deserialize<'a>>(type_name: &'static str, little_endian: bool, cdr: &'a [u8]) -> Result<T, RosError> {
+    let result =
+        if little_endian { cdr_encoding::from_bytes::<T, LittleEndian>(cdr) } else { cdr_encoding::from_bytes::<T, BigEndian>(cdr) };
+    result.map(|(value, _)| value).map_err(|source| RosError::Cdr { type_name, source })
 }

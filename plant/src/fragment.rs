@@ -2,6 +2,30 @@
 
 use crate::model::{Fragment, Hold, Input, InputKind, Model, Output, OutputKind, Place};
 
+impl Fragment {
+    /// The fragment by itself, its port moved from outside: input `displacement` (m or rad, hold cubic), and output `force` (N or N m), what it
+    /// takes to move the port. Both come before the fragment's own.
+    pub fn driven(&self) -> Model {
+        let mut model = self.network.clone();
+        let (name, gain, delay) = ("displacement".to_string(), 1.0, 0.0);
+        let input = Input {
+            name,
+            kind: InputKind::Motion,
+            on: 0,
+            hold: Hold::Cubic,
+            gain,
+            saturation: f64::INFINITY,
+            delay,
+            bandwidth: f64::INFINITY,
+            back_emf: 0.0,
+        };
+        let kind = OutputKind::Reaction(0);
+        model.inputs.insert(0, input);
+        model.outputs.insert(0, Output { name: "force".to_string(), kind, gain, delay, offset: 0.0, resolution: 0.0, noise: 0.0 });
+        model
+    }
+}
+
 /// What [`Model::attach`] added, as indices into the model it was added to.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Attached {

@@ -3,6 +3,7 @@
 //! A [`model::Model`] is what a model file says. It compiles to a stepper, is linearised, is driven
 //! by a recording or an excitation, and takes fragments (a grip, an environment) at a port.
 
+pub mod correlation;
 pub mod describe;
 pub mod elements;
 pub mod excitation;
@@ -11,6 +12,7 @@ pub mod isolate;
 pub mod linear;
 pub mod model;
 pub mod parse;
+pub mod preisach;
 pub mod recording;
 pub mod set;
 pub mod stepper;

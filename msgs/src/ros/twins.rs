@@ -14,14 +14,14 @@ const NS_PER_S: i64 = 1_000_000_000;
 
 /// `builtin_interfaces/Time`.
 #[derive(Serialize, Deserialize, Clone, Copy)]
-struct Time {
+pub(super) struct Time {
     sec: i32,
     nanosec: u32,
 }
 
 impl Time {
     /// The nearest time that fits: whole seconds are 32 bits wide.
-    fn from_ns(ns: i64) -> Time {
+    pub(super) fn from_ns(ns: i64) -> Time {
         let sec = ns.div_euclid(NS_PER_S);
         match i32::try_from(sec) {
             Ok(sec) => Time { sec, nanosec: ns.rem_euclid(NS_PER_S) as u32 },
@@ -30,13 +30,13 @@ impl Time {
         }
     }
 
-    fn to_ns(self) -> i64 {
+    pub(super) fn to_ns(self) -> i64 {
         i64::from(self.sec) * NS_PER_S + i64::from(self.nanosec)
     }
 }
 
 /// A NaN has many bit patterns; a bag holds one of them.
-fn canonical(value: f64) -> f64 {
+pub(super) fn canonical(value: f64) -> f64 {
     if value.is_nan() { NOT_MEASURED } else { value }
 }
 

@@ -49,7 +49,7 @@ impl Lugre {
 
     /// Steady friction level g at speed `v`, N.
     #[inline]
-    fn level(&self, v: f64) -> f64 {
+    pub fn level(&self, v: f64) -> f64 {
         let ratio = v / self.velocity;
         self.coulomb + (self.at_rest - self.coulomb) * (-ratio * ratio).exp()
     }

@@ -72,7 +72,7 @@ pub struct Parameter {
     pub unit: &'static str,
     /// What it may be.
     pub range: Range,
-    /// Its value where the file has none; `None` when the file must have it.
+    /// Its value where the file has none; `None` when the file must have it. Of a list that a file may leave out any number: it is then empty.
     pub default: Option<f64>,
     /// Whether it is a list of numbers.
     pub list: bool,
@@ -94,6 +94,13 @@ impl Parameter {
     /// The same, with a value for files that have none.
     const fn or(self, default: f64) -> Parameter {
         Parameter { key: self.key, unit: self.unit, range: self.range, default: Some(default), list: self.list, doc: self.doc }
+    }
+}
+
+impl Parameter {
+    /// Its values where a file has none, as [`Kind::build`] takes them; `None` when the file must have them.
+    pub fn default_values(&self) -> Option<Vec<f64>> {
+        self.default.map(|value| if self.list { Vec::new() } else { vec![value] })
     }
 }
 
@@ -124,8 +131,6 @@ pub enum Role {
     Friction(FrictionLevels),
     /// A force that depends on `x`, `v` and a memory of the path: [`Mechanics::advance`] and [`Mechanics::force`].
     Path,
-    /// This version cannot simulate it.
-    Unavailable,
 }
 
 /// Coefficients of a linear element.
@@ -278,7 +283,12 @@ mod tests {
     fn names_are_unique_and_values_round_trip() {
         for (i, kind) in KINDS.iter().enumerate() {
             assert!(KINDS[..i].iter().all(|other| other.name != kind.name), "{}", kind.name);
-            let values: Vec<Vec<f64>> = kind.parameters.iter().map(|p| if p.list { vec![1.0, 1.0] } else { vec![1.0] }).collect();
+            let one = |p: &Parameter| match (p.list, p.default) {
+                (true, Some(_)) => vec![],
+                (true, None) => vec![1.0, 1.0],
+                (false, _) => vec![1.0],
+            };
+            let values: Vec<Vec<f64>> = kind.parameters.iter().map(one).collect();
             if let Ok(law) = (kind.build)(&values) {
                 assert_eq!(law.values(), values, "{}", kind.name);
                 assert_eq!(law.kind().name, kind.name);
@@ -305,7 +315,7 @@ mod tests {
     #[test]
     fn at_rest_only_a_bias_or_a_phase_pushes() {
         for kind in KINDS {
-            let values: Vec<Vec<f64>> = kind.parameters.iter().map(|p| vec![p.default.unwrap_or(1.0)]).collect();
+            let values: Vec<Vec<f64>> = kind.parameters.iter().map(|p| p.default_values().unwrap_or(vec![1.0])).collect();
             let Ok(law) = (kind.build)(&values) else { continue };
             if law.role() == Role::Path && kind.name != "cogging" && kind.name != "bias" {
                 assert_eq!(law.force(&vec![0.0; law.memory_len()], 0.0, 0.0), 0.0, "{}", kind.name);

@@ -22,7 +22,6 @@ pub(super) fn coefficients(law: &Law, x0: f64, at: &Operating) -> Linear {
             Friction::Viscous => Linear { damping: viscous_equivalent(&levels, at), ..Linear::default() },
         },
         Role::Path => path(law, x0, at),
-        Role::Unavailable => Linear::default(),
     }
 }
 

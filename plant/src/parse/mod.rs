@@ -212,9 +212,9 @@ fn read_law(table: &mut Table, kind: &Kind, folder: Option<&Path>) -> Result<Law
             (true, false) => table.numbers(p.key, p.range)?,
             (false, _) => table.number(p.key, p.range)?.map(|value| vec![value]),
         };
-        let value = match (found, p.default) {
+        let value = match (found, p.default_values()) {
             (Some(value), _) => value,
-            (None, Some(default)) => vec![default],
+            (None, Some(default)) => default,
             (None, None) => {
                 let mut error = table.missing(p.key);
                 // A misspelt key needs no explanation, a forgotten one does.

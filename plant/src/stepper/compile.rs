@@ -109,9 +109,6 @@ fn check(model: &Model) -> Result<(), CompileError> {
             return Err(CompileError::Dangling(format!("element `{}`", element.name)));
         }
         let kind = element.law.kind();
-        if element.law.role() == Role::Unavailable {
-            return Err(CompileError::NotAvailable { element: element.name.clone(), kind: kind.name });
-        }
         let values = element.law.values();
         for (parameter, list) in kind.parameters.iter().zip(&values) {
             for value in list {
@@ -301,7 +298,7 @@ pub(super) fn plant(model: &Model, period: f64, options: &Options) -> Result<Pla
                 frictions.push(FrictionContact { first, second, levels, mode: 0, force: 0.0, velocity_before: 0.0 });
                 Share::Friction(frictions.len() - 1)
             }
-            Role::Path | Role::Unavailable => {
+            Role::Path => {
                 paths.push(path_element(first, second, &element.law));
                 Share::Path(paths.len() - 1)
             }

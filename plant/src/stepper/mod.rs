@@ -134,14 +134,6 @@ pub enum CompileError {
         /// One sentence.
         reason: String,
     },
-    /// The kind is announced only.
-    #[error("element `{element}`: kind {kind} is not available yet in this version")]
-    NotAvailable {
-        /// The element.
-        element: String,
-        /// Its kind.
-        kind: &'static str,
-    },
     /// A place, an element or an input that the model does not have.
     #[error("{0} names something that the model does not have")]
     Dangling(String),
