@@ -2,19 +2,21 @@
 //!
 //! [`Recorder`] writes one while a graph runs, on a thread of its own; [`Reader`] reads one, whoever
 //! wrote it and however it ended. Around them: [`info()`] sums a bag up, [`recover()`] saves what a killed
-//! recorder left behind, [`diff()`] compares two bags, [`signals()`] picks the columns of a recording,
+//! recorder left behind, [`diff()`] compares two bags, [`merge()`] joins those of several hosts, [`signals()`] picks the columns of a recording,
 //! [`export_csv`] and [`import_csv`] cross over to tables, and [`play()`] sends a bag's messages again.
 //!
 //! Payloads are CDR with ros2msg schemas whatever the live transport was; the graph, the models and a
 //! verdict on completeness are in the file.
 
 mod cdr;
+mod clock_offset;
 mod completeness;
 mod diff;
 mod error;
 mod framing;
 mod header;
 mod info;
+mod merge;
 mod order;
 mod play;
 mod reader;
@@ -26,11 +28,13 @@ mod without;
 mod writer;
 
 pub use cdr::{FieldPath, Schema};
+pub use clock_offset::{CLOCK_OFFSET, ClockOffset};
 pub use completeness::{Completeness, TopicCompleteness};
 pub use diff::{DiffOptions, DiffReport, Divergence, TopicDiff, diff};
 pub use error::BagError;
 pub use header::{BagHeader, Clock, TopicInfo};
 pub use info::{BagInfo, TopicSummary, info};
+pub use merge::{MergeReport, merge};
 pub use play::{PlayOptions, PlayReport, Sink, play};
 pub use reader::{Entry, Messages, Reader, TopicRef};
 pub use recorder::{Health, Recorder, RecorderOptions, WhenFull};

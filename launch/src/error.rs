@@ -74,6 +74,12 @@ pub enum LaunchError {
         /// Exit code that it asks for.
         code: u8,
     },
+    /// The other hosts of a run cannot be looked for.
+    #[error("cannot look for the other hosts: {reason}")]
+    Network {
+        /// What the network says.
+        reason: String,
+    },
     /// Stopped before the run began.
     #[error("stopped by {by} before the run began")]
     Stopped {

@@ -1,17 +1,16 @@
 //! How a process becomes a node of a running graph: ours and a user's own alike.
 
+use crate::place::{Place, Wire};
 use crate::rundir::RunPaths;
 use backdrive_bags::{BagHeader, Recorder, RecorderOptions, TopicInfo};
 use backdrive_control::core::Core;
-use backdrive_msgs::topic::{Kind, Topic};
-use backdrive_nodes::build::{self, credit_listeners, topics};
+use backdrive_nodes::build::{self, GraphTopic, credit_listeners, listeners_on, topics};
 use backdrive_nodes::graph::{Files, Graph, Node, NodeKind, Overrides};
 use backdrive_nodes::process::{ProcessOptions, run_process};
 use backdrive_nodes::protocol::FromNode;
 use backdrive_nodes::realtime;
 use backdrive_nodes::recorder::{RecorderPlan, run_recorder};
 use backdrive_nodes::stage::Clock;
-use backdrive_nodes::transport::iceoryx2::Iceoryx2;
 use std::collections::BTreeMap;
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
@@ -20,6 +19,9 @@ use std::process::ExitCode;
 /// Below the nodes of the loop, so that it takes nothing from them; above everything else on the machine, so that nothing
 /// else keeps it from taking samples over in time.
 const RECORDER_PRIORITY: i32 = 40;
+
+/// Just below the loop, which must not wait for it, and which it wakes.
+const MIDDLEWARE_PRIORITY: i32 = 49;
 
 /// Joins a run as a node of the user's own, with the arguments that the supervisor gives (`--run DIR --name NAME`),
 /// and runs it to its end. `cores` gets the graph and the node and brings one core per stage of the node's kind.
@@ -50,13 +52,23 @@ where
         Ok(paths) => paths,
         Err(e) => return fail(e.to_string(), 5),
     };
+    let place = match Place::read(&paths) {
+        Ok(place) => place,
+        Err(e) => return fail(e, 5),
+    };
     let graph = match read_graph(&paths) {
+        // Started without a host, all of it runs on this one.
+        Ok(graph) if place.host.is_none() => graph.on_one_host(),
         Ok(graph) => graph,
         Err(e) => return fail(e, 3),
     };
     let Some(node) = graph.node(name) else { return fail(format!("the graph has no node \"{name}\""), 3) };
-    let transport = match Iceoryx2::open(&paths.location(), name) {
-        Ok(transport) => Box::new(transport),
+    if graph.timing.clock == Clock::Realtime && place.wire == Wire::Ros2 {
+        // Before the middleware's threads are made, which inherit it. What is refused here the node says later.
+        let _ = realtime::enter(&realtime::Options { priority: Some(MIDDLEWARE_PRIORITY), ..realtime::Options::default() });
+    }
+    let transport = match place.join(&paths, &graph, name) {
+        Ok(transport) => transport,
         Err(e) => return fail(e.to_string(), 5),
     };
     if node.kind == NodeKind::Recorder {
@@ -65,8 +77,8 @@ where
             // too, and they say so.
             let _ = realtime::enter(&realtime::Options { priority: Some(RECORDER_PRIORITY), ..realtime::Options::default() });
         }
-        let (plan, header) = recording(&graph, name);
-        let path = graph.bag.clone().unwrap_or_else(|| PathBuf::from("run.mcap"));
+        let (plan, header) = recording(&graph, name, place.host.as_deref());
+        let path = graph.bag_of(place.host.as_deref()).unwrap_or_else(|| PathBuf::from("run.mcap"));
         return match Recorder::create(&path, &header, &recorder_options(&graph)) {
             Ok(recorder) => run_recorder(&plan, &graph.timing, transport, Box::new(recorder)),
             Err(e) => fail(e.to_string(), 5),
@@ -77,22 +89,35 @@ where
         Err(e) => return fail(e, 3),
     };
     let mut options = ProcessOptions::default();
-    options.run.listeners = topics(&graph).into_iter().map(|t| (t.topic.name, t.listeners)).collect();
+    let expected = |t: GraphTopic| {
+        let listeners = match (&place.host, place.wire) {
+            // In shared memory the bridge listens for all that are elsewhere.
+            (Some(host), Wire::Iceoryx2) => {
+                let here = listeners_on(&graph, &t.topic, host);
+                here + usize::from(here < t.listeners)
+            }
+            _ => t.listeners,
+        };
+        (t.topic.name, listeners)
+    };
+    options.run.listeners = topics(&graph).into_iter().map(expected).collect();
     run_process(plan, &graph.timing, transport, options)
 }
 
 /// The graph of a run as its processes read it: the resolved text, and the files as they were when the run began.
-fn read_graph(paths: &RunPaths) -> Result<Graph, String> {
+///
+/// # Errors
+/// It cannot be read, or no longer is a graph.
+pub fn read_graph(paths: &RunPaths) -> Result<Graph, String> {
     let path = paths.graph();
     let text = std::fs::read_to_string(&path).map_err(|e| format!("{}: cannot be read: {e}", path.display()))?;
     Graph::from_text(&text, &path, &Overrides::default(), &Files::Disk).map_err(|e| e.to_string())
 }
 
-/// What a recorder of this graph hears, and what its bag says of the run.
-pub fn recording(graph: &Graph, name: &str) -> (RecorderPlan, BagHeader) {
+/// What a recorder of this graph hears, on this of its hosts if it has some, and what its bag says of the run.
+pub fn recording(graph: &Graph, name: &str, host: Option<&str>) -> (RecorderPlan, BagHeader) {
     let topics = topics(graph);
-    let credit = (graph.timing.clock == Clock::Lockstep)
-        .then(|| (Topic { name: build::CREDIT_TOPIC.to_string(), kind: Kind::Sample }, credit_listeners(graph)));
+    let credit = (graph.timing.clock == Clock::Lockstep).then(|| (build::credit_topic(host), credit_listeners(graph)));
     let plan = RecorderPlan { name: name.to_string(), topics: topics.iter().map(|t| t.topic.clone()).collect(), credit };
     let header = BagHeader {
         title: graph.title.clone(),
@@ -105,7 +130,7 @@ pub fn recording(graph: &Graph, name: &str) -> (RecorderPlan, BagHeader) {
             Clock::Realtime => backdrive_bags::Clock::Realtime,
         },
         rate_hz: graph.timing.rate_hz,
-        host: host(),
+        host: host.map_or_else(self::host, str::to_string),
         topics: topics.into_iter().map(|t| TopicInfo { topic: t.topic, axes: t.axes, publisher: t.publisher }).collect(),
     };
     (plan, header)

@@ -5,6 +5,7 @@
 //! - [`rundir`]: the directory of a run; [`sweep`]: removing what dead runs have left
 //! - `child`: one process, heard and ended; `slot`: the place of a node in a run, over all its lives
 //! - [`mod@supervise`]: starting and ending a run; `watch`: what happens between
+//! - `hosts`: a run on several hosts starts together; [`place`]: where its nodes meet
 //! - [`status`], `screen`: what a person sees meanwhile
 //! - [`report`]: what is known afterwards
 //!
@@ -14,8 +15,10 @@
 
 mod child;
 mod error;
+mod hosts;
 pub mod join;
 mod pace;
+pub mod place;
 pub mod plan;
 pub mod report;
 pub mod rundir;
@@ -29,6 +32,8 @@ mod tell;
 mod watch;
 
 pub use error::LaunchError;
+pub use hosts::Begun;
+pub use place::{Place, Wire};
 pub use plan::{NodePlan, Plan};
 pub use report::{Cause, Death, NodeReport, RunEvent, RunReport};
 pub use rundir::{RunDir, RunHome, RunPaths};

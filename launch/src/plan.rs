@@ -1,6 +1,7 @@
 //! What the supervisor needs to know of a graph.
 
-use backdrive_nodes::graph::{Graph, NodeKind};
+use crate::place::Place;
+use backdrive_nodes::graph::{Graph, Node, NodeKind};
 use backdrive_nodes::stage::{Clock, Timing};
 use std::path::PathBuf;
 
@@ -17,6 +18,10 @@ pub struct Plan {
     pub bag: Option<PathBuf>,
     /// At least one.
     pub nodes: Vec<NodePlan>,
+    /// Where the nodes meet.
+    pub place: Place,
+    /// All hosts of the graph that have nodes, this one included; empty for a graph that runs on one host.
+    pub hosts: Vec<String>,
 }
 
 /// One process.
@@ -37,9 +42,10 @@ pub struct NodePlan {
 }
 
 impl Plan {
-    /// What the supervisor needs of this graph.
-    pub fn of(graph: &Graph) -> Plan {
-        let nodes = graph.nodes.iter().map(|n| NodePlan {
+    /// What the supervisor needs of this graph, on this host if it has several, and where its nodes meet.
+    pub fn of(graph: &Graph, place: &Place) -> Plan {
+        let here = |n: &&Node| place.host.as_deref().is_none_or(|host| graph.runs_on(n, host));
+        let nodes = graph.nodes.iter().filter(here).map(|n| NodePlan {
             name: n.name.clone(),
             kind: n.kind.name().to_string(),
             command: n.command.clone(),
@@ -51,9 +57,24 @@ impl Plan {
             title: graph.title.clone(),
             text: graph.text.clone(),
             timing: graph.timing.clone(),
-            bag: graph.bag.clone(),
+            bag: graph.bag_of(place.host.as_deref()),
             nodes: nodes.collect(),
+            place: place.clone(),
+            hosts: match &place.host {
+                None => Vec::new(),
+                Some(_) => {
+                    let busy = graph.hosts.iter().filter(|h| graph.nodes.iter().any(|n| graph.runs_on(n, &h.name)));
+                    busy.map(|h| h.name.clone()).collect()
+                }
+            },
         }
+    }
+
+    /// The same on every host that runs this graph with the same options, wherever its files lie.
+    pub(crate) fn fingerprint(&self) -> u64 {
+        let Timing { rate_hz, clock, steps, .. } = &self.timing;
+        let text = format!("{}|{rate_hz}|{clock:?}|{steps:?}|{}", self.title, self.hosts.join(","));
+        text.bytes().fold(0xcbf2_9ce4_8422_2325, |h, b| (h ^ u64::from(b)).wrapping_mul(0x0100_0000_01b3))
     }
 
     pub(crate) fn realtime(&self) -> bool {

@@ -3,6 +3,7 @@
 //! ```text
 //! <tmp>/backdrive-<uid>/<id>/
 //!     graph.toml         the graph as every process of the run reads it
+//!     place.json         where its nodes meet, if that is not shared memory alone
 //!     supervisor.lock    locked for as long as the supervisor lives
 //!     pids               who was started, for the case that the supervisor is killed
 //!     middleware/        the transport's files
@@ -26,6 +27,7 @@ use std::time::{SystemTime, UNIX_EPOCH};
 pub(crate) const LOCK: &str = "supervisor.lock";
 pub(crate) const PIDS: &str = "pids";
 const GRAPH: &str = "graph.toml";
+const PLACE: &str = "place.json";
 const MIDDLEWARE: &str = "middleware";
 
 /// A run gets its directory under this name and takes its lock before it gets the name that others look at.
@@ -189,6 +191,11 @@ impl RunPaths {
         self.root.join(GRAPH)
     }
 
+    /// Where its nodes meet, if that is not shared memory alone.
+    pub fn place(&self) -> PathBuf {
+        self.root.join(PLACE)
+    }
+
     /// What the names of the run's files in shared memory begin with.
     pub fn prefix(&self) -> String {
         prefix_of(&self.id)
@@ -213,6 +220,16 @@ impl RunDir {
     /// Where its things are.
     pub fn paths(&self) -> &RunPaths {
         &self.paths
+    }
+
+    /// Tells the processes of the run where they meet.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub(crate) fn tell_place(&self, place: &crate::place::Place) -> Result<(), LaunchError> {
+        let path = self.paths.place();
+        let text = serde_json::to_string(place).unwrap_or_default();
+        std::fs::write(&path, text).map_err(|e| failed(&path, "write it", e, "check that there is room and that you may write there"))
     }
 
     /// Notes a process of the run, so that it can be ended should it outlive the supervisor.

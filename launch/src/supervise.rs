@@ -1,6 +1,7 @@
 //! Starting and ending a run.
 
 use crate::error::LaunchError;
+use crate::place::Place;
 use crate::plan::Plan;
 use crate::report::RunReport;
 use crate::rundir::RunHome;
@@ -92,20 +93,20 @@ pub enum Command {
 ///
 /// # Errors
 /// The run cannot start. What goes wrong after the start is in the report.
-pub async fn supervise(graph: &Graph, options: SuperviseOptions) -> Result<RunReport, LaunchError> {
-    supervise_plan(Plan::of(graph), options).await
+pub async fn supervise(graph: &Graph, place: &Place, options: SuperviseOptions) -> Result<RunReport, LaunchError> {
+    supervise_plan(Plan::of(graph, place), options).await
 }
 
 /// [`supervise`] for a caller without an asynchronous runtime.
 ///
 /// # Errors
 /// The run cannot start. What goes wrong after the start is in the report.
-pub fn run(graph: &Graph, options: SuperviseOptions) -> Result<RunReport, LaunchError> {
+pub fn run(graph: &Graph, place: &Place, options: SuperviseOptions) -> Result<RunReport, LaunchError> {
     let runtime = tokio::runtime::Builder::new_current_thread()
         .enable_all()
         .build()
         .map_err(|e| LaunchError::Runtime { what: "processes", reason: e.to_string() })?;
-    runtime.block_on(supervise(graph, options))
+    runtime.block_on(supervise(graph, place, options))
 }
 
 /// Runs a graph to its end: makes the run directory, starts a process per node, waits until they have
@@ -145,6 +146,9 @@ pub async fn supervise_plan(mut plan: Plan, mut options: SuperviseOptions) -> Re
         screen.line(format!("warning: left by a dead run: {failure}"));
     }
     let directory = options.home.create(&plan.text, plan.nodes.len())?;
+    if plan.place != Place::default() {
+        directory.tell_place(&plan.place)?;
+    }
     let commands = options.commands.take();
     Supervisor::new(plan, options, directory, screen).run(signals, commands).await
 }

@@ -19,6 +19,9 @@ const UNBORN_FOR: Duration = Duration::from_secs(60);
 /// How long a process that has lost its supervisor may take to finish, such as a bag.
 const ORPHAN_GRACE: Duration = Duration::from_secs(2);
 
+/// Longest time to spend on looking which runs there are.
+const LOOK: Duration = Duration::from_secs(2);
+
 /// What a sweep did.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct Swept {
@@ -107,6 +110,18 @@ impl RunHome {
     /// What `backdrive clean` does: a sweep that takes its time.
     pub fn clean(&self) -> Swept {
         self.sweep(Duration::from_secs(60))
+    }
+
+    /// The runs that are dead and have left something.
+    pub fn dead(&self) -> Vec<String> {
+        self.find_dead(Instant::now() + LOOK, &mut Swept::default()).into_iter().map(|d| d.run.id).collect()
+    }
+
+    /// The runs that are alive.
+    pub fn alive(&self) -> Vec<String> {
+        let mut swept = Swept::default();
+        drop(self.find_dead(Instant::now() + LOOK, &mut swept));
+        swept.alive
     }
 
     fn find_dead(&self, deadline: Instant, swept: &mut Swept) -> Vec<Dead> {

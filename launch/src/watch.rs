@@ -2,6 +2,7 @@
 
 use crate::child::{Child, End, Heard, Notice, Spawn};
 use crate::error::LaunchError;
+use crate::hosts::{Begun, Hosts, There};
 use crate::plan::Plan;
 use crate::report::{Cause, Death, RunEvent, RunReport};
 use crate::rundir::RunDir;
@@ -76,6 +77,9 @@ pub(crate) struct Supervisor {
     unkillable: bool,
     /// (when, steps) of the last seconds.
     pub pace: VecDeque<(Instant, u64)>,
+    /// The other hosts of the run, if it has some, and who of them is missing.
+    hosts: Option<Hosts>,
+    absent: Vec<String>,
     notices: mpsc::Sender<Notice>,
     heard: Option<mpsc::Receiver<Notice>>,
 }
@@ -108,6 +112,8 @@ impl Supervisor {
             killed: Vec::new(),
             unkillable: false,
             pace: VecDeque::new(),
+            hosts: None,
+            absent: Vec::new(),
             notices,
             heard: Some(heard),
         }
@@ -115,7 +121,17 @@ impl Supervisor {
 
     /// The whole life of the run. Afterwards nothing of it is left.
     pub async fn run(mut self, mut signals: Signals, commands: Option<mpsc::Receiver<Command>>) -> Result<RunReport, LaunchError> {
+        match Hosts::begin(&self.plan) {
+            Ok(hosts) => self.hosts = hosts,
+            Err(e) => {
+                self.slots.iter_mut().for_each(|s| s.enter(Phase::Ended, Instant::now()));
+                self.give_up(e);
+            }
+        }
         for index in 0..self.slots.len() {
+            if self.error.is_some() {
+                break;
+            }
             if let Err(e) = self.spawn(index) {
                 self.slots[index].enter(Phase::Ended, Instant::now());
                 self.give_up(e);
@@ -263,11 +279,27 @@ impl Supervisor {
         if self.stopping || self.slots.iter().any(|s| s.phase != Phase::Ready) {
             return;
         }
-        let lead = START_LEAD[usize::from(self.plan.realtime())];
-        let read = |clock| clock_gettime(clock).map_or(Duration::ZERO, Duration::from).as_nanos() as i64;
-        let (monotonic, unix) = (read(ClockId::CLOCK_MONOTONIC), read(ClockId::CLOCK_REALTIME));
-        let lead_ns = lead.as_nanos() as i64;
-        let start = Start { at: now + lead, t0_ns: monotonic + lead_ns, unix_ns: unix + lead_ns };
+        if let Some(hosts) = &self.hosts {
+            // They settle together when to start.
+            return hosts.tell(|here| here.ready = true);
+        }
+        let lead_ns = START_LEAD[usize::from(self.plan.realtime())].as_nanos() as i64;
+        self.begin(Begun {
+            t0_ns: nanoseconds(ClockId::CLOCK_MONOTONIC) + lead_ns,
+            unix_ns: nanoseconds(ClockId::CLOCK_REALTIME) + lead_ns,
+        });
+    }
+
+    /// Step 0 is due then; in the past for a host that joins a run.
+    fn begin(&mut self, begun: Begun) {
+        if self.start.is_some() || self.stopping {
+            return;
+        }
+        let now = Instant::now();
+        let lead_ns = begun.t0_ns - nanoseconds(ClockId::CLOCK_MONOTONIC);
+        let lead = Duration::from_nanos(lead_ns.unsigned_abs());
+        let at = if lead_ns >= 0 { now + lead } else { now.checked_sub(lead).unwrap_or(now) };
+        let start = Start { at, t0_ns: begun.t0_ns, unix_ns: begun.unix_ns };
         self.start = Some(start);
         self.connected = Some(now);
         for slot in &mut self.slots {
@@ -277,6 +309,36 @@ impl Supervisor {
         }
         for index in 0..self.slots.len() {
             self.pass_gains(index);
+        }
+    }
+
+    /// What the other hosts say, and what this one says to them.
+    fn meet(&mut self) {
+        let Some(hosts) = &self.hosts else { return };
+        let lacks: Vec<String> = self.slots.iter().filter(|s| s.phase == Phase::Joining).map(Slot::lack).collect();
+        let begun = self.start.map(|s| Begun { t0_ns: s.t0_ns, unix_ns: s.unix_ns });
+        let leaving = self.stopping || self.finished.is_some();
+        hosts.tell(|here| {
+            here.missing = lacks;
+            here.begun = begun;
+            here.leaving |= leaving;
+        });
+        for there in hosts.hear() {
+            match there {
+                There::Start(begun) => self.begin(begun),
+                There::Missing(absent) => {
+                    if absent != self.absent && self.options.display != Display::Quiet {
+                        absent.iter().for_each(|line| self.screen.line(format!("waiting: {line}")));
+                    }
+                    self.absent = absent;
+                }
+                There::Event(severity, kind, text) => self.tell(severity, kind, text),
+                // In lockstep no step can be done without it; what is done already is no loss.
+                There::Left(host) if !self.plan.realtime() && self.finishing.is_none() && self.start.is_none() => {
+                    self.stop(Cause::Stopped { by: format!("host {host}") });
+                }
+                There::Left(_) => {}
+            }
         }
     }
 
@@ -467,8 +529,10 @@ impl Supervisor {
 
     /// Whatever is due.
     fn act(&mut self, now: Instant) {
+        self.meet();
         if self.start.is_none() && !self.stopping && now.saturating_duration_since(self.begun) > self.options.ready_timeout {
-            let missing = self.slots.iter().filter(|s| s.phase == Phase::Joining).map(Slot::lack).collect();
+            let mut missing: Vec<String> = self.slots.iter().filter(|s| s.phase == Phase::Joining).map(Slot::lack).collect();
+            missing.append(&mut self.absent);
             self.give_up(LaunchError::NotReady { after_s: self.options.ready_timeout.as_secs_f64(), missing });
         }
         for index in 0..self.slots.len() {
@@ -536,6 +600,10 @@ impl Supervisor {
             _ => {}
         }
     }
+}
+
+fn nanoseconds(clock: ClockId) -> i64 {
+    clock_gettime(clock).map_or(Duration::ZERO, Duration::from).as_nanos() as i64
 }
 
 /// Negative if `at` is in the future.

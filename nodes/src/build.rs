@@ -1,19 +1,28 @@
 //! From a graph to what each process does.
 
-use crate::graph::{DeviceFiles, Direction, Graph, Node, NodeKind, Settings};
+use crate::graph::{DeviceFiles, Direction, Graph, Node, NodeKind, ObserverFiles, Settings};
 use crate::stage::{Clock, InputPort, NodePlan, OutputPort, PACE_PORT, Stage};
 use backdrive_control::canceller::Canceller;
+use backdrive_control::controller::Controller;
 use backdrive_control::core::{Core, Events, Port, Tick};
+use backdrive_control::cycle::CycleNode;
 use backdrive_control::device::{Device, DeviceError, DeviceOptions, Role};
+use backdrive_control::dynamometer::{Dynamometer, DynamometerNode};
+use backdrive_control::engine::EngineNode;
 use backdrive_control::exciter::Exciter;
 use backdrive_control::guard::Guard;
 use backdrive_control::live_margin::Told;
 use backdrive_control::master::Master;
+use backdrive_control::observer::{DesignError, ObserverNode, Quantity, System, UnknownInput, design};
 use backdrive_control::operator::Operator;
+use backdrive_control::rig::Rig;
 use backdrive_control::scaling::{Backward, Forward};
+use backdrive_control::shaft::ShaftNode;
 use backdrive_control::slave::Slave;
+use backdrive_control::speed_control::SpeedControlNode;
 use backdrive_msgs::topic::{Kind, Topic};
 use backdrive_msgs::{Gains, Sample, source_id};
+use backdrive_plant::linear::Operating;
 
 /// Oscillation of the reflected force that the guard leaves alone, N or N m: about what a finger does not feel.
 const GUARD_LEAST_FORCE: f64 = 0.02;
@@ -24,8 +33,16 @@ const AHEAD_OF_RECORDER: u64 = 1024;
 /// Steps by which a source may run ahead of its listeners in lockstep where nothing records.
 const AHEAD_OF_LISTENERS: u64 = 256;
 
-/// Topic on which a recorder says how far it has come.
-pub const CREDIT_TOPIC: &str = "/recorder/credit";
+/// Topic on which a recorder says how far it has come; each host's has its own.
+pub fn credit_topic(host: Option<&str>) -> Topic {
+    let name = host.map_or("/recorder/credit".to_string(), |host| format!("/recorder/credit_{host}"));
+    Topic { name, kind: Kind::Sample }
+}
+
+/// Topic on which a host's supervisor tells of the other hosts: their clocks, and when they are gone.
+pub fn host_topic(host: &str) -> Topic {
+    Topic { name: format!("/host_{host}/events"), kind: Kind::Event }
+}
 
 /// Why a graph cannot be built.
 #[derive(Debug, thiserror::Error)]
@@ -72,7 +89,7 @@ pub struct GraphTopic {
 
 /// Every topic of a graph, in the order in which a lockstep bag holds the messages of one step.
 pub fn topics(graph: &Graph) -> Vec<GraphTopic> {
-    let recorded = usize::from(graph.node_of(NodeKind::Recorder).is_some());
+    let recorded = graph.recorders().len();
     let mut topics = Vec::new();
     for (index, node) in graph.nodes.iter().enumerate().filter(|(_, n)| n.kind != NodeKind::Recorder) {
         for port in node.kind.ports(Direction::Output) {
@@ -94,11 +111,16 @@ pub fn topics(graph: &Graph) -> Vec<GraphTopic> {
         side("events", Kind::Event);
         side("status", Kind::Status);
     }
+    // A lockstep bag holds nothing that the machines decide.
+    for host in graph.hosts.iter().filter(|_| graph.timing.clock == Clock::Realtime) {
+        let (topic, publisher) = (host_topic(&host.name), format!("host_{}", host.name));
+        topics.push(GraphTopic { topic, publisher, axes: Vec::new(), woken: 0, listeners: recorded });
+    }
     topics
 }
 
 fn is_source(kind: NodeKind) -> bool {
-    matches!(kind, NodeKind::Operator | NodeKind::Exciter)
+    matches!(kind, NodeKind::Operator | NodeKind::Exciter | NodeKind::Cycle | NodeKind::Rig)
 }
 
 /// What holds the graph's sources back in lockstep: (topic, steps they may be ahead).
@@ -106,8 +128,9 @@ fn pace(graph: &Graph) -> Vec<(Topic, u64)> {
     if graph.timing.clock == Clock::Realtime {
         return Vec::new();
     }
-    if graph.node_of(NodeKind::Recorder).is_some() {
-        return vec![(Topic { name: CREDIT_TOPIC.to_string(), kind: Kind::Sample }, AHEAD_OF_RECORDER)];
+    let recorders = graph.recorders();
+    if !recorders.is_empty() {
+        return recorders.into_iter().map(|host| (credit_topic(host), AHEAD_OF_RECORDER)).collect();
     }
     let nodes = graph.nodes.iter().enumerate().filter(|(_, n)| !is_source(n.kind));
     nodes.filter_map(|(i, n)| n.kind.ports(Direction::Output).first().map(|port| (graph.topic_of(i, port), AHEAD_OF_LISTENERS))).collect()
@@ -118,9 +141,20 @@ fn pacing(graph: &Graph, topic: &Topic) -> usize {
     if pace(graph).iter().any(|(t, _)| t == topic) { sources } else { 0 }
 }
 
-/// Sources that wait for the recorder's credit.
+/// How many of a topic's listeners run on this of the graph's hosts: nodes, sources that it paces, the recorder.
+pub fn listeners_on(graph: &Graph, topic: &Topic, host: &str) -> usize {
+    let here = |node: &Node| graph.runs_on(node, host);
+    let woken = graph.connections.iter().filter(|c| here(&graph.nodes[c.to.0]) && graph.topic_of(c.from.0, &c.from.1) == *topic).count();
+    let paced = pace(graph).iter().any(|(t, _)| t == topic);
+    let sources = graph.nodes.iter().filter(|n| paced && is_source(n.kind) && here(n)).count();
+    let credit = graph.recorders().iter().any(|recorder| credit_topic(*recorder) == *topic);
+    let recorded = graph.recorders().contains(&Some(host)) && !credit;
+    woken + sources + usize::from(recorded)
+}
+
+/// Sources that wait for the credit of each recorder.
 pub fn credit_listeners(graph: &Graph) -> usize {
-    pacing(graph, &Topic { name: CREDIT_TOPIC.to_string(), kind: Kind::Sample })
+    graph.recorders().first().map_or(0, |host| pacing(graph, &credit_topic(*host)))
 }
 
 /// The plan of one of our own nodes (not of a recorder).
@@ -182,10 +216,10 @@ pub fn plan_with(graph: &Graph, name: &str, cores: Vec<Box<dyn Core>>) -> Result
 fn cores(graph: &Graph, node: &Node) -> Result<Vec<Box<dyn Core>>, DeviceError> {
     let period_s = graph.period_s();
     let stale = graph.stale_after_s;
+    let seed = graph.seed.wrapping_mul(0x9e37_79b9).wrapping_add(source_id(&node.name) as u64);
     let simulated = |files: &DeviceFiles, role: Role| -> Result<Option<Device>, DeviceError> {
         let Some(model) = &files.model else { return Ok(None) };
-        let noise_seed = files.real_sensors.then(|| graph.seed.wrapping_mul(0x9e37_79b9).wrapping_add(source_id(&node.name) as u64));
-        let options = DeviceOptions { substeps: files.substeps, noise_seed, quantise: files.real_sensors };
+        let options = options(files, seed);
         Device::new(model, files.fragment.as_ref(), role, period_s, &options).map(Some)
     };
     let needed = |device: Option<Device>| device.ok_or_else(|| DeviceError::NoAxes("none".to_string()));
@@ -207,9 +241,45 @@ fn cores(graph: &Graph, node: &Node) -> Result<Vec<Box<dyn Core>>, DeviceError> 
             ]
         }
         Settings::Slave(files) => vec![Box::new(Slave::new(needed(simulated(files, Role::Slave)?)?, stale, period_s))],
+        Settings::Controller { law, model } => vec![Box::new(Controller::new(node.axes, law, model.as_ref(), stale, period_s)?)],
         Settings::Exciter(forces) => vec![Box::new(Exciter::new(forces.clone()))],
+        Settings::Observer(files) => vec![Box::new(observer(graph, node, files)?)],
+        Settings::Cycle(cycle) => vec![Box::new(CycleNode::new(cycle.clone()))],
+        Settings::SpeedControl(control) => vec![Box::new(SpeedControlNode::new(*control))],
+        Settings::Dynamometer(model, noise) => {
+            vec![Box::new(DynamometerNode::new(Dynamometer::new(model.clone(), period_s), *noise, seed))]
+        }
+        Settings::Engine(file) => vec![Box::new(EngineNode::new(file.engine.clone(), file.ripple))],
+        Settings::Shaft(files) => {
+            let model = files.model.as_ref().ok_or_else(|| DeviceError::NoAxes("none".to_string()))?;
+            vec![Box::new(ShaftNode::new(model, period_s, &options(files, seed))?)]
+        }
         Settings::Recorder => Vec::new(),
+        Settings::Rig(files, settings, demand) => {
+            let seed = files.real_sensors.then(|| graph.seed.wrapping_mul(0x9e37_79b9).wrapping_add(u64::from(source_id("load cell"))));
+            let device = needed(simulated(files, Role::Slave)?)?;
+            vec![Box::new(Rig::new(device, *settings, demand.clone(), seed, period_s))]
+        }
     })
+}
+
+fn options(files: &DeviceFiles, seed: u64) -> DeviceOptions {
+    DeviceOptions { substeps: files.substeps, noise_seed: files.real_sensors.then_some(seed), quantise: files.real_sensors }
+}
+
+/// An observer with the gains that its model and its connections ask for.
+fn observer(graph: &Graph, node: &Node, files: &ObserverFiles) -> Result<ObserverNode, DeviceError> {
+    let model = files.device.model.as_ref().ok_or_else(|| DeviceError::NoAxes("none".to_string()))?;
+    let connected = |port: &str| graph.connections.iter().any(|c| graph.nodes[c.to.0].name == node.name && c.to.1 == port);
+    let [measured, user] = files.quantities;
+    let user = connected("user").then_some(user);
+    let wrong = |e: DesignError| DeviceError::Observer(model.name.clone(), e);
+    let at = Operating::amplitude(files.amplitude);
+    let system = System::of_model(model, &at, measured, user, &files.noise).map_err(|e| wrong(e.into()))?;
+    let gains = design(&system, &files.weights, files.back_off).map_err(wrong)?;
+    let core = UnknownInput::new(&system, &gains.k, &gains.l, graph.period_s());
+    let velocity = [Some(measured), user].map(|quantity| quantity.map(|q| q == Quantity::Velocity));
+    Ok(ObserverNode::new(core, velocity, connected("force"), files.filter, graph.period_s()))
 }
 
 /// Gives a core the ports it expects where the graph leaves some unconnected.

@@ -55,6 +55,11 @@ impl Input {
         self.expected = None;
     }
 
+    /// Samples that came after a later one.
+    pub fn late(&self) -> u64 {
+        self.subscriber.late()
+    }
+
     /// Only what is still missing is worth waking up for.
     pub fn set_awaited(&mut self, awaited: bool) {
         self.subscriber.set_awaited(awaited);

@@ -92,6 +92,8 @@ pub struct Recording {
     source: u32,
     clock: Clock,
     sink: Box<dyn Sink>,
+    /// Real time: a topic that could not be read; the others go on.
+    broken: Option<TransportError>,
     /// Last, so that it outlives the ports that came from it.
     _transport: Box<dyn Transport>,
 }
@@ -117,7 +119,7 @@ impl Recording {
             None => None,
         };
         let (source, clock) = (source_id(&plan.name), timing.clock);
-        Ok(Recording { heard, credit, credited: 0, credits: 0, source, clock, sink, _transport: transport })
+        Ok(Recording { heard, credit, credited: 0, credits: 0, source, clock, sink, broken: None, _transport: transport })
     }
 
     /// What it still lacks before a run can start, one line each.
@@ -145,7 +147,15 @@ impl Recording {
             for (index, heard) in self.heard.iter_mut().enumerate() {
                 let mut here = 0;
                 while here < AT_ONCE {
-                    let Some(message) = heard.subscriber.receive()? else { break };
+                    let message = match heard.subscriber.receive() {
+                        Ok(Some(message)) => message,
+                        Ok(None) => break,
+                        Err(e) if self.clock == Clock::Realtime => {
+                            self.broken = Some(e);
+                            break;
+                        }
+                        Err(e) => return Err(e.into()),
+                    };
                     if heard.topic.kind == Kind::Sample {
                         heard.upto = heard.upto.max(message.step() + 1);
                     }
@@ -207,6 +217,9 @@ impl Recording {
                 tell(Told::Event(self.loss(lost - lost_before)));
                 lost_before = lost;
             }
+            if let Some(error) = self.broken.take() {
+                tell(Told::Event(self.event("connection_broken", backdrive_msgs::NOT_MEASURED, Text::new(&error.to_string()))));
+            }
             if reported.elapsed() >= Duration::from_millis(100) {
                 reported = Instant::now();
                 tell(Told::Status(self.report()));
@@ -226,9 +239,12 @@ impl Recording {
     }
 
     fn loss(&self, lost: u64) -> Event {
-        let (value, stamp_ns) = (lost as f64, now_ns());
-        let (kind, text) = (Text::new("recorder_lost"), sentence("recorder_lost", value));
-        let step = self.steps();
+        self.event("recorder_lost", lost as f64, sentence("recorder_lost", lost as f64))
+    }
+
+    /// Something for whoever watches; a recorder speaks on no topic.
+    fn event(&self, kind: &str, value: f64, text: Text<128>) -> Event {
+        let (kind, step, stamp_ns) = (Text::new(kind), self.steps(), now_ns());
         Event { layout: LAYOUT, source: self.source, step, sequence: 0, stamp_ns, severity: 2, reserved: 0, value, kind, text }
     }
 

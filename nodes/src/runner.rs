@@ -198,6 +198,8 @@ pub struct Runner {
     loop_time_recent: Histogram,
     skipped: u64,
     reported_at: i64,
+    /// Late samples that were told, and when, ns.
+    late_told: (u64, i64),
     /// Last, so that it outlives the ports that came from it.
     transport: Box<dyn Transport>,
 }
@@ -274,6 +276,7 @@ impl Runner {
             loop_time_recent: Histogram::default(),
             skipped: 0,
             reported_at: 0,
+            late_told: (0, 0),
             transport,
         })
     }
@@ -424,6 +427,7 @@ impl Runner {
                 break;
             }
             self.report_if_due(now, tell);
+            self.tell_late(now, unix(now), tell);
             if wake_at <= now {
                 continue;
             }
@@ -549,6 +553,19 @@ impl Runner {
         tell(Told::Status(self.report(&self.loop_time_recent)));
         self.teller.report.peak_effort = 0.0;
         self.loop_time_recent.clear();
+    }
+
+    /// Once a second, how many samples came too late to be used.
+    fn tell_late(&mut self, now: i64, stamp_ns: i64, tell: &mut dyn FnMut(Told)) {
+        if now - self.late_told.1 < 1_000_000_000 {
+            return;
+        }
+        let late: u64 = self.stages.iter().flat_map(|s| &s.inputs).map(Input::late).sum();
+        let (value, step) = ((late - self.late_told.0) as f64, self.stages.first().map_or(0, |s| s.step));
+        self.late_told = (late, now);
+        if value > 0.0 {
+            self.teller.tell_event(step, stamp_ns, "samples_late", value, 1, sentence("samples_late", value), tell);
+        }
     }
 
     fn report(&self, times: &Histogram) -> Report {

@@ -8,6 +8,9 @@ use std::fmt::Write;
 const SENTENCES: &[(&str, &str, Option<&str>)] = &[
     ("canceller_off", "the canceller's prediction is not finite: it no longer subtracts, since", Some("s")),
     ("connection_broken", "a message could not be sent or received", None),
+    ("controller_off", "the controller's force is not finite: it commands none any more, since", Some("s")),
+    ("drive_back", "a controller's forces arrive again, after", Some("steps without any")),
+    ("drive_stale", "no force has come for", Some("steps: the slave's motor force decays to zero")),
     ("force_back", "forces arrive again, after", Some("steps without any")),
     ("force_outdated", "the slave gets no commands any more: the master's force decays to zero", None),
     ("force_stale", "no force has come for", Some("steps: the master's force decays to zero")),
@@ -21,11 +24,13 @@ const SENTENCES: &[(&str, &str, Option<&str>)] = &[
     ("peer_timeout", "an input has not come within", Some("s: the run ends")),
     ("realtime_refused", "not all real-time settings are permitted", None),
     ("recorder_lost", "the recorder found holes in sequence numbers; messages lost:", Some("")),
+    ("samples_late", "samples came after later ones and were dropped:", Some("")),
     ("samples_lost", "an input has a hole in its sequence numbers; samples lost:", Some("")),
     ("slave_follows", "commands arrive again: the slave follows", None),
     ("slave_holds", "no command has come for", Some("steps: the slave holds")),
     ("state_not_finite", "the simulated state is not finite at", Some("s: the model or its step size does not fit")),
     ("steps_skipped", "too far behind: goes on at the step now due, having skipped", Some("steps")),
+    ("valve_fully_open", "the rig asks for more than its valve gives, at", Some("s")),
 ];
 
 /// One sentence for an event.

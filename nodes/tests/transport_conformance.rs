@@ -2,9 +2,10 @@
 
 use backdrive_msgs::text::Text;
 use backdrive_msgs::topic::{Kind, Topic};
-use backdrive_msgs::{Event, Gains, LAYOUT, Message, Sample, Status};
+use backdrive_msgs::{Event, Gains, LAYOUT, Message, NOT_MEASURED, Sample, Status};
 use backdrive_nodes::transport::iceoryx2::Iceoryx2;
 use backdrive_nodes::transport::inproc::Hub;
+use backdrive_nodes::transport::ros2::{Delivery, Network, Ros2};
 use backdrive_nodes::transport::{Location, Publisher, Subscriber, Transport, TransportError};
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::{Duration, Instant};
@@ -12,6 +13,16 @@ use std::time::{Duration, Instant};
 /// A run in which nodes can meet.
 trait World: Sync {
     fn join(&self, name: &str) -> Box<dyn Transport>;
+
+    /// How long a message or the news of a connection may take.
+    fn patience(&self) -> Duration {
+        Duration::ZERO
+    }
+
+    /// What becomes of a sample on its way.
+    fn carried(&self, sample: Sample) -> Sample {
+        sample
+    }
 }
 
 impl World for Hub {
@@ -43,6 +54,63 @@ impl Drop for SharedMemory {
     }
 }
 
+/// A domain of its own, among those whose ports no other program is given.
+struct Domain(Network);
+
+impl Domain {
+    fn new() -> Domain {
+        static COUNT: AtomicU32 = AtomicU32::new(0);
+        let domain = 10 + (std::process::id() + COUNT.fetch_add(1, Ordering::Relaxed)) % 90;
+        Domain(Network { domain: domain as u16, ..Network::default() })
+    }
+}
+
+impl World for Domain {
+    fn join(&self, name: &str) -> Box<dyn Transport> {
+        Box::new(Ros2::open(&self.0, name, Delivery::Reliable).unwrap())
+    }
+
+    fn patience(&self) -> Duration {
+        Duration::from_secs(20)
+    }
+
+    /// A NaN means "not measured", whatever its bits.
+    fn carried(&self, mut sample: Sample) -> Sample {
+        let values = sample.position.iter_mut().chain(&mut sample.velocity).chain(&mut sample.effort);
+        values.filter(|v| v.is_nan()).for_each(|v| *v = NOT_MEASURED);
+        sample
+    }
+}
+
+/// Whether it comes true within the world's patience.
+fn eventually(world: &dyn World, mut is_true: impl FnMut() -> bool) -> bool {
+    let begun = Instant::now();
+    loop {
+        if is_true() {
+            return true;
+        }
+        if begun.elapsed() >= world.patience() {
+            return false;
+        }
+        std::thread::sleep(Duration::from_millis(1));
+    }
+}
+
+/// The next message, within the world's patience.
+fn next(world: &dyn World, subscriber: &mut dyn Subscriber) -> Option<Message> {
+    let mut received = None;
+    eventually(world, || {
+        received = subscriber.receive().unwrap();
+        received.is_some()
+    });
+    received
+}
+
+/// Time in which whatever is still on its way arrives.
+fn settle(world: &dyn World) {
+    std::thread::sleep(world.patience() / 40);
+}
+
 macro_rules! conform {
     ($($test:ident),* $(,)?) => {
         mod inproc {
@@ -50,6 +118,9 @@ macro_rules! conform {
         }
         mod iceoryx2 {
             $(#[test] fn $test() { super::$test(&super::SharedMemory::new(), &super::SharedMemory::new()) })*
+        }
+        mod ros2 {
+            $(#[test] fn $test() { super::$test(&super::Domain::new(), &super::Domain::new()) })*
         }
     };
 }
@@ -81,8 +152,11 @@ fn sample(sequence: u64) -> Message {
     Message::Sample(Sample { step: sequence, sequence, ..Sample::new(2) })
 }
 
-fn sequences(subscriber: &mut Box<dyn Subscriber>) -> Vec<u64> {
-    std::iter::from_fn(|| subscriber.receive().unwrap()).map(|m| m.sequence()).collect()
+/// The next `count` messages, and whatever else is there.
+fn sequences(world: &dyn World, subscriber: &mut Box<dyn Subscriber>, count: usize) -> Vec<u64> {
+    let mut heard: Vec<u64> = (0..count).map_while(|_| next(world, &mut **subscriber)).map(|m| m.sequence()).collect();
+    heard.extend(std::iter::from_fn(|| subscriber.receive().unwrap()).map(|m| m.sequence()));
+    heard
 }
 
 /// NaNs with payloads, signed zeros, subnormals: everything a copy through floating point might change.
@@ -98,10 +172,11 @@ fn odd_sample(sequence: u64) -> Sample {
 }
 
 /// The sequence number of the first sample that does not arrive as it was sent.
-fn first_difference(sender: &mut dyn Publisher, receiver: &mut dyn Subscriber) -> Option<u64> {
+fn first_difference(world: &dyn World, sender: &mut dyn Publisher, receiver: &mut dyn Subscriber) -> Option<u64> {
     (0..1000).find(|sequence| {
         sender.send(&Message::Sample(odd_sample(*sequence))).unwrap();
-        !matches!(receiver.receive().unwrap(), Some(Message::Sample(s)) if s.same_bits(&odd_sample(*sequence)))
+        let expected = world.carried(odd_sample(*sequence));
+        !matches!(next(world, receiver), Some(Message::Sample(s)) if s.same_bits(&expected))
     })
 }
 
@@ -109,8 +184,8 @@ fn delivers_in_order_and_bit_for_bit(world: &dyn World, _: &dyn World) {
     let (mut a, mut b) = (world.join("a"), world.join("b"));
     let mut receiver = b.subscriber(&samples(), 16, true).unwrap();
     let mut sender = a.publisher(&samples(), 1).unwrap();
-    assert!(receiver.has_publisher() && sender.listeners() == 1);
-    assert_eq!(first_difference(&mut *sender, &mut *receiver), None);
+    assert!(eventually(world, || receiver.has_publisher() && sender.listeners() == 1));
+    assert_eq!(first_difference(world, &mut *sender, &mut *receiver), None);
     assert!(receiver.receive().unwrap().is_none());
 }
 
@@ -137,18 +212,19 @@ fn a_flipped_bit_is_noticed(world: &dyn World, _: &dyn World) {
     let (mut a, mut b) = (world.join("a"), world.join("b"));
     let mut receiver = b.subscriber(&samples(), 16, true).unwrap();
     let mut sender = Flipping(a.publisher(&samples(), 1).unwrap());
-    assert!(receiver.has_publisher() && sender.listeners() == 1);
-    assert_eq!(first_difference(&mut sender, &mut *receiver), Some(500));
+    assert!(eventually(world, || receiver.has_publisher() && sender.listeners() == 1));
+    assert_eq!(first_difference(world, &mut sender, &mut *receiver), Some(500));
 }
 
 fn overflow_drops_the_oldest(world: &dyn World, _: &dyn World) {
     let (mut a, mut b) = (world.join("a"), world.join("b"));
     let (mut short, mut long) = (b.subscriber(&samples(), 8, false).unwrap(), b.subscriber(&samples(), 100, false).unwrap());
     let mut sender = a.publisher(&samples(), 2).unwrap();
-    assert!(short.has_publisher() && long.has_publisher() && sender.listeners() == 2);
+    assert!(eventually(world, || short.has_publisher() && long.has_publisher() && sender.listeners() == 2));
     (0..50).for_each(|i| sender.send(&sample(i)).unwrap());
-    assert_eq!(sequences(&mut short), (42..50).collect::<Vec<_>>());
-    assert_eq!(sequences(&mut long), (0..50).collect::<Vec<_>>());
+    settle(world);
+    assert_eq!(sequences(world, &mut short, 8), (42..50).collect::<Vec<_>>());
+    assert_eq!(sequences(world, &mut long, 50), (0..50).collect::<Vec<_>>());
 }
 
 fn event(sequence: u64) -> Message {
@@ -164,11 +240,12 @@ fn a_late_joiner_sees_the_last_events_but_no_samples(world: &dyn World, _: &dyn 
     (0..5).for_each(|i| sender.send(&sample(i)).unwrap());
     (0..5).for_each(|i| event_sender.send(&event(i)).unwrap());
     let (mut receiver, mut event_receiver) = (b.subscriber(&samples(), 16, true).unwrap(), b.subscriber(&events, 16, true).unwrap());
-    assert!(receiver.has_publisher() && sender.listeners() == 1 && event_sender.listeners() == 1);
+    assert!(eventually(world, || receiver.has_publisher() && event_receiver.has_publisher()));
+    assert!(eventually(world, || sender.listeners() == 1 && event_sender.listeners() == 1));
     sender.send(&sample(5)).unwrap();
     event_sender.send(&event(5)).unwrap();
-    assert_eq!(sequences(&mut receiver), [5]);
-    assert_eq!(sequences(&mut event_receiver), [0, 1, 2, 3, 4, 5]);
+    assert_eq!(sequences(world, &mut receiver, 1), [5]);
+    assert_eq!(sequences(world, &mut event_receiver, 6), [0, 1, 2, 3, 4, 5]);
 }
 
 fn counts_listeners_and_knows_its_publisher(world: &dyn World, _: &dyn World) {
@@ -177,12 +254,12 @@ fn counts_listeners_and_knows_its_publisher(world: &dyn World, _: &dyn World) {
     assert_eq!(sender.listeners(), 0);
     let first = b.subscriber(&samples(), 16, true).unwrap();
     let second = c.subscriber(&samples(), 16, false).unwrap();
-    assert_eq!(sender.listeners(), 2);
+    assert!(eventually(world, || sender.listeners() == 2));
     drop(second);
-    assert_eq!(sender.listeners(), 1);
-    assert!(first.has_publisher());
+    assert!(eventually(world, || sender.listeners() == 1));
+    assert!(eventually(world, || first.has_publisher()));
     drop(sender);
-    assert!(!first.has_publisher());
+    assert!(eventually(world, || !first.has_publisher()));
 }
 
 fn waits_and_wakes(world: &dyn World, _: &dyn World) {
@@ -196,6 +273,8 @@ fn waits_and_wakes(world: &dyn World, _: &dyn World) {
         scope.spawn(|| {
             let mut a = world.join("a");
             let mut sender = a.publisher(&samples(), 1).unwrap();
+            assert!(eventually(world, || sender.listeners() == 1));
+            settle(world);
             for i in 0..200 {
                 std::thread::sleep(Duration::from_micros(i * 7 % 500));
                 sender.send(&sample(i)).unwrap();
@@ -216,7 +295,7 @@ fn waits_and_wakes(world: &dyn World, _: &dyn World) {
             }
         }
         // A lost wake would have cost ten seconds.
-        assert!(begun.elapsed() < Duration::from_secs(9));
+        assert!(begun.elapsed() < Duration::from_secs(9) + world.patience());
     });
 }
 
@@ -230,6 +309,7 @@ fn a_poller_is_not_woken_and_loses_nothing(world: &dyn World, _: &dyn World) {
             let mut a = world.join("a");
             let mut sender = a.publisher(&samples(), 1).unwrap();
             while sender.listeners() < 1 {}
+            settle(world);
             for i in 0..MESSAGES {
                 // As a source in lockstep: no further ahead than the buffer.
                 while i >= taken.load(Ordering::SeqCst) + 2048 {
@@ -273,13 +353,13 @@ fn a_publisher_may_come_again(world: &dyn World, _: &dyn World) {
     for _ in 0..3 {
         let mut a = world.join("a");
         let mut sender = a.publisher(&samples(), 1).unwrap();
-        assert!(receiver.has_publisher() && sender.listeners() == 1);
+        assert!(eventually(world, || receiver.has_publisher() && sender.listeners() == 1));
         (0..1000).for_each(|i| sender.send(&sample(i)).unwrap());
         drop(sender);
         drop(a);
         // What it sent outlives it.
-        assert_eq!(sequences(&mut receiver), (0..1000).collect::<Vec<_>>());
-        assert!(!receiver.has_publisher());
+        assert_eq!(sequences(world, &mut receiver, 1000), (0..1000).collect::<Vec<_>>());
+        assert!(eventually(world, || !receiver.has_publisher()));
     }
 }
 
@@ -294,9 +374,9 @@ fn carries_every_kind_and_no_other(world: &dyn World, _: &dyn World) {
         let topic = topic(&format!("/topic_{i}"), message.kind());
         let mut receiver = b.subscriber(&topic, 16, true).unwrap();
         let mut sender = a.publisher(&topic, 1).unwrap();
-        assert!(receiver.has_publisher() && sender.listeners() == 1);
+        assert!(eventually(world, || receiver.has_publisher() && sender.listeners() == 1));
         sender.send(message).unwrap();
-        let received = receiver.receive().unwrap().unwrap();
+        let received = next(world, &mut *receiver).unwrap();
         // Through their text: a NaN differs from itself.
         assert_eq!(format!("{received:?}"), format!("{message:?}"));
         let refused = sender.send(&messages[(i + 1) % messages.len()]).unwrap_err().to_string();
@@ -312,24 +392,25 @@ fn refuses_another_layout(world: &dyn World, _: &dyn World) {
     let (mut a, mut b) = (world.join("a"), world.join("b"));
     let mut receiver = b.subscriber(&samples(), 16, true).unwrap();
     let mut sender = a.publisher(&samples(), 1).unwrap();
-    assert!(receiver.has_publisher() && sender.listeners() == 1);
+    assert!(eventually(world, || receiver.has_publisher() && sender.listeners() == 1));
     sender.send(&Message::Sample(Sample { layout: LAYOUT + 1, ..Sample::new(1) })).unwrap();
     sender.send(&sample(1)).unwrap();
-    let refused = receiver.receive().unwrap_err().to_string();
+    let mut refused = String::new();
+    assert!(eventually(world, || receiver.receive().inspect_err(|e| refused = e.to_string()).is_err()));
     assert!(refused.contains("/arm/measured_js") && refused.contains("layout 2"), "{refused}");
-    assert_eq!(sequences(&mut receiver), [1]);
+    assert_eq!(sequences(world, &mut receiver, 1), [1]);
 }
 
 fn two_listeners_get_everything(world: &dyn World, _: &dyn World) {
     let (mut a, mut b, mut c) = (world.join("a"), world.join("b"), world.join("c"));
     let (mut first, mut second) = (b.subscriber(&samples(), 64, true).unwrap(), c.subscriber(&samples(), 64, true).unwrap());
     let mut sender = a.publisher(&samples(), 2).unwrap();
-    assert!(first.has_publisher() && second.has_publisher() && sender.listeners() == 2);
+    assert!(eventually(world, || first.has_publisher() && second.has_publisher() && sender.listeners() == 2));
     (0..64).for_each(|i| sender.send(&sample(i)).unwrap());
-    assert_eq!(sequences(&mut first), (0..64).collect::<Vec<_>>());
+    assert_eq!(sequences(world, &mut first, 64), (0..64).collect::<Vec<_>>());
     // One that is not awaited is kept all the same.
     second.set_awaited(false);
-    assert_eq!(sequences(&mut second), (0..64).collect::<Vec<_>>());
+    assert_eq!(sequences(world, &mut second, 64), (0..64).collect::<Vec<_>>());
 }
 
 mod killed {
@@ -409,12 +490,12 @@ mod killed {
         for _ in 0..6 {
             let mut child = start("publisher", &world.0);
             let mut heard = Vec::new();
-            until_ready(&mut child, || heard.extend(sequences(&mut receiver)));
+            until_ready(&mut child, || heard.extend(sequences(&world, &mut receiver, 0)));
             // Nothing is promised of a publisher that nobody has met alive.
             assert!(receiver.has_publisher(), "the publisher has died of itself");
             child.kill().unwrap();
             child.wait().unwrap();
-            heard.extend(sequences(&mut receiver));
+            heard.extend(sequences(&world, &mut receiver, 0));
             assert_eq!(heard, (0..100).collect::<Vec<_>>());
         }
         transport.sweep();

@@ -1,7 +1,7 @@
 //! Graphs of toy nodes.
 #![allow(dead_code)] // each test file uses its part
 
-use backdrive_launch::{Display, NodePlan, Plan, RunHome, RunReport, SuperviseOptions};
+use backdrive_launch::{Display, NodePlan, Place, Plan, RunHome, RunReport, SuperviseOptions};
 use backdrive_nodes::stage::{Clock, Timing};
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
@@ -33,6 +33,8 @@ pub fn plan(clock: Clock, steps: Option<u64>, nodes: Vec<NodePlan>) -> Plan {
         timing: Timing { rate_hz: 1000.0, clock, steps, peer_timeout_s: 1.0 },
         bag: None,
         nodes,
+        place: Place::default(),
+        hosts: Vec::new(),
     }
 }
 

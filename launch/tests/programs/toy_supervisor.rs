@@ -2,7 +2,7 @@
 //! Prints the report as JSON. `graph HOME FILE BAG SECONDS CLOCK` does the same with a graph file, whose nodes are this program too.
 
 use backdrive_launch::join::join_as;
-use backdrive_launch::{NodePlan, Plan, RunHome, SuperviseOptions, supervise_plan};
+use backdrive_launch::{NodePlan, Place, Plan, RunHome, SuperviseOptions, supervise_plan};
 use backdrive_nodes::graph::{Graph, Overrides};
 use backdrive_nodes::stage::{Clock, Timing};
 use std::path::{Path, PathBuf};
@@ -23,7 +23,7 @@ fn main() -> Outcome<ExitCode> {
                 clock: Some(clock.to_string()),
                 ..Overrides::default()
             };
-            (home, Plan::of(&Graph::load(Path::new(file), &changes)?))
+            (home, Plan::of(&Graph::load(Path::new(file), &changes)?, &Place::default()))
         }
         [home, clock, steps, nodes @ ..] => (home, toys(clock, steps, nodes)?),
         _ => return Err("too few arguments".into()),
@@ -57,5 +57,7 @@ fn toys(clock: &str, steps: &str, nodes: &[&str]) -> Outcome<Plan> {
         timing: Timing { rate_hz: 1000.0, clock, steps: steps.parse().ok(), peer_timeout_s: 1.0 },
         bag: None,
         nodes: nodes.collect(),
+        place: Place::default(),
+        hosts: Vec::new(),
     })
 }

@@ -1,6 +1,7 @@
 //! What a graph must be to run: every needed input fed once, one publisher per topic, no loop without delay, axes that agree.
 
 use super::{Connection, Direction, Graph, Node, NodeKind, Settings};
+use backdrive_plant::model::InputKind;
 use backdrive_plant::tomlfile::{FileError, Table};
 
 pub(super) fn check(graph: &Graph, top: &Table) -> Result<(), FileError> {
@@ -18,6 +19,7 @@ pub(super) fn check(graph: &Graph, top: &Table) -> Result<(), FileError> {
         return Err(top.error("has two recorders; one records every topic"));
     }
     inputs_are_fed(graph, &of_node, &of_connection)?;
+    slaves_are_driven(graph, &of_node, &of_connection)?;
     one_publisher(graph, &of_node)?;
     axes_agree(graph, &of_node, &of_connection)?;
     no_loop_without_delay(graph, &of_connection)?;
@@ -50,6 +52,48 @@ fn inputs_are_fed(graph: &Graph, of_node: &OfNode, of_connection: &OfConnection)
             if let Some(second) = feeding.next() {
                 return Err(of_connection(second, format!("the input \"{port}\" has another connection already: one publisher per input")));
             }
+        }
+    }
+    Ok(())
+}
+
+/// A slave hears a command or a force, as its model's feedback is a motion or a force.
+fn slaves_are_driven(graph: &Graph, of_node: &OfNode, of_connection: &OfConnection) -> Result<(), FileError> {
+    for (index, node) in graph.nodes.iter().enumerate().filter(|(_, n)| n.kind == NodeKind::Slave) {
+        let feeding = |port: &str| graph.connections.iter().find(|c| c.to.0 == index && c.to.1 == port);
+        let model = match &node.settings {
+            Settings::Slave(files) => files.model.as_ref(),
+            _ => None,
+        };
+        let by_force = model.and_then(|m| Some(m.inputs.get(m.axes.first()?.feedback)?.kind == InputKind::Force));
+        let name = model.map_or("", |m| m.name.as_str());
+        match (by_force, feeding("command"), feeding("force")) {
+            (Some(true), _, None) => {
+                return Err(of_node(
+                    node,
+                    format!(
+                        "its model \"{name}\" is driven by a force: as a slave its feedback must be a motion input, or a node of kind \
+                         \"controller\" must drive its input \"force\""
+                    ),
+                ));
+            }
+            (Some(true), Some(command), _) => {
+                let message = format!(
+                    "the model \"{name}\" is driven by a force and hears no command; connect the command to the input \"command\" of its controller"
+                );
+                return Err(of_connection(command, message));
+            }
+            (Some(false), _, Some(force)) => {
+                let message = format!(
+                    "the model \"{name}\" follows commands and hears no force; take a model whose feedback is a force, or connect its command alone"
+                );
+                return Err(of_connection(force, message));
+            }
+            (Some(false), None, None) => return Err(of_node(node, "nothing is connected to its input \"command\"".into())),
+            (None, None, None) => {
+                return Err(of_node(node, "nothing is connected to its inputs \"command\" and \"force\"; it needs one of them".into()));
+            }
+            _ => {}
         }
     }
     Ok(())

@@ -1,6 +1,6 @@
 //! Draws a graph as text: every node with its ports, every connection as a line beside them.
 
-use super::{Connection, Direction, Graph, Node, NodeKind, Settings, check::order};
+use super::{Connection, Direction, Graph, Node, NodeKind, ObserverFiles, Settings, check::order};
 use std::fmt::Write;
 use std::path::Path;
 
@@ -78,13 +78,19 @@ fn describe(node: &Node) -> String {
         return format!("{}: the program {name}", kind.name());
     }
     match &node.settings {
-        Settings::Master(device) | Settings::Slave(device) | Settings::Canceller(device, _) => {
+        Settings::Master(device)
+        | Settings::Slave(device)
+        | Settings::Canceller(device, _)
+        | Settings::Shaft(device)
+        | Settings::Rig(device, ..)
+        | Settings::Observer(ObserverFiles { device, .. }) => {
             let model = device.model.as_ref().map_or("subtracts nothing", |m| m.name.as_str());
             match &device.fragment {
                 Some(fragment) => format!("{}: {model} + {}", kind.name(), fragment.network.name),
                 None => format!("{}: {model}", kind.name()),
             }
         }
+        Settings::Controller { law, .. } => format!("{}: {}", kind.name(), law.law.name()),
         _ => kind.name().to_string(),
     }
 }

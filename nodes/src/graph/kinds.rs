@@ -13,10 +13,26 @@ pub enum NodeKind {
     Scaling,
     /// The remote device with its environment.
     Slave,
+    /// Drives a slave whose feedback is a force.
+    Controller,
     /// Plays an excitation on a force channel.
     Exciter,
+    /// Estimates the force that nobody measures.
+    Observer,
+    /// The operator of a test bench: pedal and speed over time.
+    Cycle,
+    /// Keeps a test bench at its speed.
+    SpeedControl,
+    /// The machine that loads an engine.
+    Dynamometer,
+    /// A combustion engine.
+    Engine,
+    /// The shaft between engine and dynamometer.
+    Shaft,
     /// Records every topic.
     Recorder,
+    /// A test rig: a ram under displacement control with a specimen on it.
+    Rig,
 }
 
 /// Whether a port takes or gives.
@@ -111,14 +127,99 @@ const SCALING: &[StageKind] = &[
 
 const SLAVE: &[StageKind] = &[StageKind {
     name: "plant",
-    inputs: &[input("command", true, "where the tip shall be")],
+    inputs: &[
+        input("command", false, "where the tip shall be, for a model that follows commands"),
+        input("force", false, "force on the motor, for a model that is driven by a force"),
+    ],
     outputs: &[state("measured", "measured_js", "position and velocity of the tip; effort is the environment's force on it")],
+}];
+
+const CONTROLLER: &[StageKind] = &[StageKind {
+    name: "law",
+    inputs: &[input("command", true, "where the tip shall be"), input("measured", true, "the slave's measured position, delay = 1")],
+    outputs: &[command("force", "servo_jf", "force on the slave's motor")],
 }];
 
 const EXCITER: &[StageKind] =
     &[StageKind { name: "play", inputs: &[], outputs: &[command("force", "servo_jf", "the excitation: a force on the master's motor")] }];
 
+const OBSERVER: &[StageKind] = &[StageKind {
+    name: "estimate",
+    inputs: &[
+        input("measured", true, "motion where the known force acts; its effort is that force"),
+        input("user", false, "motion where the unknown force acts, where it is measured too"),
+        input("force", false, "the known force, in place of the effort of measured"),
+    ],
+    outputs: &[
+        state("estimate", "estimated_js", "motion where the unknown force acts; effort is that force"),
+        state("filtered", "filtered_js", "effort is the unknown force behind the filter"),
+    ],
+}];
+
+const CYCLE: &[StageKind] = &[StageKind {
+    name: "play",
+    inputs: &[],
+    outputs: &[
+        command("pedal", "servo_jp", "accelerator pedal, position from 0 to 1"),
+        command("speed", "servo_jv", "wanted speed of the engine, velocity"),
+    ],
+}];
+
+const SPEED_CONTROL: &[StageKind] = &[StageKind {
+    name: "control",
+    inputs: &[
+        input("setpoint", true, "wanted speed"),
+        input("measured", true, "measured speed of the engine"),
+        input("added", false, "torque that is added to the controller's, for identification"),
+    ],
+    outputs: &[command("command", "servo_jf", "the torque that the dynamometer shall give")],
+}];
+
+const DYNAMOMETER: &[StageKind] = &[StageKind {
+    name: "machine",
+    inputs: &[input("command", true, "the torque that it shall give"), input("measured", false, "its speed, for the limit of power")],
+    outputs: &[
+        state("torque", "torque_js", "effort on the shaft from this step to the next; known in simulation only"),
+        state("measured", "measured_js", "effort as the converter estimates it"),
+    ],
+}];
+
+const ENGINE: &[StageKind] = &[StageKind {
+    name: "combustion",
+    inputs: &[input("pedal", true, "accelerator pedal, position from 0 to 1"), input("measured", true, "speed of the crankshaft")],
+    outputs: &[
+        state("torque", "torque_js", "effort on the shaft from this step to the next; known in simulation only"),
+        state("static", "static_js", "effort that the static map has here"),
+    ],
+}];
+
+const SHAFT: &[StageKind] = &[StageKind {
+    name: "plant",
+    inputs: &[
+        input("engine", true, "torque of the engine, one step late"),
+        input("dynamometer", true, "torque of the dynamometer, one step late"),
+    ],
+    outputs: &[
+        state("engine", "engine_js", "measured speed at the engine"),
+        state("dynamometer", "dynamometer_js", "measured speed at the dynamometer"),
+        state("coupling", "coupling_js", "measured torque in the shaft, positive where the engine is ahead"),
+    ],
+}];
+
 const RECORDER: &[StageKind] = &[];
+
+const RIG: &[StageKind] = &[StageKind {
+    name: "ram",
+    inputs: &[],
+    outputs: &[
+        state("demand", "setpoint_jp", "the demanded displacement"),
+        state(
+            "measured",
+            "measured_js",
+            "displacement and velocity of the ram; effort is its force on the specimen, as the load cell reads it",
+        ),
+    ],
+}];
 
 impl NodeKind {
     /// Names in graph files.
@@ -128,8 +229,16 @@ impl NodeKind {
         ("canceller", NodeKind::Canceller),
         ("scaling", NodeKind::Scaling),
         ("slave", NodeKind::Slave),
+        ("controller", NodeKind::Controller),
         ("exciter", NodeKind::Exciter),
+        ("observer", NodeKind::Observer),
+        ("cycle", NodeKind::Cycle),
+        ("speed_control", NodeKind::SpeedControl),
+        ("dynamometer", NodeKind::Dynamometer),
+        ("engine", NodeKind::Engine),
+        ("shaft", NodeKind::Shaft),
         ("recorder", NodeKind::Recorder),
+        ("rig", NodeKind::Rig),
     ];
 
     /// Name in graph files.
@@ -145,8 +254,16 @@ impl NodeKind {
             NodeKind::Canceller => CANCELLER,
             NodeKind::Scaling => SCALING,
             NodeKind::Slave => SLAVE,
+            NodeKind::Controller => CONTROLLER,
             NodeKind::Exciter => EXCITER,
+            NodeKind::Observer => OBSERVER,
+            NodeKind::Cycle => CYCLE,
+            NodeKind::SpeedControl => SPEED_CONTROL,
+            NodeKind::Dynamometer => DYNAMOMETER,
+            NodeKind::Engine => ENGINE,
+            NodeKind::Shaft => SHAFT,
             NodeKind::Recorder => RECORDER,
+            NodeKind::Rig => RIG,
         }
     }
 

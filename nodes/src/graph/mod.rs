@@ -3,21 +3,30 @@
 //! `parse` reads a file, `overrides` writes the command line's changes into it, `check` refuses what cannot
 //! run, `draw` shows it.
 
+pub mod bench;
 mod check;
+mod controller;
 mod draw;
+mod hosts;
 mod kinds;
 mod overrides;
 mod parse;
 mod recorded;
 
 pub use draw::draw;
+pub use hosts::Host;
 pub use kinds::{Direction, NodeKind, PortKind, StageKind};
 pub use overrides::Overrides;
 pub use parse::{Files, MAX_RATE_HZ};
 
 use crate::stage::{Impairment, Timing};
+use backdrive_control::cycle::Cycle;
+use backdrive_control::dynamometer::DynamometerModel;
+use backdrive_control::observer::{Quantity, Weights};
 use backdrive_control::operator::Intent;
+use backdrive_control::rig::RigSettings;
 use backdrive_control::scaling::GainPlan;
+use backdrive_control::speed_control::SpeedControl;
 use backdrive_msgs::topic::Topic;
 use backdrive_plant::model::{Fragment, Model};
 use std::path::PathBuf;
@@ -42,6 +51,8 @@ pub struct Graph {
     pub stale_after_s: f64,
     /// The bag to record, if there is a recorder.
     pub bag: Option<PathBuf>,
+    /// Where nodes run, in the order of the file; empty for a graph that runs on one host.
+    pub hosts: Vec<Host>,
     /// In the order of the file.
     pub nodes: Vec<Node>,
     /// In the order of the file.
@@ -74,6 +85,8 @@ pub struct Node {
     pub kind: NodeKind,
     /// The user's own program in place of ours: program and arguments.
     pub command: Option<Vec<String>>,
+    /// The host that it runs on, where the graph has hosts.
+    pub host: Option<String>,
     /// Whether the supervisor starts it again when it dies (real time only).
     pub restart: bool,
     /// Axes of its samples.
@@ -119,10 +132,50 @@ pub enum Settings {
     },
     /// The slave and what it touches.
     Slave(DeviceFiles),
+    /// Law and gains of a slave's controller, and the model that it knows of the slave.
+    Controller {
+        /// Law and gains.
+        law: backdrive_control::controller::Settings,
+        /// What it knows of the axes, if it knows anything.
+        model: Option<Model>,
+    },
     /// Forces per axis as samples, N or N m, one value per step.
     Exciter(Vec<Vec<f64>>),
+    /// What is observed, and how.
+    Observer(ObserverFiles),
+    /// Pedal and speed over time.
+    Cycle(Cycle),
+    /// Gains and limit.
+    SpeedControl(SpeedControl),
+    /// The machine, and the deviation of its converter's estimate, N m.
+    Dynamometer(DynamometerModel, f64),
+    /// Map, lag and ripple.
+    Engine(bench::EngineFile),
+    /// The two machines' inertias and what is between them.
+    Shaft(DeviceFiles),
     /// Records every topic.
     Recorder,
+    /// The ram with its specimen, its controller, and the demanded displacement per axis as samples, m or rad, one value per step.
+    Rig(DeviceFiles, RigSettings, Vec<Vec<f64>>),
+}
+
+/// What an observer node is told.
+#[derive(Debug, Clone)]
+pub struct ObserverFiles {
+    /// The model of the device, without what holds it.
+    pub device: DeviceFiles,
+    /// What is measured where the known force acts, and where the unknown one does.
+    pub quantities: [Quantity; 2],
+    /// Order of magnitude of the measurement noise, per measured quantity: all axes of `measured`, then all of `user`.
+    pub noise: Vec<f64>,
+    /// What errors and disturbances weigh.
+    pub weights: Weights,
+    /// How far m is kept above the least one, above 1.
+    pub back_off: f64,
+    /// Amplitude of displacement at which elements that are not linear are looked at, m or rad.
+    pub amplitude: f64,
+    /// Order and corner (Hz, 0 for none) of the Butterworth filter.
+    pub filter: (usize, f64),
 }
 
 /// A connection from an output port to an input port.

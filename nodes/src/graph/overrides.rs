@@ -48,7 +48,7 @@ pub struct Overrides {
 }
 
 /// Keys of node tables that name files.
-const FILE_KEYS: &[&str] = &["model", "grip", "environment", "recording"];
+const FILE_KEYS: &[&str] = &["model", "grip", "environment", "recording", "map", "cycle", "specimen"];
 
 impl Overrides {
     /// Text of the graph file with the changes, and with every file it names as an absolute path.
@@ -94,7 +94,7 @@ impl Overrides {
             let keep = path.as_os_str() == "none";
             value(if keep { "none".to_string() } else { absolute(here, path).display().to_string() })
         };
-        let wanted: [(&str, NodeKind, &str, Option<Item>); 14] = [
+        let wanted: [(&str, NodeKind, &str, Option<Item>); 15] = [
             ("--master", NodeKind::Master, "model", self.master.as_ref().map(file)),
             ("--grip", NodeKind::Master, "grip", self.grip.as_ref().map(file)),
             ("--slave", NodeKind::Slave, "model", self.slave.as_ref().map(file)),
@@ -107,6 +107,7 @@ impl Overrides {
             ("--bag", NodeKind::Recorder, "bag", self.bag.as_ref().map(file)),
             ("--sensors", NodeKind::Master, "sensors", self.sensors.as_deref().map(value)),
             ("--sensors", NodeKind::Slave, "sensors", self.sensors.as_deref().map(value)),
+            ("--sensors", NodeKind::Rig, "sensors", self.sensors.as_deref().map(value)),
             ("--limits", NodeKind::Master, "limits", self.limits.as_deref().map(value)),
             ("--limits", NodeKind::Slave, "limits", self.limits.as_deref().map(value)),
         ];
@@ -138,7 +139,7 @@ fn set(table: &mut Item, key: &str, item: Item) {
 }
 
 /// Keys of node tables that hold excitations, which may name a file.
-const EXCITATION_KEYS: &[&str] = &["force", "dither"];
+const EXCITATION_KEYS: &[&str] = &["force", "dither", "demand"];
 
 fn make_absolute(doc: &mut DocumentMut, beside: &Path) {
     let full = |path: &str| absolute(beside, Path::new(path)).display().to_string();

@@ -1,13 +1,18 @@
 //! Reads a graph file and the files that it names.
 
 use super::{
-    Connection, DeviceFiles, Direction, Experiment, Graph, Node, NodeKind, Overrides, Settings, check,
+    Connection, DeviceFiles, Direction, Experiment, Graph, Node, NodeKind, ObserverFiles, Overrides, Settings, bench, check,
+    hosts::{read_host, read_hosts},
     overrides::{absolute, experiment_text},
     recorded::Recorded,
 };
 use crate::stage::{Clock, Impairment, Timing};
+use backdrive_control::butterworth::MOST_ORDER;
+use backdrive_control::observer::{Quantity, Weights};
 use backdrive_control::operator::Intent;
+use backdrive_control::rig::RigSettings;
 use backdrive_control::scaling::{GainChange, GainPlan};
+use backdrive_control::speed_control::SpeedControl;
 use backdrive_msgs::MAX_AXES;
 use backdrive_plant::elements::Range;
 use backdrive_plant::excitation::{Excitation, ExcitationError, Shape};
@@ -89,6 +94,7 @@ impl Graph {
             gains,
             stale_after_s,
             bag: None,
+            hosts: read_hosts(&mut top)?,
             nodes: Vec::new(),
             connections: Vec::new(),
             files: Vec::new(),
@@ -183,6 +189,7 @@ impl NodeReader<'_> {
         }
         let kind = table.need_one_of("kind", NodeKind::ALL)?;
         let command = table.string_or_strings("command")?;
+        let host = read_host(&mut table, kind, &self.graph.hosts)?;
         let restart = table.boolean("restart")?.unwrap_or(false);
         let topics = match table.table("topics")? {
             None => Vec::new(),
@@ -190,7 +197,7 @@ impl NodeReader<'_> {
         };
         let (settings, axis_names) = self.settings(&mut table, kind, command.is_some())?;
         table.finish()?;
-        let node = Node { name, kind, command, restart, axes: axis_names.len(), axis_names, topics, settings, line };
+        let node = Node { name, kind, command, host, restart, axes: axis_names.len(), axis_names, topics, settings, line };
         self.graph.nodes.push(node);
         Ok(())
     }
@@ -229,6 +236,14 @@ impl NodeReader<'_> {
                 let dither = self.excitations(table, "dither")?;
                 (Settings::Scaling { dither, guard }, Vec::new())
             }
+            NodeKind::Controller => {
+                let model = match table.contains("model") {
+                    true => self.device(table, None, true)?.model,
+                    false => None,
+                };
+                let law = super::controller::read(table, model.as_ref())?;
+                (Settings::Controller { law, model }, Vec::new())
+            }
             NodeKind::Exciter => {
                 let forces = self.excitations(table, "force")?;
                 if forces.is_empty() {
@@ -237,12 +252,46 @@ impl NodeReader<'_> {
                 let names = (0..forces.len()).map(|i| format!("axis{i}")).collect();
                 (Settings::Exciter(forces), names)
             }
+            NodeKind::Observer => {
+                let observer = self.observer(table)?;
+                let names = axis_names(&observer.device);
+                (Settings::Observer(observer), names)
+            }
+            NodeKind::Cycle => {
+                let (text, path) = self.named(table, "cycle")?;
+                (Settings::Cycle(bench::cycle_from_csv(&text, &path)?), one_shaft())
+            }
+            NodeKind::SpeedControl => {
+                let mut gain = |key: &str, range: Range| table.need_number(key, range);
+                let (proportional, integral) = (gain("proportional", Range::NonNegative)?, gain("integral", Range::NonNegative)?);
+                (Settings::SpeedControl(SpeedControl::new(proportional, integral, gain("limit", Range::Positive)?)), one_shaft())
+            }
+            NodeKind::Dynamometer => {
+                let (text, path) = self.named(table, "map")?;
+                let (model, noise) = bench::dynamometer_from_toml(&text, &path)?;
+                (Settings::Dynamometer(model, noise), one_shaft())
+            }
+            NodeKind::Engine => {
+                let (text, path) = self.named(table, "map")?;
+                (Settings::Engine(bench::EngineFile::from_toml(&text, &path)?), one_shaft())
+            }
+            NodeKind::Shaft => (Settings::Shaft(self.device(table, None, false)?), one_shaft()),
             NodeKind::Recorder => {
                 let stem = self.graph.path.file_stem().map_or("run".into(), |s| s.to_string_lossy().to_string());
                 let bag = table.string("bag")?.unwrap_or_else(|| format!("{stem}.mcap"));
                 let here = std::env::current_dir().unwrap_or_default();
                 self.graph.bag = Some(absolute(&here, Path::new(&bag)));
                 (Settings::Recorder, Vec::new())
+            }
+            NodeKind::Rig => {
+                let device = self.device(table, Some("specimen"), false)?;
+                let demand = self.excitations(table, "demand")?;
+                let settings = rig_settings(table)?;
+                let names = axis_names(&device);
+                if demand.is_empty() {
+                    return Err(table.missing("demand"));
+                }
+                (Settings::Rig(device, settings, demand), names)
             }
         })
     }
@@ -276,6 +325,31 @@ impl NodeReader<'_> {
         });
         let real_sensors = table.one_of("sensors", &[("as_modelled", true), ("ideal", false)])?.unwrap_or(true);
         Ok(DeviceFiles { model, fragment, substeps, real_sensors })
+    }
+
+    /// The text of the file that a key names, and its path.
+    fn named(&mut self, table: &mut Table, key: &str) -> Result<(String, String), FileError> {
+        let path = table.need_string(key)?;
+        Ok((self.files.read(Path::new(&path), &mut self.graph.files)?, path))
+    }
+
+    /// `model`, what is measured of it, its noise, and how the gains are chosen.
+    fn observer(&mut self, table: &mut Table) -> Result<ObserverFiles, FileError> {
+        let device = self.device(table, None, false)?;
+        let choices = [("position", Quantity::Position), ("velocity", Quantity::Velocity)];
+        let measured = table.one_of("quantity", &choices)?.unwrap_or(Quantity::Position);
+        let user = table.one_of("user_quantity", &choices)?.unwrap_or(measured);
+        let noise = table.numbers("noise", Range::Positive)?.ok_or_else(|| table.missing("noise"))?;
+        let force_rate = table.number_or("force_rate", Range::Positive, 1.0)?;
+        let back_off = table.number_or("back_off", Range::Positive, 2.0)?;
+        if back_off <= 1.0 {
+            return Err(table.error_at("back_off", format!("must be above 1, is {back_off}: at the least m itself the gains are infinite")));
+        }
+        let amplitude = table.number_or("amplitude", Range::Positive, 1e-3)?;
+        let order = table.integer("filter_order", 1, MOST_ORDER as i64)?.unwrap_or(2) as usize;
+        let filter = (order, table.number_or("filter_hz", Range::NonNegative, 0.0)?);
+        let weights = Weights { rate: force_rate.powi(-2), ..Weights::default() };
+        Ok(ObserverFiles { device, quantities: [measured, user], noise, weights, back_off, amplitude, filter })
     }
 
     fn intents(&mut self, table: &mut Table) -> Result<Vec<Intent>, FileError> {
@@ -373,6 +447,17 @@ fn isolate(mut model: Model, table: &mut Table) -> Result<Model, FileError> {
     Ok(model)
 }
 
+/// The displacement controller of a rig, and its sensors.
+fn rig_settings(table: &mut Table) -> Result<RigSettings, FileError> {
+    Ok(RigSettings {
+        proportional: table.need_number("proportional", Range::Positive)?,
+        integral: table.number_or("integral", Range::NonNegative, 0.0)?,
+        derivative: table.number_or("derivative", Range::NonNegative, 0.0)?,
+        filter_hz: table.number_or("filter_hz", Range::Positive, f64::INFINITY)?,
+        force_noise: table.number_or("force_noise", Range::NonNegative, 0.0)?,
+    })
+}
+
 /// Names of the axes of a device that only the user's own program knows.
 fn own_axes(table: &mut Table) -> Result<Vec<String>, FileError> {
     let names = table
@@ -382,6 +467,11 @@ fn own_axes(table: &mut Table) -> Result<Vec<String>, FileError> {
         return Err(table.error_at("axes", format!("expected 1 to {MAX_AXES} names, found {}", names.len())));
     }
     Ok(names)
+}
+
+/// A test bench has one axis.
+fn one_shaft() -> Vec<String> {
+    vec!["shaft".to_string()]
 }
 
 fn axis_names(device: &DeviceFiles) -> Vec<String> {

@@ -4,6 +4,7 @@ mod bell;
 mod board;
 pub mod iceoryx2;
 pub mod inproc;
+pub mod ros2;
 
 use backdrive_msgs::Message;
 use backdrive_msgs::topic::{Kind, Topic};
@@ -126,6 +127,11 @@ pub trait Subscriber {
     /// Whether [`Transport::wait`] is to return for it; so from the start where it wakes at all. What
     /// arrives meanwhile is kept as always, only nobody is woken for it.
     fn set_awaited(&mut self, _awaited: bool) {}
+
+    /// Messages that came after a later one and were dropped. Each is a hole in the sequence numbers as well.
+    fn late(&self) -> u64 {
+        0
+    }
 }
 
 /// How many messages of a kind a transport keeps for a subscriber that is behind, and how many of

@@ -1,0 +1,268 @@
+//! A subscriber over ROS 2: one speaker per topic, nothing late, nothing twice.
+
+use super::Shared;
+use super::participant::Reader;
+use super::raw::Reads;
+use crate::transport::{Subscriber, TransportError, capacity, check_layout};
+use backdrive_msgs::Message;
+use backdrive_msgs::topic::{Kind, Topic};
+use rustdds::dds::ReadError;
+use rustdds::{DataReaderStatus, GUID, StatusEvented};
+use std::collections::VecDeque;
+use std::rc::Rc;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
+use std::task::{Wake, Waker};
+use std::time::{Duration, Instant};
+
+use crate::transport::bell::Bell;
+
+/// A topic's speaker that is silent for this long gives way to another.
+const SPEAKER_SILENCE: Duration = Duration::from_millis(100);
+
+/// The same for what is told now and then.
+const TELLER_SILENCE: Duration = Duration::from_secs(2);
+
+/// How often a second speaker is complained about.
+const COMPLAIN_EVERY: Duration = Duration::from_secs(1);
+
+/// Rings the node's bell when the middleware has something.
+struct Ring(Arc<Bell>);
+
+impl Wake for Ring {
+    fn wake(self: Arc<Self>) {
+        self.0.ring(0);
+    }
+}
+
+/// A waker that rings a bell.
+pub(super) fn ringing(bell: &Arc<Bell>) -> Waker {
+    Waker::from(Arc::new(Ring(Arc::clone(bell))))
+}
+
+/// Who speaks on the topic, and how far it has come.
+#[derive(Clone, Copy)]
+struct Speaker {
+    guid: GUID,
+    sequence: u64,
+    heard: Instant,
+}
+
+/// What has arrived on a topic, and from whom.
+pub(super) struct Inbox {
+    topic: Topic,
+    depth: usize,
+    awaited: bool,
+    waker: Waker,
+    reader: Reader,
+    life: u32,
+    matched: usize,
+    speaker: Option<Speaker>,
+    queue: VecDeque<Result<Message, TransportError>>,
+    late: u64,
+    strangers: u64,
+    complained: Option<Instant>,
+}
+
+pub(super) struct Receiving {
+    shared: Rc<Shared>,
+    wakes: bool,
+    inbox: Arc<Mutex<Inbox>>,
+}
+
+/// The inboxes of a node.
+pub(super) type Inboxes = Mutex<Vec<Weak<Mutex<Inbox>>>>;
+
+/// How often what has arrived is taken over where nobody asks: what is unread when its reliable writer ends is gone with it.
+const TAKE_OVER_EVERY: Duration = Duration::from_millis(2);
+
+fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Takes over what has arrived for a node's subscribers, in a thread of its own, for as long as the node is there.
+pub(super) fn take_over(inboxes: &Arc<Inboxes>) -> std::io::Result<()> {
+    let inboxes = Arc::downgrade(inboxes);
+    let work = move || {
+        while let Some(all) = inboxes.upgrade() {
+            let now: Vec<_> = locked(&all).iter().filter_map(Weak::upgrade).collect();
+            drop(all);
+            for inbox in now {
+                let mut inbox = locked(&inbox);
+                let before = inbox.queue.len();
+                inbox.drain();
+                if inbox.awaited && inbox.queue.len() > before {
+                    inbox.waker.wake_by_ref();
+                }
+            }
+            std::thread::sleep(TAKE_OVER_EVERY);
+        }
+    };
+    std::thread::Builder::new().name("ros2-take-over".to_string()).spawn(work).map(drop)
+}
+
+impl Receiving {
+    pub fn new(shared: &Rc<Shared>, topic: &Topic, depth: usize, wakes: bool) -> Result<Receiving, TransportError> {
+        let mut inbox = Inbox {
+            reader: shared.participant().reader(topic, shared.delivery)?,
+            life: shared.life.get(),
+            topic: topic.clone(),
+            depth: depth.clamp(1, capacity(topic.kind).0),
+            awaited: wakes,
+            waker: ringing(&shared.bell),
+            matched: 0,
+            speaker: None,
+            queue: VecDeque::new(),
+            late: 0,
+            strangers: 0,
+            complained: None,
+        };
+        inbox.drain();
+        let inbox = Arc::new(Mutex::new(inbox));
+        let mut all = locked(&shared.inboxes);
+        all.retain(|other| other.strong_count() > 0);
+        all.push(Arc::downgrade(&inbox));
+        Ok(Receiving { shared: Rc::clone(shared), wakes, inbox })
+    }
+
+    /// Has a reader of the participant that the node has now.
+    fn revive(&self, inbox: &mut Inbox) -> Result<(), TransportError> {
+        if inbox.life != self.shared.life.get() {
+            inbox.life = self.shared.life.get();
+            inbox.matched = 0;
+            inbox.reader = self.shared.participant().reader(&inbox.topic, self.shared.delivery)?;
+        }
+        Ok(())
+    }
+}
+
+/// Takes over what has arrived for all of them.
+pub(super) fn drain(inboxes: &Inboxes) {
+    let now: Vec<_> = locked(inboxes).iter().filter_map(Weak::upgrade).collect();
+    now.iter().for_each(|inbox| locked(inbox).drain());
+}
+
+impl Inbox {
+    /// Takes over what has arrived, and asks to be woken for what comes next.
+    fn drain(&mut self) {
+        if self.awaited {
+            // Before the look: what arrives after it rings.
+            self.reader.set_waker(Some(self.waker.clone()));
+        }
+        loop {
+            let entry = match self.reader.try_take_one_with(Reads(self.topic.kind)) {
+                Ok(None) => return,
+                Ok(Some(change)) => {
+                    let guid = change.writer_guid();
+                    let message = change.into_value();
+                    if !self.admits(guid, &message) {
+                        continue;
+                    }
+                    check_layout(&self.topic.name, &message).map(|()| message)
+                }
+                Err(ReadError::Deserialization { reason }) => Err(self.broken(reason)),
+                Err(e) => Err(self.broken(e.to_string())),
+            };
+            if self.queue.len() == self.depth {
+                self.queue.pop_front();
+            }
+            self.queue.push_back(entry);
+        }
+    }
+
+    fn broken(&self, reason: String) -> TransportError {
+        TransportError::Broken { topic: self.topic.name.clone(), reason }
+    }
+
+    /// Whether this message is the topic's next: from its speaker, and later than what was heard.
+    fn admits(&mut self, guid: GUID, message: &Message) -> bool {
+        let silence = if self.topic.kind == Kind::Sample { SPEAKER_SILENCE } else { TELLER_SILENCE };
+        let (heard, sequence) = (Instant::now(), message.sequence());
+        let admitted = match self.speaker {
+            None => true,
+            Some(s) if s.guid == guid => {
+                self.late += u64::from(sequence <= s.sequence);
+                sequence > s.sequence
+            }
+            Some(s) => {
+                // What is told now and then goes on where a publisher was made anew; of samples two may count alike.
+                let continues = self.topic.kind != Kind::Sample && sequence == s.sequence + 1;
+                let admitted = continues || s.heard.elapsed() >= silence;
+                self.strangers += u64::from(!admitted);
+                admitted
+            }
+        };
+        if admitted {
+            self.speaker = Some(Speaker { guid, sequence, heard });
+        }
+        admitted
+    }
+
+    /// Once a second, that somebody else speaks on the topic too.
+    fn complaint(&mut self) -> Option<TransportError> {
+        if self.strangers == 0 || self.complained.is_some_and(|at| at.elapsed() < COMPLAIN_EVERY) {
+            return None;
+        }
+        self.complained = Some(Instant::now());
+        let ignored = std::mem::take(&mut self.strangers);
+        Some(self.broken(format!("another publisher speaks here too; {ignored} of its messages were ignored")))
+    }
+
+    /// Learns who is connected.
+    fn hear_statuses(&mut self) {
+        while let Some(status) = self.reader.try_recv_status() {
+            if let DataReaderStatus::SubscriptionMatched { current, writer, .. } = status {
+                self.matched = current.count().max(0) as usize;
+                if current.count_change() < 0 && self.speaker.is_some_and(|s| s.guid == writer) {
+                    self.speaker = None;
+                }
+            }
+        }
+    }
+}
+
+impl Subscriber for Receiving {
+    fn receive(&mut self) -> Result<Option<Message>, TransportError> {
+        let mut inbox = locked(&self.inbox);
+        if inbox.queue.is_empty() {
+            self.shared.watch_clock();
+            self.revive(&mut inbox)?;
+            inbox.drain();
+            if inbox.queue.is_empty() {
+                inbox.hear_statuses();
+            }
+        }
+        if inbox.strangers > 0 {
+            inbox.hear_statuses();
+            if let Some(complaint) = inbox.complaint() {
+                return Err(complaint);
+            }
+        }
+        inbox.queue.pop_front().transpose()
+    }
+
+    fn has_publisher(&self) -> bool {
+        let mut inbox = locked(&self.inbox);
+        if self.revive(&mut inbox).is_err() {
+            return false;
+        }
+        inbox.hear_statuses();
+        inbox.matched > 0
+    }
+
+    fn set_awaited(&mut self, awaited: bool) {
+        let mut inbox = locked(&self.inbox);
+        let was = std::mem::replace(&mut inbox.awaited, awaited && self.wakes);
+        if inbox.awaited && !was {
+            inbox.drain();
+            if !inbox.queue.is_empty() {
+                self.shared.bell.ring(0);
+            }
+        } else if was && !inbox.awaited {
+            inbox.reader.set_waker(None);
+        }
+    }
+
+    fn late(&self) -> u64 {
+        locked(&self.inbox).late
+    }
+}
