@@ -124,7 +124,7 @@ pub fn evidence(problem: &Problem, best: &Candidate, floor: &[f64], which: usize
     let others: Vec<Hypothesis> = (0..all.len()).filter(rest).filter_map(|i| best.structure.added.get(i).cloned()).collect();
     let other_values: Vec<Vec<f64>> = (0..all.len()).filter(rest).filter_map(|i| all.get(i).cloned()).collect();
     let structure = Structure::new(problem, &problem.fit, others);
-    let without = structure.model(problem, &structure.values(problem, &best.structure.stated_of(problem, values), &other_values))?;
+    let without = structure.model(problem, &structure.values(problem, &best.structure.stated_of(problem, values), &other_values, &[]))?;
     let with = best.structure.model(problem, values)?;
 
     let records = best.structure.with_unknown(problem, &problem.fit, values);

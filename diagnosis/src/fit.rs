@@ -34,6 +34,8 @@ pub struct Evaluator<'a> {
     pub stretch: f64,
     /// How wide they may become where narrow ones mislead.
     pub widest: f64,
+    /// Whether only numbers of single records move, such as the curve of a hand that nobody measured.
+    pub own_only: bool,
 }
 
 /// How long to try.
@@ -86,6 +88,7 @@ impl<'a> Evaluator<'a> {
             substeps: 64,
             guide: None,
             stretch: 1.0,
+            own_only: false,
             widest: 64.0,
         }
     }
@@ -299,7 +302,7 @@ impl<'a> Evaluator<'a> {
         let (mut lambda, mut steps, mut weak) = (1e-3, 0, 0);
         // Slips that start a step earlier or later make small differences rough: wider ones are taken where narrow ones mislead.
         let mut stretch = self.stretch;
-        let everything: Vec<usize> = (0..own.len()).collect();
+        let everything: Vec<usize> = (0..own.len()).filter(|j| self.moves(&numbers[*j])).collect();
         let mut foreseen;
         loop {
             let weights = self.weights(&residuals);
@@ -310,7 +313,8 @@ impl<'a> Evaluator<'a> {
                     slope[j] += (own[j] - centre) / (spread * spread);
                 }
             }
-            let free: Vec<usize> = (0..own.len()).filter(|j| may_move(&numbers[*j], own[*j], slope[*j], matrix[(*j, *j)])).collect();
+            let free: Vec<usize> =
+                everything.iter().copied().filter(|j| may_move(&numbers[*j], own[*j], slope[*j], matrix[(*j, *j)])).collect();
             foreseen = step_of(&matrix, &slope, &free, 1e-9).map_or(0.0, |step| free.iter().zip(&step).map(|(j, s)| -slope[*j] * s).sum());
             let unit = cost / residuals.len().max(1) as f64;
             let ended = self.is_late() || steps >= effort.steps || weak >= 3;
@@ -323,7 +327,7 @@ impl<'a> Evaluator<'a> {
                 if age == 0 || effort.tolerance > 1.0 {
                     break;
                 }
-                (jacobian, age) = (self.columns(structure, &own, &residuals, &everything, stretch), 0);
+                (jacobian, age) = (self.all_columns(structure, &own, &residuals, &everything, stretch), 0);
                 continue;
             }
             let tries = if age > 0 { 2 } else { 6 };
@@ -352,7 +356,7 @@ impl<'a> Evaluator<'a> {
                     }
                     stretch *= 8.0;
                 }
-                (jacobian, age, lambda) = (self.columns(structure, &own, &residuals, &everything, stretch), 0, lambda.min(1e-1));
+                (jacobian, age, lambda) = (self.all_columns(structure, &own, &residuals, &everything, stretch), 0, lambda.min(1e-1));
                 continue;
             };
             let ratio = (cost - c) / foreseen.max(1e-300);
@@ -366,7 +370,7 @@ impl<'a> Evaluator<'a> {
             (own, residuals, cost) = (next, r, c);
             steps += 1;
             if fresh && steps < effort.steps {
-                (jacobian, age) = (self.columns(structure, &own, &residuals, &everything, stretch), 0);
+                (jacobian, age) = (self.all_columns(structure, &own, &residuals, &everything, stretch), 0);
             } else {
                 age += 1;
             }
@@ -374,12 +378,31 @@ impl<'a> Evaluator<'a> {
         Some(Fit { values: outward(&own), cost, residuals, jacobian, foreseen, steps })
     }
 
+    fn moves(&self, number: &Number) -> bool {
+        !self.own_only || number.record.is_some()
+    }
+
+    /// Derivatives by all numbers, 0 by those that do not move.
+    fn all_columns(&self, structure: &Structure, own: &[f64], residuals: &[f64], which: &[usize], stretch: f64) -> Vec<Vec<f64>> {
+        let mut all = vec![Vec::new(); own.len()];
+        for (j, column) in which.iter().zip(self.columns(structure, own, residuals, which, stretch)) {
+            all[*j] = column;
+        }
+        all.iter_mut().filter(|c| c.is_empty()).for_each(|c| c.resize(residuals.len(), 0.0));
+        all
+    }
+
     /// Derivatives at the start, those by stated numbers from another fit where there is one.
     fn first_jacobian(&self, structure: &Structure, own: &[f64], residuals: &[f64], known: Option<(&Structure, &Fit)>) -> Vec<Vec<f64>> {
         let Some((other, fit)) = known else {
-            return self.columns(structure, own, residuals, &(0..own.len()).collect::<Vec<_>>(), self.stretch);
+            let moving: Vec<usize> = (0..own.len()).filter(|j| self.moves(&structure.numbers[*j])).collect();
+            return self.all_columns(structure, own, residuals, &moving, self.stretch);
         };
+        let still = vec![0.0; residuals.len()];
         let column = |number: &Number| {
+            if !self.moves(number) {
+                return Some(&still);
+            }
             let place = other.numbers.iter().position(|n| n.role == number.role);
             place.and_then(|p| fit.jacobian.get(p)).filter(|c| c.len() == residuals.len())
         };

@@ -4,7 +4,7 @@
 use crate::clock::Moment;
 use crate::fit::{Effort, Evaluator, Fit};
 use crate::hypothesis::{Hypothesis, Parameter, Place};
-use crate::race::{Course, Seed, distinct_fits, hopeful};
+use crate::race::{Course, Seed, distinct_fits, hopeful, own_first};
 use crate::structure::Structure;
 use rayon::prelude::*;
 use std::time::Duration;
@@ -55,9 +55,9 @@ impl Course<'_> {
         let added = seed.effects.iter().map(|(h, _)| self.hypotheses[*h].clone()).collect();
         let structure = Structure::new(problem, &problem.fit, added);
         let values: Vec<Vec<f64>> = seed.effects.iter().map(|(_, v)| v.clone()).collect();
-        let mut starts = vec![structure.values(problem, &seed.stated, &values)];
+        let mut starts = vec![structure.values(problem, &seed.stated, &values, &seed.of_records)];
         if seed.effects.len() == 1 && !seed.guided {
-            starts.push(structure.values(problem, self.given, &values));
+            starts.push(structure.values(problem, self.given, &values, &seed.of_records));
         }
         (structure, starts)
     }
@@ -72,7 +72,8 @@ impl Course<'_> {
             }
             let (structure, starts) = self.entry(seed);
             let known = Some((&base.structure, &base.fit));
-            let fit = held.fit_knowing(&structure, starts.first()?, Effort { steps: 1, tolerance: 3.0 }, known)?;
+            let start = own_first(held, known, &structure, starts.first()?.clone());
+            let fit = held.fit_knowing(&structure, &start, Effort { steps: 1, tolerance: 3.0 }, known)?;
             Some((structure, fit))
         };
         // In their order, two at a time.
@@ -118,11 +119,10 @@ impl Course<'_> {
 
     /// The same with the place of each start among those of its law.
     fn ranked_laws(&self, structure: &Structure, values: &[f64]) -> Vec<(usize, Seed)> {
-        let stated = structure.stated_of(self.evaluator.problem, values);
         let own = self.effects_of(structure, values);
         let mut seeds: Vec<(usize, Seed)> = Vec::new();
-        for (slot, (effect, values)) in structure.added.iter().zip(structure.added_of(values)).enumerate() {
-            let known: Vec<(&str, f64)> = effect.parameters.iter().zip(&values).map(|(p, v)| (p.key.as_str(), *v)).collect();
+        for (slot, (effect, own_values)) in structure.added.iter().zip(structure.added_of(values)).enumerate() {
+            let known: Vec<(&str, f64)> = effect.parameters.iter().zip(&own_values).map(|(p, v)| (p.key.as_str(), *v)).collect();
             let beside = |h: &Hypothesis| structure.added.iter().enumerate().all(|(i, other)| i == slot || other.compatible(h));
             for (index, h) in self.hypotheses.iter().enumerate() {
                 if !h.place.same(&effect.place) || h.id == effect.id || !beside(h) {
@@ -133,7 +133,7 @@ impl Course<'_> {
                     let mut effects = own.clone();
                     if let Some(place) = effects.get_mut(slot) {
                         *place = (index, start);
-                        seeds.push((rank, Seed { effects, stated: stated.clone(), guided: true }));
+                        seeds.push((rank, Seed::beside(self.evaluator.problem, (structure, values), effects, true)));
                     }
                 }
             }

@@ -5,7 +5,7 @@ use crate::clock::Moment;
 use crate::fit::{Effort, Evaluator};
 use crate::intervals::Spread;
 use crate::numbers::name_of;
-use crate::problem::Problem;
+use crate::problem::{Problem, Record};
 use crate::search::{Candidate, candidate};
 use crate::structure::{Role, Structure};
 use rayon::prelude::*;
@@ -58,18 +58,21 @@ const UNSURE: f64 = 0.5;
 pub fn fit_each(problem: &Problem, joint: &Candidate, floor: &[f64], stop: Option<&AtomicBool>, until: Option<Moment>) -> PerRecord {
     let stated = joint.structure.stated_of(problem, &joint.fit.values);
     let added = joint.structure.added_of(&joint.fit.values);
-    let one = |record| -> Option<(String, Candidate, Spread)> {
+    let own = joint.structure.of_records(&joint.fit.values);
+    let one = |(index, record): (usize, &Record)| -> Option<(String, Candidate, Spread)> {
         let records = std::slice::from_ref(record);
         let mut evaluator = Evaluator::on(problem, records);
         (evaluator.floor, evaluator.stop, evaluator.until) = (floor.to_vec(), stop, until);
         let structure = Structure::new(problem, records, joint.structure.added.clone());
-        let start = structure.values(problem, &stated, &added);
+        let here: Vec<(Role, f64)> =
+            own.iter().filter(|(role, _)| role.in_record(index) == *role).map(|(role, value)| (role.in_record(0), *value)).collect();
+        let start = structure.values(problem, &stated, &added, &here);
         let fit = evaluator.fit(&structure, &start, Effort { steps: 25, tolerance: 0.3 })?;
         let candidate = candidate(&evaluator, structure, fit);
         let spread = Spread::of(&candidate);
         Some((record.name.clone(), candidate, spread))
     };
-    let fits: Vec<_> = problem.fit.par_iter().filter_map(one).collect();
+    let fits: Vec<_> = problem.fit.par_iter().enumerate().filter_map(one).collect();
     let shared = joint.structure.numbers.iter().enumerate().filter(|(_, n)| matches!(n.role, Role::Stated(_) | Role::Added(..)));
     let numbers = shared.filter_map(|(index, number)| across(problem, joint, index, &number.role, &fits)).collect();
     PerRecord { records: fits.iter().map(|f| f.0.clone()).collect(), levels: fits.iter().map(|f| f.1.levels.clone()).collect(), numbers }

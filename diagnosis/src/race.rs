@@ -2,10 +2,10 @@
 
 use crate::fit::{Effort, Evaluator, Fit};
 use crate::hypothesis::Hypothesis;
-use crate::problem::Record;
-use crate::screen::{Promise, worst_records};
+use crate::problem::{Problem, Record};
+use crate::screen::worst_records;
 use crate::search::{Candidate, MIDDLE, candidate, key_of};
-use crate::structure::Structure;
+use crate::structure::{Role, Structure};
 use backdrive_plant::set::Initial;
 use rayon::prelude::*;
 use std::collections::HashSet;
@@ -17,14 +17,17 @@ pub struct Seed {
     pub effects: Vec<(usize, Vec<f64>)>,
     /// Stated numbers to start from.
     pub stated: Vec<f64>,
+    /// Numbers of single records to start from.
+    pub of_records: Vec<(Role, f64)>,
     /// Whether it was found along the measured path, and is to be fitted there first.
     pub guided: bool,
 }
 
 impl Seed {
-    /// A hypothesis alone, as screening found it beside these stated numbers.
-    pub fn single(promise: &Promise, stated: &[f64], guided: bool) -> Seed {
-        Seed { effects: vec![(promise.hypothesis, promise.values.clone())], stated: stated.to_vec(), guided }
+    /// Effects beside the other numbers of a fit.
+    pub fn beside(problem: &Problem, (base, values): (&Structure, &[f64]), effects: Vec<(usize, Vec<f64>)>, guided: bool) -> Seed {
+        let (stated, of_records) = (base.stated_of(problem, values), base.of_records(values));
+        Seed { effects, stated, of_records, guided }
     }
 
     /// What sets a structure apart, whatever its values.
@@ -81,7 +84,16 @@ impl Course<'_> {
                 // Along the path the numbers have moved far from where the nominal model's derivatives hold.
                 let known = if self.along.is_some() { None } else { Some((&self.nominal.structure, &nominal_there)) };
                 let effort = Effort { steps: 2, tolerance: 3.0 };
-                let fits = starts.into_iter().filter_map(|start| coarse.fit_knowing(&structure, &start, effort, known));
+                let starts = starts.into_iter().map(|start| {
+                    let problem = evaluator.problem;
+                    let numbers = (structure.stated_of(problem, &start), structure.added_of(&start));
+                    let anew =
+                        || structure.values(problem, &numbers.0, &numbers.1, &self.nominal.structure.of_records(&nominal_there.values));
+                    // Along the measured path, and on parts of recordings, next to nothing is known of an unknown curve.
+                    let start = if problem.unknown.is_empty() { start } else { anew() };
+                    own_first(&coarse, Some((&self.nominal.structure, &nominal_there)), &structure, start)
+                });
+                let fits = starts.filter_map(|start| coarse.fit_knowing(&structure, &start, effort, known));
                 let best = fits.min_by(|a, b| hopeful(a).total_cmp(&hopeful(b)))?;
                 Some((structure, best))
             })
@@ -131,6 +143,16 @@ impl Course<'_> {
             .map(|(s, f)| candidate(evaluator, s, f))
             .collect()
     }
+}
+
+/// A start whose curves of unknown inputs are fitted beside the rest of it, with derivatives that another fit knows: a law begins beside a hand that
+/// goes with it, and not with what was found without it.
+pub(crate) fn own_first(evaluator: &Evaluator, known: Option<(&Structure, &Fit)>, structure: &Structure, start: Vec<f64>) -> Vec<f64> {
+    if evaluator.problem.unknown.is_empty() {
+        return start;
+    }
+    let only = Evaluator { own_only: true, ..evaluator.clone() };
+    only.fit_knowing(structure, &start, Effort { steps: 4, tolerance: 3.0 }, known).map_or(start, |fit| fit.values)
 }
 
 /// Keeps the first fit of each structure.

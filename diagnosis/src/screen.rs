@@ -105,13 +105,14 @@ impl Screen {
     pub fn new(evaluator: &Evaluator, base: &Structure, fit: &Fit, hypotheses: &[Hypothesis], time: Duration) -> Screen {
         let stride = fit.residuals.len().div_ceil(KEPT).max(1);
         let problem = evaluator.problem;
-        let (stated, added) = (base.stated_of(problem, &fit.values), base.added_of(&fit.values));
+        let (stated, added, own) = (base.stated_of(problem, &fit.values), base.added_of(&fit.values), base.of_records(&fit.values));
         // What a simulation of a recording takes, by a sample of the hypotheses: nonlinear ones are slower than a linear base.
         let began = Moment::now();
         let sample: Vec<&Hypothesis> = hypotheses.iter().step_by((hypotheses.len() / 8).max(1)).collect();
         sample.par_iter().for_each(|h| {
             let structure = Structure::new(problem, evaluator.records, [base.added.clone(), vec![(*h).clone()]].concat());
-            let values = structure.values(problem, &stated, &[added.clone(), h.starts.first().cloned().into_iter().collect()].concat());
+            let values =
+                structure.values(problem, &stated, &[added.clone(), h.starts.first().cloned().into_iter().collect()].concat(), &own);
             if let Some(model) = structure.model(problem, &values) {
                 let _ = evaluator.record_residuals(&structure, &model, &values, 0);
             }
@@ -161,7 +162,7 @@ impl Screen {
                         return None;
                     }
                     let structure = with(*index);
-                    let values = structure.values(problem, &stated, &[added.clone(), vec![start.to_vec()]].concat());
+                    let values = structure.values(problem, &stated, &[added.clone(), vec![start.to_vec()]].concat(), &own);
                     let model = structure.model(problem, &values)?;
                     let parts: Option<Vec<Vec<f64>>> =
                         few.iter().map(|r| evaluator.record_residuals(&structure, &model, &values, *r)).collect();
@@ -192,7 +193,7 @@ impl Screen {
                         return None;
                     }
                     let all = [added.clone(), vec![values.clone()]].concat();
-                    let residuals = evaluator.residuals(&structure, &structure.values(problem, &stated, &all))?;
+                    let residuals = evaluator.residuals(&structure, &structure.values(problem, &stated, &all, &own))?;
                     measured(residuals.iter().step_by(stride).zip(fit.residuals.iter().step_by(stride)).map(|(a, b)| a - b).collect())
                 };
                 let values = [start.to_vec(), weakened(&hypotheses[*index], start)];

@@ -213,7 +213,7 @@ pub fn search(
     report("refitting the nominal model");
     let structure = Structure::new(problem, &problem.fit, Vec::new());
     let given: Vec<f64> = problem.stated.iter().map(|s| s.given).collect();
-    let start = structure.values(problem, &given, &[]);
+    let start = structure.values(problem, &given, &[], &[]);
     let first = evaluator.residuals(&structure, &start).ok_or(SearchError::RunsAway)?;
     let middle = Evaluator { substeps: MIDDLE, ..evaluator.clone() };
     let quick = worst_first(&middle, &structure, &start, &first, [12, 3]).ok_or(SearchError::RunsAway)?;
@@ -342,7 +342,7 @@ pub fn search(
                 rank < 3 || rank < if guided { 14 } else { 8 } && promise.share > 0.5 * top
             };
             if wanted {
-                singles.push(Seed::single(promise, &view.stated, view.guided));
+                singles.push(view.seed(vec![(promise.hypothesis, promise.values.clone())]));
             }
         }
     }
@@ -407,7 +407,7 @@ pub fn search(
                 let best = distinct_structures(&found, 1).next().map(|c| &c.structure.added[0]);
                 let like = |h: &Hypothesis| best.is_some_and(|b| b.place.same(&h.place) && ["friction", "hysteresis"].contains(&b.family));
                 let rich = views[0].rich.iter().find(|p| like(&hypotheses[p.hypothesis]));
-                rich.map(|p| Seed::single(p, &views[0].stated, guided)).into_iter().collect()
+                rich.map(|p| views[0].seed(vec![(p.hypothesis, p.values.clone())])).into_iter().collect()
             }
             Pairs => {
                 effects = 2;
@@ -467,13 +467,14 @@ pub fn search(
     // The numbers of what was found may lead the nominal model out of a wrong basin: then there was less to find.
     let mut better = None;
     let last = Evaluator { until: Some(began + settings.patience.mul_f64(0.97)), ..evaluator.clone() };
-    let own = nominal.structure.stated_of(problem, &nominal.fit.values);
-    let others = found.iter().take(2).map(|c| c.structure.stated_of(problem, &c.fit.values));
+    let numbers = |c: &Candidate| (c.structure.stated_of(problem, &c.fit.values), c.structure.of_records(&c.fit.values));
+    let own = numbers(&nominal);
+    let others = found.iter().take(2).map(numbers);
     // Far from the noise its last thousandths say nothing.
     let effort = if is_far { Effort { steps: 8, tolerance: 3.0 } } else { Effort::FULL };
     let last = Evaluator { substeps: if is_far { MIDDLE } else { last.substeps }, ..last };
-    for stated in others.chain(is_far.then_some(own)) {
-        let start = nominal.structure.values(problem, &stated, &[]);
+    for (stated, of_records) in others.chain(is_far.then_some(own)) {
+        let start = nominal.structure.values(problem, &stated, &[], &of_records);
         let least = better.as_ref().map_or(nominal.fit.cost, |f: &Fit| f.cost);
         if let Some(fit) = last.fit(&nominal.structure, &start, effort)
             && fit.cost < 0.999 * least
@@ -506,7 +507,6 @@ impl Course<'_> {
     /// Simpler laws of the same family in the place of each effect of the best; where something is left to explain, laws that are as simple, too.
     fn relatives(&self, found: &[Candidate], done: bool) -> Vec<Seed> {
         let Some(best) = found.first() else { return Vec::new() };
-        let stated = best.structure.stated_of(self.evaluator.problem, &best.fit.values);
         let own = self.effects_of(&best.structure, &best.fit.values);
         let mut seeds = Vec::new();
         for (out, effect) in best.structure.added.iter().enumerate() {
@@ -521,7 +521,7 @@ impl Course<'_> {
                     let mut effects = own.clone();
                     if let Some(slot) = effects.get_mut(out) {
                         *slot = (index, start.clone());
-                        seeds.push(Seed { effects, stated: stated.clone(), guided: false });
+                        seeds.push(Seed::beside(self.evaluator.problem, (&best.structure, &best.fit.values), effects, false));
                     }
                 }
             }
@@ -543,12 +543,12 @@ impl Course<'_> {
             new.parameters.len() <= SIMPLE && base.structure.added.iter().all(|b| b.compatible(new))
         };
         let own = self.effects_of(&base.structure, &fit.values);
-        let stated = base.structure.stated_of(problem, &fit.values);
+        let seed = |p: Promise, guided| {
+            Seed::beside(problem, (&base.structure, &fit.values), [own.clone(), vec![(p.hypothesis, p.values)]].concat(), guided)
+        };
         let mut used = HashSet::new();
         let next = view.screen.look(&fit, &fits).into_iter().filter(|p| used.insert(p.hypothesis));
-        next.take(count)
-            .map(|p| Seed { effects: [own.clone(), vec![(p.hypothesis, p.values)]].concat(), stated: stated.clone(), guided: view.guided })
-            .collect()
+        next.take(count).map(|p| seed(p, view.guided)).collect()
     }
 
     /// A structure with each of what promises most added, screened beside it: an offset shows as one only where the spring behind it is bent, a law
@@ -558,13 +558,13 @@ impl Course<'_> {
         let Some(fit) = evaluator.fit(&base.structure, &base.fit.values, Effort { steps: 4, tolerance: 2.0 }) else { return Vec::new() };
         let screen = Screen::new(evaluator, &base.structure, &fit, self.hypotheses, time);
         let own = self.effects_of(&base.structure, &fit.values);
-        let stated = base.structure.stated_of(problem, &fit.values);
+        let seed = |p: Promise, guided| {
+            Seed::beside(problem, (&base.structure, &fit.values), [own.clone(), vec![(p.hypothesis, p.values)]].concat(), guided)
+        };
         let fits = |h: usize| self.hypotheses[h].parameters.len() <= SIMPLE;
         let mut used = HashSet::new();
         let next = screen.look(&fit, &fits).into_iter().filter(|p| used.insert(p.hypothesis));
-        next.take(6)
-            .map(|p| Seed { effects: [own.clone(), vec![(p.hypothesis, p.values)]].concat(), stated: stated.clone(), guided: false })
-            .collect()
+        next.take(6).map(|p| seed(p, false)).collect()
     }
 
     /// A structure with each of its effects exchanged for what promises most in its place.
@@ -572,13 +572,14 @@ impl Course<'_> {
         let problem = self.evaluator.problem;
         let stated = best.structure.stated_of(problem, &best.fit.values);
         let values = best.structure.added_of(&best.fit.values);
+        let of_records = best.structure.of_records(&best.fit.values);
         let mut seeds = Vec::new();
         for out in 0..best.structure.added.len() {
             let keep = |i: &usize| *i != out;
             let added: Vec<Hypothesis> = (0..values.len()).filter(keep).map(|i| best.structure.added[i].clone()).collect();
             let kept: Vec<Vec<f64>> = (0..values.len()).filter(keep).map(|i| values[i].clone()).collect();
             let structure = Structure::new(problem, &problem.fit, added);
-            let start = structure.values(problem, &stated, &kept);
+            let start = structure.values(problem, &stated, &kept, &of_records);
             let Some(fit) = view.evaluator.fit(&structure, &start, Effort { steps: 3, tolerance: 2.0 }) else { continue };
             seeds.extend(self.extensions(view, &candidate(&view.evaluator, structure, fit), count));
         }
@@ -666,7 +667,6 @@ struct View<'a> {
     evaluator: Evaluator<'a>,
     /// The nominal model there.
     base: Candidate,
-    stated: Vec<f64>,
     /// Whether it is along the measured path.
     guided: bool,
     /// Whether its residuals are those of the recordings, whole and without a guide.
@@ -695,8 +695,12 @@ impl<'a> View<'a> {
         let screen = Screen::new(&on, structure, &fit, hypotheses, time);
         let promises = screen.look(&fit, &|_| true);
         let (simple, rich) = promises.into_iter().partition(|p| hypotheses[p.hypothesis].parameters.len() <= SIMPLE);
-        let stated = structure.stated_of(on.problem, &fit.values);
-        View { screen, base: candidate(&on, structure.clone(), fit), evaluator: on, stated, guided, whole, simple, rich }
+        View { screen, base: candidate(&on, structure.clone(), fit), evaluator: on, guided, whole, simple, rich }
+    }
+
+    /// Effects beside the numbers of its base.
+    fn seed(&self, effects: Vec<(usize, Vec<f64>)>) -> Seed {
+        Seed::beside(self.evaluator.problem, (&self.base.structure, &self.base.fit.values), effects, self.guided)
     }
 
     /// The most promising pairs.
@@ -707,7 +711,7 @@ impl<'a> View<'a> {
         let mut used = HashSet::new();
         let best = together.iter().filter(|(a, b, _)| used.insert((simple[*a].hypothesis, simple[*b].hypothesis)));
         let pair = |a: usize, b: usize| [a, b].map(|p| (simple[p].hypothesis, simple[p].values.clone())).to_vec();
-        let seed = |(a, b, _): &(usize, usize, f64)| Seed { effects: pair(*a, *b), stated: self.stated.clone(), guided: self.guided };
+        let seed = |(a, b, _): &(usize, usize, f64)| self.seed(pair(*a, *b));
         best.take(count).map(seed).collect()
     }
 }

@@ -26,6 +26,19 @@ pub enum Role {
     Knot(usize, usize, usize),
 }
 
+impl Role {
+    /// The same in the place of another record, where it belongs to one.
+    pub fn in_record(&self, record: usize) -> Role {
+        match self {
+            Role::Condition(path, _) => Role::Condition(path.clone(), record),
+            Role::Position(body, _) => Role::Position(*body, record),
+            Role::Velocity(body, _) => Role::Velocity(*body, record),
+            Role::Knot(unknown, knot, _) => Role::Knot(*unknown, *knot, record),
+            Role::Stated(_) | Role::Added(..) => self.clone(),
+        }
+    }
+}
+
 /// A number that a fit may move.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Number {
@@ -141,15 +154,23 @@ impl Structure {
         Structure { added, numbers }
     }
 
-    /// Values to start from, as they stand in the model: the stated numbers as given, and for each hypothesis the values given.
-    pub fn values(&self, problem: &Problem, stated: &[f64], added: &[Vec<f64>]) -> Vec<f64> {
+    /// Values to start from, as they stand in the model: the stated numbers as given, for each hypothesis the values given, and what belongs to
+    /// single records, such as the curve of a hand that nobody measured, as another fit found it.
+    pub fn values(&self, problem: &Problem, stated: &[f64], added: &[Vec<f64>], of_records: &[(Role, f64)]) -> Vec<f64> {
+        let own = |role: &Role| of_records.iter().find(|(other, _)| other == role).map(|(_, value)| *value);
         let value = |number: &Number| match &number.role {
             Role::Stated(i) => stated.get(*i).copied().or_else(|| problem.stated.get(*i).map(|s| s.given)),
             Role::Added(h, p) => added.get(*h).and_then(|values| values.get(*p)).copied(),
-            Role::Condition(path, _) => problem.model.values_at(path).ok().and_then(|v| v.first().copied()),
-            Role::Position(..) | Role::Velocity(..) | Role::Knot(..) => Some(0.0),
+            Role::Condition(path, _) => own(&number.role).or_else(|| problem.model.values_at(path).ok().and_then(|v| v.first().copied())),
+            Role::Position(..) | Role::Velocity(..) | Role::Knot(..) => own(&number.role),
         };
         self.numbers.iter().map(|n| value(n).unwrap_or(0.0).clamp(n.range.0, n.range.1)).collect()
+    }
+
+    /// The numbers among `values` that belong to single records.
+    pub fn of_records(&self, values: &[f64]) -> Vec<(Role, f64)> {
+        let numbers = self.numbers.iter().zip(values).filter(|(n, _)| n.record.is_some());
+        numbers.map(|(n, value)| (n.role.clone(), *value)).collect()
     }
 
     /// The stated numbers among `values`, in the order of [`Problem::stated`]; those that are not free as given.

@@ -425,7 +425,7 @@ fn held_out(problem: &Problem, search: &Search, best: &Candidate, use_best: bool
     let records = if problem.held_out.is_empty() { &problem.fit } else { &problem.held_out };
     let structure = &search.nominal.structure;
     let given: Vec<f64> = problem.stated.iter().map(|s| s.given).collect();
-    let before = nrmse(problem, records, structure, &structure.values(problem, &given, &[]));
+    let before = nrmse(problem, records, structure, &structure.values(problem, &given, &[], &[]));
     let refit = nrmse(problem, records, structure, &search.nominal.fit.values);
     let after = if use_best { nrmse(problem, records, &best.structure, &best.fit.values) } else { before };
     let (mut sum, mut count) = (0.0, 0usize);

@@ -92,7 +92,7 @@ fn refitted_numbers_lie_in_their_intervals() {
     let evaluator = Evaluator::new(&problem);
     let structure = Structure::new(&problem, &problem.fit, Vec::new());
     let given: Vec<f64> = problem.stated.iter().map(|s| s.given).collect();
-    let fit = evaluator.fit(&structure, &structure.values(&problem, &given, &[]), Effort::FULL).unwrap();
+    let fit = evaluator.fit(&structure, &structure.values(&problem, &given, &[], &[]), Effort::FULL).unwrap();
     let level = (fit.cost / fit.residuals.len() as f64).sqrt();
     assert!(level < 1.1, "{level} floors");
     let candidate =

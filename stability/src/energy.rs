@@ -12,7 +12,7 @@ use crate::session::{AxisSignals, Session};
 use backdrive_nodes::graph::{Graph, NodeKind, Settings};
 use backdrive_plant::elements::{Mechanics, Role};
 use backdrive_plant::linear::{Friction, LinearModel, Operating};
-use backdrive_plant::model::{Model, OutputKind, Place};
+use backdrive_plant::model::{InputKind, Model, OutputKind, Place};
 use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 use std::ops::Range;
@@ -510,7 +510,7 @@ fn to_ground(model: &Model, user: usize, notes: &mut Vec<String>) -> ToGround {
         match element.law.role() {
             Role::Linear(linear) => sum.damping += linear.damping,
             Role::Friction(levels) => sum.coulomb += levels.kinetic[0].min(levels.kinetic[1]),
-            Role::Path | Role::Unavailable => {
+            Role::Path => {
                 notes.push(format!("what {} ({}) adds to b and f_c is not counted", element.name, element.law.kind().name));
             }
         }
@@ -526,7 +526,8 @@ pub fn loop_delay_s(graph: &Graph) -> f64 {
         .any(|c| graph.nodes[c.from.0].kind == NodeKind::Canceller && graph.nodes[c.to.0].kind == NodeKind::Scaling);
     let in_loop = |kind: NodeKind, port: &str| match (kind, port) {
         (NodeKind::Canceller, "measured") => through_canceller,
-        (NodeKind::Scaling, "motion" | "contact") | (NodeKind::Slave, "command") | (NodeKind::Master, "force") => true,
+        (NodeKind::Scaling, "motion" | "contact") | (NodeKind::Slave, "command" | "force") => true,
+        (NodeKind::Controller, "command") | (NodeKind::Master, "force") => true,
         _ => false,
     };
     let loop_connections = graph.connections.iter().filter(|c| in_loop(graph.nodes[c.to.0].kind, &c.to.1));
@@ -540,6 +541,9 @@ fn environment_stiffness(graph: &Graph, index: usize, signals: &AxisSignals) -> 
     let mut model = files.model.clone().ok_or("the slave has no model")?;
     let fragment = files.fragment.as_ref().ok_or("the slave has no environment")?;
     let axis = model.axes.get(index).cloned().ok_or_else(|| format!("the slave's model has no axis {index}"))?;
+    if model.inputs.get(axis.feedback).is_some_and(|input| input.kind == InputKind::Force) {
+        return Err("the slave is driven by a controller's force, and how stiff that holds it is not told from its model".to_owned());
+    }
     let attached = model.attach(fragment, axis.user, &fragment.network.name);
     let tip = signals.slave.as_ref().unwrap_or(&signals.command);
     let pressed = signals.contact.iter().zip(tip).filter(|(f, x)| f.is_finite() && x.is_finite());

@@ -87,7 +87,9 @@ fn fitted(problem: &Problem, ids: &[&str]) -> (Structure, Fit) {
     let structure = Structure::new(problem, &problem.fit, added.clone());
     let given: Vec<f64> = problem.stated.iter().map(|s| s.given).collect();
     let starts: Vec<Vec<f64>> = (0..2)
-        .map(|s| structure.values(problem, &given, &added.iter().map(|h| h.starts[s.min(h.starts.len() - 1)].clone()).collect::<Vec<_>>()))
+        .map(|s| {
+            structure.values(problem, &given, &added.iter().map(|h| h.starts[s.min(h.starts.len() - 1)].clone()).collect::<Vec<_>>(), &[])
+        })
         .collect();
     let fit = Evaluator::new(problem).best_of(&structure, &starts, Effort::FULL).unwrap();
     (structure, fit)

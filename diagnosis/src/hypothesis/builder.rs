@@ -57,7 +57,11 @@ impl<'a> ElementBuilder<'a> {
             name,
             in_place: false,
             removes: Vec::new(),
-            slots: kind.parameters.iter().map(|p| vec![Source::Fixed(p.default.unwrap_or(0.0))]).collect(),
+            slots: kind
+                .parameters
+                .iter()
+                .map(|p| p.default_values().unwrap_or(vec![0.0]).into_iter().map(Source::Fixed).collect())
+                .collect(),
             parameters: Vec::new(),
             tidy: |_| (),
             tag: "",

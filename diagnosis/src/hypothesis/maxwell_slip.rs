@@ -4,15 +4,15 @@ use super::Physics;
 use super::builder::{ElementBuilder, friction_level, log};
 use super::sites::FRICTION;
 
-/// Sliders that are fitted: few enough for a recording, many enough for the shape of a loop.
-const SLIDERS: usize = 4;
+/// Sliders that are fitted, and the word that sets the hypothesis apart: few enough to be tried at every place, then many enough for the shape of a loop.
+const SLIDERS: [(usize, &str); 2] = [(3, ""), (5, "fine")];
 
 pub(super) const PHYSICS: Physics = Physics {
     name: "maxwell_slip",
     family: "friction",
     contains: &["coulomb"],
     propose: |sites| {
-        let one = |site| {
+        let one = |site, (count, tag): (usize, &'static str)| {
             let new = ElementBuilder::new(sites, &PHYSICS, site)?;
             let (f, x) = (site.force, site.displacement);
             let (new, stated) = match sites.first_of(site, &FRICTION) {
@@ -24,15 +24,15 @@ pub(super) const PHYSICS: Physics = Physics {
             let most = 20.0 * f.max(c);
             let mut force = log(1e-7 * f, most);
             force.neutral = stated.is_none().then_some(1e-7 * f);
-            let new = new.list("stiffness", SLIDERS, log(1e-4 * f / x, 1e6 * f / x)).list("force", SLIDERS, force);
+            let new = new.tag(tag).list("stiffness", count, log(1e-4 * f / x, 1e6 * f / x)).list("force", count, force);
             // Equal sliders that slip after distances in even ratios.
             let start = |first: f64, last: f64| {
-                let each = c / SLIDERS as f64;
-                let slip = |i: usize| x * first * f64::powf(last / first, i as f64 / (SLIDERS - 1) as f64);
-                (0..SLIDERS).map(|i| each / slip(i)).chain(std::iter::repeat_n(each, SLIDERS)).collect::<Vec<f64>>()
+                let each = c / count as f64;
+                let slip = |i: usize| x * first * f64::powf(last / first, i as f64 / (count - 1) as f64);
+                (0..count).map(|i| each / slip(i)).chain(std::iter::repeat_n(each, count)).collect::<Vec<f64>>()
             };
             Some(new.starts(vec![start(0.003, 0.3), start(0.03, 1.0), start(0.0003, 0.03)]))
         };
-        sites.near().filter_map(one).collect()
+        SLIDERS.iter().flat_map(|sliders| sites.near().filter_map(|site| one(site, *sliders))).collect()
     },
 };

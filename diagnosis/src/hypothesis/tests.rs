@@ -133,7 +133,9 @@ fn every_kind_that_can_be_simulated_is_proposed() {
             let ones: Vec<Vec<f64>> = k.parameters.iter().map(|_| vec![1.0]).collect();
             !matches!((k.build)(&ones), Err(e) if e.contains("not available"))
         });
-        assert_eq!(proposed.contains(&physics.name), can, "{}", physics.name);
+        // Its curves are loops that were measured, not numbers that a search could move; maxwell_slip is proposed for the same memory.
+        let measured = physics.name == "preisach_lugre";
+        assert_eq!(proposed.contains(&physics.name), can && !measured, "{}", physics.name);
     }
     assert!(KINDS.iter().all(|k| physics_named(k.name).is_some()), "an element kind is no physics");
     for key in ["delay", "bandwidth", "saturation", "gain", "back_emf", "offset", "inertia", "series_compliance"] {
@@ -179,8 +181,11 @@ fn every_start_moves_and_is_seen() {
             for start in &h.starts {
                 let applied = h.apply(&model, start).expect("applies");
                 let after = simulate(&applied, &inputs, period, &Options::default()).unwrap_or_else(|e| panic!("{name}: {}: {e}", h.id));
-                assert!(!finite || after.iter().flatten().all(|y| y.is_finite()), "{name}: {} {start:?}", h.id);
-                seen |= before.iter().zip(&after).any(|(a, b)| a.iter().zip(b).any(|(x, y)| (x - y).abs() > 1e-9 * x.abs()));
+                // A spring that softens may give way under a force: that start is one that a fit rejects. Any other stays finite.
+                let gives_way = h.physics == "cubic_spring" && start.last().is_some_and(|cubic| *cubic < 0.0);
+                let stays = after.iter().flatten().all(|y| y.is_finite());
+                assert!(!finite || stays || gives_way, "{name}: {} {start:?}", h.id);
+                seen |= stays && before.iter().zip(&after).any(|(a, b)| a.iter().zip(b).any(|(x, y)| (x - y).abs() > 1e-9 * x.abs()));
             }
             // A stop on the side that a device never comes to is not touched.
             let one_sided = ["contact", "hunt_crossley"].contains(&h.physics);

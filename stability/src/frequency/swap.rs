@@ -7,7 +7,7 @@ use backdrive_control::device::{Device, DeviceError, DeviceOptions, Role};
 use backdrive_msgs::{MAX_AXES, Sample};
 use backdrive_nodes::graph::DeviceFiles;
 use backdrive_plant::linear::{LinearError, LinearModel, Operating};
-use backdrive_plant::model::{Output, OutputKind};
+use backdrive_plant::model::{InputKind, Output, OutputKind};
 use nalgebra::{Complex, DMatrix};
 use std::f64::consts::TAU;
 
@@ -37,6 +37,9 @@ pub enum PartError {
     /// A device has no model.
     #[error("{0}: has no model to take the response from; give a model file")]
     NoModel(&'static str),
+    /// A controller drives the slave, and its answer is not told from the model alone.
+    #[error("slave: a controller drives it, so that its response does not follow from its model alone; run the graph with it instead")]
+    Driven,
     /// The model has not as many axes as the session.
     #[error("{part}: the model has {model} axes, the session has {session}")]
     Axes {
@@ -125,6 +128,9 @@ pub(super) fn slave_response(files: &DeviceFiles, about: &[f64], hz: &[f64]) -> 
     let mut model = files.model.clone().ok_or(PartError::NoModel("slave"))?;
     if model.axes.len() != axes {
         return Err(PartError::Axes { part: "slave", model: model.axes.len(), session: axes });
+    }
+    if model.axes.iter().any(|a| model.inputs[a.feedback].kind == InputKind::Force) {
+        return Err(PartError::Driven);
     }
     let ends: Vec<_> = model.axes.iter().map(|a| (a.feedback, a.user)).collect();
     let mut at = Operating::small();
