@@ -238,7 +238,7 @@ fn with_own_friction(context: &Context, model: &Model, file: &str) -> Result<([f
     let opened = Problem::open(&set, None).map_err(|e| StudyError::Diagnosis(e.to_string()))?;
     let fixed = Problem { stated: Vec::new(), ..opened };
     let own = Structure::new(&fixed, &fixed.held_out, Vec::new());
-    let start = own.values(&fixed, &[], &[]);
+    let start = own.values(&fixed, &[], &[], &[]);
     let failed = || StudyError::Diagnosis(format!("{file}: the model cannot be simulated"));
     let fit = Evaluator::on(&fixed, &fixed.held_out).fit(&own, &start, Effort::FULL).ok_or_else(failed)?;
     let value = |path: &str| {
@@ -253,7 +253,7 @@ fn with_own_friction(context: &Context, model: &Model, file: &str) -> Result<([f
 fn each(problem: &Problem, records: &[Record]) -> Result<Vec<(String, f64)>, StudyError> {
     let given: Vec<f64> = problem.stated.iter().map(|s| s.given).collect();
     let structure = Structure::new(problem, &problem.fit, Vec::new());
-    let predicted = predictions(problem, records, &structure, &structure.values(problem, &given, &[]))
+    let predicted = predictions(problem, records, &structure, &structure.values(problem, &given, &[], &[]))
         .ok_or_else(|| StudyError::Diagnosis("the diagnosed model cannot be simulated".to_string()))?;
     let all = qualities(problem, records, &predicted, &problem.floor, false);
     let name = |record: &str| backdrive::recordings::file_name(record).to_string();

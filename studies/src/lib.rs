@@ -9,13 +9,16 @@ pub mod filter;
 pub mod run;
 pub mod table;
 
+mod ball_screw;
 mod brfd_friction_damper;
 mod emps;
+mod engine_bench;
 mod kuka_kr300;
 mod odrive_cogging;
 mod papers;
 mod piezo_p885;
 mod silverbox;
+pub mod steering;
 
 use backdrive::failure::{Failure, code};
 use data::Data;
@@ -50,6 +53,7 @@ pub struct Context<'a> {
 
 /// Every study; a new one has its line here.
 pub const STUDIES: &[&Study] = &[
+    &ball_screw::STUDY,
     &brfd_friction_damper::STUDY,
     &emps::STUDY,
     &kuka_kr300::STUDY,
@@ -60,6 +64,8 @@ pub const STUDIES: &[&Study] = &[
     &papers::steering_compensator::STUDY,
     &papers::impulse_engine::STUDY,
     &papers::engine_bench::STUDY,
+    &engine_bench::STUDY,
+    &steering::STUDY,
 ];
 
 /// Why a study has no result.

@@ -33,6 +33,27 @@ fn report(name: &str) -> Option<Report> {
 }
 
 #[test]
+fn ball_screw() {
+    let Some(report) = report("ball_screw") else { panic!("it needs no recordings") };
+    let of = |name: &str| report.figure_named(name);
+    // Closed form of LuGre's drift for slow cycles: (F_C/s0) [ln(0.7/0.3) - ln(1.7/1.3)].
+    assert!((of("drift LuGre") / 28.95 - 1.0).abs() < 0.03, "{}", of("drift LuGre"));
+    assert!(of("drift eqs (4)-(6) as printed") > 10.0 && of("drift gated").abs() < 1.0);
+    assert!(of("wiping out gated") < 1e-9 && of("wiping out LuGre") > 5e-3);
+    assert!(of("relays 400") < 0.01 && of("relays 400") < of("relays 100"));
+    for motion in ["sliding", "presliding"] {
+        let error = |name: &str| of(&format!("{motion} {name}"));
+        assert!(error("SMC") > error("SMC, LuGre fed forward"), "{motion}");
+        assert!(error("SMC, LuGre fed forward") > error("adaptive back-stepping SMC"), "{motion}");
+        assert!(error("back-stepping SMC, not adapting") > error("adaptive back-stepping SMC"), "{motion}");
+        assert!(error("PD") > error("PD, Preisach fed forward"), "{motion}");
+    }
+    if long() {
+        assert_eq!(report.missed(), 0, "{}", report.text());
+    }
+}
+
+#[test]
 fn emps() {
     let Some(report) = report("emps") else { return };
     // The pipeline is the field's.
