@@ -2,7 +2,7 @@
 
 use crate::cli;
 use crate::failure::{Failure, code};
-use backdrive_bags::{ColumnMap, DiffOptions, ImportOptions, Quantity, Reader, diff, export_csv, import_csv, info, recover};
+use backdrive_bags::{ColumnMap, DiffOptions, ImportOptions, Quantity, Reader, diff, export_csv, import_csv, info, merge, recover};
 use std::path::Path;
 
 /// Does what `backdrive bag` is asked.
@@ -12,6 +12,7 @@ pub fn bag(command: &cli::Bag) -> Result<u8, Failure> {
         cli::Bag::Import { csv, bag, map } => import(csv, bag, map),
         cli::Bag::Export { bag, csv, topic } => export(bag, csv, topic),
         cli::Bag::Recover { damaged, bag } => save(damaged, bag),
+        cli::Bag::Merge { a, b, bag, offset, json } => join(a, b, bag, *offset, *json),
         cli::Bag::Play { bag, speed } => crate::play::play(bag, *speed),
         cli::Bag::Diff { a, b, tolerance, ignore, json } => compare(a, b, tolerance, ignore, *json),
     }
@@ -104,6 +105,26 @@ fn save(damaged: &Path, bag: &Path) -> Result<u8, Failure> {
     }
     let lost = report.completeness.as_ref().is_some_and(|c| c.lost() > 0);
     Ok(if lost { code::LOST_DATA } else { 0 })
+}
+
+fn join(a: &Path, b: &Path, bag: &Path, offset_s: Option<f64>, json: bool) -> Result<u8, Failure> {
+    is_new(bag)?;
+    let report = merge(a, b, bag, offset_s).map_err(Failure::input)?;
+    if json {
+        print_json(&report)?;
+    } else {
+        let (one, other) = report.in_one;
+        println!(
+            "{}: {} messages, {} of them in both, {one} in the first only, {other} in the second only",
+            bag.display(),
+            report.messages,
+            report.in_both
+        );
+        if let Some((least, most)) = report.offset_s {
+            println!("clock    the second is {least:.6} to {most:.6} s ahead, known to {:.6} s", report.uncertainty_s);
+        }
+    }
+    Ok(if report.completeness.lost() > 0 { code::LOST_DATA } else { 0 })
 }
 
 fn compare(a: &Path, b: &Path, tolerances: &[String], ignore: &[String], json: bool) -> Result<u8, Failure> {

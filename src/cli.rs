@@ -43,6 +43,11 @@ const FIT_HELP: &str = "Examples:
 
 Exit codes: 0 fitted, 1 the records disagree: the structure is not the device's.";
 
+const TEST_BENCH_HELP: &str = "Example:
+  backdrive run launch/engine-test-bench-identify.toml --out bench --transport inproc
+  backdrive test-bench bench/unfired.mcap bench/map.mcap bench/lag.mcap --dragged bench/unfired-other.mcap --cycle bench/validation.mcap \\
+    --engine-inertia 0.9 --stiffness 2e4 --power 240e3 --out identified";
+
 /// The verbs.
 #[derive(Debug, Subcommand)]
 pub enum Command {
@@ -61,6 +66,9 @@ pub enum Command {
     /// Refit a model's numbers to recordings, its structure as it is: standard errors, correlations, agreement between records.
     #[command(after_help = FIT_HELP)]
     Fit(Fit),
+    /// Identify an engine test bench from its bags: inertias, shaft, maps, the dynamometer's linear part, the engine's lag.
+    #[command(after_help = TEST_BENCH_HELP)]
+    TestBench(TestBench),
     /// Check a graph file; errors point at the line.
     #[command(after_help = "Example:\n  backdrive check launch/contact.toml")]
     Check(Graph),
@@ -81,6 +89,12 @@ pub enum Command {
     /// Remove what dead runs left in shared memory and on disk; live runs are not touched.
     #[command(after_help = "Example:\n  backdrive clean")]
     Clean,
+    /// Put the topics of a local graph on ROS 2, and take what other hosts tell from there.
+    #[command(after_help = "Example:\n  backdrive run launch/contact.toml --clock realtime &\n  backdrive bridge --domain 7")]
+    Bridge(Bridge),
+    /// Say what of this machine would hurt a run: shared memory, real-time rights, timers, multicast, socket buffers.
+    #[command(after_help = "Example:\n  backdrive doctor --interface eth0")]
+    Doctor(Doctor),
     /// Conceal effects in a master, find them from the bags of a session, and show what that is worth on the graph.
     #[command(after_help = PROVE_EXAMPLE)]
     Prove(Prove),
@@ -247,8 +261,51 @@ pub enum Clock {
 pub enum Transport {
     /// A process per node over shared memory.
     Iceoryx2,
+    /// A process per node over ROS 2 (DDS).
+    Ros2,
     /// All nodes in this process.
     Inproc,
+}
+
+/// Where on the network ROS 2 is spoken.
+#[derive(Debug, Clone, Default, Args)]
+pub struct Network {
+    /// ROS domain, 0 to 232, in place of ROS_DOMAIN_ID.
+    #[arg(long, value_name = "N")]
+    pub domain: Option<u16>,
+    /// Name or address of a network interface to use; may be given again. All without.
+    #[arg(long, value_name = "NAME")]
+    pub interface: Vec<String>,
+    /// Address of a host to tell by unicast, where there is no multicast; may be given again.
+    #[arg(long, value_name = "ADDRESS")]
+    pub peer: Vec<std::net::Ipv4Addr>,
+}
+
+/// `backdrive bridge`
+#[derive(Debug, Args)]
+pub struct Bridge {
+    /// The beginning of the run's name; not needed while one run is alive.
+    pub run: Option<String>,
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub network: Network,
+    /// Print what crossed as JSON.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// `backdrive doctor`
+#[derive(Debug, Args)]
+pub struct Doctor {
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub network: Network,
+    /// How long to listen for other hosts, s; ROS programs announce themselves every 10 to 30 s.
+    #[arg(long = "listen", value_name = "S", default_value_t = 3.0)]
+    pub listen_s: f64,
+    /// Print the findings as JSON.
+    #[arg(long)]
+    pub json: bool,
 }
 
 /// `backdrive run`
@@ -256,9 +313,15 @@ pub enum Transport {
 pub struct Run {
     /// The graph file.
     pub graph: PathBuf,
-    /// How messages travel.
-    #[arg(long, value_enum, default_value = "iceoryx2")]
-    pub transport: Transport,
+    /// How messages travel: shared memory without --host, else ROS 2.
+    #[arg(long, value_enum)]
+    pub transport: Option<Transport>,
+    /// Run only the nodes of this host of the graph, together with the other hosts.
+    #[arg(long, value_name = "NAME")]
+    pub host: Option<String>,
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub network: Network,
     /// How time runs.
     #[arg(long, value_enum)]
     pub clock: Option<Clock>,
@@ -372,6 +435,56 @@ pub struct Fit {
     /// How long to fit, at most; up to 1.4 times that on a busy machine.
     #[arg(long, value_name = "SECONDS", value_parser = positive, default_value_t = 60.0, allow_negative_numbers = true)]
     pub patience: f64,
+    /// Print the result as JSON.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// `backdrive test-bench`
+#[derive(Debug, Args)]
+pub struct TestBench {
+    /// Bag of the bench dragged (pedal at 0) and shaken by the dynamometer.
+    pub unfired: PathBuf,
+    /// Bag of stationary points of pedal and speed.
+    pub map: PathBuf,
+    /// Bag of steps of the pedal at fixed speeds.
+    pub lag: PathBuf,
+    /// Bag of the bench dragged along other speeds, for validation; with --cycle.
+    #[arg(long, value_name = "BAG", requires = "cycle")]
+    pub dragged: Option<PathBuf>,
+    /// Bag of a test cycle, for validation; with --dragged.
+    #[arg(long, value_name = "BAG", requires = "dragged")]
+    pub cycle: Option<PathBuf>,
+    /// J_C of the data sheet, where the search starts, kg m2.
+    #[arg(long, value_name = "KG_M2", value_parser = positive, allow_negative_numbers = true)]
+    pub engine_inertia: f64,
+    /// Torsional stiffness of the data sheet, where the search starts, N m/rad.
+    #[arg(long, value_name = "NM_RAD", value_parser = positive, allow_negative_numbers = true)]
+    pub stiffness: f64,
+    /// Most power of the dynamometer by its plate, W.
+    #[arg(long, value_name = "W", value_parser = positive, allow_negative_numbers = true)]
+    pub power: f64,
+    /// Folder for engine.toml, dynamometer.toml and shaft.toml.
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+    /// Shortest stretch of one pedal and speed that counts as stationary, s.
+    #[arg(long, value_name = "S", value_parser = positive, default_value_t = 3.5, allow_negative_numbers = true)]
+    pub plateau: f64,
+    /// Pedals between which the lag is linear, %, rising.
+    #[arg(long, value_name = "PERCENT", value_delimiter = ',', default_values_t = [0.0, 50.0, 100.0])]
+    pub pedals: Vec<f64>,
+    /// Speeds between which the lag is linear, rad/s, rising; without them the lowest, middle and highest of the steps.
+    #[arg(long, value_name = "RAD_S", value_delimiter = ',')]
+    pub speeds: Vec<f64>,
+    /// Order of magnitude of the speeds' noise, rad/s: the observer's D.
+    #[arg(long, value_name = "RAD_S", value_parser = positive, default_value_t = 0.02, allow_negative_numbers = true)]
+    pub noise: f64,
+    /// How fast the engine's torque changes, N m/s: the observer's weight.
+    #[arg(long, value_name = "NM_S", value_parser = positive, default_value_t = 200.0, allow_negative_numbers = true)]
+    pub torque_rate: f64,
+    /// m of the observer's matrix inequality over the least there is, above 1.
+    #[arg(long, value_name = "FACTOR", value_parser = positive, default_value_t = 1.2, allow_negative_numbers = true)]
+    pub back_off: f64,
     /// Print the result as JSON.
     #[arg(long)]
     pub json: bool,
@@ -515,6 +628,23 @@ pub enum Bag {
         #[arg(long, value_name = "FILE")]
         bag: PathBuf,
     },
+    /// One bag from those that two hosts recorded of the same run.
+    #[command(after_help = "Example:\n  backdrive bag merge contact-desk.mcap contact-robot.mcap --bag contact.mcap")]
+    Merge {
+        /// One bag; its clock is kept.
+        a: PathBuf,
+        /// The other.
+        b: PathBuf,
+        /// The new bag.
+        #[arg(long, value_name = "FILE")]
+        bag: PathBuf,
+        /// By how much the second's clock is ahead, s, in place of what the bags say.
+        #[arg(long, value_name = "S", allow_negative_numbers = true)]
+        offset: Option<f64>,
+        /// Print the result as JSON.
+        #[arg(long)]
+        json: bool,
+    },
     /// Publish a bag's messages again, verbatim and at their times.
     #[command(after_help = "Example:\n  backdrive bag play contact.mcap --speed 0.5")]
     Play {
@@ -615,6 +745,9 @@ pub struct Prove {
     /// Only the grip of the session.
     #[arg(long, conflicts_with = "grips")]
     pub same_grip: bool,
+    /// Only conceal, record and diagnose: no gain is raised.
+    #[arg(long, conflicts_with_all = ["grips", "same_grip"])]
+    pub no_gains: bool,
     /// Where the report goes; without this proof.html in the folder of the cases.
     #[arg(long, value_name = "FILE")]
     pub html: Option<PathBuf>,

@@ -2,9 +2,10 @@
 
 use crate::cli;
 use crate::failure::Failure;
-use crate::run::run_graph;
+use crate::run::{Way, run_graph};
 use backdrive_bags::{Reader, Signal, signals};
-use backdrive_nodes::graph::{Experiment, Graph, NodeKind, Overrides, Settings};
+use backdrive_control::shaft::{SENSORS, TORQUES};
+use backdrive_nodes::graph::{DeviceFiles, Experiment, Graph, NodeKind, Overrides, Settings};
 use backdrive_plant::model::Model;
 use backdrive_plant::tomlfile::FileError;
 use serde_json::json;
@@ -13,7 +14,7 @@ use std::path::{Path, PathBuf};
 
 /// Runs every experiment of a graph and writes one set of recordings, or one per step of a protocol: a folder with a
 /// bag per experiment, `set.toml` and the model of the device that was recorded.
-pub fn run(options: &cli::Run, graph: &Graph, changes: &Overrides) -> Result<u8, Failure> {
+pub fn run(options: &cli::Run, way: &Way, graph: &Graph, changes: &Overrides) -> Result<u8, Failure> {
     if options.changes.bag.is_some() {
         return Err(Failure::input(format!("{}: has several experiments; name their folder with --out", options.graph.display())));
     }
@@ -40,7 +41,7 @@ pub fn run(options: &cli::Run, graph: &Graph, changes: &Overrides) -> Result<u8,
         };
         sets[set].add(experiment, &device).map_err(|message| at(graph, experiment, message))?;
         eprintln!("{}/{}  {}{}", index + 1, graph.experiments.len(), experiment.name, if experiment.held_out { " (held out)" } else { "" });
-        let done = run_graph(&each, options.transport)?;
+        let done = run_graph(&each.clone().on_one_host(), way)?;
         // Of an experiment it does not matter whether a loop was stable: there is none. Losses do.
         let code = done.exit_code();
         if code > 1 {
@@ -70,7 +71,7 @@ fn at(graph: &Graph, experiment: &Experiment, message: String) -> Failure {
     Failure::from(FileError::at(graph.path.display().to_string(), experiment.line, format!("experiment \"{}\"", experiment.name), message))
 }
 
-/// What an experiment records: the device as held, its grip a part of the model, and where each signal is told.
+/// What an experiment records: the device as held, its grip a part of the model, or the specimen of a rig, and where each signal is told.
 struct Device {
     model: Model,
     /// Signal, topic, field.
@@ -79,10 +80,19 @@ struct Device {
 
 impl Device {
     fn of(graph: &Graph) -> Result<Device, Failure> {
+        if let Some(index) = graph.nodes.iter().position(|n| n.kind == NodeKind::Rig) {
+            return Device::on_rig(graph, index);
+        }
         let master = graph.nodes.iter().position(|n| n.kind == NodeKind::Master);
         let device = master.map(|index| (index, &graph.nodes[index].settings));
         let Some((index, Settings::Master(files))) = device else {
-            return Err(Failure::input(format!("{}: experiments need a master to be recorded", graph.path.display())));
+            if let Some(shaft) = Device::of_bench(graph) {
+                return Ok(shaft);
+            }
+            return Err(Failure::input(format!(
+                "{}: experiments need a master, a rig, or a test bench's shaft, to be recorded",
+                graph.path.display()
+            )));
         };
         let Some(model) = &files.model else {
             return Err(Failure::input(format!("{}: experiments need a master's model", graph.path.display())));
@@ -114,6 +124,37 @@ impl Device {
         });
         held.axes.iter_mut().for_each(|a| a.measured = renumber(a.measured));
         Ok(Device { model: held, columns })
+    }
+
+    /// A test bench: its shaft, between the torques of its two machines.
+    fn of_bench(graph: &Graph) -> Option<Device> {
+        let shaft = graph.nodes.iter().position(|n| n.kind == NodeKind::Shaft)?;
+        let Settings::Shaft(DeviceFiles { model: Some(model), .. }) = &graph.nodes[shaft].settings else { return None };
+        let mut columns = Vec::new();
+        for (name, port) in TORQUES.iter().zip(["engine", "dynamometer"]) {
+            let feeding = graph.connections.iter().find(|c| c.to.0 == shaft && c.to.1 == port)?;
+            columns.push((name.to_string(), feeding.topic.name.clone(), "effort[0]".to_string()));
+        }
+        for (name, (port, field)) in SENSORS.iter().zip([("engine", "velocity"), ("dynamometer", "velocity"), ("coupling", "effort")]) {
+            columns.push((name.to_string(), graph.topic_of(shaft, port).name, format!("{field}[0]")));
+        }
+        let mut model = model.clone();
+        model.outputs.retain(|o| SENSORS.contains(&o.name.as_str()));
+        model.axes.clear();
+        Some(Device { model, columns })
+    }
+
+    /// The specimen, moved as the ram moved and pushed as the load cell says.
+    fn on_rig(graph: &Graph, index: usize) -> Result<Device, Failure> {
+        let Settings::Rig(DeviceFiles { fragment: Some(specimen), .. }, ..) = &graph.nodes[index].settings else {
+            return Err(Failure::input(format!("{}: experiments need a specimen on the rig", graph.path.display())));
+        };
+        if graph.nodes[index].axes != 1 {
+            return Err(Failure::input(format!("{}: experiments need a rig of one axis", graph.path.display())));
+        }
+        let topic = graph.topic_of(index, "measured").name;
+        let column = |signal: &str, field: &str| (signal.to_string(), topic.clone(), field.to_string());
+        Ok(Device { model: specimen.driven(), columns: vec![column("displacement", "position[0]"), column("force", "effort[0]")] })
     }
 }
 

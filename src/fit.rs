@@ -1,6 +1,7 @@
 //! `backdrive fit`: a model's numbers refitted to recordings, its structure as it is.
 
 use crate::cli;
+use crate::columns::columns;
 use crate::failure::{Failure, code};
 use crate::interrupt;
 use crate::progress;
@@ -79,7 +80,7 @@ fn fitted(problem: &Problem, patience: Duration, stop: &AtomicBool, report: &(dy
     let per_record = fit_each(problem, &nominal, &floor, Some(stop), Some(until));
     let spread = Spread::of(&nominal);
     let stated: Vec<f64> = problem.stated.iter().map(|s| s.given).collect();
-    let given = nominal.structure.values(problem, &stated, &[]);
+    let given = nominal.structure.values(problem, &stated, &[], &[]);
     let quality = |values: &[f64]| -> Vec<Quality> {
         let of = |records: &[_], seen| {
             predictions(problem, records, &nominal.structure, values)
@@ -98,23 +99,6 @@ fn fitted(problem: &Problem, patience: Duration, stop: &AtomicBool, report: &(dy
         per_record,
         model: refitted_text(problem, &nominal, &spread).map_err(Failure::input)?,
     })
-}
-
-/// Columns of text, the first to the left, the others to the right.
-fn columns(rows: &[Vec<String>]) -> String {
-    let count = rows.iter().map(Vec::len).max().unwrap_or(0);
-    let width = |c: usize| rows.iter().filter_map(|r| r.get(c)).map(|s| s.chars().count()).max().unwrap_or(0);
-    let widths: Vec<usize> = (0..count).map(width).collect();
-    let mut out = String::new();
-    for row in rows {
-        let mut line = String::new();
-        for (c, cell) in row.iter().enumerate() {
-            let pad = " ".repeat(widths[c] - cell.chars().count());
-            let _ = if c == 0 { write!(line, "{cell}{pad}") } else { write!(line, "  {pad}{cell}") };
-        }
-        let _ = writeln!(out, "{}", line.trim_end());
-    }
-    out
 }
 
 /// A few tables for a person.
@@ -172,15 +156,4 @@ fn text(problem: &Problem, fitted: &Fitted) -> String {
     }
     let _ = writeln!(out, "\n{}: {}", problem.model.name, fits.sentence());
     out.trim_end().to_string()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::columns;
-
-    #[test]
-    fn columns_stand_below_each_other() {
-        let rows = [vec!["a".to_string(), "1.5".to_string()], vec!["long".to_string(), "–".to_string()]];
-        assert_eq!(columns(&rows), "a     1.5\nlong    –\n");
-    }
 }

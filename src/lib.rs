@@ -1,16 +1,20 @@
 //! The command line as a library: [`main`] parses, dispatches, and maps errors to exit codes; studies run the code of its verbs.
 
 mod bag;
+mod bridge;
 mod cli;
+mod columns;
 pub mod diagnose;
 mod diagnose_page;
 mod diagnose_text;
+mod doctor;
 mod experiments;
 pub mod failure;
 mod fit;
 mod graph;
 mod interrupt;
 mod model;
+mod network;
 mod node;
 mod play;
 mod progress;
@@ -22,6 +26,9 @@ mod simulate;
 mod stability;
 mod stability_page;
 mod summary;
+mod test_bench;
+
+pub use run::{Done, run_here};
 
 use clap::Parser;
 use cli::{Cli, Command};
@@ -40,12 +47,15 @@ pub fn main() -> ExitCode {
         Command::Stability(options) => stability::stability(&options),
         Command::Diagnose(options) => diagnose::diagnose(&options),
         Command::Fit(options) => fit::fit(&options),
+        Command::TestBench(options) => test_bench::test_bench(&options),
         Command::Check(options) => graph::check(&options),
         Command::Graph(options) => graph::draw(&options),
         Command::Simulate(options) => simulate::simulate(&options),
         Command::Model(command) => model::model(&command),
         Command::Bag(command) => bag::bag(&command),
         Command::Clean => run::clean(),
+        Command::Bridge(options) => bridge::bridge(&options),
+        Command::Doctor(options) => doctor::doctor(&options),
         Command::Prove(options) => prove::prove(&options),
         Command::Node(options) => return node::node(&options),
         Command::SealedMaster(options) => return prove::sealed_master(&options),

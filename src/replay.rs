@@ -5,9 +5,10 @@ use crate::failure::Failure;
 use crate::run::run_here;
 use crate::summary::graph_of;
 use backdrive_bags::Reader;
+use backdrive_control::cycle::Cycle;
 use backdrive_control::operator::Intent;
-use backdrive_msgs::Message;
-use backdrive_nodes::graph::{NodeKind, Settings};
+use backdrive_msgs::{Message, Sample};
+use backdrive_nodes::graph::{Node, NodeKind, Settings};
 use backdrive_nodes::stage::Clock;
 
 /// Replays a bag in lockstep, in this process.
@@ -28,17 +29,32 @@ pub fn replay(options: &cli::Replay) -> Result<u8, Failure> {
     if !reader.ended_cleanly() {
         eprintln!("warning: {}: was not closed; what it holds is replayed, and `backdrive bag recover` makes a clean copy", path.display());
     }
-    let Some(operator) = graph.nodes.iter().position(|n| n.kind == NodeKind::Operator) else {
+    let sources = |n: &Node| matches!(n.kind, NodeKind::Operator | NodeKind::Cycle);
+    let Some(operator) = graph.nodes.iter().position(sources) else {
         return Err(Failure::input(format!("{}: its graph has no operator whose intent could be replayed", path.display())));
     };
-    let topic = graph.topic_of(operator, "intent").name;
-    let missing = reader.completeness().and_then(|c| c.topics.iter().find(|t| t.topic == topic)).map_or(0, |t| t.lost);
-    if missing > 0 {
-        eprintln!("warning: {}: {missing} messages of {topic} are missing; the hand rests where it was", path.display());
-    }
-    let (intents, steps) = recorded_intents(&reader, &topic, graph.nodes[operator].axes)?;
+    let recorded = |port: &str, read: &dyn Fn(&Sample, usize) -> [f64; 2]| {
+        let topic = graph.topic_of(operator, port).name;
+        let missing = reader.completeness().and_then(|c| c.topics.iter().find(|t| t.topic == topic)).map_or(0, |t| t.lost);
+        if missing > 0 {
+            eprintln!("warning: {}: {missing} messages of {topic} are missing; what they would change rests where it was", path.display());
+        }
+        rows_of(&reader, &topic, graph.nodes[operator].axes, read)
+    };
+    let (settings, steps) = match graph.nodes[operator].kind {
+        NodeKind::Cycle => {
+            let (pedal, steps) = recorded("pedal", &|s, axis| [s.position[axis], 0.0])?;
+            let (speed, _) = recorded("speed", &|s, axis| [s.velocity[axis], 0.0])?;
+            let both = pedal.iter().flatten().zip(speed.iter().flatten());
+            (Settings::Cycle(Cycle::Recorded(both.map(|(p, s)| [p[0], s[0]]).collect())), steps)
+        }
+        _ => {
+            let (rows, steps) = recorded("intent", &|s, axis| [s.position[axis], s.velocity[axis]])?;
+            (Settings::Operator(rows.into_iter().map(Intent::Recorded).collect()), steps)
+        }
+    };
     graph.timing.steps = Some(options.changes.duration.map_or(steps, |d| ((d * graph.timing.rate_hz).round() as u64).max(1)));
-    graph.nodes[operator].settings = Settings::Operator(intents);
+    graph.nodes[operator].settings = settings;
 
     let done = run_here(&graph, &mut |_, _| {})?;
     if options.json {
@@ -49,8 +65,11 @@ pub fn replay(options: &cli::Replay) -> Result<u8, Failure> {
     Ok(done.exit_code())
 }
 
-/// The hand's motion per axis, one value per step, and how many steps the bag holds.
-fn recorded_intents(reader: &Reader, topic: &str, axes: usize) -> Result<(Vec<Intent>, u64), Failure> {
+/// Two numbers per step, per axis.
+type Rows = Vec<Vec<[f64; 2]>>;
+
+/// Two numbers of a topic's samples per axis, one pair per step, and how many steps the bag holds.
+fn rows_of(reader: &Reader, topic: &str, axes: usize, read: &dyn Fn(&Sample, usize) -> [f64; 2]) -> Result<(Rows, u64), Failure> {
     let path = reader.path();
     reader.topic(topic).map_err(Failure::input)?;
     let mut samples: Vec<(u64, Vec<[f64; 2]>)> = Vec::new();
@@ -60,14 +79,14 @@ fn recorded_intents(reader: &Reader, topic: &str, axes: usize) -> Result<(Vec<In
             continue;
         }
         if let Some(Message::Sample(sample)) = entry.message(path).map_err(Failure::input)? {
-            samples.push((sample.step, (0..axes).map(|a| [sample.position[a], sample.velocity[a]]).collect()));
+            samples.push((sample.step, (0..axes).map(|axis| read(&sample, axis)).collect()));
         }
     }
     let Some(last) = samples.iter().map(|(step, _)| *step).max() else {
         return Err(Failure::input(format!("{}: holds no message on {topic}", path.display())));
     };
     // A step whose sample was lost keeps the value before it.
-    let mut rows: Vec<Vec<[f64; 2]>> = vec![vec![[0.0, 0.0]; last as usize + 1]; axes];
+    let mut rows: Rows = vec![vec![[0.0, 0.0]; last as usize + 1]; axes];
     samples.sort_by_key(|(step, _)| *step);
     for (index, (step, values)) in samples.iter().enumerate() {
         let until = samples.get(index + 1).map_or(last + 1, |(next, _)| *next);
@@ -75,5 +94,5 @@ fn recorded_intents(reader: &Reader, topic: &str, axes: usize) -> Result<(Vec<In
             rows[axis][*step as usize..until as usize].fill(*value);
         }
     }
-    Ok((rows.into_iter().map(Intent::Recorded).collect(), last + 1))
+    Ok((rows, last + 1))
 }

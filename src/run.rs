@@ -3,16 +3,18 @@
 use crate::cli::{self, Transport};
 use crate::failure::{Failure, code};
 use crate::graph::buildable;
+use crate::network::place;
 use crate::progress;
 use crate::summary::{Summary, Traces, summarise};
 use backdrive_bags::{Completeness, Reader, Recorder};
 use backdrive_launch::join::{recorder_options, recording};
-use backdrive_launch::{Cause, RunHome, RunReport, SuperviseOptions};
+use backdrive_launch::{Cause, Place, RunHome, RunReport, SuperviseOptions};
 use backdrive_msgs::Message;
 use backdrive_nodes::build::plan;
 use backdrive_nodes::graph::{Graph, NodeKind};
 use backdrive_nodes::sequence::Sequence;
 use backdrive_nodes::stage::Clock;
+use backdrive_nodes::transport::ros2::Courier;
 use backdrive_stability::outcome::Outcome;
 use serde_json::json;
 use std::io::Read;
@@ -22,14 +24,18 @@ use std::time::{Duration, Instant};
 /// Runs a graph, or each experiment of one.
 pub fn run(options: &cli::Run) -> Result<u8, Failure> {
     let changes = options.changes.overrides(options.clock);
-    let graph = Graph::load(&options.graph, &changes)?;
+    let mut graph = Graph::load(&options.graph, &changes)?;
+    if options.host.is_none() {
+        graph = graph.on_one_host();
+    }
+    let way = Way::of(&graph, options)?;
     if !graph.experiments.is_empty() {
-        return crate::experiments::run(options, &graph, &changes);
+        return crate::experiments::run(options, &way, &graph, &changes);
     }
     if options.out.is_some() {
         return Err(Failure::input(format!("{}: has no [[experiments]], so --out means nothing here; use --bag", options.graph.display())));
     }
-    let done = run_graph(&graph, options.transport)?;
+    let done = run_graph(&graph, &way)?;
     if options.json {
         println!("{}", done.json());
     } else {
@@ -56,18 +62,39 @@ pub struct Done {
     pub summary: Option<Summary>,
 }
 
+/// How the nodes of a run are carried out.
+pub enum Way {
+    /// In this process.
+    Here,
+    /// Each as a process of its own, which meet at this place.
+    Processes(Place),
+}
+
+impl Way {
+    /// What the command line asks for.
+    fn of(graph: &Graph, options: &cli::Run) -> Result<Way, Failure> {
+        match options.transport {
+            Some(Transport::Inproc) if options.host.is_some() => {
+                Err(Failure::input("--transport inproc is for one host; leave --host out"))
+            }
+            Some(Transport::Inproc) => Ok(Way::Here),
+            given => place(graph, given, options.host.as_deref(), &options.network).map(Way::Processes),
+        }
+    }
+}
+
 /// Runs one graph to its end.
-pub fn run_graph(graph: &Graph, transport: Transport) -> Result<Done, Failure> {
-    match transport {
-        Transport::Iceoryx2 => run_processes(graph),
-        Transport::Inproc => run_here(graph, &mut |_, _| {}),
+pub fn run_graph(graph: &Graph, way: &Way) -> Result<Done, Failure> {
+    match way {
+        Way::Processes(place) => run_processes(graph, place),
+        Way::Here => run_here(graph, &mut |_, _| {}),
     }
 }
 
 /// What would stop a run is told before it begins.
-fn ready(graph: &Graph) -> Result<(), Failure> {
+fn ready(graph: &Graph, host: Option<&str>) -> Result<(), Failure> {
     buildable(graph)?;
-    graph.bag.as_deref().map_or(Ok(()), writable)
+    graph.bag_of(host).as_deref().map_or(Ok(()), writable)
 }
 
 /// A run that ends with its last step, for a bag that cannot be written, would be lost whole. A bag that exists is
@@ -89,9 +116,18 @@ fn begins_as_bag(path: &Path) -> bool {
     std::fs::File::open(path).and_then(|mut file| file.read_exact(&mut start)).is_ok() && start == *b"\x89MCAP0\r\n"
 }
 
-fn run_processes(graph: &Graph) -> Result<Done, Failure> {
-    ready(graph)?;
-    let report = backdrive_launch::run(graph, SuperviseOptions::default())?;
+/// How long hosts may take to find each other: somebody walks from one to the other.
+const HOSTS_TIMEOUT: Duration = Duration::from_secs(120);
+
+fn run_processes(graph: &Graph, place: &Place) -> Result<Done, Failure> {
+    ready(graph, place.host.as_deref())?;
+    let courier = Courier::start(&place.network).map_err(Failure::machine)?;
+    let mut options = SuperviseOptions::default();
+    if place.host.is_some() {
+        options.ready_timeout = HOSTS_TIMEOUT;
+    }
+    let report = backdrive_launch::run(graph, place, options)?;
+    drop(courier);
     let bag = report.bag.clone().filter(|bag| bag.exists());
     // What is known of the run is told even where its bag cannot be read.
     let summary = bag.as_ref().and_then(|bag| summarise(bag).map_err(|e| eprintln!("warning: {}", e.message)).ok());
@@ -115,10 +151,10 @@ pub fn run_here(graph: &Graph, hear: &mut dyn FnMut(&str, &Message)) -> Result<D
             node.name
         )));
     }
-    ready(graph)?;
+    ready(graph, None)?;
     let plans = graph.nodes.iter().filter(|n| n.kind != NodeKind::Recorder).map(|n| plan(graph, &n.name));
     let mut sequence = Sequence::new(plans.collect::<Result<_, _>>()?, &graph.timing).map_err(Failure::input)?;
-    let (record, header) = recording(graph, "recorder");
+    let (record, header) = recording(graph, "recorder", None);
     let names: Vec<String> = sequence.topics().iter().map(|t| t.name.clone()).collect();
     let place: Vec<Option<usize>> = names.iter().map(|name| record.topics.iter().position(|t| t.name == *name)).collect();
     let mut recorder = match &graph.bag {

@@ -153,6 +153,7 @@ fn run(options: &Options) -> Result<(), Failure> {
         period_s: options.period()?,
         run: options.number("number")?.unwrap_or(0),
         firmness: options.number("firmness")?.unwrap_or(1.0),
+        coarse: false,
     };
     let network = options.network()?;
     let truth = Truth::from_json(read(&path)?.as_bytes()).map_err(|error| wrong(format!("{}: {error}", path.display())))?;

@@ -13,6 +13,8 @@ pub struct MasterOptions {
     pub run: u32,
     /// How firm the hand grips in this run: factor on stiffness and damping of the true grip.
     pub firmness: f64,
+    /// Whether a look is enough, as [`SealedPlant::coarse`] gives it.
+    pub coarse: bool,
 }
 
 /// A device that cannot be a master.
@@ -104,7 +106,8 @@ impl SealedMaster {
         truth.noise_seed ^= u64::from(options.run) << 32;
         truth.hand.stiffness *= options.firmness;
         truth.hand.damping *= options.firmness;
-        let plant = SealedPlant::new(held, &truth, options.period_s)?;
+        let make = if options.coarse { SealedPlant::coarse } else { SealedPlant::new };
+        let plant = make(held, &truth, options.period_s)?;
         Ok(SealedMaster { plant, axes, inputs: vec![0.0; held.inputs.len()], ran_away: false })
     }
 

@@ -55,6 +55,11 @@ fn halving_the_substep_changes_less_and_less() {
     // First order where surfaces begin to stick, which is at another substep each time: less from one to four, not always from two to four.
     assert!(two < 0.6 * one && four < 0.4 * one, "{one} {two} {four}");
     assert!(one > 0.0);
+    // A third of the work where a look is enough.
+    let mut coarse = SealedPlant::coarse(&network, &truth, 2e-4).unwrap();
+    assert!(coarse.substeps() * 2 < base, "{} {base}", coarse.substeps());
+    let off = off(&record(&mut coarse));
+    assert!(off < 2e-3, "{off}");
 }
 
 #[test]

@@ -55,7 +55,7 @@ fn the_process_is_the_device() {
         let truth = Truth::from_json(&bytes).unwrap();
         assert_eq!(truth, draw(&held(model), 8, &DrawOptions { effects: 2, ..DrawOptions::default() }).unwrap());
 
-        let options = MasterOptions { period_s: 2e-4, run: 3, firmness: 1.1 };
+        let options = MasterOptions { period_s: 2e-4, run: 3, firmness: 1.1, coarse: false };
         let mut here = SealedMaster::new(&held(model), &truth, &options).unwrap();
         let mut is_started = false;
         let expected = play(axes, |force, hand| {
@@ -116,7 +116,7 @@ fn it_ends_when_what_it_is_told_is_no_number() {
 fn a_reading_is_what_the_plant_does() {
     let network = held("plant/models/two-axis.toml");
     let truth = Truth::nothing(&network);
-    let mut master = SealedMaster::new(&network, &truth, &MasterOptions { period_s: 2e-4, run: 0, firmness: 1.0 }).unwrap();
+    let mut master = SealedMaster::new(&network, &truth, &MasterOptions { period_s: 2e-4, run: 0, firmness: 1.0, coarse: false }).unwrap();
     let mut plant = SealedPlant::new(&network, &truth, 2e-4).unwrap();
     master.start(&[1e-3, -1e-3]).unwrap();
     let at = |name: &str| network.input(name).unwrap();
@@ -144,7 +144,7 @@ fn a_reading_is_what_the_plant_does() {
 
 #[test]
 fn what_is_no_master_is_refused() {
-    let options = MasterOptions { period_s: 2e-4, run: 0, firmness: 1.0 };
+    let options = MasterOptions { period_s: 2e-4, run: 0, firmness: 1.0, coarse: false };
     let refused = |network: &backdrive_sealed::network::Network| {
         SealedMaster::new(network, &Truth::nothing(network), &options).map(|_| ()).unwrap_err().to_string()
     };

@@ -28,7 +28,7 @@ pub(super) fn section(page: &mut Page, found: &Found, best: &Candidate) {
     let records = if problem.held_out.is_empty() { &problem.fit } else { &problem.held_out };
     let nominal = &search.nominal.structure;
     let stated: Vec<f64> = problem.stated.iter().map(|s| s.given).collect();
-    let given = predictions(problem, records, nominal, &nominal.values(problem, &stated, &[]));
+    let given = predictions(problem, records, nominal, &nominal.values(problem, &stated, &[], &[]));
     let refitted = predictions(problem, records, nominal, &search.nominal.fit.values);
     let diagnosed = if adds(best) { predictions(problem, records, &best.structure, &best.fit.values) } else { None };
     let mut pairs: Vec<(usize, usize)> = Vec::new();
@@ -51,7 +51,7 @@ pub(super) fn section(page: &mut Page, found: &Found, best: &Candidate) {
         let quality = |structure, values: &[f64]| {
             predictions(problem, records, structure, values).map(|p| qualities(problem, records, &p, &search.floor, fitted))
         };
-        let given = quality(nominal, &nominal.values(problem, &stated, &[]));
+        let given = quality(nominal, &nominal.values(problem, &stated, &[], &[]));
         let refitted = quality(nominal, &search.nominal.fit.values);
         let diagnosed = quality(&best.structure, &best.fit.values);
         let Some(last) = &diagnosed else { continue };

@@ -1,9 +1,10 @@
 //! One proof: draw and seal, record, diagnose, raise the gain, and only then look at the truth.
 
 use super::absolute;
-use super::chosen::{Task, choose};
+use super::chosen::{Chosen, Task, choose};
 use super::edges::{Canceller, Loop, Moved};
 use super::hidden::{Hidden, Opened, program};
+use super::live::{self, LiveRun, hide};
 use super::score::{Finding, Mark, findings, is_nonlinear, mark, name_of};
 use super::session::hand_over;
 use crate::cli;
@@ -23,6 +24,9 @@ const LONGER: f64 = 2.5;
 
 /// Cancellers that are compared at other grips than the session's.
 const AT_OTHER_GRIPS: [&str; 5] = ["none", "second order", "linear, refitted", "diagnosed", "chosen"];
+
+/// Cancellers whose edges the live graph confirms.
+const LIVE: [&str; 3] = ["none", "diagnosed", "chosen"];
 
 /// A stable gain that was measured.
 #[derive(Debug, Clone, Serialize)]
@@ -72,8 +76,10 @@ pub struct Case {
     pub held_out: [Option<f64>; 3],
     /// Stable mu*lambda by canceller and grip.
     pub gains: Vec<Gain>,
-    /// Share of the diagnosed estimate that was chosen where the grip is uncertain; 0 for no canceller.
-    pub share: f64,
+    /// The live graph at gains about the edges without a canceller and with the diagnosed and the chosen one.
+    pub live: Vec<LiveRun>,
+    /// Share of the diagnosed estimate that was chosen where the grip is uncertain, 0 for no canceller; `None` where no gain was raised.
+    pub share: Option<f64>,
 }
 
 /// Runs one case; its files stay in `folder`.
@@ -111,12 +117,20 @@ pub fn prove(options: &cli::Prove, folder: &Path, drawn: &Draw, stop: &AtomicBoo
     ours(folder, "diagnose", &[&"diagnose", &session, &"--out", &found, &"--patience", &patience])?;
     let verdict: Value = serde_json::from_str(&read(&found.join("verdict.json"))?).map_err(Failure::input)?;
 
-    let mut cancellers = cancellers(options, folder, &session, &found)?;
-    let (diagnosed, scaled) = (found.join("model.diagnosed.toml"), folder.join("chosen.toml"));
-    let rivals = verdict["rival_models"].as_array().into_iter().flatten().filter_map(Value::as_str).map(|name| found.join(name));
-    let task = Task { graph: &options.contact, high_pass_hz: options.high_pass };
-    let chosen = choose(&diagnosed, &rivals.collect::<Vec<_>>(), &scaled, &task, stop)?;
-    cancellers.push(Canceller { name: "chosen", model: (chosen.share > 0.0).then_some(scaled), grip: None });
+    let (mut cancellers, mut share) = (Vec::new(), None);
+    if !options.no_gains {
+        cancellers = all_cancellers(options, folder, &session, &found)?;
+        let (diagnosed, scaled) = (found.join("model.diagnosed.toml"), folder.join("chosen.toml"));
+        let rivals = verdict["rival_models"].as_array().into_iter().flatten().filter_map(Value::as_str).map(|name| found.join(name));
+        let task = Task { graph: &options.contact, high_pass_hz: options.high_pass };
+        // What is unexplained is in the device and in no model at hand: what it does to the loop nobody can say, so nothing is cancelled.
+        let chosen = match verdict["verdict"].as_str() {
+            Some("unexplained") => Chosen::nothing(),
+            _ => choose(&diagnosed, &rivals.collect::<Vec<_>>(), &scaled, &task, stop)?,
+        };
+        cancellers.push(Canceller { name: "chosen", model: (chosen.share > 0.0).then_some(scaled), grip: None });
+        share = Some(chosen.share);
+    }
 
     // The verdict is written; now the truth is opened.
     let bytes = std::fs::read(&hidden.truth).map_err(|e| Failure::input(format!("{}: {e}", hidden.truth.display())))?;
@@ -125,16 +139,19 @@ pub fn prove(options: &cli::Prove, folder: &Path, drawn: &Draw, stop: &AtomicBoo
     }
     let truth = Truth::from_json(&bytes).map_err(Failure::input)?;
     let device = Arc::new(Opened::new(&hidden, &truth).map_err(Failure::input)?);
-    let master = Moved::Hidden(&hidden.model, hidden.grip.as_deref(), device);
+    let master = Moved::Hidden(&hidden.model, hidden.grip.as_deref(), device.clone());
     let the_loop = Loop { graph: &options.contact, high_pass_hz: options.high_pass, master };
     let further: &[f64] = if options.same_grip { &[] } else { &options.grips };
-    let mut gains = Vec::new();
+    let (mut gains, mut live) = (Vec::new(), Vec::new());
     for grip in [1.0].iter().chain(further) {
         for canceller in cancellers.iter().filter(|c| *grip == 1.0 || AT_OTHER_GRIPS.contains(&c.name)) {
             if stop.load(Ordering::SeqCst) {
                 break;
             }
             let edge = the_loop.edge(canceller, *grip, stop)?;
+            if *grip == 1.0 && LIVE.contains(&canceller.name) {
+                live.extend(live::about(&folder.join("live"), &the_loop, canceller, &edge, &hidden, &device)?);
+            }
             let whole_range = edge.critical_gain.is_none() && edge.limited_from.is_none() && edge.at_least > 0.0;
             gains.push(Gain { canceller: canceller.name, grip: *grip, stable_to: edge.at_least, because: edge.reason, whole_range });
         }
@@ -144,7 +161,7 @@ pub fn prove(options: &cli::Prove, folder: &Path, drawn: &Draw, stop: &AtomicBoo
     Ok(Case {
         name: folder.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned()),
         shows_hand: drawn.shows_hand,
-        share: chosen.share,
+        share,
         sealed: digest,
         sentence: verdict["sentence"].as_str().unwrap_or_default().to_string(),
         concealed: truth.effects.iter().map(name_of).collect(),
@@ -154,6 +171,7 @@ pub fn prove(options: &cli::Prove, folder: &Path, drawn: &Draw, stop: &AtomicBoo
         word,
         findings,
         gains,
+        live,
     })
 }
 
@@ -194,13 +212,20 @@ impl Case {
         let gains: Vec<String> =
             here.map(|g| format!("{} {}{:.2}", g.canceller, if g.whole_range { "above " } else { "" }, g.stable_to)).collect();
         let [given, refitted, diagnosed] = self.held_out.map(percent);
-        format!(
-            "  concealed   {}\n  found       {} ({})\n  held out    {given} as given, {refitted} refitted, {diagnosed} diagnosed\n  stable to   {}",
+        let mut text = format!(
+            "  concealed   {}\n  found       {} ({})\n  held out    {given} as given, {refitted} refitted, {diagnosed} diagnosed",
             list(&self.concealed),
             list(&found),
             self.word,
-            gains.join(", "),
-        )
+        );
+        if !gains.is_empty() {
+            text += &format!("\n  stable to   {}", gains.join(", "));
+        }
+        if !self.live.is_empty() {
+            let agree = self.live.iter().filter(|run| run.agrees()).count();
+            text += &format!("\n  live graph  {agree} of {} runs about those edges did what they say", self.live.len());
+        }
+        text
     }
 
     /// For programs.
@@ -208,7 +233,7 @@ impl Case {
         json!({
             "case": self.name, "sealed": self.sealed, "shows_hand": self.shows_hand, "verdict": self.word, "sentence": self.sentence,
             "findings": self.findings, "concealed": self.concealed, "marks": self.marks, "nonlinear": self.nonlinear,
-            "held_out": self.held_out, "stable_gain": self.gains, "share": self.share, "ratio": self.ratio("diagnosed", 1.0),
+            "held_out": self.held_out, "stable_gain": self.gains, "live": self.live, "share": self.share, "ratio": self.ratio("diagnosed", 1.0),
         })
     }
 }
@@ -240,7 +265,6 @@ fn draw(options: &cli::Prove, hidden: &Hidden, drawn: &Draw) -> Result<String, F
 fn session(mut graph: DocumentMut, options: &cli::Prove, hidden: &Hidden, digest: &str) -> Result<String, Failure> {
     graph["title"] = value(format!("A session with a sealed master, SHA-256 {digest}"));
     let beside = PathBuf::from(absolute(&options.session)?).parent().map(Path::to_path_buf).unwrap_or_default();
-    let exe = std::env::current_exe().map_err(Failure::machine)?;
     let nodes = graph.get_mut("nodes").and_then(Item::as_array_of_tables_mut);
     for node in nodes.into_iter().flat_map(|n| n.iter_mut()) {
         for key in ["model", "environment", "grip"] {
@@ -256,21 +280,13 @@ fn session(mut graph: DocumentMut, options: &cli::Prove, hidden: &Hidden, digest
                 node["grip"] = value(grip.display().to_string());
             }
         }
-        if kind == "master" {
-            let mut words = Array::new();
-            words.push(exe.display().to_string());
-            words.push("sealed-master");
-            for word in hidden.words(1, 1.0) {
-                words.push(format!("--word={word}"));
-            }
-            node["command"] = value(words);
-        }
     }
+    hide(&mut graph, hidden, 1)?;
     Ok(graph.to_string())
 }
 
 /// The cancellers that are compared: none, the nominal model, the two linear models fitted to the session, and the diagnosed one.
-fn cancellers(options: &cli::Prove, folder: &Path, session: &Path, found: &Path) -> Result<Vec<Canceller>, Failure> {
+fn all_cancellers(options: &cli::Prove, folder: &Path, session: &Path, found: &Path) -> Result<Vec<Canceller>, Failure> {
     let second = folder.join("second-order.toml");
     let still = still(options, session)?;
     ours(folder, "fit-second-order", &[&"fit", &options.second_order, &still, &"--out", &second])?;
@@ -304,8 +320,8 @@ fn still(options: &cli::Prove, session: &Path) -> Result<PathBuf, Failure> {
     Ok(still)
 }
 
-/// Runs this program again as a process of its own, its output in a file beside the case.
-fn ours(folder: &Path, name: &str, arguments: &[&dyn AsRef<std::ffi::OsStr>]) -> Result<(), Failure> {
+/// Runs this program again as a process of its own, its output in a file beside the case; what it said.
+pub(super) fn ours(folder: &Path, name: &str, arguments: &[&dyn AsRef<std::ffi::OsStr>]) -> Result<String, Failure> {
     let exe = std::env::current_exe().map_err(Failure::machine)?;
     let log = folder.join(format!("{name}.log"));
     let file = std::fs::File::create(&log).map_err(|e| Failure::write(&log, e))?;
@@ -313,11 +329,11 @@ fn ours(folder: &Path, name: &str, arguments: &[&dyn AsRef<std::ffi::OsStr>]) ->
     let mut command = Command::new(exe);
     command.args(arguments).stdin(Stdio::null()).stdout(file).stderr(errors);
     let status = command.status().map_err(Failure::machine)?;
+    let said = std::fs::read_to_string(&log).unwrap_or_default();
     // 1 is a negative answer, which is one.
     match status.code() {
-        Some(0 | 1 | 7) => Ok(()),
+        Some(0 | 1 | 7) => Ok(said),
         _ => {
-            let said = std::fs::read_to_string(&log).unwrap_or_default();
             let why = said.lines().rev().find_map(|line| line.strip_prefix("error: ")).unwrap_or("its output says why");
             Err(Failure::input(format!("{name} ended with {status}: {why} ({})", log.display())))
         }
@@ -328,6 +344,6 @@ fn read(path: &Path) -> Result<String, Failure> {
     std::fs::read_to_string(path).map_err(|e| Failure::input(format!("{}: cannot be read: {e}", path.display())))
 }
 
-fn write(path: &Path, text: &str) -> Result<(), Failure> {
+pub(super) fn write(path: &Path, text: &str) -> Result<(), Failure> {
     std::fs::write(path, text).map_err(|e| Failure::write(path, e))
 }

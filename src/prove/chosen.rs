@@ -26,6 +26,13 @@ pub struct Chosen {
     pub worst: f64,
 }
 
+impl Chosen {
+    /// No canceller, because nothing is known of its stable gain.
+    pub fn nothing() -> Chosen {
+        Chosen { share: 0.0, worst: 0.0 }
+    }
+}
+
 /// Chooses, and writes the model with its outputs scaled to `path`. The hand holds the diagnosed model `model`, and every one of its `rivals`: the
 /// loop has to be stable whichever of them the device is.
 pub fn choose(model: &Path, rivals: &[PathBuf], path: &Path, task: &Task, stop: &AtomicBool) -> Result<Chosen, Failure> {

@@ -43,14 +43,14 @@ pub struct Loop<'a> {
 }
 
 impl Loop<'_> {
-    /// The edge with a canceller, the hand gripping `firmness` times as firmly as when it was recorded.
-    pub fn edge(&self, canceller: &Canceller, firmness: f64, cancel: &AtomicBool) -> Result<Edge, Failure> {
+    /// What the graph file's loop becomes with a canceller.
+    pub fn changes(&self, canceller: &Canceller) -> Overrides {
         let none = || PathBuf::from("none");
         let (model, grip) = match &self.master {
             Moved::Model(model) => (*model, None),
             Moved::Hidden(model, grip, _) => (*model, *grip),
         };
-        let changes = Overrides {
+        Overrides {
             master: Some(model.to_path_buf()),
             grip: Some(grip.map_or_else(none, Path::to_path_buf)),
             canceller: Some(canceller.model.clone().unwrap_or_else(none)),
@@ -58,7 +58,12 @@ impl Loop<'_> {
             high_pass_hz: Some(self.high_pass_hz),
             limits: Some("ignored".to_string()),
             ..Overrides::default()
-        };
+        }
+    }
+
+    /// The edge with a canceller, the hand gripping `firmness` times as firmly as when it was recorded.
+    pub fn edge(&self, canceller: &Canceller, firmness: f64, cancel: &AtomicBool) -> Result<Edge, Failure> {
+        let changes = self.changes(canceller);
         let mut graph = Graph::load(self.graph, &changes)?;
         let device = match &self.master {
             Moved::Model(_) => {

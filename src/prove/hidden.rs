@@ -100,7 +100,7 @@ impl Opened {
 
     /// The core of a master that is this device, in a run with sensor noise of its own.
     pub fn core(&self, graph: &Graph, node: &Node, run: u32, firmness: f64) -> Result<Vec<Box<dyn Core>>, String> {
-        let options = MasterOptions { period_s: self.period_s, run, firmness };
+        let options = MasterOptions { period_s: self.period_s, run, firmness, coarse: true };
         let mut plant = SealedMaster::new(&self.held, &self.truth, &options).map_err(|e| e.to_string())?;
         let axes = plant.axes();
         let mut started = false;

@@ -4,6 +4,7 @@ mod case;
 mod chosen;
 mod edges;
 pub mod hidden;
+mod live;
 mod page;
 mod score;
 mod session;
@@ -24,7 +25,7 @@ const NULLS: usize = 5;
 /// Proves as many cases as are asked for.
 pub fn prove(options: &cli::Prove) -> Result<u8, Failure> {
     let stop = interrupt::heard()?;
-    let mut cases = Vec::new();
+    let (mut cases, mut broken) = (Vec::new(), None);
     for index in 0..options.cases {
         let several = options.cases > 1;
         let drawn = Draw {
@@ -37,9 +38,18 @@ pub fn prove(options: &cli::Prove) -> Result<u8, Failure> {
             },
         };
         let folder = options.out.join(format!("case-{:03}", index + 1));
-        let case = case::prove(options, &folder, &drawn, &stop)?;
-        println!("{}\n", case.text());
-        cases.push(case);
+        match case::prove(options, &folder, &drawn, &stop) {
+            Ok(case) => {
+                println!("{}\n", case.text());
+                cases.push(case);
+            }
+            // What is wrong with the command shows in the first case; one of many that breaks must not cost the others.
+            Err(failure) if !cases.is_empty() && !stop.load(Ordering::SeqCst) => {
+                println!("  not ended   {}\n", failure.message);
+                broken = Some(failure);
+            }
+            Err(failure) => return Err(failure),
+        }
         // What is done is kept, whatever comes.
         write(options, &cases)?;
         if stop.load(Ordering::SeqCst) {
@@ -48,6 +58,13 @@ pub fn prove(options: &cli::Prove) -> Result<u8, Failure> {
     }
     if cases.len() > 1 {
         println!("{} cases: {}", cases.len(), Summary::of(&cases).text());
+    }
+    if let Some(failure) = broken {
+        let not_ended = options.cases - cases.len();
+        return Err(Failure {
+            message: format!("{not_ended} of {} cases did not end; the last: {}", options.cases, failure.message),
+            ..failure
+        });
     }
     Ok(if cases.iter().all(Case::is_right) { 0 } else { code::NEGATIVE })
 }

@@ -28,12 +28,16 @@ pub fn page(options: &cli::Prove, cases: &[Case]) -> Page {
                 summary.false_alarms
             ),
         );
-        page.figure(ratios(cases), "Stable mu*lambda with the diagnosed and with the chosen canceller, over that with the better of the two linear ones; above 1 is better. Cases in their order.");
+        if !options.no_gains {
+            page.figure(ratios(cases), "Stable mu*lambda with the diagnosed and with the chosen canceller, over that with the better of the two linear ones; above 1 is better. Cases in their order.");
+        }
         page.section("What was found");
         page.table(table(cases));
         page.section("What was taken for what");
         page.table(confusion(&summary));
-        page.section("What it is worth");
+        if !options.no_gains {
+            page.section("What it is worth");
+        }
         for (name, worths) in [("Nonlinear effects", &summary.nonlinear), ("Linear effects", &summary.linear)] {
             if !worths.is_empty() {
                 page.text(&format!("{name}: median of the stable gain over that of the better linear canceller, and in how many cases it is below that without one."));
@@ -57,7 +61,8 @@ pub fn page(options: &cli::Prove, cases: &[Case]) -> Page {
          to 50 in steps that end at 3 %, the canceller behind a high-pass of {} Hz; \"linear, refitted\" is the nominal model with its numbers fitted to \
          the session, \"second order\" one mass on a spring and a damper fitted to the recordings in which the hand holds still, \"chosen\" the diagnosed \
          model with that share of its estimate whose worst stable gain over grips 20 % softer to 20 % firmer is best when the diagnosed model itself, or \
-         one of its rivals that explain the recordings nearly as well, is the master.",
+         one of its rivals that explain the recordings nearly as well, is the master, and no canceller where the verdict leaves something unexplained. Edges are searched with the loop in one process; at the edges without \
+         canceller, with the diagnosed and with the chosen one the graph itself is run, its processes over shared memory.",
         options.seed,
         options.contact.display(),
         options.high_pass
@@ -81,7 +86,9 @@ fn lead(page: &mut Page, case: &Case) {
 }
 
 fn one(page: &mut Page, case: &Case) {
-    page.figure(gains(case), "Highest stable mu*lambda against how firmly the hand grips, 1 being its grip in the session.");
+    if !case.gains.is_empty() {
+        page.figure(gains(case), "Highest stable mu*lambda against how firmly the hand grips, 1 being its grip in the session.");
+    }
     let mut table = Table::new(["canceller", "grip", "stable to", "because"]);
     for gain in &case.gains {
         let stable = if gain.whole_range { format!("above {}", number(gain.stable_to)) } else { number(gain.stable_to) };
@@ -91,8 +98,21 @@ fn one(page: &mut Page, case: &Case) {
     page.text(&format!("Concealed: {}. Found: {}. {}", concealed(case), found(case), case.sentence));
     page.text(&format!("Error on recordings that no fit has seen: {given} as given, {refitted} refitted, {diagnosed} diagnosed."));
     let hand = if case.shows_hand { "The bags hold what the hand wants." } else { "Nobody measured the hand: it was found with the rest." };
-    page.text(&format!("{hand} Share of the estimate that was chosen: {}. Seal: {}.", number(case.share), case.sealed));
-    page.table(table);
+    let share = case.share.map_or_else(String::new, |share| format!(" Share of the estimate that was chosen: {}.", number(share)));
+    page.text(&format!("{hand}{share} Seal: {}.", case.sealed));
+    if !case.gains.is_empty() {
+        page.table(table);
+    }
+    if !case.live.is_empty() {
+        page.text("The running graph, with the hidden plant's process as its master, just below and just above those edges:");
+        let mut table = Table::new(["canceller", "mu*lambda", "should be", "was"]);
+        for run in &case.live {
+            let tone = if run.agrees() { Tone::Good } else { Tone::Warning };
+            let should = if run.below_edge { "stable" } else { "not stable" };
+            table.push([run.canceller.into(), number(run.gain).into(), should.into(), Cell::tone(run.outcome.replace('_', " "), tone)]);
+        }
+        page.table(table);
+    }
     page.text(&format!("The diagnosis itself: {}/diagnosis/report.html", case.name));
 }
 

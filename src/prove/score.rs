@@ -44,25 +44,26 @@ pub fn findings(verdict: &Value) -> Vec<Finding> {
 }
 
 fn sits_at(finding: &Finding, site: &Site) -> bool {
-    let place: Vec<&str> = finding.place.iter().map(String::as_str).collect();
-    match site {
-        Site::Between([a, b]) => place == [a.as_str(), b] || place == [b.as_str(), a],
-        Site::Signal(name) => place == [name.as_str()],
+    // The model that is diagnosed has the grip's name before its bodies' names: `normal.hand`.
+    let same = |found: &str, name: &str| found == name || found.strip_suffix(name).is_some_and(|before| before.ends_with('.'));
+    match (&finding.place[..], site) {
+        ([one, other], Site::Between([a, b])) => (same(one, a) && same(other, b)) || (same(one, b) && same(other, a)),
+        ([one], Site::Signal(name)) => one == name,
+        _ => false,
     }
 }
 
-/// Marks a verdict's findings for an effect. An inertia may as well be found in the numbers.
+/// Marks a verdict's findings for an effect. Where it can only be told from the model's numbers, or from what an unmeasured hand may do, the
+/// right verdict names nothing.
 pub fn mark(effect: &Effect, word: &str, findings: &[Finding], hand_hidden: bool) -> Mark {
-    if word == "parameters" && effect.physics.name() == "inertia" {
+    let possible = || effect.accept.iter().filter(|answer| hand_hidden || !answer.hand_hidden);
+    if findings.is_empty() && possible().any(|answer| answer.physics.iter().any(|name| name == word)) {
         return Mark { place: true, family: true, exact: true };
     }
     let right = |f: &Finding| {
-        effect.accept.iter().any(|answer| {
+        possible().any(|answer| {
             let beside = |name: &String| findings.iter().any(|other| other.physics == *name && sits_at(other, &answer.site));
-            (hand_hidden || !answer.hand_hidden)
-                && sits_at(f, &answer.site)
-                && answer.physics.contains(&f.physics)
-                && answer.together_with.iter().all(beside)
+            sits_at(f, &answer.site) && answer.physics.contains(&f.physics) && answer.together_with.iter().all(beside)
         })
     };
     let exact = findings.iter().any(right);
@@ -83,4 +84,24 @@ pub fn name_of(effect: &Effect) -> String {
 /// Whether any concealed effect is nonlinear.
 pub fn is_nonlinear(truth: &Truth) -> bool {
     truth.effects.iter().any(|e| e.nonlinear)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_finding_sits_where_the_effect_does_whatever_the_grip_is_called() {
+        let found =
+            |place: &[&str]| Finding { physics: "bias".to_string(), place: place.iter().map(|p| p.to_string()).collect(), confidence: 1.0 };
+        let joint = Site::Between(["handle".to_string(), "hand".to_string()]);
+        for place in [["handle", "hand"], ["hand", "handle"], ["handle", "normal.hand"]] {
+            assert!(sits_at(&found(&place), &joint), "{place:?}");
+        }
+        for place in [["handle", "ground"], ["handle", "otherhand"], ["handle", "handle"]] {
+            assert!(!sits_at(&found(&place), &joint), "{place:?}");
+        }
+        assert!(sits_at(&found(&["feedback_force"]), &Site::Signal("feedback_force".to_string())));
+        assert!(!sits_at(&found(&["feedback_force"]), &joint));
+    }
 }

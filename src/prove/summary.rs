@@ -46,6 +46,8 @@ pub struct Summary {
     pub exact: Share,
     /// Cases that conceal nothing and in which something was named.
     pub false_alarms: Share,
+    /// Runs of the live graph about the edges that did what these say.
+    pub live: Share,
     /// What was concealed, what was said first, how often. `nothing` stands for no effect and no finding.
     pub confusion: Vec<(String, String, usize)>,
     /// Cases that conceal something nonlinear: worth by grip.
@@ -67,6 +69,10 @@ impl Summary {
             family: share(&|m| m.family),
             exact: share(&|m| m.exact),
             false_alarms: Share { are: alarms, of: nulls.len() },
+            live: {
+                let runs = || cases.iter().flat_map(|c| &c.live);
+                Share { are: runs().filter(|run| run.agrees()).count(), of: runs().count() }
+            },
             confusion: confusion(cases),
             nonlinear: worths(&with(true)),
             linear: worths(&with(false)),
@@ -76,6 +82,9 @@ impl Summary {
     /// A few lines for a person.
     pub fn text(&self) -> String {
         let mut text = format!("place {}, family {}, exact {}; false alarms {}", self.place, self.family, self.exact, self.false_alarms);
+        if self.live.of > 0 {
+            text += &format!("; the live graph agreed in {} runs", self.live);
+        }
         for (name, worths) in [("nonlinear", &self.nonlinear), ("linear", &self.linear)] {
             for worth in worths {
                 let of = |x: Option<f64>| x.map_or("-".to_string(), |x| format!("{x:.1}"));

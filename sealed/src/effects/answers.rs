@@ -2,7 +2,7 @@
 
 use super::{Effect, Physics, Site};
 use crate::laws::Law;
-use crate::network::{GROUND, InputKind, Network};
+use crate::network::{Element, GROUND, InputKind, Network};
 use serde::{Deserialize, Serialize};
 
 /// One right answer. The first one of an effect is the effect itself, in the nearest words that verdicts have; others say the
@@ -12,7 +12,7 @@ pub struct Answer {
     /// The place, as `between` or `signal`.
     #[serde(flatten)]
     pub site: Site,
-    /// Names of physics, in the vocabulary of verdicts, any of which is right here.
+    /// Names of physics, in the vocabulary of verdicts, any of which is right here; or the word of a verdict that names none: `parameters`, `none`.
     pub physics: Vec<String>,
     /// Names that findings at the same place must have besides, all of them.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -100,12 +100,24 @@ pub(super) fn answers(effect: &Effect, network: &Network) -> Vec<Answer> {
             all.push(Answer { together_with, ..answer(site, &["bias"]) });
         }
         (Physics::Law(Law::Bias(_)), Site::Between(ends)) => {
-            let rubs = |element: &&crate::network::Element| {
+            let rubs = |element: &&Element| {
                 matches!(element.law, Law::Coulomb(_))
                     && element.between.iter().all(|end| ends.iter().any(|name| network.place_name(*end) == name))
             };
             if network.elements.iter().any(|element| rubs(&element)) {
                 all.push(answer(site, &["asymmetric_coulomb"]));
+            }
+            // A constant force on a body is the same whether the ground takes the reaction or a body whose motion is prescribed, as the hand's.
+            let moved: Vec<&str> = network
+                .inputs
+                .iter()
+                .filter(|input| input.kind == InputKind::Motion)
+                .map(|input| network.bodies[input.on].name.as_str())
+                .collect();
+            if let Some(body) = ends.iter().find(|end| *end != GROUND).filter(|_| site.is_at_ground()) {
+                for hand in moved {
+                    all.push(answer(&Site::Between([body.clone(), hand.to_string()]), &["bias"]));
+                }
             }
         }
         // At the only input and the only output; the hand's motion is an input that only some recordings have.
@@ -115,5 +127,24 @@ pub(super) fn answers(effect: &Effect, network: &Network) -> Vec<Answer> {
         }
         _ => {}
     }
+    // What only moves a number of the model, or what a hand that nobody measured may do as well, is nothing that a model leaves out.
+    let held = |is: fn(&Law) -> bool| network.elements.iter().any(|e| e.of_grip && is(&e.law) && ends_at(e, site, network));
+    let in_the_numbers = |hand_hidden: bool, words: &[&str]| Answer { hand_hidden, ..answer(site, words) };
+    match &effect.physics {
+        Physics::Inertia { .. } => all.push(in_the_numbers(false, &["parameters"])),
+        Physics::Law(Law::Damper(_)) if site.is_at_ground() && held(|law| matches!(law, Law::Damper(_))) => {
+            all.push(in_the_numbers(true, &["parameters"]));
+        }
+        Physics::Law(Law::Bias(_)) if site.is_at_ground() && held(|law| matches!(law, Law::Spring(_))) => {
+            all.push(in_the_numbers(true, &["parameters", "none"]));
+        }
+        _ => {}
+    }
     all
+}
+
+/// Whether an element joins a body that the site names.
+fn ends_at(element: &Element, site: &Site, network: &Network) -> bool {
+    let Site::Between(ends) = site else { return false };
+    element.between.iter().flatten().any(|body| ends.contains(&network.bodies[*body].name))
 }

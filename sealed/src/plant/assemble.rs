@@ -3,7 +3,7 @@
 use super::drive::Drive;
 use super::kick::Kick;
 use super::sense::Sensor;
-use super::{Joint, Names, PHASE_PER_SUBSTEP, PlantError, SUBSTEPS_AT_LEAST, SUBSTEPS_AT_MOST, SealedPlant, dense};
+use super::{Joint, Names, PlantError, SUBSTEPS_AT_MOST, SealedPlant, dense};
 use crate::laws::{Damper, Law};
 use crate::network::{InputKind, Network};
 use crate::truth::Truth;
@@ -11,7 +11,7 @@ use crate::truth::Truth;
 /// A dead time of more periods than this is a mistake.
 const PERIODS_OF_DELAY: usize = 100_000;
 
-pub(super) fn assemble(device: &Network, truth: &Truth, period_s: f64, substeps: usize) -> Result<SealedPlant, PlantError> {
+pub(super) fn assemble(device: &Network, truth: &Truth, period_s: f64, (phase, least): (f64, usize)) -> Result<SealedPlant, PlantError> {
     let delays = device
         .inputs
         .iter()
@@ -52,7 +52,7 @@ pub(super) fn assemble(device: &Network, truth: &Truth, period_s: f64, substeps:
     let mass_inverse =
         dense::inverse(&pick(&mass, bodies, &free), free.len()).ok_or_else(|| PlantError::NoInertia(device.nominal.name.clone()))?;
     let fastest = fastest(&mass_inverse, &free, &joints, bodies);
-    let needed = (period_s * fastest / PHASE_PER_SUBSTEP).ceil().max(substeps as f64).max(SUBSTEPS_AT_LEAST as f64);
+    let needed = (period_s * fastest / phase).ceil().max(least as f64);
     if needed.is_nan() || needed > SUBSTEPS_AT_MOST as f64 {
         return Err(PlantError::TooStiff { device: device.nominal.name.clone(), rad_per_s: fastest, period_s });
     }

@@ -28,6 +28,9 @@ const PHASE_PER_SUBSTEP: f64 = 0.05;
 /// Substeps of a period at least, for reversals, dead times and edges that fall inside it.
 const SUBSTEPS_AT_LEAST: usize = 20;
 
+/// The same where a look is enough: the fastest frequency is off by 4e-4 of itself.
+const COARSE: (f64, usize) = (0.1, 6);
+
 /// Substeps of a period at most: more and a second takes minutes.
 const SUBSTEPS_AT_MOST: usize = 20_000;
 
@@ -167,11 +170,25 @@ impl SealedPlant {
     ///
     /// As [`SealedPlant::new`].
     pub fn with_substeps(nominal: &Network, truth: &Truth, period_s: f64, substeps: usize) -> Result<SealedPlant, PlantError> {
+        SealedPlant::resolving(nominal, truth, period_s, (PHASE_PER_SUBSTEP, substeps.max(SUBSTEPS_AT_LEAST)))
+    }
+
+    /// The same in about a third of the substeps: where thousands of runs are judged by what they do at large, and none is a recording.
+    ///
+    /// # Errors
+    ///
+    /// As [`SealedPlant::new`].
+    pub fn coarse(nominal: &Network, truth: &Truth, period_s: f64) -> Result<SealedPlant, PlantError> {
+        SealedPlant::resolving(nominal, truth, period_s, COARSE)
+    }
+
+    /// At most so much phase of the fastest motion in a substep, rad, and at least so many substeps.
+    fn resolving(nominal: &Network, truth: &Truth, period_s: f64, fineness: (f64, usize)) -> Result<SealedPlant, PlantError> {
         if !(period_s.is_finite() && period_s > 0.0) {
             return Err(PlantError::Period(period_s));
         }
         let device = truth.device(nominal)?;
-        let mut plant = assemble::assemble(&device, truth, period_s, substeps)?;
+        let mut plant = assemble::assemble(&device, truth, period_s, fineness)?;
         plant.measure();
         Ok(plant)
     }

@@ -1,0 +1,154 @@
+//! `backdrive test-bench`: an engine test bench identified from its bags.
+
+use crate::cli;
+use crate::columns::columns;
+use crate::failure::Failure;
+use backdrive_bench::lag::Observation;
+use backdrive_bench::{Asked, BenchError, Identified, Record, Validation, identify, validate};
+use backdrive_control::engine::Ripple;
+use backdrive_nodes::graph::bench::{EngineFile, dynamometer_to_toml};
+use backdrive_plant::elements::Law;
+use backdrive_plant::model::Model;
+use backdrive_report::number;
+use serde_json::{Value, json};
+use std::path::Path;
+
+/// The shaft that is written: its structure.
+const SHAFT: &str = include_str!("../plant/models/engine-test-bench.toml");
+
+/// Identifies, writes what a graph takes, and tells the numbers.
+pub fn test_bench(options: &cli::TestBench) -> Result<u8, Failure> {
+    let bad = |e: BenchError| Failure::input(e);
+    let record = |path: &Path| Record::of_bag(path).map_err(bad);
+    let (unfired, map, steps) = (record(&options.unfired)?, record(&options.map)?, record(&options.lag)?);
+    let asked = asked(options, &steps);
+    let found = identify(&asked, &unfired, &map, &steps).map_err(bad)?;
+    let validation = match (&options.dragged, &options.cycle) {
+        (Some(dragged), Some(cycle)) => Some(validate(&found.bench, &asked.observation, &record(dragged)?, &record(cycle)?).map_err(bad)?),
+        _ => None,
+    };
+    write(&options.out, &found)?;
+    if options.json {
+        println!("{}", serde_json::to_string_pretty(&as_json(&asked, &found, validation.as_ref())).map_err(Failure::input)?);
+    } else {
+        println!("{}", text(&asked, &found, validation.as_ref()));
+    }
+    eprintln!("wrote engine.toml, dynamometer.toml and shaft.toml into {}", options.out.display());
+    Ok(0)
+}
+
+/// What is asked for; without speeds of the lag's grid the lowest, middle and highest at which the pedal was stepped.
+fn asked(options: &cli::TestBench, steps: &Record) -> Asked {
+    let stepped = steps.pedal.windows(2).zip(&steps.setpoint).filter(|(pedal, _)| pedal[0] != pedal[1]).map(|(_, speed)| *speed);
+    let (low, high) = stepped.fold((f64::INFINITY, 0.0_f64), |(low, high), s| (low.min(s), high.max(s)));
+    let speeds = if options.speeds.is_empty() { vec![low, 0.5 * (low + high), high] } else { options.speeds.clone() };
+    Asked {
+        engine_inertia: options.engine_inertia,
+        stiffness: options.stiffness,
+        power: options.power,
+        plateau_s: options.plateau,
+        lag_points: [options.pedals.iter().map(|percent| 0.01 * percent).collect(), speeds],
+        observation: Observation { noise: [options.noise; 2], force_rate: options.torque_rate, back_off: options.back_off },
+    }
+}
+
+fn write(out: &Path, found: &Identified) -> Result<(), Failure> {
+    std::fs::create_dir_all(out).map_err(|e| Failure::write(out, e))?;
+    let put = |name: &str, text: String| {
+        let path = out.join(name);
+        std::fs::write(&path, text).map_err(|e| Failure::write(&path, e))
+    };
+    // Combustion's ripple is above what the observer passes on.
+    let engine = EngineFile { engine: found.bench.engine.clone(), ripple: Ripple { per_revolution: 0.0, share: 0.0 } };
+    put("engine.toml", engine.to_toml("Engine, identified"))?;
+    put("dynamometer.toml", dynamometer_to_toml(&found.bench.dynamometer, "Dynamometer, identified"))?;
+    let mut shaft = Model::from_toml(SHAFT, "the shaft").map_err(Failure::machine)?;
+    let numbers = &found.bench.shaft;
+    (shaft.name, shaft.title) = ("engine-test-bench-identified".to_string(), "Combustion engine test bench, identified".to_string());
+    shaft.source = "identified by backdrive test-bench".to_string();
+    for body in &mut shaft.bodies {
+        body.inertia = if body.name == "engine" { numbers.engine } else { numbers.dynamometer };
+    }
+    for element in &mut shaft.elements {
+        match &mut element.law {
+            Law::Spring(spring) => spring.stiffness = numbers.stiffness,
+            Law::Damper(damper) => damper.damping = numbers.damping,
+            _ => {}
+        }
+    }
+    put("shaft.toml", shaft.to_toml())
+}
+
+/// Name, unit, value, standard error.
+fn numbers(found: &Identified) -> Vec<(&'static str, &'static str, f64, Option<f64>)> {
+    let (shaft, machine, errors) = (&found.bench.shaft, &found.bench.dynamometer, &found.refined.deviations);
+    vec![
+        ("J_A, dynamometer's inertia", "kg m2", shaft.dynamometer, None),
+        ("J_C, engine's inertia", "kg m2", shaft.engine, errors.first().copied()),
+        ("c, shaft's stiffness", "N m/rad", shaft.stiffness, errors.get(1).copied()),
+        ("d, shaft's damping", "N m s/rad", shaft.damping, errors.get(2).copied()),
+        ("d by matching poles", "N m s/rad", found.first_damping, None),
+        ("torsional mode", "Hz", found.torsional_hz, None),
+        ("dynamometer's frequency", "Hz", machine.frequency_hz, None),
+        ("dynamometer's damping ratio", "", machine.damping_ratio, None),
+        ("dynamometer's delay", "s", machine.delay_s, None),
+    ]
+}
+
+/// What correlates with what, 0 to 1, and the paper's value.
+fn correlations(validation: &Validation) -> Vec<(&'static str, f64)> {
+    vec![
+        ("dragged, closed loop: dynamometer's speed", validation.mechanical_closed),
+        ("dragged, open loop: dynamometer's speed", validation.mechanical_open),
+        ("observed torque fed to the shaft: engine's speed", validation.observer[0]),
+        ("observed torque fed to the shaft: dynamometer's speed", validation.observer[1]),
+        ("engine model with the observed torque", validation.engine),
+        ("dynamometer model, dragged", validation.dynamometer[0]),
+        ("dynamometer model, cycle", validation.dynamometer[1]),
+        ("whole bench from pedal and wanted speed: engine's speed", validation.whole[0]),
+        ("whole bench from pedal and wanted speed: dynamometer's torque", validation.whole[1]),
+    ]
+}
+
+/// The lag by pedal and speed: pedal (0 to 1), speed (rad/s), time constant (s), standard error (s).
+fn lags(asked: &Asked, found: &Identified) -> Vec<[f64; 4]> {
+    let [pedals, speeds] = &asked.lag_points;
+    let points = speeds.iter().flat_map(|speed| pedals.iter().map(move |pedal| (*pedal, *speed)));
+    let of = |values: &[f64], k: usize| values.get(k).copied().unwrap_or(f64::NAN);
+    points.enumerate().map(|(k, (pedal, speed))| [pedal, speed, of(&found.lags.values, k), of(&found.lags.deviations, k)]).collect()
+}
+
+fn as_json(asked: &Asked, found: &Identified, validation: Option<&Validation>) -> Value {
+    let numbers: Vec<Value> = numbers(found)
+        .into_iter()
+        .map(|(name, unit, value, error)| json!({ "name": name, "unit": unit, "value": value, "standard_error": error }))
+        .collect();
+    let lags: Vec<Value> = lags(asked, found)
+        .into_iter()
+        .map(|[pedal, speed, value, error]| json!({ "pedal": pedal, "speed": speed, "time_constant": value, "standard_error": error }))
+        .collect();
+    let correlations: Option<Vec<Value>> =
+        validation.map(|v| correlations(v).into_iter().map(|(name, value)| json!({ "of": name, "correlation": value })).collect());
+    json!({ "numbers": numbers, "lags": lags, "correlations": correlations })
+}
+
+fn text(asked: &Asked, found: &Identified, validation: Option<&Validation>) -> String {
+    let mut table = vec![["number", "value", "std. error", "unit"].map(String::from).to_vec()];
+    for (name, unit, value, error) in numbers(found) {
+        table.push(vec![name.to_string(), number(value), error.map_or("–".to_string(), number), unit.to_string()]);
+    }
+    let mut out = columns(&table);
+    let mut table = vec![["engine's lag at pedal, %", "speed, rad/s", "time constant, s", "std. error"].map(String::from).to_vec()];
+    for [pedal, speed, value, error] in lags(asked, found) {
+        table.push(vec![number(100.0 * pedal), number(speed), number(value), number(error)]);
+    }
+    out += "\n";
+    out += &columns(&table);
+    if let Some(validation) = validation {
+        let mut table = vec![["correlation on recordings that no fit has seen", "%"].map(String::from).to_vec()];
+        table.extend(correlations(validation).into_iter().map(|(name, value)| vec![name.to_string(), format!("{:.1}", 100.0 * value)]));
+        out += "\n";
+        out += &columns(&table);
+    }
+    out.trim_end().to_string()
+}
