@@ -70,6 +70,13 @@ fn a_sealed_effect_is_diagnosed_without_its_truth() {
     assert!(gain("none") > 0.05 && gain("diagnosed") > 0.0 && gain("chosen") >= 0.94 * gain("none").min(gain("diagnosed")));
     assert!(place.path("proof/proof.html").is_file());
 
+    // The graph itself was run below and above the edge without canceller; its bags are there.
+    let live = found["live"].as_array().unwrap();
+    let of_none = |below: bool| live.iter().find(|run| run["canceller"] == "none" && run["below_edge"] == below).unwrap();
+    assert_eq!(of_none(true)["outcome"], "stable");
+    assert_ne!(of_none(false)["outcome"], "stable");
+    assert!(case.join("live/none-below.mcap").is_file());
+
     // Once more where nobody could look: the truth is gone, and the diagnosis does as before.
     std::fs::rename(case.join("sealed"), place.path("elsewhere")).unwrap();
     let (session, out) = (case.join("session"), place.path("again"));

@@ -40,6 +40,16 @@ fn agrees_with_scipy() {
 }
 
 #[test]
+fn presliding_hysteresis_agrees_with_relays_and_scipy() {
+    run("preisach_check.py", &[]);
+}
+
+#[test]
+fn the_observer_agrees_with_scipy() {
+    run("observer_check.py", &[]);
+}
+
+#[test]
 fn agrees_with_mujoco_on_a_chain_with_joint_friction() {
     run("mujoco_chain.py", &[]);
 }
@@ -52,4 +62,10 @@ fn agrees_with_the_independent_simulator() {
     } else {
         eprintln!("skipped: the independent simulator is not at {}", folder.display());
     }
+}
+
+#[test]
+fn the_steering_compensator_agrees_with_scipy() {
+    let models = Path::new(env!("CARGO_MANIFEST_DIR")).join("plant/models");
+    run("steering_check.py", &[&models]);
 }

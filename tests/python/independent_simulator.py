@@ -235,6 +235,10 @@ def nominal_models(program, core, folder, table):
         table.row(name, [*numbers, own], [1e-4, LOOSER.get(case, 1e-3)])
 
 
+# Devices whose motion magnifies what is small, as their own error shows: limit at the chosen step, and why.
+RATTLES = {"steering-compensator-master": (0.1, "its half kilogram, which nobody holds, bounces in the gap: any error grows from bounce to bounce")}
+
+
 def devices(program, core, table):
     """The device models of the project, driven by tones of a size that suits each.
 
@@ -243,7 +247,7 @@ def devices(program, core, table):
     run as cubics here.
     """
     size = {"force": 1.5, "motion": 3e-4}
-    special = {"engine-test-bench": 150.0, "ball-screw": 0.5, "steering-compensator": 3e-3}
+    special = {"steering-compensator-master": 60.0, "engine-test-bench": 150.0, "ball-screw": 0.5, "steering-compensator": 3e-3}
     for path in sorted(MODELS.glob("*.toml")):
         model_file = program.here / "device.toml"
         text = path.read_text()
@@ -253,7 +257,7 @@ def devices(program, core, table):
         if {e["kind"] for e in other["elements"]} - set(core.KIND):
             print(f"{path.stem}: has a kind that the other does not know")
             continue
-        amplitude = [number for name, number in special.items() if path.stem.startswith(name)]
+        amplitude = [number for name, number in special.items() if path.stem.startswith(name)][:1]
         inputs = {}
         for i, q in enumerate(other["inputs"]):
             inputs[q["name"]] = tones(*(amplitude or [size[q["kind"]]]), 1.3, 4.1, 9.7, seed=i)
@@ -266,7 +270,10 @@ def devices(program, core, table):
         numbers = [max(error(run[o["name"]], expected[:, i], o) for i, o in enumerate(other["outputs"])) for run in runs]
         own = max(error(halved[:, i], expected[:, i], o) for i, o in enumerate(other["outputs"]))
         why = TOUCH if any(e["kind"] == "backlash" for e in other["elements"]) else ""
-        table.row(path.stem, [*numbers, own], [1e-3 if why else 1e-4, 1e-2 if why else 1e-3], why)
+        loose = 1e-2 if why else 1e-3
+        if path.stem in RATTLES:
+            loose, why = RATTLES[path.stem]
+        table.row(path.stem, [*numbers, own], [1e-3 if why else 1e-4, loose], why)
 
 
 def error(found, expected, output):

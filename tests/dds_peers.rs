@@ -1,0 +1,222 @@
+//! CycloneDDS and Fast DDS on the other host: they hear every topic, they are heard, and how long a sample takes beside Cyclone to Cyclone.
+
+mod netns;
+
+use backdrive_bags::Reader;
+use netns::Hosts;
+use serde_json::Value;
+use std::ffi::OsString;
+use std::io::Read;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::sync::OnceLock;
+
+const DOMAIN: &str = "7";
+const OTHER_DOMAIN: &str = "8";
+
+/// A Python with CycloneDDS; `None`, with a message, where there is none. With BACKDRIVE_REQUIRE_PYTHON=1 that is a failure.
+fn python() -> Option<OsString> {
+    if let Some(python) = std::env::var_os("BACKDRIVE_PYTHON") {
+        return Some(python);
+    }
+    let why = "BACKDRIVE_PYTHON is not set: it names a Python that has tests/python/requirements.txt";
+    assert!(std::env::var("BACKDRIVE_REQUIRE_PYTHON").as_deref() != Ok("1"), "{why}");
+    eprintln!("SKIPPED: {why}");
+    None
+}
+
+/// The example, built with what this test was built with.
+fn peer() -> &'static Path {
+    static PEER: OnceLock<PathBuf> = OnceLock::new();
+    PEER.get_or_init(|| {
+        let folder = std::env::current_exe().unwrap().parent().unwrap().parent().unwrap().join("examples");
+        let peer = folder.join("ros2_peer");
+        assert!(peer.exists(), "{}: `cargo build --example ros2_peer` makes it", peer.display());
+        peer
+    })
+}
+
+/// The last line of its standard output as JSON.
+fn told(child: Child) -> Value {
+    let output = child.wait_with_output().unwrap();
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert!(output.status.success(), "{text}{}", String::from_utf8_lossy(&output.stderr));
+    serde_json::from_str(text.lines().last().unwrap_or_default()).unwrap_or_else(|e| panic!("{e}: {text}"))
+}
+
+/// Starts it, and waits until it says that it listens.
+fn listening(mut command: Command) -> Child {
+    let mut child = command.stdout(Stdio::piped()).spawn().unwrap();
+    // Byte by byte: what comes later is read by somebody else.
+    let (mut line, mut byte, out) = (Vec::new(), [0], child.stdout.as_mut().unwrap());
+    while !line.ends_with(b"listening\n") && out.read(&mut byte).unwrap() == 1 {
+        line.push(byte[0]);
+    }
+    child
+}
+
+fn with_domain(mut command: Command) -> Command {
+    command.env("ROS_DOMAIN_ID", DOMAIN).stderr(Stdio::inherit());
+    command
+}
+
+fn cyclone(hosts: &Hosts, host: usize, python: &OsString, words: &[&str]) -> Command {
+    let mut command = hosts.on(host, python);
+    command.arg(Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/python/dds_peer.py")).args(words);
+    with_domain(command)
+}
+
+fn ours(hosts: &Hosts, host: usize, words: &[&str]) -> Command {
+    let mut command = hosts.on(host, peer());
+    command.args(words);
+    with_domain(command)
+}
+
+/// Topics of the contact graph: what they carry by our names, their types and QoS by everybody's.
+fn topics() -> Vec<(String, &'static str, &'static str)> {
+    let samples = [
+        "/operator/setpoint_js",
+        "/master/measured_js",
+        "/master/user_js",
+        "/master/servo_jf",
+        "/canceller/measured_js",
+        "/canceller/induced_js",
+        "/scaling/dither_jf",
+        "/slave/servo_jp",
+        "/slave/measured_js",
+    ];
+    let mut all: Vec<_> = samples.map(|topic| (topic.to_string(), "sample", "JointState:best_effort")).to_vec();
+    all.push(("/scaling/gains".to_string(), "gains", "JointState:reliable"));
+    all.push(("/scaling/margin".to_string(), "margin", "JointState:reliable"));
+    for node in ["operator", "master", "canceller", "scaling", "slave"] {
+        all.push((format!("/{node}/status"), "status", "JointState:reliable"));
+        all.push((format!("/{node}/events"), "event", "Log:reliable"));
+    }
+    all
+}
+
+/// A run on one host. On the other another vendor's DDS hears every topic, and publishes it in another domain, where we listen: three counts are
+/// the same. `peer` starts it with what it has to pass on.
+///
+/// What is best effort may be lost on a busy machine, so that one of two runs has to be whole.
+fn every_topic_both_ways(hosts: &Hosts, peer: impl Fn(&[String]) -> Command, bag: &Path) {
+    if let Some(why) = missing_both_ways(hosts, &peer, bag) {
+        eprintln!("again: {why}");
+        assert_eq!(missing_both_ways(hosts, &peer, bag), None);
+    }
+}
+
+/// Of one run, what did not arrive.
+fn missing_both_ways(hosts: &Hosts, peer: &impl Fn(&[String]) -> Command, bag: &Path) -> Option<String> {
+    let ours_hear: Vec<String> = topics().iter().map(|(topic, kind, _)| format!("{topic}:{kind}")).collect();
+    let mut command = ours(hosts, 0, &["listen"]);
+    command.args(&ours_hear).env("ROS_DOMAIN_ID", OTHER_DOMAIN);
+    let second = listening(command);
+    let words: Vec<String> = ["pass", "60", OTHER_DOMAIN].map(String::from).into_iter().collect();
+    let wanted = topics().into_iter().map(|(topic, _, of)| format!("{topic}:{of}"));
+    let first = listening(peer(&words.into_iter().chain(wanted).collect::<Vec<_>>()));
+    let mut run = with_domain(hosts.on(0, env!("CARGO_BIN_EXE_backdrive")));
+    run.arg("run").arg(Path::new(env!("CARGO_MANIFEST_DIR")).join("launch/contact-hosts.toml"));
+    run.args(["--transport", "ros2", "--rate", "100", "--duration", "4", "--bag"]).arg(bag);
+    let done = run.env("TMPDIR", bag.parent().unwrap()).output().unwrap();
+    assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+    let (heard, again) = (told(first), told(second));
+    for topic in &Reader::open(bag).unwrap().completeness().unwrap().topics {
+        // As many as in our bag, from the first on, in order; and as many of them from the peer.
+        for (who, all) in [("the peer", &heard), ("ours", &again)] {
+            let told = &all[topic.topic.as_str()];
+            assert!(told.is_object(), "{} is not asked for", topic.topic);
+            let counted = (told["count"].as_u64(), told["ordered"].as_bool());
+            if counted != (Some(topic.written), Some(true)) || topic.written > 0 && told["first"].as_i64() != Some(0) {
+                return Some(format!("{who}, {}, {} in the bag: {told}", topic.topic, topic.written));
+            }
+        }
+    }
+    None
+}
+
+#[test]
+fn cyclone_hears_every_topic_of_a_run_and_publishes_it_for_us() {
+    let Some(python) = python() else { return };
+    let Some(hosts) = Hosts::joined() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let bag = folder.path().join("run.mcap");
+    let peer = |words: &[String]| cyclone(&hosts, 1, &python, &words.iter().map(String::as_str).collect::<Vec<_>>());
+    every_topic_both_ways(&hosts, peer, &bag);
+    // Other people's reader opens the bag too.
+    let script = "import sys; from pathlib import Path; from rosbags.highlevel import AnyReader\n\
+                  with AnyReader([Path(sys.argv[1])]) as r: print(sum(1 for _ in r.messages()))";
+    let read = Command::new(&python).args(["-c", script]).arg(&bag).output().unwrap();
+    let count: u64 =
+        String::from_utf8_lossy(&read.stdout).trim().parse().unwrap_or_else(|_| panic!("{}", String::from_utf8_lossy(&read.stderr)));
+    assert_eq!(count, Reader::open(&bag).unwrap().counts().iter().sum::<u64>());
+}
+
+#[test]
+fn fast_dds_hears_every_topic_of_a_run_and_publishes_it_for_us() {
+    let Some(hosts) = Hosts::joined() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let peer = folder.path().join("fastdds");
+    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fastdds/peer.cpp");
+    let built = Command::new("c++").args(["-std=c++17", "-O1", "-o"]).arg(&peer).arg(&source).args(["-lfastrtps", "-lfastcdr"]).output();
+    let hint = "on Debian: apt install g++ libfastrtps-dev";
+    match built {
+        Err(e) => return eprintln!("SKIPPED: Fast DDS: there is no C++ compiler ({hint}): {e}"),
+        Ok(built) if !built.status.success() => {
+            let why = String::from_utf8_lossy(&built.stderr);
+            let there = Path::new("/usr/include/fastdds/dds/domain/DomainParticipant.hpp").exists();
+            assert!(!there, "Fast DDS is there and {} is not built: {why}", source.display());
+            return eprintln!("SKIPPED: Fast DDS is not here ({hint}): {}", why.lines().next().unwrap_or_default());
+        }
+        Ok(_) => {}
+    }
+    let start = |words: &[String]| {
+        let mut command = hosts.on(1, &peer);
+        command.args(words);
+        with_domain(command)
+    };
+    every_topic_both_ways(&hosts, start, &folder.path().join("run.mcap"));
+}
+
+#[test]
+fn cyclone_is_heard() {
+    let Some(python) = python() else { return };
+    let Some(hosts) = Hosts::joined() else { return };
+    let listener = listening(ours(&hosts, 0, &["listen", "/slave/servo_jp"]));
+    let spoken = told(cyclone(&hosts, 1, &python, &["speak", "/slave/servo_jp", "1000", "500"]).stdout(Stdio::piped()).spawn().unwrap());
+    let heard = told(listener);
+    let heard = &heard["/slave/servo_jp"];
+    assert_eq!((&heard["count"], &heard["first"]), (&spoken["count"], &Value::from(0)), "{heard}");
+}
+
+#[test]
+fn a_sample_takes_about_as_long_as_between_cyclones() {
+    let Some(python) = python() else { return };
+    let Some(hosts) = Hosts::joined() else { return };
+    let count = if std::env::var("BACKDRIVE_LONG").as_deref() == Ok("1") { "10000" } else { "2000" };
+    let ping = ["ping", count, "1000"];
+    let mut table = Vec::new();
+    for (name, ours_asks, ours_echoes) in
+        [("backdrive - backdrive", true, true), ("cyclone - cyclone", false, false), ("backdrive - cyclone", true, false)]
+    {
+        let echo = listening(if ours_echoes { ours(&hosts, 1, &["echo"]) } else { cyclone(&hosts, 1, &python, &["echo"]) });
+        let asks = if ours_asks { ours(&hosts, 0, &ping) } else { cyclone(&hosts, 0, &python, &ping) };
+        let result = told({ asks }.stdout(Stdio::piped()).spawn().unwrap());
+        let mut echo = echo;
+        let _ = echo.kill();
+        let _ = echo.wait();
+        eprintln!(
+            "{name:<24} one way p50 {:>7} p99 {:>8}   round trip p50 {:>7} p99 {:>8} us   {} of {}",
+            result["one_way_us"][0],
+            result["one_way_us"][1],
+            result["round_trip_us"][0],
+            result["round_trip_us"][1],
+            result["count"],
+            result["sent"]
+        );
+        table.push(result);
+    }
+    // A shared machine decides the figures; that all arrive on a cable is ours.
+    let (count, sent) = (table[0]["count"].as_f64().unwrap(), table[0]["sent"].as_f64().unwrap());
+    assert!(count >= 0.99 * sent, "{count} of {sent} came back");
+}
