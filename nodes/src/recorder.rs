@@ -135,45 +135,43 @@ impl Recording {
         lines
     }
 
-    /// Takes over what has arrived by now; returns how many messages that were.
+    /// Takes over what has arrived by now, of each topic so much at most; returns how many messages that were.
     ///
     /// # Errors
     /// A subscriber or the sink fails.
-    pub fn take(&mut self) -> Result<usize, RunError> {
-        let mut taken = 0;
-        loop {
-            let mut full = false;
-            let arrival = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |d| d.as_nanos() as i64);
-            for (index, heard) in self.heard.iter_mut().enumerate() {
-                let mut here = 0;
-                while here < AT_ONCE {
-                    let message = match heard.subscriber.receive() {
-                        Ok(Some(message)) => message,
-                        Ok(None) => break,
-                        Err(e) if self.clock == Clock::Realtime => {
-                            self.broken = Some(e);
-                            break;
-                        }
-                        Err(e) => return Err(e.into()),
-                    };
-                    if heard.topic.kind == Kind::Sample {
-                        heard.upto = heard.upto.max(message.step() + 1);
+    fn take(&mut self) -> Result<usize, RunError> {
+        let (mut taken, mut more) = (0, false);
+        let arrival = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |d| d.as_nanos() as i64);
+        for (index, heard) in self.heard.iter_mut().enumerate() {
+            let mut here = 0;
+            while here < AT_ONCE {
+                let message = match heard.subscriber.receive() {
+                    Ok(Some(message)) => message,
+                    Ok(None) => break,
+                    Err(e) if self.clock == Clock::Realtime => {
+                        self.broken = Some(e);
+                        break;
                     }
-                    // A lockstep bag holds nothing that the machine decides.
-                    let receive_ns = if self.clock == Clock::Lockstep { message.stamp_ns() } else { arrival };
-                    self.sink.push(index, message, receive_ns)?;
-                    here += 1;
+                    Err(e) => return Err(e.into()),
+                };
+                if heard.topic.kind == Kind::Sample {
+                    heard.upto = heard.upto.max(message.step() + 1);
                 }
-                full |= here == AT_ONCE;
-                taken += here;
+                // A lockstep bag holds nothing that the machine decides.
+                let receive_ns = if self.clock == Clock::Lockstep { message.stamp_ns() } else { arrival };
+                self.sink.push(index, message, receive_ns)?;
+                here += 1;
             }
-            if !full {
-                self.give_credit(1)?;
-                self.sink.checkpoint();
-                return Ok(taken);
-            }
-            self.give_credit(CREDIT_EVERY)?;
+            more |= here == AT_ONCE;
+            taken += here;
         }
+        if more {
+            self.give_credit(CREDIT_EVERY)?;
+        } else {
+            self.give_credit(1)?;
+            self.sink.checkpoint();
+        }
+        Ok(taken)
     }
 
     /// Steps of which every sample has been taken over.
