@@ -403,7 +403,9 @@ fn main() -> std::process::ExitCode {
         let mut errors: Vec<f64> = rows.iter().map(|r| r.found.critical_gain.map_or(1.0, |g| (g / r.live - 1.0).abs())).collect();
         errors.sort_by(f64::total_cmp);
         bound("median error of the predicted edge, %, at most 3", 100.0 * percentile(&errors, 0.5), percentile(&errors, 0.5) <= 0.03);
-        bound("90th percentile, %, at most 10", 100.0 * percentile(&errors, 0.9), percentile(&errors, 0.9) <= 0.10);
+        let within = errors.iter().filter(|e| **e <= 0.10).count() as f64 / errors.len() as f64;
+        let lowest = least(0.9, errors.len());
+        bound(&format!("edges predicted within 10 %, %, at least {:.0}", 100.0 * lowest), 100.0 * within, within >= lowest);
         let outside: Vec<&(f64, bool, bool)> = rows.iter().flat_map(|r| &r.trials).filter(|t| (t.0 - 1.0).abs() > 0.05).collect();
         let right = outside.iter().filter(|t| t.1 == t.2).count() as f64 / outside.len() as f64;
         let lowest = least(0.95, outside.len());

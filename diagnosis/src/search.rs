@@ -237,7 +237,12 @@ pub fn search(
     let model = structure.model(problem, &nominal.values).ok_or(SearchError::RunsAway)?;
     let seen = structure.with_unknown(problem, &problem.fit, &nominal.values);
     let runs: Vec<(Vec<Vec<f64>>, f64)> = seen.iter().map(|r| (r.inputs.clone(), r.period)).collect();
-    let scales = Scales::of(&model, &runs)?;
+    let largest = |output: usize| {
+        let samples = problem.fit.iter().filter_map(|r| r.outputs.get(output)?.as_deref()).flatten();
+        samples.fold(0.0_f64, |most, y| most.max(y.abs()))
+    };
+    let measured: Vec<f64> = (0..model.outputs.len()).map(largest).collect();
+    let scales = Scales::of(&model, &runs)?.with_measured(&model, &measured);
     let level = levels(&evaluator, &nominal.residuals).into_iter().fold(0.0, f64::max);
     let strength = if level > 3.0 * FAR { 1.0 } else { 0.3 };
     let far = level > FAR;
@@ -347,8 +352,19 @@ pub fn search(
         }
     }
     distinct(&mut singles);
+    // To first order a law may do no more than the nominal model's numbers do together, so that screening sees nothing of it, and still be what is
+    // missing: where little is left over those of one number are fitted whatever they promise.
+    let plain: Vec<Seed> = if far || quiet {
+        Vec::new()
+    } else {
+        let one = |(index, h): (usize, &Hypothesis)| {
+            let start = h.starts.first().filter(|start| start.len() == 1)?;
+            Some(view.seed(vec![(index, start.clone())]))
+        };
+        hypotheses.iter().enumerate().filter_map(one).collect()
+    };
     use Wave::*;
-    let mut waves = vec![First, Laws, Singles, Relatives];
+    let mut waves = vec![First, Laws, Singles, Plain, Relatives];
     if !quiet {
         waves.extend([Pairs, Laws, Exchanges, Richer, MoreSingles, MorePairs, Laws, Exchanges]);
         for _ in 2..settings.effects {
@@ -356,7 +372,7 @@ pub fn search(
         }
         waves.push(Relatives);
     }
-    let mut singles = singles.into_iter();
+    let (mut singles, mut plain) = (singles.into_iter(), plain.into_iter());
     let mut effects = 1;
     // Substeps that blur less than what is left over.
     let mut fine = COARSE;
@@ -399,6 +415,7 @@ pub fn search(
                 seeds
             }
             Singles => singles.by_ref().take(if guided { 30 } else { 5 }).collect(),
+            Plain => plain.by_ref().collect(),
             MoreSingles => singles.by_ref().collect(),
             // A law that wins with more numbers has to win over its simpler relatives, whatever these promised.
             Relatives => course.relatives(&found, done(&found, &nominal, samples)),
@@ -622,6 +639,7 @@ enum Wave {
     First,
     Laws,
     Singles,
+    Plain,
     Relatives,
     Pairs,
     Exchanges,
@@ -637,6 +655,7 @@ impl Wave {
         match self {
             Wave::First | Wave::Singles => "fitting single effects",
             Wave::Laws => "fitting other laws in the same place",
+            Wave::Plain => "fitting laws of one number",
             Wave::Relatives => "fitting simpler relatives",
             Wave::Pairs => "fitting pairs",
             Wave::Exchanges => "exchanging effects",
@@ -652,7 +671,7 @@ impl Wave {
     fn keep(self) -> [usize; 2] {
         match self {
             Wave::First | Wave::Laws | Wave::Relatives => [3, 3],
-            Wave::Singles | Wave::Exchanges | Wave::MoreSingles | Wave::Anew => [4, 2],
+            Wave::Singles | Wave::Plain | Wave::Exchanges | Wave::MoreSingles | Wave::Anew => [4, 2],
             Wave::Pairs | Wave::MorePairs => [5, 3],
             Wave::Richer => [2, 1],
             Wave::More => [4, 3],

@@ -3,7 +3,7 @@
 use super::Physics;
 use super::builder::{ElementBuilder, any, even, log};
 
-/// Periods that fits start from, in a peak-to-peak travel, longest first.
+/// Periods that fits start from, in a peak-to-peak travel, longest first; a ripple has to be seen to come again.
 const PERIODS: [f64; 13] = [0.71, 0.5, 0.35, 0.25, 0.18, 0.125, 0.088, 0.0625, 0.044, 0.031, 0.022, 0.016, 0.011];
 
 pub(super) const PHYSICS: Physics = Physics {
@@ -16,9 +16,8 @@ pub(super) const PHYSICS: Physics = Physics {
             let (travel, f) = (2.0 * site.displacement_peak, site.force);
             let new = new
                 .number("amplitude", even(-20.0 * f, 20.0 * f, 0.0))
-                // What does not come again within the travel is a spring, not a ripple. The travel is that of the refitted nominal model, which may
-                // fall short.
-                .number("period", log(1e-4 * travel, 1.5 * travel))
+                // What does not come again within the travel is a spring, not a ripple.
+                .number("period", log(1e-4 * travel, PERIODS[0] * sites.scales.reach * travel))
                 // More than a turn, so that no fit runs into an end.
                 .number("phase", any(-10.0, 10.0));
             // The force is linear in a cos(phase) and a sin(phase): two phases span it. What a period scan finds is a better start.

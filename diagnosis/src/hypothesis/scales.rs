@@ -1,6 +1,6 @@
 //! How far, how fast and how hard things move: what parameters are measured against.
 
-use backdrive_plant::model::{InputKind, Model};
+use backdrive_plant::model::{InputKind, Model, OutputKind};
 use backdrive_plant::stepper::{CompileError, Options, Plant, Segment, ahead, segments};
 
 /// Root mean square and peak of a quantity.
@@ -27,6 +27,8 @@ pub struct Scales {
     pub period: f64,
     /// Longest run, s.
     pub duration: f64,
+    /// How many times further things were measured to move than these simulations do, at least 1.
+    pub reach: f64,
 }
 
 /// Sums of squares and peaks on the way to a [`Span`].
@@ -43,6 +45,8 @@ impl Sum {
     }
 }
 
+/// What a nominal model can fall short of the measured travel; a sensor's offset may look like more.
+const FURTHEST: f64 = 4.0;
 /// Magnitude beyond which a simulation counts as having left the device behind.
 const RUNAWAY: f64 = 1e9;
 
@@ -112,7 +116,16 @@ impl Scales {
             outputs: spans(outputs),
             period: shortest,
             duration: longest,
+            reach: 1.0,
         })
+    }
+
+    /// The same where positions were measured: `measured` has the largest magnitude of each output, in the model's order.
+    pub fn with_measured(self, model: &Model, measured: &[f64]) -> Scales {
+        let positions =
+            model.outputs.iter().zip(measured).zip(&self.outputs).filter(|((o, _), _)| matches!(o.kind, OutputKind::Position(_)));
+        let ratios = positions.map(|((_, measured), simulated)| measured / simulated.peak).filter(|r| r.is_finite());
+        Scales { reach: ratios.fold(1.0, f64::max).min(FURTHEST), ..self }
     }
 
     /// Displacement, speed and acceleration of one place against another, ground being `None`.
