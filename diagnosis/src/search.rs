@@ -364,23 +364,32 @@ pub fn search(
         hypotheses.iter().enumerate().filter_map(one).collect()
     };
     use Wave::*;
-    let mut waves = vec![First, Laws, Singles, Plain, Relatives];
+    let mut waves = vec![First, Laws, Singles, Plain, Elsewhere, Relatives];
     if !quiet {
-        waves.extend([Pairs, Laws, Exchanges, Richer, MoreSingles, MorePairs, Laws, Exchanges]);
+        waves.extend([Pairs, Laws, Exchanges, Richer, MoreSingles, MorePairs, Laws, Exchanges, Elsewhere]);
         for _ in 2..settings.effects {
             waves.extend([More, Anew, Exchanges]);
         }
-        waves.push(Relatives);
+        waves.extend([Elsewhere, Relatives]);
     }
     let (mut singles, mut plain) = (singles.into_iter(), plain.into_iter());
     let mut effects = 1;
     // Substeps that blur less than what is left over.
     let mut fine = COARSE;
-    // Of a best with so many effects the simpler relatives were tried.
-    let mut related = 0;
+    // Of a best with so many effects the simpler relatives were tried, and of this one other places.
+    let (mut related, mut moved_about) = (0, String::new());
     for wave in waves {
-        if late(if wave == Relatives { 0.85 } else { 0.7 }) || (wave != Relatives && done(&found, &nominal, samples)) {
+        // They are rivals of the best however little it leaves over.
+        let of_the_best = matches!(wave, Relatives | Elsewhere);
+        if late(if of_the_best { 0.85 } else { 0.7 }) || (!of_the_best && done(&found, &nominal, samples)) {
             continue;
+        }
+        if wave == Elsewhere {
+            let law = simplest(&found, samples).map_or_else(String::new, |c| key_of(&c.structure.added));
+            if law == moved_about {
+                continue;
+            }
+            moved_about = law;
         }
         if wave == Relatives {
             // Far from the noise more effects come first: which law it is shows beside them.
@@ -417,6 +426,8 @@ pub fn search(
             Singles => singles.by_ref().take(if guided { 30 } else { 5 }).collect(),
             Plain => plain.by_ref().collect(),
             MoreSingles => singles.by_ref().collect(),
+            // The place that a law was found at first may be a neighbour of its own.
+            Elsewhere => simplest(&found, samples).map_or_else(Vec::new, |law| course.elsewhere(law)),
             // A law that wins with more numbers has to win over its simpler relatives, whatever these promised.
             Relatives => course.relatives(&found, done(&found, &nominal, samples)),
             Richer => {
@@ -453,14 +464,15 @@ pub fn search(
             }
         };
         // Relatives start anew beside the numbers of the best, even those whose own race went wrong.
-        if wave != Relatives {
+        if !of_the_best {
             distinct(&mut seeds);
         }
         let known: HashSet<String> = found.iter().map(|c| key_of(&c.structure.added)).collect();
-        seeds.retain(|s| wave == Relatives || !known.contains(&key_of(s.effects.iter().map(|(h, _)| &hypotheses[*h]))));
+        seeds.retain(|s| of_the_best || !known.contains(&key_of(s.effects.iter().map(|(h, _)| &hypotheses[*h]))));
         // What only shows beside a law that was found shows little along the path of the nominal model.
         let raced = match wave {
             Anew => Course { along: None, coarse: fine, ..course }.race(seeds, wave.keep()),
+            Elsewhere => Course { along: None, ..to_the_end }.race(seeds, wave.keep()),
             Relatives => to_the_end.race(seeds, wave.keep()),
             _ => course.race(seeds, wave.keep()),
         };
@@ -540,6 +552,32 @@ impl Course<'_> {
                         *slot = (index, start.clone());
                         seeds.push(Seed::beside(self.evaluator.problem, (&best.structure, &best.fit.values), effects, false));
                     }
+                }
+            }
+        }
+        seeds
+    }
+
+    /// Each effect with its values at every other place where that physics may be: to first order neighbours that are firmly joined do the same, and
+    /// screening, or a path along which they are led, may have taken one for the other.
+    fn elsewhere(&self, best: &Candidate) -> Vec<Seed> {
+        let own = self.effects_of(&best.structure, &best.fit.values);
+        let mut seeds = Vec::new();
+        for (slot, (effect, values)) in best.structure.added.iter().zip(best.structure.added_of(&best.fit.values)).enumerate() {
+            let beside = |h: &Hypothesis| best.structure.added.iter().enumerate().all(|(i, other)| i == slot || other.compatible(h));
+            for (index, h) in self.hypotheses.iter().enumerate() {
+                if h.physics != effect.physics || h.place.same(&effect.place) || !beside(h) {
+                    continue;
+                }
+                let alike =
+                    h.parameters.len() == values.len() && h.parameters.iter().zip(&effect.parameters).all(|(a, b)| a.unit == b.unit);
+                let carried: Vec<f64> = h.parameters.iter().zip(&values).map(|(p, v)| v.clamp(p.range.0, p.range.1)).collect();
+                let start = if alike { Some(carried) } else { h.starts.first().cloned() };
+                let Some(start) = start else { continue };
+                let mut effects = own.clone();
+                if let Some(place) = effects.get_mut(slot) {
+                    *place = (index, start);
+                    seeds.push(Seed::beside(self.evaluator.problem, (&best.structure, &best.fit.values), effects, false));
                 }
             }
         }
@@ -640,6 +678,7 @@ enum Wave {
     Laws,
     Singles,
     Plain,
+    Elsewhere,
     Relatives,
     Pairs,
     Exchanges,
@@ -656,6 +695,7 @@ impl Wave {
             Wave::First | Wave::Singles => "fitting single effects",
             Wave::Laws => "fitting other laws in the same place",
             Wave::Plain => "fitting laws of one number",
+            Wave::Elsewhere => "fitting the same law in other places",
             Wave::Relatives => "fitting simpler relatives",
             Wave::Pairs => "fitting pairs",
             Wave::Exchanges => "exchanging effects",
@@ -670,7 +710,7 @@ impl Wave {
     /// How many are fitted further, and how many to their end.
     fn keep(self) -> [usize; 2] {
         match self {
-            Wave::First | Wave::Laws | Wave::Relatives => [3, 3],
+            Wave::First | Wave::Laws | Wave::Elsewhere | Wave::Relatives => [3, 3],
             Wave::Singles | Wave::Plain | Wave::Exchanges | Wave::MoreSingles | Wave::Anew => [4, 2],
             Wave::Pairs | Wave::MorePairs => [5, 3],
             Wave::Richer => [2, 1],
@@ -775,6 +815,16 @@ fn detectable(view: &View, samples: usize, hypotheses: &[Hypothesis]) -> Vec<Det
         }
     }
     found
+}
+
+/// The best, or far from the noise, where the law is open as well as its place, what does nearly as well with the fewest numbers.
+fn simplest(found: &[Candidate], samples: usize) -> Option<&Candidate> {
+    let best = found.first()?;
+    if best.fit.cost < NEAR * samples as f64 {
+        return Some(best);
+    }
+    let like = |c: &&Candidate| c.structure.added.len() == best.structure.added.len() && c.fit.cost < 2.0 * best.fit.cost;
+    found.iter().filter(like).min_by_key(|c| c.structure.numbers.len())
 }
 
 /// The ids of a structure's effects, whatever their order.
