@@ -109,6 +109,18 @@ fn refitted_numbers_lie_in_their_intervals() {
 }
 
 #[test]
+fn a_force_limit_that_was_left_out_is_named() {
+    let problem = recorded(&NOMINAL.replace("on = \"motor\"\n", "on = \"motor\"\nsaturation = 3.7\n"), 5);
+    let found = search(&problem, &Settings::default(), None, &|_| {}).unwrap();
+    let said = verdict(&problem, &found, "after.toml").unwrap();
+    assert_eq!(said.json["verdict"], "missing", "{:#}", said.json);
+    let [only] = said.json["findings"].as_array().unwrap().as_slice() else { panic!("{:#}", said.json) };
+    assert_eq!((only["physics"].as_str(), only["signal"].as_str()), (Some("saturation"), Some("force")), "{only:#}");
+    let limit = only["parameters"]["saturation"]["value"].as_f64().unwrap();
+    assert!((limit - 3.7).abs() < 0.01, "{limit}");
+}
+
+#[test]
 fn dry_friction_that_was_left_out_is_named() {
     let problem = recorded(&format!("{NOMINAL}{COULOMB}"), 2);
     let found = search(&problem, &Settings::default(), None, &|_| {}).unwrap();
