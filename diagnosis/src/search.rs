@@ -354,7 +354,7 @@ pub fn search(
     distinct(&mut singles);
     // To first order a law may do no more than the nominal model's numbers do together, so that screening sees nothing of it, and still be what is
     // missing: where little is left over those of one number are fitted whatever they promise.
-    let plain: Vec<Seed> = if far || quiet {
+    let plain: Vec<Seed> = if far {
         Vec::new()
     } else {
         let one = |(index, h): (usize, &Hypothesis)| {
@@ -379,8 +379,9 @@ pub fn search(
     // Of a best with so many effects the simpler relatives were tried, and of this one other places.
     let (mut related, mut moved_about) = (0, String::new());
     for wave in waves {
-        // They are rivals of the best however little it leaves over.
-        let of_the_best = matches!(wave, Relatives | Elsewhere);
+        // They are rivals of the best however little it leaves over, and so are laws of one number where it took more.
+        let takes_more = |c: &Candidate| c.structure.numbers.len() > nominal.structure.numbers.len() + 1;
+        let of_the_best = matches!(wave, Relatives | Elsewhere) || wave == Plain && found.first().is_some_and(takes_more);
         if late(if of_the_best { 0.85 } else { 0.7 }) || (!of_the_best && done(&found, &nominal, samples)) {
             continue;
         }
@@ -463,12 +464,13 @@ pub fn search(
                 })
             }
         };
-        // Relatives start anew beside the numbers of the best, even those whose own race went wrong.
-        if !of_the_best {
+        // Some start anew beside the numbers of the best, even those whose own race went wrong.
+        let anew = matches!(wave, Relatives | Elsewhere);
+        if !anew {
             distinct(&mut seeds);
         }
         let known: HashSet<String> = found.iter().map(|c| key_of(&c.structure.added)).collect();
-        seeds.retain(|s| of_the_best || !known.contains(&key_of(s.effects.iter().map(|(h, _)| &hypotheses[*h]))));
+        seeds.retain(|s| anew || !known.contains(&key_of(s.effects.iter().map(|(h, _)| &hypotheses[*h]))));
         // What only shows beside a law that was found shows little along the path of the nominal model.
         let raced = match wave {
             Anew => Course { along: None, coarse: fine, ..course }.race(seeds, wave.keep()),
