@@ -70,6 +70,12 @@ fn a_sealed_effect_is_diagnosed_without_its_truth() {
     assert!(gain("none") > 0.05 && gain("diagnosed") > 0.0 && gain("chosen") >= 0.94 * gain("none").min(gain("diagnosed")));
     assert!(place.path("proof/proof.html").is_file());
 
+    // All effects count once, and again where the refitted nominal model stays away from what no fit has seen.
+    let floors = found["refit_floors"].as_f64().unwrap();
+    assert!(floors > 0.5, "{floors}");
+    let summary = &proof["summary"];
+    assert_eq!((&summary["place"]["of"], &summary["showing"]["place"]["of"]), (&1.into(), &usize::from(floors >= 3.0).into()), "{summary}");
+
     // The graph itself was run below and above the edge without canceller; its bags are there.
     let live = found["live"].as_array().unwrap();
     let of_none = |below: bool| live.iter().find(|run| run["canceller"] == "none" && run["below_edge"] == below).unwrap();

@@ -22,6 +22,9 @@ use toml_edit::{Array, DocumentMut, Item, value};
 /// Factor on the time for a search where the hand is not shown: its curve makes every fit longer.
 const LONGER: f64 = 2.5;
 
+/// Noise floors from which on an effect counts as one that shows.
+pub const SHOWS: f64 = 3.0;
+
 /// Cancellers that are compared at other grips than the session's.
 const AT_OTHER_GRIPS: [&str; 5] = ["none", "second order", "linear, refitted", "diagnosed", "chosen"];
 
@@ -74,6 +77,8 @@ pub struct Case {
     pub nonlinear: bool,
     /// Error on recordings that no fit has seen, as shares of their deviation: as given, refitted, diagnosed.
     pub held_out: [Option<f64>; 3],
+    /// The refitted one of these over the noise floor: how far the recordings are from what the nominal model with other numbers can do.
+    pub refit_floors: Option<f64>,
     /// Stable mu*lambda by canceller and grip.
     pub gains: Vec<Gain>,
     /// The live graph at gains about the edges without a canceller and with the diagnosed and the chosen one.
@@ -168,6 +173,7 @@ pub fn prove(options: &cli::Prove, folder: &Path, drawn: &Draw, stop: &AtomicBoo
         marks: truth.effects.iter().map(|e| mark(e, &word, &findings, !drawn.shows_hand)).collect(),
         nonlinear: is_nonlinear(&truth),
         held_out: ["nrmse_before", "nrmse_refit", "nrmse_after"].map(error),
+        refit_floors: error("nrmse_refit").zip(error("noise_floor")).map(|(refit, floor)| refit / floor).filter(|x| x.is_finite()),
         word,
         findings,
         gains,
@@ -198,6 +204,12 @@ impl Case {
         grips
     }
 
+    /// Whether the recordings show what is concealed: the nominal model, with whatever numbers fit best, stays [`SHOWS`] noise floors and more away
+    /// from recordings that no fit has seen. Below that its numbers take the effect on.
+    pub fn shows(&self) -> bool {
+        self.refit_floors.is_none_or(|floors| floors >= SHOWS)
+    }
+
     /// Whether everything concealed was found by its family and place, and nothing where nothing was.
     pub fn is_right(&self) -> bool {
         if self.marks.is_empty() { self.findings.is_empty() } else { self.marks.iter().all(|m| m.family) }
@@ -212,8 +224,9 @@ impl Case {
         let gains: Vec<String> =
             here.map(|g| format!("{} {}{:.2}", g.canceller, if g.whole_range { "above " } else { "" }, g.stable_to)).collect();
         let [given, refitted, diagnosed] = self.held_out.map(percent);
+        let floors = self.refit_floors.map_or_else(String::new, |floors| format!(" ({floors:.1} noise floors)"));
         let mut text = format!(
-            "  concealed   {}\n  found       {} ({})\n  held out    {given} as given, {refitted} refitted, {diagnosed} diagnosed",
+            "  concealed   {}\n  found       {} ({})\n  held out    {given} as given, {refitted} refitted{floors}, {diagnosed} diagnosed",
             list(&self.concealed),
             list(&found),
             self.word,
@@ -233,7 +246,7 @@ impl Case {
         json!({
             "case": self.name, "sealed": self.sealed, "shows_hand": self.shows_hand, "verdict": self.word, "sentence": self.sentence,
             "findings": self.findings, "concealed": self.concealed, "marks": self.marks, "nonlinear": self.nonlinear,
-            "held_out": self.held_out, "stable_gain": self.gains, "live": self.live, "share": self.share, "ratio": self.ratio("diagnosed", 1.0),
+            "held_out": self.held_out, "refit_floors": self.refit_floors, "stable_gain": self.gains, "live": self.live, "share": self.share, "ratio": self.ratio("diagnosed", 1.0),
         })
     }
 }

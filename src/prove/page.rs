@@ -1,6 +1,6 @@
 //! The report of a proof: what was concealed beside what was found, and what that is worth.
 
-use super::case::Case;
+use super::case::{Case, SHOWS};
 use super::summary::{Summary, Worth};
 use crate::cli;
 use backdrive_report::{Cell, Figure, Page, Plot, Series, Table, Tone, number, percent};
@@ -20,12 +20,11 @@ pub fn page(options: &cli::Prove, cases: &[Case]) -> Page {
         page.lead(
             tone,
             &format!(
-                "{} cases: place {}, family {}, exact {}; false alarms {}.",
+                "{} cases: {}; false alarms {}. Of effects that the nominal model's numbers cannot take on ({SHOWS} noise floors and more after a refit): {}.",
                 cases.len(),
-                summary.place,
-                summary.family,
-                summary.exact,
-                summary.false_alarms
+                summary.all,
+                summary.false_alarms,
+                summary.showing
             ),
         );
         if !options.no_gains {
@@ -151,15 +150,24 @@ fn ratios(cases: &[Case]) -> Figure {
 }
 
 fn table(cases: &[Case]) -> Table {
-    let headers = ["case", "hand", "concealed", "found", "right", "error: refitted", "diagnosed"];
+    let headers = ["case", "hand", "concealed", "found", "right", "error: refitted", "in noise floors", "diagnosed"];
     let mut table = Table::new(headers.into_iter().map(str::to_string).chain(CANCELLERS.iter().map(|c| format!("gain: {c}"))));
     for case in cases {
         let right = case.is_right();
         let error = |i: usize| case.held_out[i].map_or("-".to_string(), percent);
+        let floors = case.refit_floors.map_or("-".to_string(), number);
         let hand = if case.shows_hand { "recorded" } else { "unknown" };
         let mark = Cell::tone(if right { "yes" } else { "no" }, if right { Tone::Good } else { Tone::Bad });
-        let mut row: Vec<Cell> =
-            vec![case.name.clone().into(), hand.into(), concealed(case).into(), found(case).into(), mark, error(1).into(), error(2).into()];
+        let mut row: Vec<Cell> = vec![
+            case.name.clone().into(),
+            hand.into(),
+            concealed(case).into(),
+            found(case).into(),
+            mark,
+            error(1).into(),
+            floors.into(),
+            error(2).into(),
+        ];
         row.extend(CANCELLERS.iter().map(|c| Cell::from(case.gain(c, 1.0).map_or("-".to_string(), number))));
         table.push(row);
     }

@@ -1,6 +1,6 @@
 //! Over all cases: shares of what was found, what was taken for what, and what the found models are worth.
 
-use super::case::Case;
+use super::case::{Case, SHOWS};
 use super::score::Mark;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -17,6 +17,31 @@ pub struct Share {
 impl std::fmt::Display for Share {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "{} of {}", self.are, self.of)
+    }
+}
+
+/// How many effects were found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct Found {
+    /// At their place.
+    pub place: Share,
+    /// By their family there.
+    pub family: Share,
+    /// Exactly.
+    pub exact: Share,
+}
+
+impl Found {
+    fn of<'a>(cases: impl Iterator<Item = &'a Case>) -> Found {
+        let marks: Vec<&Mark> = cases.flat_map(|c| &c.marks).collect();
+        let share = |is: &dyn Fn(&Mark) -> bool| Share { are: marks.iter().filter(|m| is(m)).count(), of: marks.len() };
+        Found { place: share(&|m| m.place), family: share(&|m| m.family), exact: share(&|m| m.exact) }
+    }
+}
+
+impl std::fmt::Display for Found {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "place {}, family {}, exact {}", self.place, self.family, self.exact)
     }
 }
 
@@ -38,12 +63,11 @@ pub struct Worth {
 /// All cases in a few numbers.
 #[derive(Debug, Clone, Serialize)]
 pub struct Summary {
-    /// Effects found at their place.
-    pub place: Share,
-    /// By their family there.
-    pub family: Share,
-    /// Exactly.
-    pub exact: Share,
+    /// Of all effects.
+    #[serde(flatten)]
+    pub all: Found,
+    /// Of those that show in recordings after the nominal model's numbers were fitted anew ([`Case::shows`]).
+    pub showing: Found,
     /// Cases that conceal nothing and in which something was named.
     pub false_alarms: Share,
     /// Runs of the live graph about the edges that did what these say.
@@ -59,15 +83,12 @@ pub struct Summary {
 impl Summary {
     /// Of cases.
     pub fn of(cases: &[Case]) -> Summary {
-        let marks: Vec<&Mark> = cases.iter().flat_map(|c| &c.marks).collect();
-        let share = |is: &dyn Fn(&Mark) -> bool| Share { are: marks.iter().filter(|m| is(m)).count(), of: marks.len() };
         let nulls: Vec<&Case> = cases.iter().filter(|c| c.marks.is_empty()).collect();
         let alarms = nulls.iter().filter(|c| !c.findings.is_empty()).count();
         let with = |nonlinear: bool| cases.iter().filter(|c| !c.marks.is_empty() && c.nonlinear == nonlinear).collect::<Vec<_>>();
         Summary {
-            place: share(&|m| m.place),
-            family: share(&|m| m.family),
-            exact: share(&|m| m.exact),
+            all: Found::of(cases.iter()),
+            showing: Found::of(cases.iter().filter(|c| c.shows())),
             false_alarms: Share { are: alarms, of: nulls.len() },
             live: {
                 let runs = || cases.iter().flat_map(|c| &c.live);
@@ -81,9 +102,10 @@ impl Summary {
 
     /// A few lines for a person.
     pub fn text(&self) -> String {
-        let mut text = format!("place {}, family {}, exact {}; false alarms {}", self.place, self.family, self.exact, self.false_alarms);
+        let mut text = format!("{}; false alarms {}", self.all, self.false_alarms);
+        text += &format!("\nof effects {SHOWS} noise floors and more from the refitted nominal model: {}", self.showing);
         if self.live.of > 0 {
-            text += &format!("; the live graph agreed in {} runs", self.live);
+            text += &format!("\nthe live graph agreed in {} runs", self.live);
         }
         for (name, worths) in [("nonlinear", &self.nonlinear), ("linear", &self.linear)] {
             for worth in worths {
