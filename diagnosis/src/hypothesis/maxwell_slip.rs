@@ -1,8 +1,8 @@
 //! Friction of many contacts that slip one after the other: presliding hysteresis with non-local memory.
 
-use super::Physics;
 use super::builder::{ElementBuilder, friction_level, log};
 use super::sites::FRICTION;
+use super::{Hypothesis, Physics};
 
 /// Sliders that are fitted, and the word that sets the hypothesis apart: few enough to be tried at every place, then many enough for the shape of a loop.
 const SLIDERS: [(usize, &str); 2] = [(3, ""), (5, "fine")];
@@ -36,3 +36,23 @@ pub(super) const PHYSICS: Physics = Physics {
         SLIDERS.iter().flat_map(|sliders| sites.near().filter_map(|site| one(site, *sliders))).collect()
     },
 };
+
+/// Values with which `finer`, this law at the same place with more sliders, does nearly what `coarse` does with its own: those that carry most are
+/// parted in two, one that slips earlier and one that slips later. How many sliders there are is how finely a loop is drawn, and no physics.
+pub(super) fn split(coarse: &Hypothesis, values: &[f64], finer: &Hypothesis) -> Option<Vec<f64>> {
+    let (from, to) = (values.len() / 2, finer.parameters.len() / 2);
+    if values.len() != coarse.parameters.len() || !(from < to && to <= 2 * from) {
+        return None;
+    }
+    let mut sliders: Vec<[f64; 2]> = (0..from).map(|i| [values[i], values[from + i]]).collect();
+    sliders.sort_by(|a, b| b[1].total_cmp(&a[1]));
+    let halves = |[stiffness, force]: [f64; 2]| [[0.5 * APART * stiffness, 0.5 * force], [0.5 / APART * stiffness, 0.5 * force]];
+    let parted: Vec<[f64; 2]> = sliders.iter().take(to - from).flat_map(|slider| halves(*slider)).collect();
+    let all: Vec<[f64; 2]> = parted.into_iter().chain(sliders.drain(to - from..)).collect();
+    let lists = [0, 1].map(|key| all.iter().map(|slider| slider[key]).collect::<Vec<f64>>());
+    let within = |(p, v): (&super::Parameter, f64)| v.clamp(p.range.0, p.range.1);
+    Some(finer.parameters.iter().zip(lists.concat()).map(within).collect())
+}
+
+/// Factor between the slips of what was one slider, to either side.
+const APART: f64 = 1.5;

@@ -139,6 +139,13 @@ pub struct Parameter {
     pub log: bool,
 }
 
+/// Values with which one hypothesis does nearly what another of the same law, at the same place and with fewer numbers, does with its own; `None`
+/// where they are no such two.
+pub fn refined(coarse: &Hypothesis, values: &[f64], finer: &Hypothesis) -> Option<Vec<f64>> {
+    let alike = coarse.physics == finer.physics && coarse.place.same(&finer.place) && coarse.replaces == finer.replaces;
+    if alike && coarse.physics == maxwell_slip::PHYSICS.name { maxwell_slip::split(coarse, values, finer) } else { None }
+}
+
 /// A physics at a place.
 #[derive(Debug, Clone)]
 pub struct Hypothesis {

@@ -277,3 +277,34 @@ fn contradicting_values_are_brought_together_and_wrong_ones_are_refused() {
     let inertia = hypotheses.iter().find(|h| h.physics == "inertia").expect("proposed");
     assert!(matches!(inertia.apply(&Model::default(), &[0.1]), Err(HypothesisError::NoSuch { .. })));
 }
+
+#[test]
+fn a_law_drawn_more_finely_begins_where_the_coarse_one_ends() {
+    let mut pairs = 0;
+    for (name, _, model) in devices() {
+        let (hypotheses, (inputs, period)) = hypotheses(&model);
+        for coarse in hypotheses.iter().filter(|h| h.physics == "maxwell_slip") {
+            // Sliders that carry unequal shares, as those of a fit.
+            let mut values = coarse.starts[0].clone();
+            let count = values.len() / 2;
+            (0..count).for_each(|i| values[count + i] *= 1.0 + i as f64);
+            let fines = hypotheses.iter().filter_map(|h| Some((h, refined(coarse, &values, h)?)));
+            for (fine, start) in fines {
+                assert_eq!(start.len(), fine.parameters.len());
+                let level = |v: &[f64]| v[v.len() / 2..].iter().sum::<f64>();
+                assert!((level(&start) / level(&values) - 1.0).abs() < 1e-12, "{name}: {}", fine.id);
+                let of = |h: &Hypothesis, values: &[f64]| {
+                    simulate(&h.apply(&model, values).expect("applies"), &inputs, period, &Options::default()).expect("simulates")
+                };
+                let nominal = simulate(&model, &inputs, period, &Options::default()).expect("simulates");
+                let (a, b) = (of(coarse, &values), of(fine, &start));
+                let size = |x: &[Vec<f64>], y: &[Vec<f64>]| -> f64 {
+                    x.iter().flatten().zip(y.iter().flatten()).map(|(x, y)| (x - y) * (x - y)).sum::<f64>().sqrt()
+                };
+                assert!(size(&a, &b) <= 0.1 * size(&a, &nominal), "{name}: {} {}", fine.id, size(&a, &b) / size(&a, &nominal));
+                pairs += 1;
+            }
+        }
+    }
+    assert!(pairs > 20, "{pairs}");
+}

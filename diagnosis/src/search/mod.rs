@@ -1,23 +1,28 @@
 //! Which physics was left out: from the nominal model, refitted, to the structures that explain the recordings best.
 
+mod next;
+mod view;
+mod wave;
+
 use crate::clock::Moment;
 use crate::compare::mean_square;
 use crate::fit::{Effort, Evaluator, Fit};
 use crate::floor;
 use crate::guide::Guide;
 use crate::hypothesis::{self, Hypothesis, Place, Scales};
-use crate::locate;
 use crate::parts::Parts;
 use crate::problem::{Problem, Record};
 use crate::race::{Course, NEAR, Seed, distinct};
-use crate::screen::{Promise, Screen, pairs, worst_records};
+use crate::screen::worst_records;
 use crate::statistics::{advantage, correlation_time, levels, slowness};
 use crate::structure::Structure;
-use backdrive_plant::model::{InputKind, Model};
+use backdrive_plant::model::InputKind;
 use rayon::prelude::*;
 use std::collections::HashSet;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
+use view::View;
+use wave::Wave;
 
 /// How to search.
 #[derive(Debug, Clone)]
@@ -139,8 +144,6 @@ pub fn price(candidate: &Candidate, samples: usize, correlation_time: f64) -> f6
 const WHITE: (f64, f64) = (1.5, 4.0);
 /// What the best of many hypotheses takes from a cost of white noise by chance, squares of the noise.
 const CHANCE: f64 = 25.0;
-/// Numbers of a physics that is tried first, at most.
-const SIMPLE: usize = 6;
 /// Substeps per sample, at most: for screening and the first steps of fits, and for their middle.
 pub(crate) const COARSE: usize = 2;
 /// See [`COARSE`].
@@ -165,8 +168,6 @@ const SHARE: f64 = 0.3;
 /// Other ways to be led, until enough is left over: how much looser than at first, and whether parts of the recordings are enough. On parts the
 /// numbers of the nominal model may take on what differs from one part to the next.
 const LOOSER: [(f64, bool); 5] = [(0.2, true), (1.0, false), (0.2, false), (0.04, false), (0.008, false)];
-/// Samples in which ripples are looked for, at most.
-const LOCATED: usize = 12_000;
 /// Samples that screening is shown far from the noise, about.
 const SHOWN: usize = 5_000;
 /// The last steps of those that could still win.
@@ -295,7 +296,7 @@ pub fn search(
     });
 
     report("looking for ripples");
-    ripples(&seen, &model, &evaluator.floor, &mut hypotheses);
+    view::ripples(&seen, &model, &evaluator.floor, &mut hypotheses);
     report("screening");
     let share = if far { 0.08 } else { 0.2 };
     let mut views = vec![View::of(&coarse, parts.as_ref(), (&structure, base), &hypotheses, settings.patience.mul_f64(share), guided)];
@@ -366,7 +367,7 @@ pub fn search(
     use Wave::*;
     let mut waves = vec![First, Laws, Singles, Plain, Elsewhere, Relatives];
     if !quiet {
-        waves.extend([Pairs, Laws, Exchanges, Richer, MoreSingles, MorePairs, Laws, Exchanges, Elsewhere]);
+        waves.extend([Finer, Pairs, Laws, Exchanges, Richer, MoreSingles, MorePairs, Laws, Exchanges, Elsewhere]);
         for _ in 2..settings.effects {
             waves.extend([More, Anew, Exchanges]);
         }
@@ -429,6 +430,8 @@ pub fn search(
             MoreSingles => singles.by_ref().collect(),
             // The place that a law was found at first may be a neighbour of its own.
             Elsewhere => simplest(&found, samples).map_or_else(Vec::new, |law| course.elsewhere(law)),
+            // How finely a law is drawn is no physics: that comes before another effect.
+            Finer => course.finer(&found),
             // A law that wins with more numbers has to win over its simpler relatives, whatever these promised.
             Relatives => course.relatives(&found, done(&found, &nominal, samples)),
             Richer => {
@@ -465,7 +468,7 @@ pub fn search(
             }
         };
         // Some start anew beside the numbers of the best, even those whose own race went wrong.
-        let anew = matches!(wave, Relatives | Elsewhere);
+        let anew = matches!(wave, Relatives | Elsewhere | Finer);
         if !anew {
             distinct(&mut seeds);
         }
@@ -474,6 +477,7 @@ pub fn search(
         // What only shows beside a law that was found shows little along the path of the nominal model.
         let raced = match wave {
             Anew => Course { along: None, coarse: fine, ..course }.race(seeds, wave.keep()),
+            Finer => Course { along: None, ..course }.race(seeds, wave.keep()),
             Elsewhere => Course { along: None, ..to_the_end }.race(seeds, wave.keep()),
             Relatives => to_the_end.race(seeds, wave.keep()),
             _ => course.race(seeds, wave.keep()),
@@ -530,123 +534,8 @@ pub fn search(
     }
     let simulations = evaluator.simulations.load(Ordering::Relaxed);
     let (floor, count) = (evaluator.floor.clone(), hypotheses.len());
-    let detectable = detectable(view, samples, &hypotheses);
+    let detectable = view::detectable(view, samples, &hypotheses);
     Ok(Search { floor, levels_given, nominal, found, tried, hypotheses: count, samples, unseen_samples, detectable, simulations, stopped })
-}
-
-impl Course<'_> {
-    /// Simpler laws of the same family in the place of each effect of the best; where something is left to explain, laws that are as simple, too.
-    fn relatives(&self, found: &[Candidate], done: bool) -> Vec<Seed> {
-        let Some(best) = found.first() else { return Vec::new() };
-        let own = self.effects_of(&best.structure, &best.fit.values);
-        let mut seeds = Vec::new();
-        for (out, effect) in best.structure.added.iter().enumerate() {
-            let relative = |h: &Hypothesis| {
-                h.place.same(&effect.place)
-                    && h.family == effect.family
-                    && h.id != effect.id
-                    && h.parameters.len() < effect.parameters.len() + usize::from(!done)
-            };
-            for (index, h) in self.hypotheses.iter().enumerate().filter(|(_, h)| relative(h)) {
-                for start in &h.starts {
-                    let mut effects = own.clone();
-                    if let Some(slot) = effects.get_mut(out) {
-                        *slot = (index, start.clone());
-                        seeds.push(Seed::beside(self.evaluator.problem, (&best.structure, &best.fit.values), effects, false));
-                    }
-                }
-            }
-        }
-        seeds
-    }
-
-    /// Each effect with its values at every other place where that physics may be: to first order neighbours that are firmly joined do the same, and
-    /// screening, or a path along which they are led, may have taken one for the other.
-    fn elsewhere(&self, best: &Candidate) -> Vec<Seed> {
-        let own = self.effects_of(&best.structure, &best.fit.values);
-        let mut seeds = Vec::new();
-        for (slot, (effect, values)) in best.structure.added.iter().zip(best.structure.added_of(&best.fit.values)).enumerate() {
-            let beside = |h: &Hypothesis| best.structure.added.iter().enumerate().all(|(i, other)| i == slot || other.compatible(h));
-            for (index, h) in self.hypotheses.iter().enumerate() {
-                if h.physics != effect.physics || h.place.same(&effect.place) || !beside(h) {
-                    continue;
-                }
-                let alike =
-                    h.parameters.len() == values.len() && h.parameters.iter().zip(&effect.parameters).all(|(a, b)| a.unit == b.unit);
-                let carried: Vec<f64> = h.parameters.iter().zip(&values).map(|(p, v)| v.clamp(p.range.0, p.range.1)).collect();
-                let start = if alike { Some(carried) } else { h.starts.first().cloned() };
-                let Some(start) = start else { continue };
-                let mut effects = own.clone();
-                if let Some(place) = effects.get_mut(slot) {
-                    *place = (index, start);
-                    seeds.push(Seed::beside(self.evaluator.problem, (&best.structure, &best.fit.values), effects, false));
-                }
-            }
-        }
-        seeds
-    }
-
-    /// A structure with each of what promises most beside it added.
-    fn extensions(&self, view: &View, base: &Candidate, count: usize) -> Vec<Seed> {
-        let problem = self.evaluator.problem;
-        let fit = if view.whole {
-            Some(base.fit.clone())
-        } else {
-            view.evaluator.fit(&base.structure, &base.fit.values, Effort { steps: 4, tolerance: 2.0 })
-        };
-        let Some(fit) = fit else { return Vec::new() };
-        let fits = |h: usize| {
-            let new = &self.hypotheses[h];
-            new.parameters.len() <= SIMPLE && base.structure.added.iter().all(|b| b.compatible(new))
-        };
-        let own = self.effects_of(&base.structure, &fit.values);
-        let seed = |p: Promise, guided| {
-            Seed::beside(problem, (&base.structure, &fit.values), [own.clone(), vec![(p.hypothesis, p.values)]].concat(), guided)
-        };
-        let mut used = HashSet::new();
-        let next = view.screen.look(&fit, &fits).into_iter().filter(|p| used.insert(p.hypothesis));
-        next.take(count).map(|p| seed(p, view.guided)).collect()
-    }
-
-    /// A structure with each of what promises most added, screened beside it: an offset shows as one only where the spring behind it is bent, a law
-    /// at low speed only where the friction at speed is right.
-    fn anew(&self, evaluator: &Evaluator, base: &Candidate, time: Duration) -> Vec<Seed> {
-        let problem = self.evaluator.problem;
-        let Some(fit) = evaluator.fit(&base.structure, &base.fit.values, Effort { steps: 4, tolerance: 2.0 }) else { return Vec::new() };
-        let screen = Screen::new(evaluator, &base.structure, &fit, self.hypotheses, time);
-        let own = self.effects_of(&base.structure, &fit.values);
-        let seed = |p: Promise, guided| {
-            Seed::beside(problem, (&base.structure, &fit.values), [own.clone(), vec![(p.hypothesis, p.values)]].concat(), guided)
-        };
-        let fits = |h: usize| self.hypotheses[h].parameters.len() <= SIMPLE;
-        let mut used = HashSet::new();
-        let next = screen.look(&fit, &fits).into_iter().filter(|p| used.insert(p.hypothesis));
-        next.take(6).map(|p| seed(p, false)).collect()
-    }
-
-    /// A structure with each of its effects exchanged for what promises most in its place.
-    fn exchanges(&self, view: &View, best: &Candidate, count: usize) -> Vec<Seed> {
-        let problem = self.evaluator.problem;
-        let stated = best.structure.stated_of(problem, &best.fit.values);
-        let values = best.structure.added_of(&best.fit.values);
-        let of_records = best.structure.of_records(&best.fit.values);
-        let mut seeds = Vec::new();
-        for out in 0..best.structure.added.len() {
-            let keep = |i: &usize| *i != out;
-            let added: Vec<Hypothesis> = (0..values.len()).filter(keep).map(|i| best.structure.added[i].clone()).collect();
-            let kept: Vec<Vec<f64>> = (0..values.len()).filter(keep).map(|i| values[i].clone()).collect();
-            let structure = Structure::new(problem, &problem.fit, added);
-            let start = structure.values(problem, &stated, &kept, &of_records);
-            let Some(fit) = view.evaluator.fit(&structure, &start, Effort { steps: 3, tolerance: 2.0 }) else { continue };
-            seeds.extend(self.extensions(view, &candidate(&view.evaluator, structure, fit), count));
-        }
-        seeds
-    }
-
-    pub(crate) fn effects_of(&self, structure: &Structure, values: &[f64]) -> Vec<(usize, Vec<f64>)> {
-        let place = |h: &Hypothesis| self.hypotheses.iter().position(|other| other.id == h.id);
-        structure.added.iter().zip(structure.added_of(values)).filter_map(|(h, v)| Some((place(h)?, v))).collect()
-    }
 }
 
 /// Size of most of the residuals, floors, that a fit with the floors `before` left over; a few that are far off do not count.
@@ -671,152 +560,6 @@ fn substeps_for(evaluator: &Evaluator, candidate: &Candidate) -> usize {
         off > BLUR * size
     };
     [COARSE, MIDDLE, 2 * MIDDLE, 4 * MIDDLE].into_iter().find(|s| !errs(s)).unwrap_or(FINEST)
-}
-
-/// What is tried next.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Wave {
-    First,
-    Laws,
-    Singles,
-    Plain,
-    Elsewhere,
-    Relatives,
-    Pairs,
-    Exchanges,
-    Richer,
-    MoreSingles,
-    MorePairs,
-    More,
-    Anew,
-}
-
-impl Wave {
-    fn name(self) -> &'static str {
-        match self {
-            Wave::First | Wave::Singles => "fitting single effects",
-            Wave::Laws => "fitting other laws in the same place",
-            Wave::Plain => "fitting laws of one number",
-            Wave::Elsewhere => "fitting the same law in other places",
-            Wave::Relatives => "fitting simpler relatives",
-            Wave::Pairs => "fitting pairs",
-            Wave::Exchanges => "exchanging effects",
-            Wave::Richer => "fitting richer laws",
-            Wave::MoreSingles => "fitting more single effects",
-            Wave::MorePairs => "fitting more pairs",
-            Wave::More => "fitting more effects at once",
-            Wave::Anew => "screening beside the best",
-        }
-    }
-
-    /// How many are fitted further, and how many to their end.
-    fn keep(self) -> [usize; 2] {
-        match self {
-            Wave::First | Wave::Laws | Wave::Elsewhere | Wave::Relatives => [3, 3],
-            Wave::Singles | Wave::Plain | Wave::Exchanges | Wave::MoreSingles | Wave::Anew => [4, 2],
-            Wave::Pairs | Wave::MorePairs => [5, 3],
-            Wave::Richer => [2, 1],
-            Wave::More => [4, 3],
-        }
-    }
-}
-
-/// What screening sees from one base.
-struct View<'a> {
-    screen: Screen,
-    /// What it looks at: the recordings, or parts of them.
-    evaluator: Evaluator<'a>,
-    /// The nominal model there.
-    base: Candidate,
-    /// Whether it is along the measured path.
-    guided: bool,
-    /// Whether its residuals are those of the recordings, whole and without a guide.
-    whole: bool,
-    simple: Vec<Promise>,
-    /// Physics of many numbers come in where simpler relatives do not suffice.
-    rich: Vec<Promise>,
-}
-
-impl<'a> View<'a> {
-    fn of(
-        evaluator: &Evaluator<'a>,
-        parts: Option<&'a Parts>,
-        (structure, fit): (&Structure, Fit),
-        hypotheses: &[Hypothesis],
-        time: Duration,
-        guided: bool,
-    ) -> View<'a> {
-        let on = parts.map_or_else(|| evaluator.clone(), |p| p.evaluator(evaluator));
-        let there = parts.and_then(|_| on.fit(structure, &fit.values, Effort { steps: 0, tolerance: 1.0 }));
-        // A part that cannot be simulated is none.
-        let (on, whole, fit) = match (parts, there) {
-            (Some(_), Some(there)) => (on, false, there),
-            _ => (evaluator.clone(), evaluator.guide.is_none(), fit),
-        };
-        let screen = Screen::new(&on, structure, &fit, hypotheses, time);
-        let promises = screen.look(&fit, &|_| true);
-        let (simple, rich) = promises.into_iter().partition(|p| hypotheses[p.hypothesis].parameters.len() <= SIMPLE);
-        View { screen, base: candidate(&on, structure.clone(), fit), evaluator: on, guided, whole, simple, rich }
-    }
-
-    /// Effects beside the numbers of its base.
-    fn seed(&self, effects: Vec<(usize, Vec<f64>)>) -> Seed {
-        Seed::beside(self.evaluator.problem, (&self.base.structure, &self.base.fit.values), effects, self.guided)
-    }
-
-    /// The most promising pairs.
-    fn pairs(&self, hypotheses: &[Hypothesis], count: usize) -> Vec<Seed> {
-        let simple = &self.simple;
-        let compatible = |a: usize, b: usize| hypotheses[a].compatible(&hypotheses[b]);
-        let together = pairs(simple, &self.base.fit, &self.base.fit.jacobian, 90, compatible);
-        let mut used = HashSet::new();
-        let best = together.iter().filter(|(a, b, _)| used.insert((simple[*a].hypothesis, simple[*b].hypothesis)));
-        let pair = |a: usize, b: usize| [a, b].map(|p| (simple[p].hypothesis, simple[p].values.clone())).to_vec();
-        let seed = |(a, b, _): &(usize, usize, f64)| self.seed(pair(*a, *b));
-        best.take(count).map(seed).collect()
-    }
-}
-
-/// A ripple shows in a force over displacement, at whatever period, but fits only start from a few: where locating finds one, a fit starts there.
-fn ripples(records: &[Record], model: &Model, floor: &[f64], hypotheses: &mut [Hypothesis]) {
-    let runs: Vec<locate::Run> = records.iter().map(locate::Run::from).collect();
-    let options = locate::Options { most_samples: LOCATED, laws_of_a_form: 0, ..locate::Options::quick() };
-    // Where the model cannot be located in, fits start from the usual periods.
-    let Ok(location) = locate::locate(model, &runs, floor, &options) else { return };
-    for place in &location.ranking {
-        for h in hypotheses.iter_mut().filter(|h| h.physics == "cogging" && h.place.same(&place.place)) {
-            let starts = place.ripples.iter().map(|r| vec![r.amplitude, r.period, r.phase]);
-            let inside = |start: &Vec<f64>| start.iter().zip(&h.parameters).all(|(x, p)| (p.range.0..=p.range.1).contains(x));
-            let new: Vec<Vec<f64>> = starts.filter(inside).collect();
-            h.starts.splice(0..0, new);
-        }
-    }
-}
-
-/// Physics whose effect grows in proportion to their first parameter: what an effect is worth claiming, at the place where the least is enough.
-fn detectable(view: &View, samples: usize, hypotheses: &[Hypothesis]) -> Vec<Detectable> {
-    const LINEAR: [&str; 9] = ["coulomb", "damper", "spring", "quadratic_drag", "cogging", "bias", "inertia", "delay", "back_emf"];
-    let base = &view.base;
-    // All of the recordings show what their parts do, and more.
-    let more = samples as f64 / base.fit.residuals.len().max(1) as f64;
-    let effective = (samples as f64 / base.correlation_time).max(2.0);
-    let needed = (30.0 + effective.ln()) * base.correlation_time * base.fit.cost / base.fit.residuals.len().max(1) as f64;
-    let mut found: Vec<Detectable> = Vec::new();
-    for (index, length) in view.screen.lengths(&base.fit) {
-        let h = &hypotheses[index.0];
-        let (Some(parameter), Some(value)) = (h.parameters.first(), index.1.first()) else { continue };
-        let size = value.abs() * (needed / (more * length * length)).sqrt();
-        if !LINEAR.contains(&h.physics) || !size.is_finite() || parameter.neutral != Some(0.0) {
-            continue;
-        }
-        let new = Detectable { physics: h.physics, place: h.place.clone(), key: parameter.key.clone(), size, unit: parameter.unit.clone() };
-        match found.iter_mut().find(|d| d.physics == h.physics) {
-            Some(d) if d.size <= size => {}
-            Some(d) => *d = new,
-            None => found.push(new),
-        }
-    }
-    found
 }
 
 /// The best, or far from the noise, where the law is open as well as its place, what does nearly as well with the fewest numbers.

@@ -1,0 +1,150 @@
+//! Which structures are tried beside those that were found.
+
+use super::view::{SIMPLE, View};
+use super::{Candidate, candidate, distinct_structures};
+use crate::fit::{Effort, Evaluator};
+use crate::hypothesis::{self, Hypothesis};
+use crate::race::{Course, Seed};
+use crate::screen::{Promise, Screen};
+use crate::structure::Structure;
+use std::collections::HashSet;
+use std::time::Duration;
+
+/// Times the cost of the best up to which a law that is drawn coarsely may win when drawn more finely.
+const COARSELY: f64 = 3.0;
+
+impl Course<'_> {
+    /// Simpler laws of the same family in the place of each effect of the best; where something is left to explain, laws that are as simple, too.
+    pub(super) fn relatives(&self, found: &[Candidate], done: bool) -> Vec<Seed> {
+        let Some(best) = found.first() else { return Vec::new() };
+        let own = self.effects_of(&best.structure, &best.fit.values);
+        let mut seeds = Vec::new();
+        for (out, effect) in best.structure.added.iter().enumerate() {
+            let relative = |h: &Hypothesis| {
+                h.place.same(&effect.place)
+                    && h.family == effect.family
+                    && h.id != effect.id
+                    && h.parameters.len() < effect.parameters.len() + usize::from(!done)
+            };
+            for (index, h) in self.hypotheses.iter().enumerate().filter(|(_, h)| relative(h)) {
+                for start in &h.starts {
+                    let mut effects = own.clone();
+                    if let Some(slot) = effects.get_mut(out) {
+                        *slot = (index, start.clone());
+                        seeds.push(Seed::beside(self.evaluator.problem, (&best.structure, &best.fit.values), effects, false));
+                    }
+                }
+            }
+        }
+        seeds
+    }
+
+    /// Each effect with its values at every other place where that physics may be: to first order neighbours that are firmly joined do the same, and
+    /// screening, or a path along which they are led, may have taken one for the other.
+    pub(super) fn elsewhere(&self, best: &Candidate) -> Vec<Seed> {
+        let own = self.effects_of(&best.structure, &best.fit.values);
+        let mut seeds = Vec::new();
+        for (slot, (effect, values)) in best.structure.added.iter().zip(best.structure.added_of(&best.fit.values)).enumerate() {
+            let beside = |h: &Hypothesis| best.structure.added.iter().enumerate().all(|(i, other)| i == slot || other.compatible(h));
+            for (index, h) in self.hypotheses.iter().enumerate() {
+                if h.physics != effect.physics || h.place.same(&effect.place) || !beside(h) {
+                    continue;
+                }
+                let alike =
+                    h.parameters.len() == values.len() && h.parameters.iter().zip(&effect.parameters).all(|(a, b)| a.unit == b.unit);
+                let carried: Vec<f64> = h.parameters.iter().zip(&values).map(|(p, v)| v.clamp(p.range.0, p.range.1)).collect();
+                let start = if alike { Some(carried) } else { h.starts.first().cloned() };
+                let Some(start) = start else { continue };
+                let mut effects = own.clone();
+                if let Some(place) = effects.get_mut(slot) {
+                    *place = (index, start);
+                    seeds.push(Seed::beside(self.evaluator.problem, (&best.structure, &best.fit.values), effects, false));
+                }
+            }
+        }
+        seeds
+    }
+
+    /// The best, and what does nearly as well with as many effects, with a law of theirs drawn more finely.
+    pub(super) fn finer(&self, found: &[Candidate]) -> Vec<Seed> {
+        let Some(best) = found.first() else { return Vec::new() };
+        let near = |c: &&Candidate| c.fit.cost < COARSELY * best.fit.cost;
+        let mut seeds = Vec::new();
+        for c in distinct_structures(found, best.structure.added.len()).filter(near) {
+            let own = self.effects_of(&c.structure, &c.fit.values);
+            for (slot, (effect, values)) in c.structure.added.iter().zip(c.structure.added_of(&c.fit.values)).enumerate() {
+                for (index, h) in self.hypotheses.iter().enumerate() {
+                    let Some(start) = hypothesis::refined(effect, &values, h) else { continue };
+                    let mut effects = own.clone();
+                    if let Some(place) = effects.get_mut(slot) {
+                        *place = (index, start);
+                        seeds.push(Seed::beside(self.evaluator.problem, (&c.structure, &c.fit.values), effects, false));
+                    }
+                }
+            }
+        }
+        seeds
+    }
+
+    /// A structure with each of what promises most beside it added.
+    pub(super) fn extensions(&self, view: &View, base: &Candidate, count: usize) -> Vec<Seed> {
+        let problem = self.evaluator.problem;
+        let fit = if view.whole {
+            Some(base.fit.clone())
+        } else {
+            view.evaluator.fit(&base.structure, &base.fit.values, Effort { steps: 4, tolerance: 2.0 })
+        };
+        let Some(fit) = fit else { return Vec::new() };
+        let fits = |h: usize| {
+            let new = &self.hypotheses[h];
+            new.parameters.len() <= SIMPLE && base.structure.added.iter().all(|b| b.compatible(new))
+        };
+        let own = self.effects_of(&base.structure, &fit.values);
+        let seed = |p: Promise, guided| {
+            Seed::beside(problem, (&base.structure, &fit.values), [own.clone(), vec![(p.hypothesis, p.values)]].concat(), guided)
+        };
+        let mut used = HashSet::new();
+        let next = view.screen.look(&fit, &fits).into_iter().filter(|p| used.insert(p.hypothesis));
+        next.take(count).map(|p| seed(p, view.guided)).collect()
+    }
+
+    /// A structure with each of what promises most added, screened beside it: an offset shows as one only where the spring behind it is bent, a law
+    /// at low speed only where the friction at speed is right.
+    pub(super) fn anew(&self, evaluator: &Evaluator, base: &Candidate, time: Duration) -> Vec<Seed> {
+        let problem = self.evaluator.problem;
+        let Some(fit) = evaluator.fit(&base.structure, &base.fit.values, Effort { steps: 4, tolerance: 2.0 }) else { return Vec::new() };
+        let screen = Screen::new(evaluator, &base.structure, &fit, self.hypotheses, time);
+        let own = self.effects_of(&base.structure, &fit.values);
+        let seed = |p: Promise, guided| {
+            Seed::beside(problem, (&base.structure, &fit.values), [own.clone(), vec![(p.hypothesis, p.values)]].concat(), guided)
+        };
+        let fits = |h: usize| self.hypotheses[h].parameters.len() <= SIMPLE;
+        let mut used = HashSet::new();
+        let next = screen.look(&fit, &fits).into_iter().filter(|p| used.insert(p.hypothesis));
+        next.take(6).map(|p| seed(p, false)).collect()
+    }
+
+    /// A structure with each of its effects exchanged for what promises most in its place.
+    pub(super) fn exchanges(&self, view: &View, best: &Candidate, count: usize) -> Vec<Seed> {
+        let problem = self.evaluator.problem;
+        let stated = best.structure.stated_of(problem, &best.fit.values);
+        let values = best.structure.added_of(&best.fit.values);
+        let of_records = best.structure.of_records(&best.fit.values);
+        let mut seeds = Vec::new();
+        for out in 0..best.structure.added.len() {
+            let keep = |i: &usize| *i != out;
+            let added: Vec<Hypothesis> = (0..values.len()).filter(keep).map(|i| best.structure.added[i].clone()).collect();
+            let kept: Vec<Vec<f64>> = (0..values.len()).filter(keep).map(|i| values[i].clone()).collect();
+            let structure = Structure::new(problem, &problem.fit, added);
+            let start = structure.values(problem, &stated, &kept, &of_records);
+            let Some(fit) = view.evaluator.fit(&structure, &start, Effort { steps: 3, tolerance: 2.0 }) else { continue };
+            seeds.extend(self.extensions(view, &candidate(&view.evaluator, structure, fit), count));
+        }
+        seeds
+    }
+
+    pub(crate) fn effects_of(&self, structure: &Structure, values: &[f64]) -> Vec<(usize, Vec<f64>)> {
+        let place = |h: &Hypothesis| self.hypotheses.iter().position(|other| other.id == h.id);
+        structure.added.iter().zip(structure.added_of(values)).filter_map(|(h, v)| Some((place(h)?, v))).collect()
+    }
+}

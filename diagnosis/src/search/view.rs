@@ -1,0 +1,117 @@
+//! What screening sees, and what would have been seen.
+
+use super::{Candidate, Detectable, candidate};
+use crate::fit::{Effort, Evaluator, Fit};
+use crate::hypothesis::Hypothesis;
+use crate::locate;
+use crate::parts::Parts;
+use crate::problem::Record;
+use crate::race::Seed;
+use crate::screen::{Promise, Screen, pairs};
+use crate::structure::Structure;
+use backdrive_plant::model::Model;
+use std::collections::HashSet;
+use std::time::Duration;
+
+/// Numbers of a physics that is tried first, at most.
+pub(super) const SIMPLE: usize = 6;
+/// Samples in which ripples are looked for, at most.
+const LOCATED: usize = 12_000;
+
+/// What screening sees from one base.
+pub(super) struct View<'a> {
+    pub screen: Screen,
+    /// What it looks at: the recordings, or parts of them.
+    pub evaluator: Evaluator<'a>,
+    /// The nominal model there.
+    pub base: Candidate,
+    /// Whether it is along the measured path.
+    pub guided: bool,
+    /// Whether its residuals are those of the recordings, whole and without a guide.
+    pub whole: bool,
+    pub simple: Vec<Promise>,
+    /// Physics of many numbers come in where simpler relatives do not suffice.
+    pub rich: Vec<Promise>,
+}
+
+impl<'a> View<'a> {
+    pub fn of(
+        evaluator: &Evaluator<'a>,
+        parts: Option<&'a Parts>,
+        (structure, fit): (&Structure, Fit),
+        hypotheses: &[Hypothesis],
+        time: Duration,
+        guided: bool,
+    ) -> View<'a> {
+        let on = parts.map_or_else(|| evaluator.clone(), |p| p.evaluator(evaluator));
+        let there = parts.and_then(|_| on.fit(structure, &fit.values, Effort { steps: 0, tolerance: 1.0 }));
+        // A part that cannot be simulated is none.
+        let (on, whole, fit) = match (parts, there) {
+            (Some(_), Some(there)) => (on, false, there),
+            _ => (evaluator.clone(), evaluator.guide.is_none(), fit),
+        };
+        let screen = Screen::new(&on, structure, &fit, hypotheses, time);
+        let promises = screen.look(&fit, &|_| true);
+        let (simple, rich) = promises.into_iter().partition(|p| hypotheses[p.hypothesis].parameters.len() <= SIMPLE);
+        View { screen, base: candidate(&on, structure.clone(), fit), evaluator: on, guided, whole, simple, rich }
+    }
+
+    /// Effects beside the numbers of its base.
+    pub fn seed(&self, effects: Vec<(usize, Vec<f64>)>) -> Seed {
+        Seed::beside(self.evaluator.problem, (&self.base.structure, &self.base.fit.values), effects, self.guided)
+    }
+
+    /// The most promising pairs.
+    pub fn pairs(&self, hypotheses: &[Hypothesis], count: usize) -> Vec<Seed> {
+        let simple = &self.simple;
+        let compatible = |a: usize, b: usize| hypotheses[a].compatible(&hypotheses[b]);
+        let together = pairs(simple, &self.base.fit, &self.base.fit.jacobian, 90, compatible);
+        let mut used = HashSet::new();
+        let best = together.iter().filter(|(a, b, _)| used.insert((simple[*a].hypothesis, simple[*b].hypothesis)));
+        let pair = |a: usize, b: usize| [a, b].map(|p| (simple[p].hypothesis, simple[p].values.clone())).to_vec();
+        let seed = |(a, b, _): &(usize, usize, f64)| self.seed(pair(*a, *b));
+        best.take(count).map(seed).collect()
+    }
+}
+
+/// A ripple shows in a force over displacement, at whatever period, but fits only start from a few: where locating finds one, a fit starts there.
+pub(super) fn ripples(records: &[Record], model: &Model, floor: &[f64], hypotheses: &mut [Hypothesis]) {
+    let runs: Vec<locate::Run> = records.iter().map(locate::Run::from).collect();
+    let options = locate::Options { most_samples: LOCATED, laws_of_a_form: 0, ..locate::Options::quick() };
+    // Where the model cannot be located in, fits start from the usual periods.
+    let Ok(location) = locate::locate(model, &runs, floor, &options) else { return };
+    for place in &location.ranking {
+        for h in hypotheses.iter_mut().filter(|h| h.physics == "cogging" && h.place.same(&place.place)) {
+            let starts = place.ripples.iter().map(|r| vec![r.amplitude, r.period, r.phase]);
+            let inside = |start: &Vec<f64>| start.iter().zip(&h.parameters).all(|(x, p)| (p.range.0..=p.range.1).contains(x));
+            let new: Vec<Vec<f64>> = starts.filter(inside).collect();
+            h.starts.splice(0..0, new);
+        }
+    }
+}
+
+/// Physics whose effect grows in proportion to their first parameter: what an effect is worth claiming, at the place where the least is enough.
+pub(super) fn detectable(view: &View, samples: usize, hypotheses: &[Hypothesis]) -> Vec<Detectable> {
+    const LINEAR: [&str; 9] = ["coulomb", "damper", "spring", "quadratic_drag", "cogging", "bias", "inertia", "delay", "back_emf"];
+    let base = &view.base;
+    // All of the recordings show what their parts do, and more.
+    let more = samples as f64 / base.fit.residuals.len().max(1) as f64;
+    let effective = (samples as f64 / base.correlation_time).max(2.0);
+    let needed = (30.0 + effective.ln()) * base.correlation_time * base.fit.cost / base.fit.residuals.len().max(1) as f64;
+    let mut found: Vec<Detectable> = Vec::new();
+    for (index, length) in view.screen.lengths(&base.fit) {
+        let h = &hypotheses[index.0];
+        let (Some(parameter), Some(value)) = (h.parameters.first(), index.1.first()) else { continue };
+        let size = value.abs() * (needed / (more * length * length)).sqrt();
+        if !LINEAR.contains(&h.physics) || !size.is_finite() || parameter.neutral != Some(0.0) {
+            continue;
+        }
+        let new = Detectable { physics: h.physics, place: h.place.clone(), key: parameter.key.clone(), size, unit: parameter.unit.clone() };
+        match found.iter_mut().find(|d| d.physics == h.physics) {
+            Some(d) if d.size <= size => {}
+            Some(d) => *d = new,
+            None => found.push(new),
+        }
+    }
+    found
+}
