@@ -2,10 +2,13 @@
 
 use super::builder::{ElementBuilder, friction_level, log};
 use super::sites::FRICTION;
-use super::{Hypothesis, Physics};
+use super::{Hypothesis, Parameter, Physics};
 
 /// Sliders that are fitted, and the word that sets the hypothesis apart: few enough to be tried at every place, then many enough for the shape of a loop.
 const SLIDERS: [(usize, &str); 2] = [(3, ""), (5, "fine")];
+
+/// Factor between the slips of what was one slider, to either side.
+const APART: f64 = 1.5;
 
 pub(super) const PHYSICS: Physics = Physics {
     name: "maxwell_slip",
@@ -47,12 +50,9 @@ pub(super) fn split(coarse: &Hypothesis, values: &[f64], finer: &Hypothesis) -> 
     let mut sliders: Vec<[f64; 2]> = (0..from).map(|i| [values[i], values[from + i]]).collect();
     sliders.sort_by(|a, b| b[1].total_cmp(&a[1]));
     let halves = |[stiffness, force]: [f64; 2]| [[0.5 * APART * stiffness, 0.5 * force], [0.5 / APART * stiffness, 0.5 * force]];
-    let parted: Vec<[f64; 2]> = sliders.iter().take(to - from).flat_map(|slider| halves(*slider)).collect();
-    let all: Vec<[f64; 2]> = parted.into_iter().chain(sliders.drain(to - from..)).collect();
+    let (most, rest) = sliders.split_at(to - from);
+    let all: Vec<[f64; 2]> = most.iter().flat_map(|slider| halves(*slider)).chain(rest.iter().copied()).collect();
     let lists = [0, 1].map(|key| all.iter().map(|slider| slider[key]).collect::<Vec<f64>>());
-    let within = |(p, v): (&super::Parameter, f64)| v.clamp(p.range.0, p.range.1);
+    let within = |(p, v): (&Parameter, f64)| v.clamp(p.range.0, p.range.1);
     Some(finer.parameters.iter().zip(lists.concat()).map(within).collect())
 }
-
-/// Factor between the slips of what was one slider, to either side.
-const APART: f64 = 1.5;

@@ -141,7 +141,7 @@ pub struct Parameter {
 
 /// Values with which one hypothesis does nearly what another of the same law, at the same place and with fewer numbers, does with its own; `None`
 /// where they are no such two.
-pub fn refined(coarse: &Hypothesis, values: &[f64], finer: &Hypothesis) -> Option<Vec<f64>> {
+pub(crate) fn refined(coarse: &Hypothesis, values: &[f64], finer: &Hypothesis) -> Option<Vec<f64>> {
     let alike = coarse.physics == finer.physics && coarse.place.same(&finer.place) && coarse.replaces == finer.replaces;
     if alike && coarse.physics == maxwell_slip::PHYSICS.name { maxwell_slip::split(coarse, values, finer) } else { None }
 }
