@@ -55,7 +55,9 @@ fn under(model: &Model, condition: &[(String, Condition)], recording: &str) -> R
             Condition::Value(value) => {
                 model.set_values_at(path, &[*value]).map_err(|e| Failure::input(format!("{recording}: condition {path}: {e}")))?
             }
-            Condition::Free => eprintln!("note: {recording}: {path} is free in this file; the model's own number is used"),
+            Condition::Free | Condition::Shared(_) => {
+                eprintln!("note: {recording}: {path} is free in this file; the model's own number is used")
+            }
         }
     }
     Ok(model)

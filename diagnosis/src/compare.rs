@@ -20,7 +20,7 @@ impl Ready {
     fn of(problem: &Problem, records: &[Record], structure: &Structure, values: &[f64]) -> Option<Ready> {
         let fixed = Problem { model: structure.model(problem, values)?, stated: Vec::new(), ..problem.clone() };
         let mut own = Structure::new(&fixed, records, Vec::new());
-        own.numbers.retain(|n| n.record.is_some());
+        own.numbers.retain(|n| n.records.is_some());
         let mut values = own.values(&fixed, &[], &[], &[]);
         if !own.numbers.is_empty()
             && let Some(fit) = Evaluator::on(&fixed, records).fit(&own, &values, Effort { steps: 15, tolerance: 1.0 })

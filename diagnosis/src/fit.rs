@@ -184,9 +184,9 @@ impl<'a> Evaluator<'a> {
         // Weights of unknown curves that are far from each other are moved at the same time.
         let mut together: BTreeMap<Set, Vec<usize>> = BTreeMap::new();
         for (at, j) in which.iter().enumerate() {
-            match (&structure.numbers[*j].role, structure.numbers[*j].record) {
+            match (&structure.numbers[*j].role, &structure.numbers[*j].records) {
                 (Role::Knot(unknown, knot, r), _) => together.entry((*unknown, *r, knot % APART)).or_default().push(at),
-                (_, Some(r)) => jobs.push((at, r)),
+                (_, Some(of)) => jobs.extend(of.iter().map(|r| (at, *r))),
                 (_, None) => jobs.extend((0..self.records.len()).map(|r| (at, r))),
             }
         }
@@ -379,7 +379,7 @@ impl<'a> Evaluator<'a> {
     }
 
     fn moves(&self, number: &Number) -> bool {
-        !self.own_only || number.record.is_some()
+        !self.own_only || number.records.is_some()
     }
 
     /// Derivatives by all numbers, 0 by those that do not move.

@@ -132,6 +132,7 @@ impl Guide {
                 delay: 0.0,
                 bandwidth: f64::INFINITY,
                 back_emf: 0.0,
+                offset: 0.0,
             });
             let sensor = [sensor.gain, sensor.delay, sensor.offset];
             moved.push(match link.paths.get(record).filter(|_| sensor == link.sensor) {

@@ -161,6 +161,7 @@ fn unit_of_path(problem: &Problem, path: &str) -> String {
             "bandwidth" => "Hz",
             "saturation" => "N",
             "back_emf" => "N s/m",
+            "offset" if owner.starts_with("inputs.") => "m",
             "offset" => return model.outputs.iter().find(|o| o.name == name).map_or(String::new(), |o| unit_of_output(problem, &o.kind)),
             _ => "",
         },

@@ -16,7 +16,7 @@ pub enum Role {
     Stated(usize),
     /// A parameter of an added physics: which hypothesis, which of its parameters.
     Added(usize, usize),
-    /// A number that differs in one record: path and record.
+    /// A number that differs in one record, or in those of a session: path, and the record or the first of them.
     Condition(String, usize),
     /// Position with which a body starts in a record, m.
     Position(usize, usize),
@@ -52,8 +52,8 @@ pub struct Number {
     pub step: f64,
     /// Whether that step is as wide as it can be (a delay, over about a sample).
     pub coarse: bool,
-    /// The record that alone depends on it, if there is one.
-    pub record: Option<usize>,
+    /// The records that alone depend on it; `None` where all do.
+    pub records: Option<Vec<usize>>,
     /// What it would be without data, and how sure that is, in the fit's own unit: holds what the recordings say nothing of.
     pub prior: Option<(f64, f64)>,
 }
@@ -72,6 +72,11 @@ impl Number {
     pub fn outward(&self, own: f64) -> f64 {
         let value = if self.log { own.exp() } else { own };
         value.clamp(self.range.0, self.range.1)
+    }
+
+    /// Whether a record depends on it.
+    pub fn is_of(&self, record: usize) -> bool {
+        self.records.as_ref().is_none_or(|of| of.contains(&record))
     }
 
     /// Bounds in the fit's own unit.
@@ -95,7 +100,7 @@ impl Structure {
         let mut numbers = Vec::new();
         for (index, stated) in problem.stated.iter().enumerate() {
             let element = stated.path.strip_prefix("elements.").and_then(|p| p.rsplit_once('.')).map(|p| p.0);
-            let conditioned = |r: &Record| r.conditions.iter().any(|(path, c)| *path == stated.path && *c == Condition::Free);
+            let conditioned = |r: &Record| r.conditions.iter().any(|(path, c)| *path == stated.path && estimated(c));
             let replaced = added.iter().any(|h| element.is_some_and(|name| h.replaces.iter().any(|r| r == name)));
             let all_conditioned = !records.is_empty() && records.iter().all(conditioned);
             if replaced || all_conditioned {
@@ -123,16 +128,23 @@ impl Structure {
                     log,
                     step,
                     coarse: parameter.key == "delay",
-                    record: None,
+                    records: None,
                     prior: None,
                 });
             }
         }
         for (r, record) in records.iter().enumerate() {
             for (path, condition) in &record.conditions {
-                if *condition != Condition::Free {
+                if !estimated(condition) {
                     continue;
                 }
+                // The first of a session has the number for all.
+                let of = |other: &Record| other.conditions.iter().any(|(p, c)| p == path && c == condition);
+                let session = |r: &usize| matches!(condition, Condition::Shared(_)) && records.get(*r).is_some_and(of);
+                if (0..r).any(|before| session(&before)) {
+                    continue;
+                }
+                let later = (r + 1..records.len()).filter(session);
                 let given = problem.model.values_at(path).ok().and_then(|v| v.first().copied()).unwrap_or(0.0);
                 let (range, log) = if given > 0.0 { ((given / 1e3, given * 1e3), true) } else { ((-1e6, 1e6), false) };
                 let step = if log { 1e-3 } else { 1e-6 };
@@ -142,7 +154,7 @@ impl Structure {
                     log,
                     step,
                     coarse: false,
-                    record: Some(r),
+                    records: Some(std::iter::once(r).chain(later).collect()),
                     prior: None,
                 });
             }
@@ -169,7 +181,7 @@ impl Structure {
 
     /// The numbers among `values` that belong to single records.
     pub fn of_records(&self, values: &[f64]) -> Vec<(Role, f64)> {
-        let numbers = self.numbers.iter().zip(values).filter(|(n, _)| n.record.is_some());
+        let numbers = self.numbers.iter().zip(values).filter(|(n, _)| n.records.is_some());
         numbers.map(|(n, value)| (n.role.clone(), *value)).collect()
     }
 
@@ -236,7 +248,7 @@ impl Structure {
     ) -> Option<Vec<f64>> {
         let mut starts: Vec<Start> = Vec::new();
         let mut changed: Option<Model> = None;
-        for (number, value) in self.numbers.iter().zip(values).filter(|(n, _)| n.record == Some(index)) {
+        for (number, value) in self.numbers.iter().zip(values).filter(|(n, _)| n.records.is_some() && n.is_of(index)) {
             match &number.role {
                 Role::Condition(path, _) => changed.get_or_insert_with(|| model.clone()).set_values_at(path, &[*value]).ok()?,
                 Role::Position(body, _) => starts.push((*body, *value, 0.0)),
@@ -283,12 +295,17 @@ impl Structure {
     }
 }
 
+/// Whether a number with this condition is estimated.
+fn estimated(condition: &Condition) -> bool {
+    matches!(condition, Condition::Free | Condition::Shared(_))
+}
+
 fn stated_number(index: usize, stated: &Stated) -> Number {
     let (range, log) = (stated.range, stated.log);
     let centre = if log { stated.given.ln() } else { stated.given };
     let spread = if log { PRIOR_SPREAD } else { 2.0 * stated.given.abs() };
     let step = if log { 1e-3 } else { 1e-3 * stated.given.abs() };
-    Number { role: Role::Stated(index), range, log, step, coarse: false, record: None, prior: Some((centre, spread)) }
+    Number { role: Role::Stated(index), range, log, step, coarse: false, records: None, prior: Some((centre, spread)) }
 }
 
 /// How far an unknown input may go, in sizes of what was measured; a fit moves it by a hundredth of that without surprise.
@@ -304,7 +321,7 @@ fn knots<'a>(problem: &'a Problem, record: &'a Record, r: usize) -> impl Iterato
             log: false,
             step: 1e-3 * size,
             coarse: false,
-            record: Some(r),
+            records: Some(vec![r]),
             prior: Some((0.0, 0.01 * UNKNOWN_REACH * size)),
         })
     })
@@ -332,7 +349,7 @@ fn start_numbers(problem: &Problem, record: &Record, r: usize) -> Vec<Number> {
             log: false,
             step: 1e-5 * width,
             coarse: false,
-            record: Some(r),
+            records: Some(vec![r]),
             prior: Some((0.0, 0.3 * width)),
         };
         let speed = size / (20.0 * record.period);

@@ -8,7 +8,7 @@ use backdrive_diagnosis::structure::Structure;
 use backdrive_diagnosis::verdict::verdict;
 use backdrive_plant::model::Model;
 use backdrive_plant::recording::Recording;
-use backdrive_plant::set::Initial;
+use backdrive_plant::set::{Condition, Initial};
 use backdrive_plant::stepper::{Options, simulate};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
@@ -180,5 +180,77 @@ fn a_right_model_lacks_nothing() {
         let found = search(&problem, &Settings::default(), None, &|_| {}).unwrap();
         let said = verdict(&problem, &found, "after.toml").unwrap();
         assert_eq!(said.json["verdict"], "nothing_missing", "{:#}", said.json);
+    }
+}
+
+const SLIDE: &str = r#"
+name = "slide"   # moved as measured, the force on it recorded
+motion = "translation"
+[bodies]
+slide = 2.0
+[[elements]]
+name = "oil"
+kind = "damper"
+between = ["slide", "ground"]
+damping = 30.0
+[[inputs]]
+name = "place"
+kind = "motion"
+on = "slide"
+[[outputs]]
+name = "pull"
+kind = "reaction"
+of = "slide"
+"#;
+
+const RIPPLE: &str = "\n[[elements]]\nname = \"teeth\"\nkind = \"cogging\"\nbetween = [\"slide\", \"ground\"]\namplitude = 0.8\nperiod = 4e-3\nphase = 0.5\n";
+
+/// The slide with teeth, moved to and fro; in the two recordings that no fit has seen its encoder counts from another place.
+fn switched_on_again(condition: Option<Condition>) -> Problem {
+    let truth = Model::from_toml(&format!("{SLIDE}{RIPPLE}"), "truth").unwrap();
+    let nominal = Model::from_toml(SLIDE, "nominal").unwrap();
+    let period = 1e-3;
+    let one = |i: usize| {
+        let t: Vec<f64> = (0..3000).map(|k| k as f64 * period).collect();
+        let way = [0.02, 0.015, 0.018, 0.013][i];
+        let place: Vec<f64> = t.iter().map(|t| way * (1.0 - (std::f64::consts::TAU * 0.4 * (1.0 + 0.2 * i as f64) * t).cos())).collect();
+        let mut random = ChaCha8Rng::seed_from_u64(40 + i as u64);
+        let pull = simulate(&truth, std::slice::from_ref(&place), period, &Options::default()).unwrap().remove(0);
+        let noisy = |y: &f64| {
+            let e: f64 = StandardNormal.sample(&mut random);
+            y + 0.02 * e
+        };
+        let pull: Vec<f64> = pull.iter().map(noisy).collect();
+        // Half a ripple off.
+        let counted = place.iter().map(|x| if i < 2 { *x } else { x + 1.9e-3 }).collect();
+        let recording = Recording::new(format!("{i}"), t, vec![("place".into(), counted), ("pull".into(), pull)]).unwrap();
+        let own = condition.clone().filter(|_| i >= 2).map(|c| ("inputs.place.offset".to_string(), c));
+        Record::new(&recording, &nominal, own.into_iter().collect()).unwrap()
+    };
+    let records: Vec<Record> = (0..4).map(one).collect();
+    let (fit, held_out) = (records[..2].to_vec(), records[2..].to_vec());
+    Problem::new(SLIDE.to_string(), "slide.toml".into(), nominal, fit, held_out, Initial::Rest).unwrap()
+}
+
+#[test]
+fn where_an_encoder_counts_from_is_a_number_of_its_session() {
+    let verdict_of = |condition: Option<Condition>| {
+        let problem = switched_on_again(condition);
+        let found = search(&problem, &Settings::default(), None, &|_| ()).unwrap();
+        verdict(&problem, &found, "found.toml").unwrap().json
+    };
+    // Where the set does not say so, the recordings that no fit has seen speak against a ripple.
+    assert_ne!(verdict_of(None)["findings"][0]["physics"], "cogging");
+    let json = verdict_of(Some(Condition::Shared(0)));
+    assert_eq!((&json["verdict"], &json["findings"][0]["physics"]), (&"missing".into(), &"cogging".into()), "{json}");
+    let period = json["findings"][0]["parameters"]["period"]["value"].as_f64().unwrap();
+    assert!((period / 4e-3 - 1.0).abs() < 1e-3, "{period}");
+    assert!(json["held_out"]["nrmse_after"].as_f64().unwrap() < 1.1 * json["held_out"]["noise_floor"].as_f64().unwrap(), "{json}");
+
+    // One number for the session, and one each where files are free by themselves.
+    for (condition, own) in [(Condition::Shared(0), 1), (Condition::Free, 2)] {
+        let problem = switched_on_again(Some(condition));
+        let structure = Structure::new(&problem, &problem.held_out, Vec::new());
+        assert_eq!(structure.numbers.iter().filter(|n| n.records.is_some()).count(), own);
     }
 }

@@ -24,6 +24,7 @@ fn input(kind: InputKind, on: usize) -> Input {
         delay: 0.0,
         bandwidth: f64::INFINITY,
         back_emf: 0.0,
+        offset: 0.0,
     }
 }
 

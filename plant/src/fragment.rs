@@ -18,6 +18,7 @@ impl Fragment {
             delay,
             bandwidth: f64::INFINITY,
             back_emf: 0.0,
+            offset: 0.0,
         };
         let kind = OutputKind::Reaction(0);
         model.inputs.insert(0, input);
@@ -128,6 +129,7 @@ impl Model {
                 delay: 0.0,
                 bandwidth: f64::INFINITY,
                 back_emf: 0.0,
+                offset: 0.0,
             });
         }
         attached

@@ -101,6 +101,8 @@ pub struct Input {
     pub bandwidth: f64,
     /// Force lost in proportion to the driven body's velocity, behind delay and lag, N per m/s.
     pub back_emf: f64,
+    /// Of a motion, m: where the body is when the recording says 0, as an encoder that counts from where it was switched on.
+    pub offset: f64,
 }
 
 /// What an output measures.

@@ -20,6 +20,8 @@ pub enum Initial {
 pub enum Condition {
     /// Another value than in the other files, to be estimated.
     Free,
+    /// The same in all files of a session, by its place in `[sessions]`, and to be estimated.
+    Shared(usize),
     /// This value.
     Value(f64),
 }
@@ -183,6 +185,34 @@ fn read(mut top: Table, folder: PathBuf) -> Result<RecordingSet, FileError> {
             }
             let below = table.table(&name)?.ok_or_else(|| table.missing(&name))?;
             files.push((name, read_rules(below)?));
+        }
+    }
+    if let Some(mut table) = top.table("sessions")? {
+        for (session, name) in table.keys().into_iter().enumerate() {
+            let mut below = table.table(&name)?.ok_or_else(|| table.missing(&name))?;
+            let mut condition = Vec::new();
+            read_condition(below.table("condition")?.ok_or_else(|| below.missing("condition"))?, "", &mut condition)?;
+            for c in condition.iter_mut().filter(|c| c.1 == Condition::Free) {
+                c.1 = Condition::Shared(session);
+            }
+            for file in below.strings("files")?.ok_or_else(|| below.missing("files"))? {
+                if !fit.contains(&file) && !held_out.contains(&file) {
+                    return Err(below.error_at("files", unknown("file", &file, fit.iter().chain(&held_out).map(String::as_str))));
+                }
+                let at = files.iter().position(|(name, _)| *name == file).unwrap_or_else(|| {
+                    files.push((file.clone(), FileRules::default()));
+                    files.len() - 1
+                });
+                let Some((_, rules)) = files.get_mut(at) else { continue };
+                for (path, value) in &condition {
+                    if rules.condition.iter().any(|(other, _)| other == path) {
+                        let message = format!("\"{path}\" has a condition in this file, or in another session of it, already");
+                        return Err(below.error_at("files", format!("\"{file}\": {message}")));
+                    }
+                    rules.condition.push((path.clone(), value.clone()));
+                }
+            }
+            below.finish()?;
         }
     }
     top.finish()?;

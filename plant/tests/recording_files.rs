@@ -145,6 +145,10 @@ speed = { scale = 0.5 }
 rows = [10, 20]
 where = { run = 3, side = "left" }
 condition = { "elements.band.force" = "free", elements.oil.damping = 3 }
+
+[sessions.tuesday]
+files = ["a.csv", "c.csv"]
+condition = { "inputs.position.offset" = "free" }
 "#;
     let dir = folder(&[("set.toml", set), ("model.toml", ""), ("a.csv", DATA), ("b.mcap", ""), ("c.csv", DATA)]);
     let s = RecordingSet::open(dir.path()).unwrap();
@@ -158,9 +162,14 @@ condition = { "elements.band.force" = "free", elements.oil.damping = 3 }
     assert_eq!(rules.piece.keep, [("run".to_string(), Cell::Number(3.0)), ("side".to_string(), Cell::Text("left".into()))]);
     assert_eq!(
         rules.condition,
-        [("elements.band.force".to_string(), Condition::Free), ("elements.oil.damping".to_string(), Condition::Value(3.0))]
+        [
+            ("elements.band.force".to_string(), Condition::Free),
+            ("elements.oil.damping".to_string(), Condition::Value(3.0)),
+            ("inputs.position.offset".to_string(), Condition::Shared(0))
+        ]
     );
-    assert_eq!(s.rules_of("c.csv"), Default::default());
+    assert_eq!(s.rules_of("b.mcap"), Default::default());
+    assert_eq!(s.rules_of("c.csv").condition, [("inputs.position.offset".to_string(), Condition::Shared(0))]);
     let error = s.check_conditions(&Model::default()).unwrap_err();
     assert!(error.to_string().ends_with("files.a.csv.condition.elements.band.force: unknown element \"band\"; there is none here"));
     assert_eq!(RecordingSet::open(&dir.path().join("set.toml")).unwrap(), s);
@@ -199,6 +208,15 @@ fn wrong_sets_are_refused() {
         "set.toml:2: columns.y: expected the heading of a column, or a table with column, or with topic and field"
     );
     assert_eq!(open("[columns]\ny = { topic = '/a' }"), "set.toml:2: columns.y: missing key \"field\"");
+    assert_eq!(
+        open("[sessions.b]\nfiles = ['c.csv']\ncondition = { elements.band.force = 'free' }"),
+        "set.toml:2: sessions.b.files: unknown file \"c.csv\"; did you mean \"a.csv\"?"
+    );
+    assert_eq!(
+        open("[sessions.b]\nfiles = ['b.csv', 'b.csv']\ncondition = { elements.band.force = 'free' }"),
+        "set.toml:2: sessions.b.files: \"b.csv\": \"elements.band.force\" has a condition in this file, or in another session of it, already"
+    );
+    assert_eq!(open("[sessions.b]\nfiles = ['b.csv']"), "set.toml:1: sessions.b: missing key \"condition\"");
     assert_eq!(
         open("[files.'a.csv']\ncondition = { band = 'free' }"),
         "set.toml:2: files.a.csv.condition.band: expected the path of a parameter, such as elements.band.force"

@@ -166,7 +166,7 @@ pub fn excite(
     floor: &[f64],
     until: Moment,
 ) -> Result<Experiment, Reason> {
-    let numbers: Vec<usize> = numbers.iter().copied().filter(|j| structure.numbers.get(*j).is_some_and(|n| n.record.is_none())).collect();
+    let numbers: Vec<usize> = numbers.iter().copied().filter(|j| structure.numbers.get(*j).is_some_and(|n| n.records.is_none())).collect();
     if numbers.is_empty() || values.len() != structure.numbers.len() {
         return Err(Reason("there is no number to determine".to_string()));
     }

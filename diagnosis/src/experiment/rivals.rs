@@ -92,7 +92,7 @@ impl<'a> Rival<'a> {
     pub(super) fn jacobian(&self, scene: &Scene, trial: &Trial, own: &[f64], at: &[f64]) -> Vec<Vec<f64>> {
         let column = |(j, number): (usize, &Number)| {
             let none = || vec![0.0; at.len()];
-            if number.record.is_some() {
+            if number.records.is_some() {
                 return none();
             }
             let (low, high) = number.bounds();

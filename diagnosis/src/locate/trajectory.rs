@@ -70,7 +70,7 @@ impl Trajectory {
         if rows.is_empty() {
             return Err(LocateError::NothingMeasured { run: run.name.to_string() });
         }
-        let drive = model.inputs.iter().zip(inputs).map(|(i, c)| c[..len].iter().map(|u| i.gain * u).collect()).collect();
+        let drive = model.inputs.iter().zip(inputs).map(|(i, c)| c[..len].iter().map(|u| i.gain * u + i.offset).collect()).collect();
         Ok(Trajectory { period: run.period, len, position, velocity, drive, rows, predicted, residual })
     }
 

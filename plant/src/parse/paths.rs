@@ -5,12 +5,13 @@ use crate::elements::Range;
 use crate::model::{Model, Output};
 use crate::tomlfile::{check_range, unknown};
 
-const INPUT_KEYS: [(&str, Range, f64); 5] = [
+const INPUT_KEYS: [(&str, Range, f64); 6] = [
     ("gain", Range::Any, 1.0),
     ("saturation", Range::Positive, f64::INFINITY),
     ("delay", Range::NonNegative, 0.0),
     ("bandwidth", Range::Positive, f64::INFINITY),
     ("back_emf", Range::Any, 0.0),
+    ("offset", Range::Any, 0.0),
 ];
 
 const OUTPUT_KEYS: [(&str, Range, f64); 5] = [
@@ -38,7 +39,7 @@ impl Model {
             Spot::Element(element, parameter) => self.elements[element].law.values().swap_remove(parameter),
             Spot::Input(input, key) => {
                 let i = &self.inputs[input];
-                vec![[i.gain, i.saturation, i.delay, i.bandwidth, i.back_emf][key]]
+                vec![[i.gain, i.saturation, i.delay, i.bandwidth, i.back_emf, i.offset][key]]
             }
             Spot::Output(output, key) => {
                 let o = &self.outputs[output];
@@ -76,7 +77,7 @@ impl Model {
                 let range = if INPUT_KEYS[key].0 == "delay" { delay_range(self.inputs[input].kind) } else { INPUT_KEYS[key].1 };
                 let x = one(range, INPUT_KEYS[key].2)?;
                 let i = &mut self.inputs[input];
-                *[&mut i.gain, &mut i.saturation, &mut i.delay, &mut i.bandwidth, &mut i.back_emf][key] = x;
+                *[&mut i.gain, &mut i.saturation, &mut i.delay, &mut i.bandwidth, &mut i.back_emf, &mut i.offset][key] = x;
             }
             Spot::Output(output, key) => {
                 let x = one(OUTPUT_KEYS[key].1, OUTPUT_KEYS[key].2)?;

@@ -59,7 +59,12 @@ pub(super) fn read_input(table: &mut Table, model: &Model) -> Result<Input, File
         delay: table.number_or("delay", delay_range(kind), 0.0)?,
         bandwidth: table.number("bandwidth", Range::Positive)?.unwrap_or(f64::INFINITY),
         back_emf: table.number_or("back_emf", Range::Any, 0.0)?,
+        offset: table.number_or("offset", Range::Any, 0.0)?,
     };
+    if kind == InputKind::Force && input.offset != 0.0 {
+        let message = "says where the zero of a recorded motion lies; a force that is always there is an element of kind \"bias\"";
+        return Err(table.error_at("offset", message));
+    }
     if kind == InputKind::Motion {
         if input.back_emf != 0.0 {
             return Err(table.error_at("back_emf", "is a force lost; a motion input has none"));

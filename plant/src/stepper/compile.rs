@@ -138,6 +138,7 @@ fn check(model: &Model) -> Result<(), CompileError> {
         number(place, "delay", input.delay, expected, input.delay >= 0.0 && input.delay.is_finite())?;
         number(place, "bandwidth", input.bandwidth, "above 0", input.bandwidth > 0.0)?;
         number(place, "back_emf", input.back_emf, "a finite number", input.back_emf.is_finite())?;
+        number(place, "offset", input.offset, "a finite number", input.offset.is_finite())?;
     }
     for output in &model.outputs {
         let place = || format!("output `{}`", output.name);

@@ -11,6 +11,8 @@ pub(super) struct Drive {
     /// Whether it prescribes a motion; else it is a force.
     pub(super) moves: bool,
     pub(super) gain: f64,
+    /// Of a motion, m.
+    pub(super) offset: f64,
     saturation: f64,
     period: f64,
     /// Whole periods of the delay, and what is left of it, s.
@@ -43,6 +45,7 @@ impl Drive {
             slot,
             moves: input.kind == InputKind::Motion,
             gain: input.gain,
+            offset: if input.kind == InputKind::Motion { input.offset } else { 0.0 },
             saturation: if input.kind == InputKind::Force { input.saturation } else { f64::INFINITY },
             period,
             delay_periods: periods as usize,
@@ -151,7 +154,7 @@ impl Drive {
     pub(super) fn motion(&self, s: f64) -> (f64, f64, f64) {
         let (segment, shift) = self.delayed(s < self.delay_rest);
         let s = s - shift;
-        (self.gain * segment.value(s), self.gain * segment.slope(s), self.gain * segment.curvature(s))
+        (self.gain * segment.value(s) + self.offset, self.gain * segment.slope(s), self.gain * segment.curvature(s))
     }
 
     /// Rate of the lag, rad/s, when there is one.

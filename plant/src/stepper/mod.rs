@@ -262,7 +262,7 @@ impl Plant {
         for (index, drive) in self.drives.iter_mut().enumerate() {
             drive.reset();
             if drive.moves {
-                self.x[drive.slot] = drive.gain * first.get(index).copied().unwrap_or(0.0);
+                self.x[drive.slot] = drive.gain * first.get(index).copied().unwrap_or(0.0) + drive.offset;
             }
         }
         for contact in &mut self.frictions {

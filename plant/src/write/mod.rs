@@ -141,6 +141,7 @@ fn input_keys(model: &Model, input: &crate::model::Input) -> String {
         ("delay", input.delay, 0.0),
         ("bandwidth", input.bandwidth, f64::INFINITY),
         ("back_emf", input.back_emf, 0.0),
+        ("offset", input.offset, 0.0),
     ];
     push_unless_default(&mut keys, &numbers);
     keys.join("\n")

@@ -13,10 +13,12 @@ pub const fn at(body: usize) -> Place {
     Some(body)
 }
 
-/// A law of this kind from numbers in the order of its parameters.
+/// A law of this kind from numbers in the order of its parameters; those at the end that are left out have their defaults.
 pub fn law(kind: &str, values: &[f64]) -> Law {
-    let lists: Vec<Vec<f64>> = values.iter().map(|v| vec![*v]).collect();
-    (kind_named(kind).expect("a kind").build)(&lists).expect("a law")
+    let kind = kind_named(kind).expect("a kind");
+    let defaults = kind.parameters.iter().skip(values.len()).map(|p| p.default.expect("a default"));
+    let lists: Vec<Vec<f64>> = values.iter().copied().chain(defaults).map(|v| vec![v]).collect();
+    (kind.build)(&lists).expect("a law")
 }
 
 pub fn element(kind: &str, between: [Place; 2], values: &[f64]) -> Element {
@@ -46,6 +48,7 @@ pub fn force_input(on: usize) -> Input {
         delay: 0.0,
         bandwidth: f64::INFINITY,
         back_emf: 0.0,
+        offset: 0.0,
     }
 }
 
