@@ -20,7 +20,8 @@ pub(super) const PHYSICS: Physics = Physics {
             let neutral = stated.unwrap_or(0.0);
             let most = typical.max(neutral.abs());
             let cubic = 1000.0 * most / (x * x);
-            let new = new.number("stiffness", even(-most, 1000.0 * most, neutral)).number("cubic", even(-cubic, cubic, 0.0));
+            // With less than none it would snap from one rest to another: that imitates a play, and is no spring.
+            let new = new.number("stiffness", even(neutral.min(0.0), 1000.0 * most, neutral)).number("cubic", even(-cubic, cubic, 0.0));
             // A quarter of the force at full deflection; less where it softens, which at twice that lets go.
             let k = if neutral > 0.0 { neutral } else { 0.2 * typical };
             let softer = -0.1 * k / (site.displacement_peak * site.displacement_peak);

@@ -172,8 +172,8 @@ const LOOSER: [(f64, bool); 5] = [(0.2, true), (1.0, false), (0.2, false), (0.04
 const SHOWN: usize = 5_000;
 /// The last steps of those that could still win.
 const POLISH: Effort = Effort { steps: 15, tolerance: 0.3 };
-/// Candidates that are held against recordings that no fit has seen.
-const FINALISTS: usize = 12;
+/// Structures of so many effects that are held against recordings that no fit has seen.
+const FINALISTS: usize = 8;
 /// A residual at its floor has this level, up to chance and rounding.
 pub const AT_FLOOR: f64 = 1.04;
 
@@ -181,7 +181,7 @@ pub const AT_FLOOR: f64 = 1.04;
 /// the residuals at the start.
 fn worst_first(evaluator: &Evaluator, structure: &Structure, start: &[f64], there: &[f64], steps: [usize; 2]) -> Option<Fit> {
     let problem = evaluator.problem;
-    let own_numbers = structure.numbers.iter().any(|n| n.record.is_some());
+    let own_numbers = structure.numbers.iter().any(|n| n.records.is_some());
     let worst = worst_records(evaluator, there, 2);
     let effort = |steps: usize| Effort { steps, tolerance: 3.0 };
     if own_numbers || there.len() < SHOWN || 2 * worst.len() > problem.fit.len() {
@@ -460,11 +460,20 @@ pub fn search(
                 distinct_structures(&found, effects - 1).take(3).flat_map(|base| course.extensions(view, base, 5)).collect()
             }
             Anew => {
-                let base = distinct_structures(&found, effects - 1).next();
-                base.map_or_else(Vec::new, |base| {
-                    fine = substeps_for(&view.evaluator, base);
-                    course.anew(&Evaluator { substeps: fine, ..view.evaluator.clone() }, base, settings.patience.mul_f64(ANEW))
-                })
+                let best = distinct_structures(&found, effects - 1).next();
+                // The first step to it may have been the wrong one: so from the best without that, too.
+                let without = |first: &Hypothesis| {
+                    distinct_structures(&found, effects - 1).find(|c| c.structure.added.iter().all(|h| h.physics != first.physics))
+                };
+                let other = best.and_then(|b| b.structure.added.first()).filter(|_| !late(0.5)).and_then(without);
+                let mut seeds = Vec::new();
+                fine = COARSE;
+                for base in best.into_iter().chain(other) {
+                    let substeps = substeps_for(&view.evaluator, base);
+                    fine = fine.max(substeps);
+                    seeds.extend(course.anew(&Evaluator { substeps, ..view.evaluator.clone() }, base, settings.patience.mul_f64(ANEW)));
+                }
+                seeds
             }
         };
         // Some start anew beside the numbers of the best, even those whose own race went wrong.
@@ -522,12 +531,19 @@ pub fn search(
         let fit = to_its_end(&last, &nominal.structure, fit);
         nominal = candidate(&evaluator, nominal.structure, fit);
     }
-    // The best are held against the recordings that no fit has seen.
+    let mut seen = HashSet::new();
+    found.retain(|c| seen.insert(key_of(&c.structure.added)));
+    // The best with so many effects each are held against the recordings that no fit has seen: those may speak for fewer effects than fits do.
     let unseen_samples = Evaluator { records: &problem.held_out, ..Evaluator::new(problem) }.len();
-    for c in found.iter_mut().take(FINALISTS).chain(std::iter::once(&mut nominal)) {
+    let mut so_many = vec![0; found.iter().map(|c| c.structure.added.len() + 1).max().unwrap_or(0)];
+    let finalists = found.iter_mut().filter(|c| {
+        let before = so_many.get_mut(c.structure.added.len());
+        before.is_some_and(|n| std::mem::replace(n, *n + 1) < FINALISTS)
+    });
+    let mut finalists: Vec<&mut Candidate> = finalists.chain(std::iter::once(&mut nominal)).collect();
+    finalists.par_iter_mut().for_each(|c| {
         c.unseen = mean_square(problem, &problem.held_out, &c.structure, &c.fit.values, &evaluator.floor);
-    }
-    sort(&mut found, samples);
+    });
     for t in &mut tried {
         let single = found.iter().find(|c| c.structure.added.len() == 1 && c.structure.added[0].id == t.id);
         t.taken = single.map(|c| 1.0 - c.fit.cost / nominal.fit.cost);
