@@ -111,7 +111,7 @@ fn correlation_finds_what_the_linear_model_says() {
 #[test]
 fn friction_makes_the_gain_fall_at_low_frequencies() {
     let mut model = environment("-sae-10").driven();
-    *law(&mut model, "gearbox") = Law::Backlash(Backlash { gap: 0.0, stiffness: 563e3, damping: 100.0 });
+    *law(&mut model, "gearbox") = Law::Backlash(Backlash { gap: 0.0, stiffness: 563e3, damping: 100.0, rounding: 0.0 });
     *law(&mut model, "friction") = Law::Coulomb(Coulomb { force: 16.38 });
     let stroke = 10e-3;
     let at = |f: f64| admittance_of(&model, [0, 0], f, stroke, &FINE).unwrap();
@@ -129,7 +129,7 @@ fn friction_makes_the_gain_fall_at_low_frequencies() {
 fn backlash_makes_the_gain_fall_faster_than_its_phase_says() {
     let with = environment("-sae-10").driven();
     let mut without = with.clone();
-    *law(&mut without, "gearbox") = Law::Backlash(Backlash { gap: 0.0, stiffness: 861e3, damping: 100.0 });
+    *law(&mut without, "gearbox") = Law::Backlash(Backlash { gap: 0.0, stiffness: 861e3, damping: 100.0, rounding: 0.0 });
     let of = |model: &Model, f: f64, stroke: f64| admittance_of(model, [0, 0], f, stroke, &FINE).unwrap();
     let slope = |model: &Model, stroke: f64| {
         let [low, high] = [24.27, 35.0].map(|f| of(model, f, stroke).norm());

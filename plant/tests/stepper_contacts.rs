@@ -86,6 +86,7 @@ fn contacts_far_too_stiff_for_the_substep_stay_finite_and_take_energy() {
         ("hunt_crossley", vec![1e10, 1e9, 1.5, 1e-3]),
         ("backlash", vec![2e-3, 1e8, 10.0]),
         ("backlash", vec![2e-3, 1e8, 0.0]),
+        ("backlash", vec![2e-3, 1e8, 0.0, 4e-4]),
         ("cubic_spring", vec![0.0, 1e13]),
         ("lugre", vec![1e7, 1e3, 0.5, 0.8, 1e-3]),
         ("dahl", vec![1e8, 0.5]),

@@ -2,6 +2,10 @@
 
 use super::Physics;
 use super::builder::{ElementBuilder, even, first_value};
+use super::{Hypothesis, Parameter};
+
+/// The word that sets a play with round edges apart.
+const ROUND: &str = "round";
 
 pub(super) const PHYSICS: Physics = Physics {
     name: "backlash",
@@ -9,7 +13,7 @@ pub(super) const PHYSICS: Physics = Physics {
     // With no gap it is a spring and a damper.
     contains: &["spring"],
     propose: |sites| {
-        let one = |site| {
+        let one = |site, round: bool| {
             // Play without a shaft is nothing.
             let (index, spring) = sites.first_of(site, &["spring"])?;
             let damper = sites.first_of(site, &["damper"]);
@@ -20,10 +24,26 @@ pub(super) const PHYSICS: Physics = Physics {
                 .number("gap", even(0.0, 4.0 * site.displacement_peak, 0.0))
                 .number("stiffness", even(0.0, 1000.0 * k.max(typical), k))
                 .number("damping", even(0.0, 1000.0 * b.max(site.force / site.speed), b));
+            let new = if round { new.tag(ROUND).number("rounding", even(0.0, 4.0 * site.displacement_peak, 0.0)) } else { new };
             // The spring as refitted has the joint's deflection at the forces that act: of that a gap takes a share, and the shaft is as much stiffer.
             let shared = |share: f64| vec![2.0 * share * site.displacement_peak, k / (1.0 - share), b];
-            Some(new.starts(vec![vec![0.2 * x, k, b], shared(0.5), vec![0.02 * x, k, b], shared(0.8), vec![x, k, b]]))
+            let mut starts = vec![vec![0.2 * x, k, b], shared(0.5), vec![0.02 * x, k, b], shared(0.8), vec![x, k, b]];
+            if round {
+                starts.iter_mut().for_each(|start| start.push(BLUNT * start[0]));
+            }
+            Some(new.starts(starts))
         };
-        sites.near().filter_map(one).collect()
+        [false, true].into_iter().flat_map(|round| sites.near().filter_map(move |site| one(site, round))).collect()
     },
 };
+
+/// Rounding that a fit starts from, in a gap.
+const BLUNT: f64 = 0.2;
+
+/// A sharp play as fitted, its edges a little blunt: how sharp they are is how finely it is drawn, and no other physics.
+pub(super) fn blunted(values: &[f64], finer: &Hypothesis) -> Option<Vec<f64>> {
+    let [gap, ..] = values else { return None };
+    let start: Vec<f64> = values.iter().copied().chain(std::iter::once(BLUNT * gap)).collect();
+    let within = |(p, v): (&Parameter, f64)| v.clamp(p.range.0, p.range.1);
+    (start.len() == finer.parameters.len()).then(|| finer.parameters.iter().zip(start).map(within).collect())
+}

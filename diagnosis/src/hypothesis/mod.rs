@@ -143,7 +143,12 @@ pub struct Parameter {
 /// where they are no such two.
 pub(crate) fn refined(coarse: &Hypothesis, values: &[f64], finer: &Hypothesis) -> Option<Vec<f64>> {
     let alike = coarse.physics == finer.physics && coarse.place.same(&finer.place) && coarse.replaces == finer.replaces;
-    if alike && coarse.physics == maxwell_slip::PHYSICS.name { maxwell_slip::split(coarse, values, finer) } else { None }
+    match coarse.physics {
+        _ if !alike => None,
+        "maxwell_slip" => maxwell_slip::split(coarse, values, finer),
+        "backlash" => backlash::blunted(values, finer),
+        _ => None,
+    }
 }
 
 /// A physics at a place.

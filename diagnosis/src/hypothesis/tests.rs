@@ -314,3 +314,31 @@ fn a_law_drawn_more_finely_begins_where_the_coarse_one_ends() {
     }
     assert!(pairs > 10, "{pairs}");
 }
+
+#[test]
+fn a_play_with_round_edges_begins_where_the_sharp_one_ends() {
+    use backdrive_plant::elements::{Backlash, Mechanics};
+    let mut pairs = 0;
+    for (name, _, model) in devices() {
+        let (hypotheses, _) = hypotheses(&model);
+        for coarse in hypotheses.iter().filter(|h| h.physics == "backlash") {
+            let values = coarse.starts[0].clone();
+            for (fine, start) in hypotheses.iter().filter_map(|h| Some((h, refined(coarse, &values, h)?))) {
+                assert!(fine.parameters.len() == 4 && values.len() == 3 && fine.place.same(&coarse.place), "{name}: {}", fine.id);
+                let law = |v: &[f64]| Backlash { gap: v[0], stiffness: v[1], damping: 0.0, rounding: v.get(3).copied().unwrap_or(0.0) };
+                let (sharp, round) = (law(&values), law(&start));
+                for x in (-40..=40).map(|i| 0.1 * f64::from(i) * values[0]) {
+                    let pull = |law: &Backlash| {
+                        let mut memory = [0.0];
+                        law.advance(&mut memory, 0.0, x, 1e-3);
+                        law.force(&memory, x, 0.0)
+                    };
+                    // What an edge rounded over w gives at the edge itself is w/2 of twist, and nowhere more.
+                    assert!((pull(&round) - pull(&sharp)).abs() <= 0.5 * start[3] * values[1] * (1.0 + 1e-9), "{name}: {} at {x}", fine.id);
+                }
+                pairs += 1;
+            }
+        }
+    }
+    assert!(pairs > 3, "{pairs}");
+}

@@ -152,7 +152,7 @@ impl Compensator {
             "gearbox",
             [lever, disc],
             if self.gap > 0.0 {
-                Law::Backlash(Backlash { gap: self.gap, stiffness: self.k, damping: SHAFT_DAMPING })
+                Law::Backlash(Backlash { gap: self.gap, stiffness: self.k, damping: SHAFT_DAMPING, rounding: 0.0 })
             } else {
                 Law::Spring(Spring { stiffness: self.k, rest: 0.0 })
             },
