@@ -736,6 +736,9 @@ pub struct Prove {
     /// Whether the bags hold what the hand wants: in a real session nobody measures it.
     #[arg(long, value_name = "WHICH", value_enum, default_value_t = Operator::Half)]
     pub operator: Operator,
+    /// Whether the nominal numbers were refitted to a session before: they have then taken on what they can of what is concealed.
+    #[arg(long, value_name = "WHICH", value_enum, default_value_t = Nominal::Half)]
+    pub nominal: Nominal,
     /// Hz, up to which a hand moves that nobody measured.
     #[arg(long, value_name = "HZ", value_parser = positive, default_value_t = 5.0)]
     pub hand_bandwidth: f64,
@@ -764,6 +767,17 @@ pub enum Operator {
     /// All.
     Hidden,
     /// Every second one.
+    Half,
+}
+
+/// Which cases have a nominal model that was refitted to the hidden plant.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub enum Nominal {
+    /// None: its numbers are off as they were drawn.
+    Given,
+    /// All.
+    Refitted,
+    /// Two of every four.
     Half,
 }
 

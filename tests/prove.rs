@@ -3,6 +3,7 @@
 mod system;
 
 use backdrive_bags::Reader;
+use backdrive_plant::model::Model;
 use sha2::{Digest, Sha256};
 use std::path::{Path, PathBuf};
 use system::{Place, file};
@@ -37,7 +38,7 @@ fn a_sealed_effect_is_diagnosed_without_its_truth() {
         return;
     }
     let place = Place::new();
-    let ended = prove(&place, &["--seed", "13", "--operator", "hidden", "--patience", "10", "--out", "proof"]);
+    let ended = prove(&place, &["--seed", "13", "--operator", "hidden", "--nominal", "refitted", "--patience", "10", "--out", "proof"]);
     assert!([Some(0), Some(1)].contains(&ended.code), "{ended:?}");
     let case = place.path("proof/case-001");
 
@@ -51,7 +52,7 @@ fn a_sealed_effect_is_diagnosed_without_its_truth() {
         let reader = Reader::open(&case.join(format!("session/{name}.mcap"))).unwrap();
         let header = reader.header().unwrap();
         assert!(header.title.contains(&digest), "{}", header.title);
-        assert!(header.files.iter().any(|(name, _)| name.ends_with("impulse-engine-linear.toml")));
+        assert!(header.files.iter().any(|(name, _)| name.ends_with("nominal.toml")));
         let text = format!("{}{}", header.graph_toml, header.files.iter().map(|f| f.1.as_str()).collect::<String>());
         assert!(!text.contains("truth") && !text.contains("sealed-master") && !text.contains("waypoints"), "{text}");
         let topics: Vec<&str> = header.topics.iter().map(|t| t.topic.name.as_str()).collect();
@@ -59,10 +60,19 @@ fn a_sealed_effect_is_diagnosed_without_its_truth() {
         assert!(reader.completeness().is_some_and(|c| c.topics.iter().all(|t| t.lost == 0)));
     }
 
+    // The nominal numbers are those of a refit to the session before.
+    let nominal = Model::load(&case.join("nominal.toml")).unwrap();
+    let given = Model::load(Path::new(&file("plant/models/impulse-engine-linear.toml"))).unwrap();
+    let handed = Model::load(&case.join("session/model.toml")).unwrap();
+    let at = |model: &Model, path: &str| model.values_at(path).unwrap()[0];
+    assert_eq!(at(&handed, "bodies.handle"), at(&nominal, "bodies.handle"));
+    assert_ne!(at(&handed, "bodies.handle"), at(&given, "bodies.handle"));
+
     let proof: serde_json::Value = serde_json::from_str(&std::fs::read_to_string(place.path("proof/proof.json")).unwrap()).unwrap();
     let found = &proof["cases"][0];
     assert_eq!(found["sealed"], digest.as_str());
     assert_eq!(found["shows_hand"], false);
+    assert_eq!(found["nominal_refitted"], true);
     let gain = |canceller: &str| {
         let all = found["stable_gain"].as_array().unwrap();
         all.iter().find(|g| g["canceller"] == canceller).and_then(|g| g["stable_to"].as_f64()).unwrap()

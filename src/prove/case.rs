@@ -54,6 +54,14 @@ pub struct Draw {
     pub effects: usize,
     /// Whether the bags hold what the hand wants.
     pub shows_hand: bool,
+    /// Whether the nominal numbers are refitted to a session of the hidden plant first.
+    pub refitted: bool,
+}
+
+/// A nominal model as the graph and the diagnosis get it, and the grip beside it; `None` where its file holds the hand.
+struct Nominal {
+    model: PathBuf,
+    grip: Option<PathBuf>,
 }
 
 /// What a proof gave.
@@ -62,6 +70,8 @@ pub struct Case {
     pub name: String,
     /// Whether the bags hold what the hand wants.
     pub shows_hand: bool,
+    /// Whether the nominal numbers were refitted to a session of the hidden plant first.
+    pub refitted: bool,
     /// SHA-256 of the truth, as printed before anything was recorded.
     pub sealed: String,
     /// The verdict's word and sentence.
@@ -109,14 +119,26 @@ pub fn prove(options: &cli::Prove, folder: &Path, drawn: &Draw, stop: &AtomicBoo
     };
     let digest = draw(options, &hidden, drawn)?;
     let hand = if drawn.shows_hand { "" } else { "; nobody measures the hand" };
-    println!("{}: sealed, SHA-256 {digest}{hand}", folder.display());
+    let masked = if drawn.refitted { "; the nominal numbers were refitted" } else { "" };
+    println!("{}: sealed, SHA-256 {digest}{hand}{masked}", folder.display());
 
     // From here to the verdict only the hidden plant's process opens the truth.
-    let graph = folder.join("session.toml");
-    write(&graph, &session(template, options, &hidden, &digest)?)?;
-    let (recorded, session) = (folder.join("recorded"), folder.join("session"));
-    ours(folder, "run", &[&"run", &graph, &"--out", &recorded])?;
-    hand_over(&recorded, &session, drawn.shows_hand, options.hand_bandwidth)?;
+    let record = |nominal: &Nominal, name: &str| {
+        let graph = folder.join(format!("{name}.toml"));
+        write(&graph, &graph_of(template.clone(), options, &hidden, nominal, &digest)?)?;
+        let (recorded, session) = (folder.join("recorded"), folder.join(name));
+        ours(folder, &format!("run-{name}"), &[&"run", &graph, &"--out", &recorded])?;
+        hand_over(&recorded, &session, drawn.shows_hand, options.hand_bandwidth)?;
+        Ok::<PathBuf, Failure>(session)
+    };
+    let mut nominal = Nominal { model: hidden.model.clone(), grip: hidden.grip.clone() };
+    if drawn.refitted {
+        let before = record(&nominal, "before")?;
+        let model = PathBuf::from(absolute(&folder.join("nominal.toml"))?);
+        refit(folder, "fit-before", &before, &model)?;
+        nominal = Nominal { model, grip: None };
+    }
+    let session = record(&nominal, "session")?;
     let found = folder.join("diagnosis");
     let patience = (options.patience * if drawn.shows_hand { 1.0 } else { LONGER }).to_string();
     ours(folder, "diagnose", &[&"diagnose", &session, &"--out", &found, &"--patience", &patience])?;
@@ -124,7 +146,7 @@ pub fn prove(options: &cli::Prove, folder: &Path, drawn: &Draw, stop: &AtomicBoo
 
     let (mut cancellers, mut share) = (Vec::new(), None);
     if !options.no_gains {
-        cancellers = all_cancellers(options, folder, &session, &found)?;
+        cancellers = all_cancellers(options, folder, &nominal, &session, &found)?;
         let (diagnosed, scaled) = (found.join("model.diagnosed.toml"), folder.join("chosen.toml"));
         let rivals = verdict["rival_models"].as_array().into_iter().flatten().filter_map(Value::as_str).map(|name| found.join(name));
         let task = Task { graph: &options.contact, high_pass_hz: options.high_pass };
@@ -166,6 +188,7 @@ pub fn prove(options: &cli::Prove, folder: &Path, drawn: &Draw, stop: &AtomicBoo
     Ok(Case {
         name: folder.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned()),
         shows_hand: drawn.shows_hand,
+        refitted: drawn.refitted,
         share,
         sealed: digest,
         sentence: verdict["sentence"].as_str().unwrap_or_default().to_string(),
@@ -244,7 +267,7 @@ impl Case {
     /// For programs.
     pub fn json(&self) -> Value {
         json!({
-            "case": self.name, "sealed": self.sealed, "shows_hand": self.shows_hand, "verdict": self.word, "sentence": self.sentence,
+            "case": self.name, "sealed": self.sealed, "shows_hand": self.shows_hand, "nominal_refitted": self.refitted, "verdict": self.word, "sentence": self.sentence,
             "findings": self.findings, "concealed": self.concealed, "marks": self.marks, "nonlinear": self.nonlinear,
             "held_out": self.held_out, "refit_floors": self.refit_floors, "stable_gain": self.gains, "live": self.live, "share": self.share, "ratio": self.ratio("diagnosed", 1.0),
         })
@@ -274,8 +297,8 @@ fn draw(options: &cli::Prove, hidden: &Hidden, drawn: &Draw) -> Result<String, F
     said.split_whitespace().next().map(str::to_string).ok_or_else(|| Failure::machine(format!("{name}: printed no digest")))
 }
 
-/// The session's graph with the hidden plant in the master's place. It names the digest, and where the truth lies, which only that process opens.
-fn session(mut graph: DocumentMut, options: &cli::Prove, hidden: &Hidden, digest: &str) -> Result<String, Failure> {
+/// A session's graph with the hidden plant in the master's place. It names the digest, and where the truth lies, which only that process opens.
+fn graph_of(mut graph: DocumentMut, options: &cli::Prove, hidden: &Hidden, nominal: &Nominal, digest: &str) -> Result<String, Failure> {
     graph["title"] = value(format!("A session with a sealed master, SHA-256 {digest}"));
     let beside = PathBuf::from(absolute(&options.session)?).parent().map(Path::to_path_buf).unwrap_or_default();
     let nodes = graph.get_mut("nodes").and_then(Item::as_array_of_tables_mut);
@@ -288,10 +311,8 @@ fn session(mut graph: DocumentMut, options: &cli::Prove, hidden: &Hidden, digest
         }
         let kind = node.get("kind").and_then(Item::as_str).unwrap_or_default().to_string();
         if matches!(kind.as_str(), "master" | "canceller") {
-            node["model"] = value(hidden.model.display().to_string());
-            if let Some(grip) = &hidden.grip {
-                node["grip"] = value(grip.display().to_string());
-            }
+            node["model"] = value(nominal.model.display().to_string());
+            node["grip"] = value(nominal.grip.as_ref().map_or("none".to_string(), |grip| grip.display().to_string()));
         }
     }
     hide(&mut graph, hidden, 1)?;
@@ -299,20 +320,25 @@ fn session(mut graph: DocumentMut, options: &cli::Prove, hidden: &Hidden, digest
 }
 
 /// The cancellers that are compared: none, the nominal model, the two linear models fitted to the session, and the diagnosed one.
-fn all_cancellers(options: &cli::Prove, folder: &Path, session: &Path, found: &Path) -> Result<Vec<Canceller>, Failure> {
+fn all_cancellers(options: &cli::Prove, folder: &Path, nominal: &Nominal, session: &Path, found: &Path) -> Result<Vec<Canceller>, Failure> {
     let second = folder.join("second-order.toml");
     let still = still(options, session)?;
     ours(folder, "fit-second-order", &[&"fit", &options.second_order, &still, &"--out", &second])?;
     let refitted = folder.join("refitted.toml");
-    ours(folder, "fit-nominal", &[&"fit", &session.join("model.toml"), &session, &"--out", &refitted])?;
+    refit(folder, "fit-nominal", session, &refitted)?;
     let holds = |name, model: PathBuf| Canceller { name, model: Some(model), grip: None };
     Ok(vec![
         Canceller { name: "none", model: None, grip: None },
-        Canceller { name: "nominal", model: Some(options.model.clone()), grip: Some(options.grip.clone()) },
+        Canceller { name: "nominal", model: Some(nominal.model.clone()), grip: nominal.grip.clone() },
         holds("second order", second),
         holds("linear, refitted", refitted),
         holds("diagnosed", found.join("model.diagnosed.toml")),
     ])
+}
+
+/// The nominal model of a session with its numbers fitted to that.
+fn refit(folder: &Path, name: &str, session: &Path, out: &Path) -> Result<(), Failure> {
+    ours(folder, name, &[&"fit", &session.join("model.toml"), &session, &"--out", &out]).map(drop)
 }
 
 /// The recordings in which the hand holds still as a set of their own: a model of second order has no hand that could move.

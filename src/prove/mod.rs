@@ -36,6 +36,11 @@ pub fn prove(options: &cli::Prove) -> Result<u8, Failure> {
                 cli::Operator::Hidden => false,
                 cli::Operator::Half => index % 2 == 0,
             },
+            refitted: match options.nominal {
+                cli::Nominal::Given => false,
+                cli::Nominal::Refitted => true,
+                cli::Nominal::Half => index % 4 >= 2,
+            },
         };
         let folder = options.out.join(format!("case-{:03}", index + 1));
         match case::prove(options, &folder, &drawn, &stop) {

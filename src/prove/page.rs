@@ -56,7 +56,8 @@ pub fn page(options: &cli::Prove, cases: &[Case]) -> Page {
     page.text(&format!(
         "A master hides effects drawn from a seed (--seed {}). The file that says which was sealed first: its SHA-256 is printed before anything is \
          recorded, and stands in the title of every bag. Only the process of the hidden plant opens it, and, after verdict.json is written, the scorer. \
-         The diagnosis is a process of its own that gets the nominal model and the bags. The stable gain is that of the contact script {}, searched up \
+         The diagnosis is a process of its own that gets the nominal model and the bags. Where the nominal numbers are \"refitted\", they were first \
+         fitted to another session of the hidden plant, so that they have taken on what they can of what is concealed. The stable gain is that of the contact script {}, searched up \
          to 50 in steps that end at 3 %, the canceller behind a high-pass of {} Hz; \"linear, refitted\" is the nominal model with its numbers fitted to \
          the session, \"second order\" one mass on a spring and a damper fitted to the recordings in which the hand holds still, \"chosen\" the diagnosed \
          model with that share of its estimate whose worst stable gain over grips 20 % softer to 20 % firmer is best when the diagnosed model itself, or \
@@ -98,7 +99,8 @@ fn one(page: &mut Page, case: &Case) {
     page.text(&format!("Error on recordings that no fit has seen: {given} as given, {refitted} refitted, {diagnosed} diagnosed."));
     let hand = if case.shows_hand { "The bags hold what the hand wants." } else { "Nobody measured the hand: it was found with the rest." };
     let share = case.share.map_or_else(String::new, |share| format!(" Share of the estimate that was chosen: {}.", number(share)));
-    page.text(&format!("{hand}{share} Seal: {}.", case.sealed));
+    let nominal = if case.refitted { " The nominal model's numbers were refitted to a session before." } else { "" };
+    page.text(&format!("{hand}{nominal}{share} Seal: {}.", case.sealed));
     if !case.gains.is_empty() {
         page.table(table);
     }
@@ -150,7 +152,7 @@ fn ratios(cases: &[Case]) -> Figure {
 }
 
 fn table(cases: &[Case]) -> Table {
-    let headers = ["case", "hand", "concealed", "found", "right", "error: refitted", "in noise floors", "diagnosed"];
+    let headers = ["case", "hand", "nominal numbers", "concealed", "found", "right", "error: refitted", "in noise floors", "diagnosed"];
     let mut table = Table::new(headers.into_iter().map(str::to_string).chain(CANCELLERS.iter().map(|c| format!("gain: {c}"))));
     for case in cases {
         let right = case.is_right();
@@ -161,6 +163,7 @@ fn table(cases: &[Case]) -> Table {
         let mut row: Vec<Cell> = vec![
             case.name.clone().into(),
             hand.into(),
+            (if case.refitted { "refitted" } else { "given" }).into(),
             concealed(case).into(),
             found(case).into(),
             mark,
