@@ -112,6 +112,16 @@ fn told(report: &mut Report, context: &Context, ask: &Ask, train: &Record, pulse
         PAPER,
         Some(there <= BAR),
     );
+    if let Some((error, zero)) = pipeline::error_from_its_zero(pulses, &model)? {
+        report.figure(&format!("{from} error from its zero"), error);
+        report.line(
+            &format!("the same, pulses, where its encoder counts from found, from the {from} model"),
+            format!("{error:.2} % (at {:.2} mm)", 1e3 * zero),
+            "",
+            "",
+            None,
+        );
+    }
     let mass = model.values_at("bodies.carriage").ok().and_then(|v| v.first().copied()).unwrap_or(f64::NAN);
     report.figure(&format!("{from} mass"), mass);
     report.line(

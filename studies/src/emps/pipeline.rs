@@ -88,6 +88,29 @@ pub(super) fn error_of_model(record: &Record, model: &Model) -> Result<f64, Stud
     Ok(relative(&reduced(&record.force), &reduced(predicted)))
 }
 
+/// Steps in a ripple's period in which a record's zero is looked for.
+const STEPS: usize = 50;
+
+/// Least error over where the record's encoder counts from, within a ripple's period, and that place, m: a number of the record, not of the
+/// axis. `None` where the model has no ripple.
+pub(super) fn error_from_its_zero(record: &Record, model: &Model) -> Result<Option<(f64, f64)>, StudyError> {
+    let ripple = model.elements.iter().find(|e| e.law.kind().name == "cogging");
+    let Some(period) = ripple.and_then(|e| model.values_at(&format!("elements.{}.period", e.name)).ok()?.first().copied()) else {
+        return Ok(None);
+    };
+    let mut best: Option<(f64, f64)> = None;
+    for step in 0..STEPS {
+        let zero = period * (step as f64 / STEPS as f64 - 0.5);
+        let mut from_there = model.clone();
+        from_there.inputs.iter_mut().for_each(|input| input.offset = zero);
+        let error = error_of_model(record, &from_there)?;
+        if best.is_none_or(|(least, _)| error < least) {
+            best = Some((error, zero));
+        }
+    }
+    Ok(best)
+}
+
 /// 100 times the size of the difference over that of the first.
 fn relative(measured: &[f64], predicted: &[f64]) -> f64 {
     let size = |x: &mut dyn Iterator<Item = f64>| x.map(|x| x * x).sum::<f64>().sqrt();
