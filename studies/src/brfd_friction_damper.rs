@@ -1,6 +1,6 @@
 //! The banded rotary friction device: from a stiff linkage and the same friction either way to the play and the friction of each direction.
 
-use crate::run::{Ask, diagnose, diagnosed_model, findings, parameter, refit, refitted, said, write};
+use crate::run::{Ask, LIKELY, diagnose, diagnosed_model, findings, instead, parameter, refit, refitted, said, write};
 use crate::table::Report;
 use crate::{Context, Study, StudyError, csv_columns};
 use backdrive_diagnosis::compare::{predictions, qualities};
@@ -83,6 +83,10 @@ fn run(context: &Context) -> Result<Report, StudyError> {
     let has = |physics: &str| named.iter().any(|(p, _)| p == physics);
     let both = has("backlash") && has("asymmetric_coulomb");
     report.line("verdict", verdict, "play, friction by direction, compliance", "Coble et al. 2022", Some(both));
+    let others = instead(json, LIKELY);
+    report.word("instead", &others.join(" "));
+    let text = if others.is_empty() { "nothing".to_string() } else { others.join(", ") };
+    report.line("or instead", text, "", "", None);
     let middle = median(&mut dead);
     if let Some((gap, [low, high])) = parameter(json, "backlash", "gap") {
         report.figure("gap", gap);

@@ -10,7 +10,7 @@ use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
-use toml_edit::{DocumentMut, Item};
+use toml_edit::{Array, DocumentMut, Item};
 
 /// How a diagnosis is made.
 #[derive(Debug, Clone)]
@@ -89,14 +89,18 @@ fn resolve(text: &str, folders: &[&Path]) -> Result<String, String> {
         found.map_or(name.to_string(), |p| p.canonicalize().unwrap_or(p).display().to_string())
     };
     document["model"] = toml_edit::value("model.toml");
-    for key in ["fit", "held_out"] {
-        if let Some(list) = document.get_mut(key).and_then(Item::as_array_mut) {
-            for at in 0..list.len() {
-                if let Some(name) = list.get(at).and_then(|v| v.as_str()).map(place) {
-                    list.replace(at, name);
-                }
+    let resolved = |list: Option<&mut Array>| {
+        for value in list.into_iter().flat_map(Array::iter_mut) {
+            if let Some(name) = value.as_str().map(place) {
+                *value = name.into();
             }
         }
+    };
+    for key in ["fit", "held_out"] {
+        resolved(document.get_mut(key).and_then(Item::as_array_mut));
+    }
+    for (_, session) in document.get_mut("sessions").and_then(Item::as_table_like_mut).into_iter().flat_map(|t| t.iter_mut()) {
+        resolved(session.as_table_like_mut().and_then(|t| t.get_mut("files")).and_then(Item::as_array_mut));
     }
     if let Some(files) = document.get_mut("files").and_then(Item::as_table_like_mut) {
         let names: Vec<String> = files.iter().map(|(name, _)| name.to_string()).collect();
@@ -124,6 +128,25 @@ pub fn said(verdict: &Value) -> String {
     let named: Vec<String> = findings(verdict).into_iter().map(|(physics, place)| format!("{physics} at {place}")).collect();
     let word = verdict["verdict"].as_str().unwrap_or("").replace('_', " ");
     if named.is_empty() { word } else { format!("{word}: {}", named.join(", ")) }
+}
+
+/// Confidence above which an alternative is worth a line.
+pub const LIKELY: f64 = 0.05;
+
+/// What could be instead of each finding, as the verdict says, with a confidence above this.
+pub fn instead(verdict: &Value, least: f64) -> Vec<String> {
+    let mut all = Vec::new();
+    for finding in verdict["findings"].as_array().into_iter().flatten() {
+        let own = finding["physics"].as_str().unwrap_or("");
+        for other in finding["alternatives"].as_array().into_iter().flatten() {
+            let confidence = other["confidence"].as_f64().unwrap_or(0.0);
+            let text = format!("{} for {own} ({confidence:.2})", other["physics"].as_str().unwrap_or(""));
+            if confidence > least && !all.contains(&text) {
+                all.push(text);
+            }
+        }
+    }
+    all
 }
 
 /// Value and 95 % interval of a finding's parameter; `None` where it is a list or not there.
@@ -160,13 +183,15 @@ mod tests {
         std::fs::write(data.path().join("a.csv"), "t,x\n0,1\n1,2\n").unwrap();
         std::fs::write(out.path().join("prepared.csv"), "t,x\n0,1\n1,2\n").unwrap();
         std::fs::write(out.path().join("model.toml"), "").unwrap();
-        let text = "model = 'other.toml'\nfit = ['prepared.csv']\nheld_out = ['a.csv']\n[files.'a.csv']\nrows = [0, 2]\n";
+        let text = "model = 'other.toml'\nfit = ['prepared.csv']\nheld_out = ['a.csv']\n[files.'a.csv']\nrows = [0, 2]\n\
+                    [sessions.b]\nfiles = ['a.csv']\ncondition = { bodies.carriage = 'free' }\n";
         let resolved = resolve(text, &[out.path(), data.path()]).unwrap();
         let set = out.path().join("set.toml");
         std::fs::write(&set, resolved).unwrap();
         let set = RecordingSet::open(&set).unwrap();
         assert!(set.path_of(&set.held_out[0]).starts_with(data.path().canonicalize().unwrap()));
         assert_eq!(set.rules_of(&set.held_out[0]).piece.rows, Some([0, 2]));
+        assert_eq!(set.rules_of(&set.held_out[0]).condition.len(), 1);
         assert!(set.path_of(&set.fit[0]).ends_with("prepared.csv"));
     }
 }

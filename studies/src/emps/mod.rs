@@ -4,7 +4,7 @@ mod null;
 mod pipeline;
 mod prepare;
 
-use crate::run::{Ask, diagnose, diagnosed_model, findings, parameter, refit, refitted, said};
+use crate::run::{Ask, LIKELY, diagnose, diagnosed_model, findings, instead, parameter, refit, refitted, said};
 use crate::table::Report;
 use crate::{Context, Study, StudyError};
 use backdrive_plant::model::Model;
@@ -115,11 +115,11 @@ fn told(report: &mut Report, context: &Context, ask: &Ask, train: &Record, pulse
     if let Some((error, zero)) = pipeline::error_from_its_zero(pulses, &model)? {
         report.figure(&format!("{from} error from its zero"), error);
         report.line(
-            &format!("the same, pulses, where its encoder counts from found, from the {from} model"),
+            &format!("the same, pulses, with the place its encoder counts from, from the {from} model"),
             format!("{error:.2} % (at {:.2} mm)", 1e3 * zero),
-            "",
-            "",
-            None,
+            "4.96 % (asymmetric form)",
+            PAPER,
+            Some(error <= BAR),
         );
     }
     let mass = model.values_at("bodies.carriage").ok().and_then(|v| v.first().copied()).unwrap_or(f64::NAN);
@@ -173,15 +173,7 @@ fn physics(report: &mut Report, from: &str, json: &Value) {
     };
     line("friction lost near rest", shown(lost, 1.0, "N"), "9 to 12 N", recomputed, Some(lost.is_some()));
     line("below a speed of", shown(speed, 1e3, "mm/s"), "10 to 14 mm/s, by the form of the law", recomputed, None);
-    let rivals = json["findings"].as_array().into_iter().flatten().flat_map(|f| {
-        let own = f["physics"].as_str().unwrap_or("").to_string();
-        let others = f["alternatives"].as_array().cloned().unwrap_or_default();
-        others
-            .into_iter()
-            .filter(|o| o["confidence"].as_f64().unwrap_or(0.0) > 0.05)
-            .map(move |o| format!("{own} or {} ({})", o["physics"].as_str().unwrap_or(""), o["confidence"]))
-    });
-    let rivals: Vec<String> = rivals.collect();
+    let rivals = instead(json, LIKELY);
     let text = if rivals.is_empty() { "nothing".to_string() } else { rivals.join(", ") };
     line("hard to tell apart", text, "exponential or power law at low speed", recomputed, None);
 }
