@@ -97,7 +97,7 @@ impl Device {
         let Some(model) = &files.model else {
             return Err(Failure::input(format!("{}: experiments need a master's model", graph.path.display())));
         };
-        let mut held = model.clone();
+        let (mut held, mut hands) = (model.clone(), model.own_hands());
         let mut columns = Vec::new();
         let topic = graph.topic_of(index, "measured").name;
         let intent = graph.nodes.iter().position(|n| n.kind == NodeKind::Operator);
@@ -107,12 +107,14 @@ impl Device {
             columns.push((output.clone(), topic.clone(), format!("position[{number}]")));
         }
         if let Some(grip) = &files.fragment {
-            let hands;
-            (held, hands) = model.held_by(grip);
-            for (number, hand) in hands {
-                let Some(intent) = intent else { continue };
-                columns.push((held.inputs[hand].name.clone(), graph.topic_of(intent, "intent").name, format!("position[{number}]")));
-            }
+            let of_grip;
+            (held, of_grip) = model.held_by(grip);
+            hands.extend(of_grip);
+        }
+        if let Some(intent) = intent {
+            let topic = graph.topic_of(intent, "intent").name;
+            let of_hand = |(number, hand): (usize, usize)| (held.inputs[hand].name.clone(), topic.clone(), format!("position[{number}]"));
+            columns.extend(hands.into_iter().map(of_hand));
         }
         // Only what is recorded can be compared.
         let recorded: Vec<usize> = model.axes.iter().map(|a| a.measured).collect();

@@ -117,6 +117,8 @@ impl Device {
             return Err(DeviceError::TooManyAxes(name, model.axes.len()));
         }
         let mut axes = Vec::new();
+        // A model that holds its user may have the hand as a motion input: it is the intent of the axis.
+        let own_hands = model.own_hands();
         for (index, axis) in model.axes.clone().iter().enumerate() {
             let kind = model.inputs[axis.feedback].kind;
             let (role_name, needed, fits) = match role {
@@ -131,7 +133,9 @@ impl Device {
             }
             axes.push(attach(&mut model, axis, index, fragment));
         }
-        bind_held_hands(&model, &mut axes);
+        for (axis, hand) in own_hands {
+            axes[axis].hand = Some(hand);
+        }
         for (index, input) in model.inputs.iter().enumerate() {
             if !axes.iter().any(|a| a.feedback == index || a.hand == Some(index)) {
                 return Err(DeviceError::UndrivenInput { model: name, input: input.name.clone() });
@@ -247,19 +251,6 @@ impl Device {
     /// Whether the state is finite.
     pub fn is_finite(&self) -> bool {
         self.plant.is_finite()
-    }
-}
-
-/// A model that holds its user may have the hand as a motion input: it is the intent of the axis, in the order of the axes.
-fn bind_held_hands(model: &Model, axes: &mut [Bound]) {
-    let feedbacks: Vec<usize> = axes.iter().map(|a| a.feedback).collect();
-    let is_hand = |i: &usize| model.inputs[*i].kind == InputKind::Motion && !feedbacks.contains(i);
-    let bound: Vec<usize> = axes.iter().filter_map(|a| a.hand).collect();
-    let mut hands = (0..model.inputs.len()).filter(is_hand).filter(|i| !bound.contains(i));
-    for (index, axis) in axes.iter_mut().enumerate() {
-        if axis.hand.is_none() && model.axes[index].holds_user {
-            axis.hand = hands.next();
-        }
     }
 }
 

@@ -72,6 +72,14 @@ impl Model {
         (held, hands)
     }
 
+    /// Of each axis whose user is part of the model, the input that is its hand, if it has one: a motion that drives no axis, in the order of the axes.
+    pub fn own_hands(&self) -> Vec<(usize, usize)> {
+        let drives = |i: usize| self.axes.iter().any(|axis| axis.feedback == i);
+        let hands = (0..self.inputs.len()).filter(|i| self.inputs[*i].kind == InputKind::Motion && !drives(*i));
+        let held = self.axes.iter().enumerate().filter(|(_, axis)| axis.holds_user).map(|(number, _)| number);
+        held.zip(hands).collect()
+    }
+
     /// Adds a fragment's bodies, elements, inputs and outputs, its port being body `user` of this model.
     ///
     /// Names are prefixed: `grip.spring`. Where `prefix` is taken already, `prefix2`, `prefix3`, ... is
