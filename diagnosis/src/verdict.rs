@@ -371,7 +371,15 @@ fn rivals(search: &Search, best: &Candidate, which: usize) -> Vec<(Hypothesis, f
         }
     }
     found.sort_by(|a, b| a.1.total_cmp(&b.1));
-    found
+    // However finely a law is drawn, it is one physics.
+    let same = |a: &Hypothesis, b: &Hypothesis| a.physics == b.physics && a.place.same(&b.place);
+    let mut each: Vec<(Hypothesis, f64)> = Vec::new();
+    for (rival, behind) in found {
+        if !same(&rival, own) && !each.iter().any(|(other, _)| same(&rival, other)) {
+            each.push((rival, behind));
+        }
+    }
+    each
 }
 
 fn place(place: &Place) -> Json {
