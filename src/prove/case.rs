@@ -5,7 +5,7 @@ use super::chosen::{Chosen, Task, choose};
 use super::edges::{Canceller, Loop, Moved};
 use super::hidden::{Hidden, Opened, program};
 use super::live::{self, LiveRun, hide};
-use super::score::{Finding, Mark, findings, is_nonlinear, mark, name_of};
+use super::score::{Finding, Handed, Mark, findings, is_nonlinear, mark, name_of};
 use super::session::hand_over;
 use crate::cli;
 use crate::failure::Failure;
@@ -193,7 +193,11 @@ pub fn prove(options: &cli::Prove, folder: &Path, drawn: &Draw, stop: &AtomicBoo
         sealed: digest,
         sentence: verdict["sentence"].as_str().unwrap_or_default().to_string(),
         concealed: truth.effects.iter().map(name_of).collect(),
-        marks: truth.effects.iter().map(|e| mark(e, &word, &findings, !drawn.shows_hand)).collect(),
+        marks: truth
+            .effects
+            .iter()
+            .map(|e| mark(e, &word, &findings, Handed { hand_hidden: !drawn.shows_hand, refitted: drawn.refitted }))
+            .collect(),
         nonlinear: is_nonlinear(&truth),
         held_out: ["nrmse_before", "nrmse_refit", "nrmse_after"].map(error),
         refit_floors: error("nrmse_refit").zip(error("noise_floor")).map(|(refit, floor)| refit / floor).filter(|x| x.is_finite()),

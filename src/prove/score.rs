@@ -53,11 +53,21 @@ fn sits_at(finding: &Finding, site: &Site) -> bool {
     }
 }
 
+/// How a case was handed over.
+#[derive(Debug, Clone, Copy)]
+pub struct Handed {
+    /// Whether nobody measured the hand.
+    pub hand_hidden: bool,
+    /// Whether the nominal numbers had been refitted before.
+    pub refitted: bool,
+}
+
 /// Marks a verdict's findings for an effect. Where it can only be told from the model's numbers, or from what an unmeasured hand may do, the
-/// right verdict names nothing.
-pub fn mark(effect: &Effect, word: &str, findings: &[Finding], hand_hidden: bool) -> Mark {
-    let possible = || effect.accept.iter().filter(|answer| hand_hidden || !answer.hand_hidden);
-    if findings.is_empty() && possible().any(|answer| answer.physics.iter().any(|name| name == word)) {
+/// right verdict names nothing; and where those numbers were refitted before, they may be right already.
+pub fn mark(effect: &Effect, word: &str, findings: &[Finding], handed: Handed) -> Mark {
+    let possible = || effect.accept.iter().filter(|answer| handed.hand_hidden || !answer.hand_hidden);
+    let says = |name: &str| name == word || handed.refitted && (name, word) == ("parameters", "nothing_missing");
+    if findings.is_empty() && possible().any(|answer| answer.physics.iter().any(|name| says(name))) {
         return Mark { place: true, family: true, exact: true };
     }
     let right = |f: &Finding| {
@@ -89,6 +99,17 @@ pub fn is_nonlinear(truth: &Truth) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_a_number_can_be_is_no_finding_and_after_a_refit_not_even_a_number() {
+        let truth = r#"{ "physics": "inertia", "parameters": { "inertia": 0.1 }, "between": ["drum", "ground"], "replaces": [], "family": ["inertia"],
+            "nonlinear": false, "in_formats": true, "accept": [{ "between": ["drum", "ground"], "physics": ["inertia", "parameters"] }] }"#;
+        let effect: Effect = serde_json::from_str(truth).unwrap();
+        let right = |word: &str, refitted: bool| mark(&effect, word, &[], Handed { hand_hidden: false, refitted }).exact;
+        assert!(right("parameters", false) && right("parameters", true));
+        assert!(!right("nothing_missing", false) && right("nothing_missing", true));
+        assert!(!right("unexplained", true));
+    }
 
     #[test]
     fn a_finding_sits_where_the_effect_does_whatever_the_grip_is_called() {
