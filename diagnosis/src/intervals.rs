@@ -5,6 +5,7 @@ use crate::fit::{Evaluator, normal_equations};
 use crate::search::Candidate;
 use crate::simulate::TWICE;
 use nalgebra::{DMatrix, DVector};
+use statrs::distribution::{ChiSquared, ContinuousCDF};
 use std::time::Duration;
 
 /// Standard deviations of a fit's numbers, in the fit's own unit (logarithms where it steps in them), and their correlations. Residuals
@@ -21,6 +22,8 @@ pub struct Spread {
 
 /// 97.5 % of a normal distribution.
 const NORMAL_975: f64 = 1.959_964;
+/// Probability below which numbers lie elsewhere than a fit has them.
+const CHANCE: f64 = 1e-3;
 /// Blocks that each recording's output is divided into, where the scores of a fit are summed.
 const BLOCKS: usize = 25;
 /// What a simulation of all recordings may take before it counts as slow.
@@ -104,6 +107,22 @@ impl Spread {
         spread
     }
 
+    /// Whether some of these numbers lie elsewhere than the fit has them by more than chance: `others` are places among the fit's numbers, and values as
+    /// they stand in the model. All together, for numbers that go together may each lie in its own interval.
+    pub fn is_far(&self, candidate: &Candidate, others: &[(usize, f64)]) -> bool {
+        let away = |(number, other): &(usize, f64)| {
+            let (n, value) = (candidate.structure.numbers.get(*number)?, candidate.fit.values.get(*number)?);
+            let (deviation, bias) = (self.deviation.get(*number)?, self.bias.get(*number)?);
+            let off = n.inward(*other) - n.inward(*value);
+            let beyond = (off.abs() - bias).max(0.0).copysign(off);
+            deviation.is_finite().then_some((*number, beyond / deviation))
+        };
+        let known: Vec<(usize, f64)> = others.iter().filter_map(away).collect();
+        let correlation = DMatrix::from_fn(known.len(), known.len(), |a, b| self.correlation[(known[a].0, known[b].0)]);
+        let square = distance_square(&known.iter().map(|k| k.1).collect::<Vec<f64>>(), correlation);
+        ChiSquared::new(known.len() as f64).is_ok_and(|d| d.sf(square) < CHANCE)
+    }
+
     /// Half of a number's 95 % interval, in the fit's own unit.
     pub fn half(&self, number: usize) -> f64 {
         let deviation = self.deviation.get(number).copied().unwrap_or(f64::INFINITY);
@@ -120,6 +139,14 @@ impl Spread {
         let half = self.half(number);
         [n.outward((own - half).max(low)), n.outward((own + half).min(high))]
     }
+}
+
+/// Square of the distance of normal numbers from their means: `off` in standard deviations.
+fn distance_square(off: &[f64], correlation: DMatrix<f64>) -> f64 {
+    let off = DVector::from_column_slice(off);
+    // What does not tell two numbers apart at all must not make them far.
+    let inner = (correlation + DMatrix::identity(off.len(), off.len()) * 1e-6).cholesky();
+    inner.map_or_else(|| off.norm_squared(), |inner| off.dot(&inner.solve(&off)))
 }
 
 /// Curvature of half the cost, priors included.
@@ -154,4 +181,20 @@ fn inverse(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
         }
     }
     Some(inverse)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_that_go_together_are_nearer_than_each_says() {
+        let of = |off: [f64; 2], rho: f64| distance_square(&off, DMatrix::from_row_slice(2, 2, &[1.0, rho, rho, 1.0]));
+        // 2/(1 + rho) along the direction in which they go together, 2/(1 - rho) across it.
+        for rho in [0.0, 0.5, 0.9] {
+            assert!((of([1.0, 1.0], rho) / (2.0 / (1.0 + rho)) - 1.0).abs() < 1e-4);
+            assert!((of([1.0, -1.0], rho) / (2.0 / (1.0 - rho)) - 1.0).abs() < 1e-4);
+        }
+        assert!(of([1.0, 1.0], 1.0) < 1.001);
+    }
 }

@@ -10,7 +10,7 @@ use crate::numbers::stated_edits;
 use crate::problem::Problem;
 use crate::search::{AT_FLOOR, Candidate, Search, advantage_over};
 use crate::statistics::advantage;
-use crate::structure::Role;
+use crate::structure::{Number, Role, Structure};
 use crate::unknown::{Estimated, Unknown, estimated};
 use backdrive_plant::write::{patch, round_significant};
 use serde_json::{Value as Json, json};
@@ -146,8 +146,8 @@ pub fn verdict(problem: &Problem, search: &Search, model_name: &str) -> Result<V
     let added = !best.structure.added.is_empty();
     let bursts = bursts(problem, best);
     let alike = alike(search, best);
-    let off = given_is_off(problem, search);
     let nominal = &search.nominal;
+    let off = given_is_off(problem, search) && (added || spread.is_far(nominal, &stated_in(problem, &nominal.structure)));
     let wanders = nominal.slowness > WANDERS && nominal.levels.iter().any(|l| *l > AT_FLOOR);
     let word = match () {
         () if added && (at_floor || explained > 0.99) && !alike.is_empty() => "ambiguous",
@@ -256,6 +256,15 @@ fn given_is_off(problem: &Problem, search: &Search) -> bool {
     let refit = &search.nominal;
     let numbers = refit.structure.numbers.len();
     advantage(cost, 0, refit.fit.cost, numbers, total, refit.correlation_time) > 0.0 && refit.fit.cost < 0.99 * cost
+}
+
+/// Where the stated numbers are among a structure's, and what the nominal file says.
+fn stated_in(problem: &Problem, structure: &Structure) -> Vec<(usize, f64)> {
+    let one = |(place, number): (usize, &Number)| match number.role {
+        Role::Stated(i) => Some((place, problem.stated.get(i)?.given)),
+        _ => None,
+    };
+    structure.numbers.iter().enumerate().filter_map(one).collect()
 }
 
 /// Structures of as many effects that cannot be told from the best: another place, or a law that is no richer form of its own.
