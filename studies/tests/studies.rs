@@ -138,8 +138,9 @@ fn the_damper_s_joint_is_slack_about_its_middle() {
     assert!(["backlash at rod-drum", "cubic_spring at rod-drum"].iter().any(|p| verdict.contains(p)), "{verdict}");
     let [before, after] = ["held out before", "held out after"].map(|name| report.figure_named(name));
     assert!(after < 0.7 * before, "{after} {before}");
-    // The play that is known to be there, fitted in its place.
-    assert!((3.5e-3..5.5e-3).contains(&report.figure_named("rival gap")), "{}", report.figure_named("rival gap"));
+    // The play that is known to be there, fitted in its place: its gap lies between the lines that its round edges go over to, and is wider than
+    // the dead zone of 4.3 mm that is read off.
+    assert!((4.0e-3..7.0e-3).contains(&report.figure_named("rival gap")), "{}", report.figure_named("rival gap"));
     let [forward, backward] = ["forward", "backward"].map(|side| report.figure_named(&format!("rival {side}")));
     assert!((8e3..11e3).contains(&forward) && (9e3..12e3).contains(&backward), "{forward} {backward}");
     // More tension, more friction.
