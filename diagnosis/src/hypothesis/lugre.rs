@@ -1,8 +1,8 @@
 //! Bristle friction: presliding, a level that falls with speed, and lag between them.
 
-use super::Physics;
 use super::builder::{ElementBuilder, Freedom, any, log, replaced_friction};
 use super::sites::FRICTION;
+use super::{Hypothesis, Parameter, Physics};
 
 pub(super) const PHYSICS: Physics = Physics {
     name: "lugre",
@@ -32,3 +32,22 @@ pub(super) const PHYSICS: Physics = Physics {
         sites.near().filter_map(one).collect()
     },
 };
+
+/// What holds a body at rest over what it slides with, at first.
+const HOLDS: f64 = 1.2;
+
+/// Values about those of Dahl's law, whose level is that at speed, and a little more at rest.
+pub(super) fn around(dahl: &[f64], finer: &Hypothesis) -> Option<Vec<f64>> {
+    let &[stiffness, level] = dahl else { return None };
+    let first = finer.starts.first()?;
+    let value = |(p, start): (&Parameter, &f64)| {
+        let value = match p.key.as_str() {
+            "stiffness" => stiffness,
+            "coulomb" => level,
+            "static" => HOLDS * level,
+            _ => *start,
+        };
+        value.clamp(p.range.0, p.range.1)
+    };
+    Some(finer.parameters.iter().zip(first).map(value).collect())
+}

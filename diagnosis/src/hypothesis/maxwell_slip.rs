@@ -56,3 +56,21 @@ pub(super) fn split(coarse: &Hypothesis, values: &[f64], finer: &Hypothesis) -> 
     let within = |(p, v): (&Parameter, f64)| v.clamp(p.range.0, p.range.1);
     Some(finer.parameters.iter().zip(lists.concat()).map(within).collect())
 }
+
+/// Values with which sliders pull at first loading as one bristle of `coarse` does, a force that nears its level exponentially: the corners of a
+/// polygon on that curve.
+pub(super) fn spread(coarse: &Hypothesis, values: &[f64], finer: &Hypothesis) -> Option<Vec<f64>> {
+    let number = |key: &str| coarse.parameters.iter().zip(values).find(|(p, _)| p.key == key).map(|(_, v)| *v);
+    let (stiffness, level) = (number("stiffness")?, number("coulomb")?);
+    let count = finer.parameters.len() / 2;
+    // Corners at which even shares of the level are reached, short of it, where the last slider slips.
+    let reach = |corner: usize| corner as f64 / (count as f64 + 0.25);
+    let corners: Vec<[f64; 2]> = (0..=count).map(|i| [-(1.0 - reach(i)).ln() * level / stiffness, reach(i) * level]).collect();
+    let slopes: Vec<f64> = corners.windows(2).map(|w| (w[1][1] - w[0][1]) / (w[1][0] - w[0][0])).chain([0.0]).collect();
+    let whole = 1.0 / reach(count);
+    let sliders = slopes.windows(2).zip(corners.iter().skip(1)).map(|(s, c)| [whole * (s[0] - s[1]), whole * (s[0] - s[1]) * c[0]]);
+    let (stiffnesses, forces): (Vec<f64>, Vec<f64>) = sliders.map(|[k, f]| (k, f)).unzip();
+    let within = |(p, v): (&Parameter, f64)| v.clamp(p.range.0, p.range.1);
+    let start: Vec<f64> = finer.parameters.iter().zip(stiffnesses.into_iter().chain(forces)).map(within).collect();
+    start.iter().all(|v| v.is_finite()).then_some(start)
+}

@@ -139,14 +139,17 @@ pub struct Parameter {
     pub log: bool,
 }
 
-/// Values with which one hypothesis does nearly what another of the same law, at the same place and with fewer numbers, does with its own; `None`
-/// where they are no such two.
+/// Values with which one hypothesis does nearly what another at the same place with fewer numbers does with its own, where it is the same law drawn
+/// more finely: friction that builds up over a distance is that of many contacts, drawn with one state. `None` where they are no such two.
 pub(crate) fn refined(coarse: &Hypothesis, values: &[f64], finer: &Hypothesis) -> Option<Vec<f64>> {
-    let alike = coarse.physics == finer.physics && coarse.place.same(&finer.place) && coarse.replaces == finer.replaces;
-    match coarse.physics {
-        _ if !alike => None,
-        "maxwell_slip" => maxwell_slip::split(coarse, values, finer),
-        "backlash" => backlash::blunted(values, finer),
+    if !coarse.place.same(&finer.place) || coarse.replaces != finer.replaces {
+        return None;
+    }
+    match (coarse.physics, finer.physics) {
+        ("maxwell_slip", "maxwell_slip") => maxwell_slip::split(coarse, values, finer),
+        ("dahl" | "lugre", "maxwell_slip") => maxwell_slip::spread(coarse, values, finer),
+        ("dahl", "lugre") => lugre::around(values, finer),
+        ("backlash", "backlash") => backlash::blunted(values, finer),
         _ => None,
     }
 }

@@ -316,6 +316,40 @@ fn a_law_drawn_more_finely_begins_where_the_coarse_one_ends() {
 }
 
 #[test]
+fn many_contacts_begin_where_one_bristle_ends() {
+    let (mut sliders, mut bristles) = (0, 0);
+    for (name, _, model) in devices() {
+        let (hypotheses, _) = hypotheses(&model);
+        for coarse in hypotheses.iter().filter(|h| ["dahl", "lugre"].contains(&h.physics)) {
+            let values = &coarse.starts[0];
+            let number = |key: &str| coarse.parameters.iter().zip(values).find(|(p, _)| p.key == key).map(|(_, v)| *v);
+            let (stiffness, level) = (number("stiffness").expect("has one"), number("coulomb").expect("has one"));
+            for (fine, start) in hypotheses.iter().filter_map(|h| Some((h, refined(coarse, values, h)?))) {
+                assert!(fine.parameters.len() > coarse.parameters.len() && fine.place.same(&coarse.place), "{name}: {}", fine.id);
+                if fine.physics == "lugre" {
+                    let of = |key: &str| fine.parameters.iter().zip(&start).find(|(p, _)| p.key == key).map(|(_, v)| *v);
+                    assert_eq!((of("stiffness"), of("coulomb")), (Some(stiffness), Some(level)), "{name}: {}", fine.id);
+                    assert!(of("static") > Some(level));
+                    bristles += 1;
+                    continue;
+                }
+                let (stiffnesses, forces) = start.split_at(start.len() / 2);
+                let pull = |x: f64| -> f64 { stiffnesses.iter().zip(forces).map(|(k, f)| (k * x).min(*f)).sum() };
+                for x in (0..60).map(|i| 0.1 * f64::from(i) * level / stiffness) {
+                    // Dahl's law with exponent 1, whose force at first loading is known.
+                    let exact = level * (1.0 - (-stiffness * x / level).exp());
+                    let most = level / (forces.len() as f64 + 0.25);
+                    assert!((pull(x) - exact).abs() < most, "{name}: {} at {x}: {} and {exact} of {level}", fine.id, pull(x));
+                }
+                assert!((forces.iter().sum::<f64>() / level - 1.0).abs() < 1e-12, "{name}: {}", fine.id);
+                sliders += 1;
+            }
+        }
+    }
+    assert!(sliders > 10 && bristles > 5, "{sliders} and {bristles}");
+}
+
+#[test]
 fn a_play_with_round_edges_begins_where_the_sharp_one_ends() {
     use backdrive_plant::elements::{Backlash, Mechanics};
     let mut pairs = 0;

@@ -170,6 +170,8 @@ const SHARE: f64 = 0.3;
 const LOOSER: [(f64, bool); 5] = [(0.2, true), (1.0, false), (0.2, false), (0.04, false), (0.008, false)];
 /// Samples that screening is shown far from the noise, about.
 const SHOWN: usize = 5_000;
+/// Ripples that stand alone in the spectrum of their force which are fitted without the path that leads the others.
+const RIPPLES: usize = 4;
 /// The last steps of those that could still win.
 const POLISH: Effort = Effort { steps: 15, tolerance: 0.3 };
 /// Structures of so many effects that are held against recordings that no fit has seen.
@@ -296,7 +298,7 @@ pub fn search(
     });
 
     report("looking for ripples");
-    view::ripples(&seen, &model, &evaluator.floor, &mut hypotheses);
+    let ripples = view::ripples(&seen, &model, &evaluator.floor, &mut hypotheses);
     report("screening");
     let share = if far { 0.08 } else { 0.2 };
     let mut views = vec![View::of(&coarse, parts.as_ref(), (&structure, base), &hypotheses, settings.patience.mul_f64(share), guided)];
@@ -365,7 +367,7 @@ pub fn search(
         hypotheses.iter().enumerate().filter_map(one).collect()
     };
     use Wave::*;
-    let mut waves = vec![First, Laws, Singles, Plain, Elsewhere, Relatives];
+    let mut waves = vec![Ripples, First, Laws, Singles, Plain, Elsewhere, Relatives];
     if !quiet {
         waves.extend([Finer, Pairs, Laws, Exchanges, Richer, MoreSingles, MorePairs, Laws, Exchanges, Elsewhere]);
         for _ in 2..settings.effects {
@@ -406,6 +408,12 @@ pub fn search(
         }
         report(wave.name());
         let mut seeds: Vec<Seed> = match wave {
+            // Along the measured path a ripple slides out of phase.
+            Ripples if guided => {
+                let beside = (&nominal.structure, &nominal.fit.values[..]);
+                ripples.iter().take(RIPPLES).map(|ripple| Seed::beside(problem, beside, vec![ripple.clone()], false)).collect()
+            }
+            Ripples => Vec::new(),
             // Those that promise most first: where one of them reaches the floor, the rest have nothing left to explain.
             First => singles.by_ref().take(if guided { 30 } else { 4 }).collect(),
             // Where one law helps another one may be the right one: every law there, from every start.
@@ -486,7 +494,7 @@ pub fn search(
         // What only shows beside a law that was found shows little along the path of the nominal model.
         let raced = match wave {
             Anew => Course { along: None, coarse: fine, ..course }.race(seeds, wave.keep()),
-            Finer => Course { along: None, ..course }.race(seeds, wave.keep()),
+            Finer | Ripples => Course { along: None, ..course }.race(seeds, wave.keep()),
             Elsewhere => Course { along: None, ..to_the_end }.race(seeds, wave.keep()),
             Relatives => to_the_end.race(seeds, wave.keep()),
             _ => course.race(seeds, wave.keep()),

@@ -3,7 +3,7 @@
 use super::{Candidate, Detectable, candidate};
 use crate::fit::{Effort, Evaluator, Fit};
 use crate::hypothesis::Hypothesis;
-use crate::locate;
+use crate::locate::{self, Ripple};
 use crate::parts::Parts;
 use crate::problem::Record;
 use crate::race::Seed;
@@ -17,6 +17,10 @@ use std::time::Duration;
 pub(super) const SIMPLE: usize = 6;
 /// Samples in which ripples are looked for, at most.
 const LOCATED: usize = 12_000;
+/// Power of a ripple's line over the median of all: the highest of a thousand lines of white noise has about ten times that.
+const PROMINENT: f64 = 100.0;
+/// Share of a force that a ripple explains over the next one's, above which it stands alone.
+const ALONE: f64 = 3.0;
 
 /// What screening sees from one base.
 pub(super) struct View<'a> {
@@ -75,19 +79,26 @@ impl<'a> View<'a> {
 }
 
 /// A ripple shows in a force over displacement, at whatever period, but fits only start from a few: where locating finds one, a fit starts there.
-pub(super) fn ripples(records: &[Record], model: &Model, floor: &[f64], hypotheses: &mut [Hypothesis]) {
+/// Those that stand alone in the spectrum of their force, with what makes them, are given back, the largest share first: gaps and friction make many lines.
+pub(super) fn ripples(records: &[Record], model: &Model, floor: &[f64], hypotheses: &mut [Hypothesis]) -> Vec<(usize, Vec<f64>)> {
     let runs: Vec<locate::Run> = records.iter().map(locate::Run::from).collect();
     let options = locate::Options { most_samples: LOCATED, laws_of_a_form: 0, ..locate::Options::quick() };
     // Where the model cannot be located in, fits start from the usual periods.
-    let Ok(location) = locate::locate(model, &runs, floor, &options) else { return };
+    let Ok(location) = locate::locate(model, &runs, floor, &options) else { return Vec::new() };
+    let mut alone: Vec<(f64, usize, Vec<f64>)> = Vec::new();
     for place in &location.ranking {
-        for h in hypotheses.iter_mut().filter(|h| h.physics == "cogging" && h.place.same(&place.place)) {
-            let starts = place.ripples.iter().map(|r| vec![r.amplitude, r.period, r.phase]);
+        for (index, h) in hypotheses.iter_mut().enumerate().filter(|(_, h)| h.physics == "cogging" && h.place.same(&place.place)) {
+            let start = |r: &Ripple| vec![r.amplitude, r.period, r.phase];
             let inside = |start: &Vec<f64>| start.iter().zip(&h.parameters).all(|(x, p)| (p.range.0..=p.range.1).contains(x));
-            let new: Vec<Vec<f64>> = starts.filter(inside).collect();
+            let next = place.ripples.get(1).map_or(0.0, |r| r.share);
+            let first = place.ripples.first().filter(|r| r.prominence > PROMINENT && r.share > ALONE * next);
+            alone.extend(first.map(|r| (r.share, index, start(r))).filter(|(_, _, start)| inside(start)));
+            let new: Vec<Vec<f64>> = place.ripples.iter().map(start).filter(inside).collect();
             h.starts.splice(0..0, new);
         }
     }
+    alone.sort_by(|a, b| b.0.total_cmp(&a.0));
+    alone.into_iter().map(|(_, index, start)| (index, start)).collect()
 }
 
 /// Physics whose effect grows in proportion to their first parameter: what an effect is worth claiming, at the place where the least is enough.

@@ -3,6 +3,7 @@
 /// What is tried next.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Wave {
+    Ripples,
     First,
     Laws,
     Singles,
@@ -22,6 +23,7 @@ pub(super) enum Wave {
 impl Wave {
     pub fn name(self) -> &'static str {
         match self {
+            Wave::Ripples => "fitting ripples",
             Wave::First | Wave::Singles => "fitting single effects",
             Wave::Laws => "fitting other laws in the same place",
             Wave::Plain => "fitting laws of one number",
@@ -44,7 +46,7 @@ impl Wave {
             Wave::First | Wave::Laws | Wave::Elsewhere | Wave::Relatives => [3, 3],
             Wave::Singles | Wave::Plain | Wave::Exchanges | Wave::MoreSingles | Wave::Anew => [4, 2],
             Wave::Pairs | Wave::MorePairs => [5, 3],
-            Wave::Finer => [3, 2],
+            Wave::Finer | Wave::Ripples => [3, 2],
             Wave::Richer => [2, 1],
             Wave::More => [4, 3],
         }
