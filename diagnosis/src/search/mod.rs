@@ -516,6 +516,13 @@ pub fn search(
         found[i] = candidate(&evaluator, found[i].structure.clone(), fit);
     }
     sort(&mut found, samples);
+    // An effect may only have led the rest out of a wrong valley: each of the best's is left out again, the others from where they are now.
+    let last = Evaluator { until: Some(began + settings.patience.mul_f64(0.94)), ..evaluator.clone() };
+    let fewer = to_the_end.fewer(&found);
+    let fits = fewer.into_par_iter().filter_map(|(structure, start)| Some((last.fit(&structure, &start, POLISH)?, structure)));
+    let fewer: Vec<Candidate> = fits.map(|(fit, structure)| candidate(&evaluator, structure, fit)).collect();
+    found.extend(fewer);
+    sort(&mut found, samples);
     // The numbers of what was found may lead the nominal model out of a wrong basin: then there was less to find.
     let mut better = None;
     let last = Evaluator { until: Some(began + settings.patience.mul_f64(0.97)), ..evaluator.clone() };

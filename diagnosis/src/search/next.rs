@@ -65,6 +65,22 @@ impl Course<'_> {
         seeds
     }
 
+    /// The best with each of its effects left out, where there is more than one, and where to start.
+    pub(super) fn fewer(&self, found: &[Candidate]) -> Vec<(Structure, Vec<f64>)> {
+        let problem = self.evaluator.problem;
+        let Some(best) = found.first().filter(|c| c.structure.added.len() > 1) else { return Vec::new() };
+        let (stated, of_records) = (best.structure.stated_of(problem, &best.fit.values), best.structure.of_records(&best.fit.values));
+        let values = best.structure.added_of(&best.fit.values);
+        let without = |out: usize| {
+            let rest = || best.structure.added.iter().zip(&values).enumerate().filter(move |(i, _)| *i != out).map(|(_, effect)| effect);
+            let structure = Structure::new(problem, &problem.fit, rest().map(|(h, _)| h.clone()).collect());
+            let kept: Vec<Vec<f64>> = rest().map(|(_, v)| v.clone()).collect();
+            let start = structure.values(problem, &stated, &kept, &of_records);
+            (structure, start)
+        };
+        (0..values.len()).map(without).collect()
+    }
+
     /// The best, and what does nearly as well with as many effects, with a law of theirs drawn more finely.
     pub(super) fn finer(&self, found: &[Candidate]) -> Vec<Seed> {
         let Some(best) = found.first() else { return Vec::new() };
