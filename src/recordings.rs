@@ -120,16 +120,16 @@ fn of_files(paths: &[PathBuf]) -> Result<RecordingSet, Failure> {
         }
     }
     let fit = paths.iter().map(|p| p.to_string_lossy().into_owned()).collect();
-    let (model, held_out, files) = (None, Vec::new(), Vec::new());
     Ok(RecordingSet {
         folder: PathBuf::new(),
-        model,
+        model: None,
         fit,
-        held_out,
+        held_out: Vec::new(),
         initial: Initial::Rest,
         unknown: Vec::new(),
         columns: Columns::new(),
-        files,
+        files: Vec::new(),
+        sessions: Vec::new(),
     })
 }
 

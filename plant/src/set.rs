@@ -52,8 +52,10 @@ pub struct RecordingSet {
     pub unknown: Vec<(String, f64)>,
     /// Names and units in the files.
     pub columns: Columns,
-    /// What is particular to a file, by its name in `fit` or `held_out`.
+    /// What is particular to a file, by its name in `fit` or `held_out`; what a session shares stands at each of its files.
     pub files: Vec<(String, FileRules)>,
+    /// Names of the sessions, in their order, and the paths that each of them has a condition for.
+    pub sessions: Vec<(String, Vec<String>)>,
 }
 
 impl RecordingSet {
@@ -80,6 +82,7 @@ impl RecordingSet {
                     unknown: Vec::new(),
                     columns: Columns::new(),
                     files: Vec::new(),
+                    sessions: Vec::new(),
                 })
             }
         }
@@ -95,17 +98,18 @@ impl RecordingSet {
         self.files.iter().find(|f| f.0 == file).map(|f| f.1.clone()).unwrap_or_default()
     }
 
-    /// Whether every condition names a number of the model; the error names the file of the set and the path.
+    /// Whether every condition names a number of the model; the error names the file or the session, and the path.
     pub fn check_conditions(&self, model: &crate::model::Model) -> Result<(), FileError> {
-        for (file, rules) in &self.files {
-            for (path, _) in &rules.condition {
-                model.values_at(path).map_err(|message| FileError {
-                    path: self.path_of("set.toml").display().to_string(),
-                    line: None,
-                    key: format!("files.{file}.condition.{path}"),
-                    message,
-                })?;
-            }
+        let of_sessions = self.sessions.iter().flat_map(|(name, paths)| paths.iter().map(move |path| (format!("sessions.{name}"), path)));
+        let of_files =
+            self.files.iter().flat_map(|(name, rules)| rules.condition.iter().map(move |(path, _)| (format!("files.{name}"), path)));
+        for (owner, path) in of_sessions.chain(of_files) {
+            model.values_at(path).map_err(|message| FileError {
+                path: self.path_of("set.toml").display().to_string(),
+                line: None,
+                key: format!("{owner}.condition.{path}"),
+                message,
+            })?;
         }
         Ok(())
     }
@@ -187,6 +191,7 @@ fn read(mut top: Table, folder: PathBuf) -> Result<RecordingSet, FileError> {
             files.push((name, read_rules(below)?));
         }
     }
+    let mut sessions = Vec::new();
     if let Some(mut table) = top.table("sessions")? {
         for (session, name) in table.keys().into_iter().enumerate() {
             let mut below = table.table(&name)?.ok_or_else(|| table.missing(&name))?;
@@ -213,10 +218,12 @@ fn read(mut top: Table, folder: PathBuf) -> Result<RecordingSet, FileError> {
                 }
             }
             below.finish()?;
+            sessions.push((name, condition.into_iter().map(|(path, _)| path).collect()));
         }
     }
     top.finish()?;
-    Ok(RecordingSet { model: model.map(|name| folder.join(name)), folder, fit, held_out, initial, unknown: unknown_inputs, columns, files })
+    let model = model.map(|name| folder.join(name));
+    Ok(RecordingSet { model, folder, fit, held_out, initial, unknown: unknown_inputs, columns, files, sessions })
 }
 
 fn shown(folder: &Path) -> String {

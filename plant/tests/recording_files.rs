@@ -170,8 +170,12 @@ condition = { "inputs.position.offset" = "free" }
     );
     assert_eq!(s.rules_of("b.mcap"), Default::default());
     assert_eq!(s.rules_of("c.csv").condition, [("inputs.position.offset".to_string(), Condition::Shared(0))]);
-    let error = s.check_conditions(&Model::default()).unwrap_err();
-    assert!(error.to_string().ends_with("files.a.csv.condition.elements.band.force: unknown element \"band\"; there is none here"));
+    assert_eq!(s.sessions, [("tuesday".to_string(), vec!["inputs.position.offset".to_string()])]);
+    let refused = |s: &RecordingSet| s.check_conditions(&Model::default()).unwrap_err().to_string();
+    let message = refused(&s);
+    assert!(message.contains("set.toml: sessions.tuesday.condition.inputs.position.offset: unknown input \"position\""), "{message}");
+    let message = refused(&RecordingSet { sessions: Vec::new(), ..s.clone() });
+    assert!(message.ends_with("files.a.csv.condition.elements.band.force: unknown element \"band\"; there is none here"), "{message}");
     assert_eq!(RecordingSet::open(&dir.path().join("set.toml")).unwrap(), s);
 
     let bare = folder(&[("b.csv", DATA), ("a.csv", DATA), ("notes.txt", "")]);
