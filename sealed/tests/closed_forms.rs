@@ -2,7 +2,7 @@
 
 mod common;
 
-use backdrive_sealed::effects::{Physics, Site};
+use backdrive_sealed::effects::{Answer, Physics, Site};
 use backdrive_sealed::laws::*;
 use backdrive_sealed::plant::SealedPlant;
 use backdrive_sealed::truth::Truth;
@@ -306,4 +306,36 @@ of = "ram"
     let force = 0.01 / (1.0 / 1000.0 + 1.0 / 2000.0 + 1.0 / 4000.0);
     near(rows[2999][0], force, 1e-6);
     near(rows[2999][1], force, 1e-6);
+}
+
+#[test]
+fn a_constant_force_whose_reaction_the_held_body_takes_is_a_hand_elsewhere() {
+    let network = held("plant/models/impulse-engine-linear.toml");
+    let force = 0.44;
+    let bias = |to: &str| (Physics::Law(Law::Bias(Bias { force })), Site::Between(["drum".to_string(), to.to_string()]), Vec::new());
+    let truths = [hiding(&network, vec![bias("ground")]), hiding(&network, vec![bias("handle")])];
+    let hidden = |truth: &Truth, place: [&str; 2]| {
+        let same = |a: &&Answer| a.site == Site::Between(place.map(String::from)) && a.physics == ["bias"] && a.hand_hidden;
+        truth.effects[0].accept.iter().filter(same).count()
+    };
+    assert_eq!((hidden(&truths[0], ["drum", "handle"]), hidden(&truths[1], ["drum", "ground"])), (1, 1));
+    // What the second pulls at the handle, the hand's spring gives back where the hand stands off by force/stiffness.
+    let spring = network.elements.iter().find_map(|e| match &e.law {
+        Law::Spring(spring) if e.of_grip => Some(spring.stiffness),
+        _ => None,
+    });
+    let off = force / spring.unwrap();
+    let mut plants = truths.map(|truth| SealedPlant::new(&network, &truth, 2e-4).unwrap());
+    let (mut apart, mut moved) = (0.0_f64, 0.0_f64);
+    for k in 0..5000 {
+        let (f, hand) = (2.0 * (0.01 * f64::from(k)).sin(), 2e-3 * (1e-3 * f64::from(k)).sin());
+        plants[0].step(&[f, hand]).unwrap();
+        plants[1].step(&[f, hand - off]).unwrap();
+        let [a, b] = [plants[0].outputs()[0], plants[1].outputs()[0]];
+        // The hand takes its place in the first step, which dies away.
+        if k > 4000 {
+            (apart, moved) = (apart.max((a - b).abs()), moved.max(a.abs()));
+        }
+    }
+    assert!(moved > 1e-3 && apart < 1e-9, "{moved} m, {apart} m apart");
 }

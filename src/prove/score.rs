@@ -78,7 +78,7 @@ pub fn mark(effect: &Effect, word: &str, findings: &[Finding], handed: Handed) -
     };
     let exact = findings.iter().any(right);
     let there: Vec<&Finding> =
-        findings.iter().filter(|f| sits_at(f, &effect.site) || effect.accept.iter().any(|a| sits_at(f, &a.site))).collect();
+        findings.iter().filter(|f| sits_at(f, &effect.site) || possible().any(|a| sits_at(f, &a.site))).collect();
     Mark { place: exact || !there.is_empty(), family: exact || there.iter().any(|f| effect.family.contains(&f.physics)), exact }
 }
 
@@ -109,6 +109,18 @@ mod tests {
         assert!(right("parameters", false) && right("parameters", true));
         assert!(!right("nothing_missing", false) && right("nothing_missing", true));
         assert!(!right("unexplained", true));
+    }
+
+    #[test]
+    fn what_only_a_hidden_hand_makes_the_same_is_wrong_where_the_hand_is_known() {
+        let truth = r#"{ "physics": "bias", "parameters": { "force": 0.1 }, "between": ["drum", "ground"], "replaces": [], "family": ["bias"],
+            "nonlinear": false, "in_formats": true, "accept": [{ "between": ["drum", "ground"], "physics": ["bias"] },
+            { "between": ["drum", "handle"], "physics": ["bias"], "hand_hidden": true }] }"#;
+        let effect: Effect = serde_json::from_str(truth).unwrap();
+        let found = Finding { physics: "bias".to_string(), place: vec!["drum".to_string(), "handle".to_string()], confidence: 1.0 };
+        let marked = |hand_hidden: bool| mark(&effect, "missing", std::slice::from_ref(&found), Handed { hand_hidden, refitted: false });
+        assert!(marked(true).exact && marked(true).place);
+        assert!(!marked(false).exact && !marked(false).place && !marked(false).family);
     }
 
     #[test]

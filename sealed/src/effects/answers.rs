@@ -115,9 +115,23 @@ pub(super) fn answers(effect: &Effect, network: &Network) -> Vec<Answer> {
                 .map(|input| network.bodies[input.on].name.as_str())
                 .collect();
             if let Some(body) = ends.iter().find(|end| *end != GROUND).filter(|_| site.is_at_ground()) {
-                for hand in moved {
+                for hand in &moved {
                     all.push(answer(&Site::Between([body.clone(), hand.to_string()]), &["bias"]));
                 }
+            }
+            // Where the reaction is taken by the body that the hand's spring holds, a hand somewhere else takes it on; one that nobody measured may be.
+            for end in network.elements.iter().filter(|e| e.of_grip && matches!(e.law, Law::Spring(_))).flat_map(|e| e.between) {
+                let held = network.place_name(end);
+                let other = |name: &str| ends.iter().find(|end| *end == name).and_then(|_| ends.iter().find(|end| *end != name));
+                if held == GROUND || moved.contains(&held) {
+                    continue;
+                }
+                let same = match (other(GROUND), other(held)) {
+                    (Some(body), _) if body != held => [body.clone(), held.to_string()],
+                    (None, Some(body)) => [body.clone(), GROUND.to_string()],
+                    _ => continue,
+                };
+                all.push(Answer { hand_hidden: true, ..answer(&Site::Between(same), &["bias"]) });
             }
         }
         // At the only input and the only output; the hand's motion is an input that only some recordings have.
