@@ -77,8 +77,7 @@ pub fn mark(effect: &Effect, word: &str, findings: &[Finding], handed: Handed) -
         })
     };
     let exact = findings.iter().any(right);
-    let there: Vec<&Finding> =
-        findings.iter().filter(|f| sits_at(f, &effect.site) || possible().any(|a| sits_at(f, &a.site))).collect();
+    let there: Vec<&Finding> = findings.iter().filter(|f| sits_at(f, &effect.site) || possible().any(|a| sits_at(f, &a.site))).collect();
     Mark { place: exact || !there.is_empty(), family: exact || there.iter().any(|f| effect.family.contains(&f.physics)), exact }
 }
 

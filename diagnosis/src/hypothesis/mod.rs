@@ -154,6 +154,31 @@ pub(crate) fn refined(coarse: &Hypothesis, values: &[f64], finer: &Hypothesis) -
     }
 }
 
+/// Where a fit of `other` starts in the place of a law that was fitted: of friction that holds and slides the forces are those of the one before, all
+/// scaled alike. Elsewhere its own starts.
+pub(crate) fn starts_beside(law: &Hypothesis, values: &[f64], other: &Hypothesis) -> Vec<Vec<f64>> {
+    let is_force = |p: &Parameter| matches!(p.unit.as_str(), "N" | "N m");
+    let forces = |h: &Hypothesis, values: &[f64]| {
+        let all: Vec<f64> = h.parameters.iter().zip(values).filter(|(p, _)| is_force(p)).map(|(_, v)| *v).collect();
+        // Sliders carry what they do together, other laws at one time one of their levels.
+        let share = if h.physics == "maxwell_slip" { 1.0 } else { 1.0 / all.len().max(1) as f64 };
+        share * all.iter().sum::<f64>()
+    };
+    let level = forces(law, values);
+    if law.family != "friction" || other.family != "friction" || level.is_nan() || level <= 0.0 {
+        return other.starts.clone();
+    }
+    let scaled = |start: &Vec<f64>| {
+        let own = forces(other, start);
+        let scale = if own > 0.0 { level / own } else { 1.0 };
+        let value = |(p, v): (&Parameter, &f64)| (if is_force(p) { scale * v } else { *v }).clamp(p.range.0, p.range.1);
+        other.parameters.iter().zip(start).map(value).collect()
+    };
+    let mut starts: Vec<Vec<f64>> = other.starts.iter().map(scaled).collect();
+    starts.dedup();
+    starts
+}
+
 /// A physics at a place.
 #[derive(Debug, Clone)]
 pub struct Hypothesis {

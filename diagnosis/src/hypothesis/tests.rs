@@ -376,3 +376,33 @@ fn a_play_with_round_edges_begins_where_the_sharp_one_ends() {
     }
     assert!(pairs > 3, "{pairs}");
 }
+
+#[test]
+fn friction_laws_begin_at_the_level_of_the_one_before() {
+    let mut seen = std::collections::BTreeSet::new();
+    for (name, _, model) in devices() {
+        let (hypotheses, _) = hypotheses(&model);
+        let is_force = |p: &Parameter| p.unit == "N" || p.unit == "N m";
+        for law in hypotheses.iter().filter(|h| h.physics == "dahl") {
+            let mut values = law.starts[0].clone();
+            let slot = law.parameters.iter().position(is_force).expect("has a level");
+            values[slot] *= 1.7;
+            for other in hypotheses.iter().filter(|h| h.family == "friction" && h.place.same(&law.place) && h.id != law.id) {
+                for start in starts_beside(law, &values, other) {
+                    let forces: Vec<f64> = other.parameters.iter().zip(&start).filter(|(p, _)| is_force(p)).map(|(_, v)| *v).collect();
+                    let together: f64 = forces.iter().sum();
+                    let level = if other.physics == "maxwell_slip" { together } else { together / forces.len() as f64 };
+                    assert!(
+                        (level / values[slot] - 1.0).abs() < 1e-12,
+                        "{name}: {} from {}: {level} for {}",
+                        other.id,
+                        law.id,
+                        values[slot]
+                    );
+                    seen.insert(other.physics);
+                }
+            }
+        }
+    }
+    assert!(["coulomb", "asymmetric_coulomb", "stribeck", "lugre"].iter().all(|law| seen.contains(law)), "{seen:?}");
+}

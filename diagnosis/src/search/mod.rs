@@ -367,7 +367,7 @@ pub fn search(
         hypotheses.iter().enumerate().filter_map(one).collect()
     };
     use Wave::*;
-    let mut waves = vec![Ripples, First, Laws, Singles, Plain, Elsewhere, Relatives];
+    let mut waves = vec![Ripples, First, GivenBack, Laws, Singles, Plain, Relatives, Elsewhere, Relatives];
     if !quiet {
         waves.extend([Finer, Pairs, Laws, Exchanges, Richer, MoreSingles, MorePairs, Laws, Exchanges, Elsewhere]);
         for _ in 2..settings.effects {
@@ -379,12 +379,12 @@ pub fn search(
     let mut effects = 1;
     // Substeps that blur less than what is left over.
     let mut fine = COARSE;
-    // Of a best with so many effects the simpler relatives were tried, and of this one other places.
-    let (mut related, mut moved_about) = (0, String::new());
+    // The best whose relatives were tried, and the one that other places were tried for.
+    let (mut related, mut moved_about) = (String::new(), String::new());
     for wave in waves {
         // They are rivals of the best however little it leaves over, and so are laws of one number where it took more.
         let takes_more = |c: &Candidate| c.structure.numbers.len() > nominal.structure.numbers.len() + 1;
-        let of_the_best = matches!(wave, Relatives | Elsewhere) || wave == Plain && found.first().is_some_and(takes_more);
+        let of_the_best = matches!(wave, GivenBack | Relatives | Elsewhere) || wave == Plain && found.first().is_some_and(takes_more);
         if late(if of_the_best { 0.85 } else { 0.7 }) || (!of_the_best && done(&found, &nominal, samples)) {
             continue;
         }
@@ -395,16 +395,9 @@ pub fn search(
             }
             moved_about = law;
         }
-        if wave == Relatives {
-            // Far from the noise more effects come first: which law it is shows beside them.
-            let near = found.first().is_some_and(|c| c.fit.cost < NEAR * samples as f64);
-            if !quiet && effects == 1 && !near {
-                continue;
-            }
-            let best = found.first().map_or(0, |c| c.structure.added.len());
-            if std::mem::replace(&mut related, best) == best {
-                continue;
-            }
+        let best = |found: &[Candidate]| found.first().map_or_else(String::new, |c| key_of(&c.structure.added));
+        if wave == Relatives && related == best(&found) {
+            continue;
         }
         report(wave.name());
         let mut seeds: Vec<Seed> = match wave {
@@ -416,6 +409,9 @@ pub fn search(
             Ripples => Vec::new(),
             // Those that promise most first: where one of them reaches the floor, the rest have nothing left to explain.
             First => singles.by_ref().take(if guided { 30 } else { 4 }).collect(),
+            // Near the noise, where what numbers have taken on is all that a law does.
+            GivenBack if far => Vec::new(),
+            GivenBack => course.given_back(&view.simple, chance),
             // Where one law helps another one may be the right one: every law there, from every start.
             Laws => {
                 // Along the measured path what is far off was tried already.
@@ -440,7 +436,8 @@ pub fn search(
             Elsewhere => simplest(&found, samples).map_or_else(Vec::new, |law| course.elsewhere(law)),
             // How finely a law is drawn is no physics: that comes before another effect.
             Finer => course.finer(&found),
-            // A law that wins with more numbers has to win over its simpler relatives, whatever these promised.
+            // A law that wins with more numbers has to win over its simpler relatives, whatever these promised; and far from the noise, where fits were cut
+            // short, the first that came near may not be the one.
             Relatives => course.relatives(&found, done(&found, &nominal, samples)),
             Richer => {
                 // In the place of what is the best of its kind.
@@ -485,7 +482,7 @@ pub fn search(
             }
         };
         // Some start anew beside the numbers of the best, even those whose own race went wrong.
-        let anew = matches!(wave, Relatives | Elsewhere | Finer);
+        let anew = matches!(wave, GivenBack | Relatives | Elsewhere | Finer);
         if !anew {
             distinct(&mut seeds);
         }
@@ -496,11 +493,14 @@ pub fn search(
             Anew => Course { along: None, coarse: fine, ..course }.race(seeds, wave.keep()),
             Finer | Ripples => Course { along: None, ..course }.race(seeds, wave.keep()),
             Elsewhere => Course { along: None, ..to_the_end }.race(seeds, wave.keep()),
-            Relatives => to_the_end.race(seeds, wave.keep()),
+            Relatives => Course { along: None, ..to_the_end }.race(seeds, wave.keep()),
             _ => course.race(seeds, wave.keep()),
         };
         found.extend(raced);
         sort(&mut found, samples);
+        if wave == Relatives {
+            related = best(&found);
+        }
     }
     let stopped = late(1.0);
     report("fitting the best to the end");

@@ -3,34 +3,70 @@
 use super::view::{SIMPLE, View};
 use super::{Candidate, candidate, distinct_structures};
 use crate::fit::{Effort, Evaluator};
-use crate::hypothesis::{self, Hypothesis};
+use crate::hypothesis::{self, Hypothesis, Place};
 use crate::race::{Course, Seed};
 use crate::screen::{Promise, Screen};
 use crate::structure::Structure;
 use std::collections::HashSet;
 use std::time::Duration;
 
+/// Share of what promises most that a law has to promise, where a stated number is to give back what it may have taken on.
+const PROMISED: f64 = 0.5;
+/// Parts of a stated number that it may have taken on.
+const TAKEN_ON: [f64; 3] = [0.25, 0.5, 0.9];
 /// Times the cost of the best up to which a law that is drawn coarsely may win when drawn more finely.
 const COARSELY: f64 = 3.0;
 
 impl Course<'_> {
+    /// Laws of one number that promise something, beside a stated number of the same kind that has a body in common with them and that gives back what it
+    /// may have taken on. A damper at a motor and one at the drum behind a stiff cable do nearly the same: a fit goes from all at one to all at the other along
+    /// a narrow valley, and not to its end. `chance` is the share that the best promises by chance.
+    pub(super) fn given_back(&self, promises: &[Promise], chance: f64) -> Vec<Seed> {
+        let problem = self.evaluator.problem;
+        let top = promises.first().map_or(0.0, |p| p.share);
+        let (stated, of_records) = (
+            self.nominal.structure.stated_of(problem, &self.nominal.fit.values),
+            self.nominal.structure.of_records(&self.nominal.fit.values),
+        );
+        let mut used = HashSet::new();
+        let mut seeds = Vec::new();
+        for promise in promises.iter().filter(|p| p.share > chance.max(PROMISED * top) && used.insert(p.hypothesis)) {
+            let Some(law) = self.hypotheses.get(promise.hypothesis) else { continue };
+            let (Place::Between(a, b), [parameter]) = (&law.place, law.parameters.as_slice()) else { continue };
+            for element in problem.model.elements.iter().filter(|e| e.law.kind().name == law.physics) {
+                let ends = element.between.map(|end| problem.model.place_name(end));
+                let path = format!("elements.{}.{}", element.name, parameter.key);
+                let own = problem.stated.iter().zip(&stated).enumerate().find(|(_, (s, _))| s.path == path);
+                let Some((index, (number, value))) = own.filter(|_| ends.iter().any(|end| end == a || end == b)) else { continue };
+                let moved = (value - number.given).max(0.0);
+                for taken in TAKEN_ON.iter().map(|part| part * value).chain((moved > 0.0).then_some(moved)) {
+                    let mut stated = stated.clone();
+                    stated[index] = (value - taken).clamp(number.range.0, number.range.1);
+                    let values = vec![taken.clamp(parameter.range.0, parameter.range.1)];
+                    seeds.push(Seed { effects: vec![(promise.hypothesis, values)], stated, of_records: of_records.clone(), guided: false });
+                }
+            }
+        }
+        seeds
+    }
+
     /// Simpler laws of the same family in the place of each effect of the best; where something is left to explain, laws that are as simple, too.
     pub(super) fn relatives(&self, found: &[Candidate], done: bool) -> Vec<Seed> {
         let Some(best) = found.first() else { return Vec::new() };
         let own = self.effects_of(&best.structure, &best.fit.values);
         let mut seeds = Vec::new();
-        for (out, effect) in best.structure.added.iter().enumerate() {
+        for (out, (effect, values)) in best.structure.added.iter().zip(best.structure.added_of(&best.fit.values)).enumerate() {
             let relative = |h: &Hypothesis| {
                 h.place.same(&effect.place)
                     && h.family == effect.family
                     && h.id != effect.id
-                    && h.parameters.len() < effect.parameters.len() + usize::from(!done)
+                    && h.parameters.len() < effect.parameters.len() + if done { 0 } else { 2 }
             };
             for (index, h) in self.hypotheses.iter().enumerate().filter(|(_, h)| relative(h)) {
-                for start in &h.starts {
+                for start in hypothesis::starts_beside(effect, &values, h) {
                     let mut effects = own.clone();
                     if let Some(slot) = effects.get_mut(out) {
-                        *slot = (index, start.clone());
+                        *slot = (index, start);
                         seeds.push(Seed::beside(self.evaluator.problem, (&best.structure, &best.fit.values), effects, false));
                     }
                 }

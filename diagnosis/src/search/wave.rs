@@ -5,6 +5,7 @@
 pub(super) enum Wave {
     Ripples,
     First,
+    GivenBack,
     Laws,
     Singles,
     Plain,
@@ -25,6 +26,7 @@ impl Wave {
         match self {
             Wave::Ripples => "fitting ripples",
             Wave::First | Wave::Singles => "fitting single effects",
+            Wave::GivenBack => "giving back what numbers took on",
             Wave::Laws => "fitting other laws in the same place",
             Wave::Plain => "fitting laws of one number",
             Wave::Elsewhere => "fitting the same law in other places",
@@ -46,7 +48,7 @@ impl Wave {
             Wave::First | Wave::Laws | Wave::Elsewhere | Wave::Relatives => [3, 3],
             Wave::Singles | Wave::Plain | Wave::Exchanges | Wave::MoreSingles | Wave::Anew => [4, 2],
             Wave::Pairs | Wave::MorePairs => [5, 3],
-            Wave::Finer | Wave::Ripples => [3, 2],
+            Wave::Finer | Wave::Ripples | Wave::GivenBack => [3, 2],
             Wave::Richer => [2, 1],
             Wave::More => [4, 3],
         }
