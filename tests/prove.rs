@@ -18,6 +18,11 @@ fn hidden_plant() -> Option<PathBuf> {
 }
 
 fn prove(place: &Place, more: &[&str]) -> system::Ended {
+    prove_with(place, &[], more)
+}
+
+/// With other files than the project's for some options.
+fn prove_with(place: &Place, others: &[(&str, &str)], more: &[&str]) -> system::Ended {
     let inputs = [
         ("--model", "plant/models/impulse-engine-linear.toml"),
         ("--grip", "plant/grips/normal.toml"),
@@ -25,7 +30,8 @@ fn prove(place: &Place, more: &[&str]) -> system::Ended {
         ("--session", "launch/prove.toml"),
         ("--contact", "launch/contact.toml"),
     ];
-    let files: Vec<(&str, String)> = inputs.iter().map(|(option, path)| (*option, file(path))).collect();
+    let other = |option: &str| others.iter().find(|(name, _)| *name == option).map(|(_, path)| path.to_string());
+    let files: Vec<(&str, String)> = inputs.iter().map(|(option, path)| (*option, other(option).unwrap_or_else(|| file(path)))).collect();
     let mut arguments = vec!["prove", "--same-grip", "--nonlinear"];
     arguments.extend(files.iter().flat_map(|(option, path)| [*option, path.as_str()]));
     arguments.extend(more);
@@ -111,11 +117,16 @@ fn a_sealed_effect_is_diagnosed_without_its_truth() {
 fn what_cannot_be_proven_is_told_in_one_line() {
     let place = Place::new();
     let of = |arguments: &[&str]| place.run_for(arguments, std::time::Duration::from_secs(60));
-    let ended = of(&["prove", "--plant", "no-such-program", "--session", &file("launch/prove.toml")]);
+    let ended = prove(&place, &["--plant", "no-such-program"]);
     assert_eq!(ended.code, Some(5), "{ended:?}");
     assert!(ended.stderr.contains("no-such-program") && ended.stderr.contains("cargo build"), "{}", ended.stderr);
     let ended = of(&["prove", "--effects", "7"]);
     assert!(ended.code == Some(2) && ended.stderr.contains("from 0 to 3"), "{ended:?}");
-    let ended = of(&["prove", "--session", "nothing.toml", "--out", "other"]);
+    let ended = prove_with(&place, &[("--session", "nothing.toml")], &["--out", "other"]);
     assert!(ended.code == Some(3) && ended.stderr.contains("nothing.toml"), "{ended:?}");
+    // Of what is needed last it is told first, and nothing is sealed that would stand in the way of the next try.
+    let ended = prove_with(&place, &[("--contact", "no-task.toml")], &["--out", "third"]);
+    assert_eq!(ended.code, Some(3), "{ended:?}");
+    assert!(ended.stderr.contains("no-task.toml") && ended.stderr.contains("--contact"), "{}", ended.stderr);
+    assert!(!place.path("third").exists());
 }

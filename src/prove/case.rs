@@ -106,7 +106,6 @@ pub fn prove(options: &cli::Prove, folder: &Path, drawn: &Draw, stop: &AtomicBoo
             sealed.display()
         )));
     }
-    std::fs::create_dir_all(&sealed).map_err(|e| Failure::write(&sealed, e))?;
     let template: DocumentMut =
         read(&options.session)?.parse().map_err(|e| Failure::input(format!("{}: {e}", options.session.display())))?;
     let rate_hz = template.get("rate_hz").and_then(|i| i.as_float().or(i.as_integer().map(|n| n as f64))).unwrap_or(5000.0);
@@ -117,6 +116,7 @@ pub fn prove(options: &cli::Prove, folder: &Path, drawn: &Draw, stop: &AtomicBoo
         truth: PathBuf::from(absolute(&sealed.join("truth.json"))?),
         rate_hz,
     };
+    std::fs::create_dir_all(&sealed).map_err(|e| Failure::write(&sealed, e))?;
     let digest = draw(options, &hidden, drawn)?;
     let hand = if drawn.shows_hand { "" } else { "; nobody measures the hand" };
     let masked = if drawn.refitted { "; the nominal numbers were refitted" } else { "" };

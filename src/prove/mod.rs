@@ -24,6 +24,7 @@ const NULLS: usize = 5;
 
 /// Proves as many cases as are asked for.
 pub fn prove(options: &cli::Prove) -> Result<u8, Failure> {
+    given_files_are_there(options)?;
     let stop = interrupt::heard()?;
     let (mut cases, mut broken) = (Vec::new(), None);
     for index in 0..options.cases {
@@ -72,6 +73,26 @@ pub fn prove(options: &cli::Prove) -> Result<u8, Failure> {
         });
     }
     Ok(if cases.iter().all(Case::is_right) { 0 } else { code::NEGATIVE })
+}
+
+/// Before anything is sealed or recorded: the files that are needed at the end of a case.
+fn given_files_are_there(options: &cli::Prove) -> Result<(), Failure> {
+    let given = [
+        ("model", &options.model),
+        ("grip", &options.grip),
+        ("second-order", &options.second_order),
+        ("session", &options.session),
+        ("contact", &options.contact),
+    ];
+    for (option, path) in given {
+        std::fs::File::open(path).map_err(|e| {
+            let path = path.display();
+            Failure::input(format!(
+                "{path}: cannot be read: {e}; run this in the folder of the project, or name another file with --{option}"
+            ))
+        })?;
+    }
+    Ok(())
 }
 
 /// Writes proof.json and the report.
