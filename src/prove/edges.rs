@@ -8,9 +8,10 @@ use backdrive_stability::resimulate::edge::{Edge, Search, edge};
 use backdrive_stability::resimulate::{OwnCores, RunOptions, Scenario, grips};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use std::sync::atomic::AtomicBool;
 
-/// Where edges are looked for: to 50, coarser than `stability` does, for there are many.
+/// Where edges are looked for: to 50, coarser than `stability` does, for there are many. With the grip of the session, where the live graph is asked too,
+/// the loop is also looked at about the edge, since noise and dry friction make verdicts flicker there.
 const SEARCH: Search = Search { lowest: 0.05, highest: 50.0, tolerance: 0.03, per_decade: 8, whole_grid: false, around: false };
 
 /// A model that predicts the induced motion, and with which grip.
@@ -77,15 +78,24 @@ impl Loop<'_> {
         };
         let mut scenario = Scenario::new(graph, None, None).map_err(Failure::input)?;
         if let Some(device) = device {
-            let runs = AtomicU32::new(1000);
             let own: OwnCores = Arc::new(move |graph, node, firmness| {
-                (node.kind == NodeKind::Master).then(|| device.core(graph, node, runs.fetch_add(1, Ordering::Relaxed), firmness))
+                (node.kind == NodeKind::Master).then(|| device.core(graph, node, number_at(graph.gains.mu * graph.gains.lambda), firmness))
             });
             scenario = scenario.with_own_cores(own);
         }
         let options = RunOptions { grip_scale: firmness, ..RunOptions::default() };
-        edge(&scenario, &SEARCH, &options, &|_, _| {}, cancel).map_err(Failure::input)
+        let around = firmness == 1.0 && matches!(self.master, Moved::Hidden(..));
+        edge(&scenario, &Search { around, ..SEARCH }, &options, &|_, _| {}, cancel).map_err(Failure::input)
     }
+}
+
+/// Numbers of runs of the hidden plant from this on are of runs at a gain.
+const AT_GAINS: u32 = 10_000;
+
+/// The run's number, which its noise comes from: another one at each gain, and at one gain the same with all cancellers.
+fn number_at(gain: f64) -> u32 {
+    let bits = gain.to_bits();
+    ((bits ^ (bits >> 32)) as u32).max(AT_GAINS)
 }
 
 /// The hand of a master whose model holds it grips `factor` times as firmly.

@@ -12,7 +12,8 @@ use serde_json::Value;
 use std::path::Path;
 use toml_edit::{Array, DocumentMut, Item, value};
 
-/// Where the live graph is run, as factors on the highest gain found stable and on the lowest found not stable.
+/// Where the live graph is run, as factors on the highest gain found stable and on the lowest found not stable; where verdicts flicker about the edge, on the
+/// ends of that range.
 const BELOW: f64 = 0.9;
 const ABOVE: f64 = 1.15;
 
@@ -66,7 +67,8 @@ pub fn about(
     hidden: &Hidden,
     device: &Opened,
 ) -> Result<Vec<LiveRun>, Failure> {
-    let above = edge.critical_gain.or(edge.limited_from);
+    let flickers = edge.flickers.map(|[_, highest_stable]| highest_stable);
+    let above = edge.critical_gain.or(edge.limited_from).map(|gain| flickers.map_or(gain, |highest| gain.max(highest)));
     let points = [(edge.at_least > 0.0).then_some((BELOW * edge.at_least, true)), above.map(|gain| (ABOVE * gain, false))];
     std::fs::create_dir_all(folder).map_err(|e| Failure::write(folder, e))?;
     let mut runs = Vec::new();
