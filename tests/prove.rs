@@ -78,6 +78,8 @@ fn a_sealed_effect_is_diagnosed_without_its_truth() {
     let found = &proof["cases"][0];
     assert_eq!(found["sealed"], digest.as_str());
     assert_eq!(found["shows_hand"], false);
+    let sentence = found["sentence"].as_str().unwrap();
+    assert!(sentence.contains("model"), "{sentence}");
     assert_eq!(found["nominal_refitted"], true);
     let gain = |canceller: &str| {
         let all = found["stable_gain"].as_array().unwrap();

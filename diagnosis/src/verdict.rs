@@ -183,6 +183,7 @@ pub fn verdict(problem: &Problem, search: &Search, model_name: &str) -> Result<V
     let json = json!({
         "schema": 1,
         "verdict": word,
+        "sentence": sentence,
         "findings": findings,
         "where": place_in_signals(problem, search, &bursts),
         "parameters": parameters,
