@@ -339,3 +339,31 @@ fn a_constant_force_whose_reaction_the_held_body_takes_is_a_hand_elsewhere() {
     }
     assert!(moved > 1e-3 && apart < 1e-9, "{moved} m, {apart} m apart");
 }
+
+#[test]
+fn a_linear_joint_that_yields_in_series_is_a_softer_one() {
+    let network = held("plant/models/impulse-engine-linear.toml");
+    let joint = Site::Between(["drum".to_string(), "handle".to_string()]);
+    let truth = hiding(&network, vec![(Physics::SeriesCompliance { stiffness: 10290.0, damping: 0.13, inertia: 5.5e-4 }, joint, vec![])]);
+    assert!(truth.effects[0].accept.iter().any(|answer| answer.physics == ["parameters"] && !answer.hand_hidden));
+    // Two springs with dampers beside them, to first order in frequency.
+    let (k, c): ([f64; 2], [f64; 2]) = ([3950.0, 10290.0], [1.0, 0.13]);
+    let softer = k[1] / (k[0] + k[1]);
+    let damping = (c[0] * k[1] * k[1] + c[1] * k[0] * k[0]) / (k[0] + k[1]).powi(2);
+    let with = |numbers: &[(&str, f64)]| Truth {
+        numbers: numbers.iter().map(|(path, factor)| (path.to_string(), *factor)).collect(),
+        ..Truth::nothing(&network)
+    };
+    let numbers = with(&[("elements.linkage.stiffness", softer), ("elements.linkage_damping.damping", damping / c[0])]);
+    let mut plants = [&truth, &numbers, &with(&[])].map(|truth| SealedPlant::new(&network, truth, 2e-4).unwrap());
+    let (mut apart, mut unlike) = (0.0_f64, 0.0_f64);
+    for step in 0..10_000 {
+        // Up to 100 Hz, as a session's sweeps are.
+        let t = 2e-4 * f64::from(step);
+        let inputs = [2.0 * (2.0 * PI * (5.0 + 24.0 * t) * t).sin(), 0.0];
+        plants.iter_mut().for_each(|plant| plant.step(&inputs).unwrap());
+        let [yielding, softer, stiff] = plants.each_ref().map(|plant| plant.outputs()[0]);
+        (apart, unlike) = (apart.max((yielding - softer).abs()), unlike.max((yielding - stiff).abs()));
+    }
+    assert!(apart < 0.1 * unlike, "{apart} m apart, {unlike} m from the stiff one");
+}

@@ -146,6 +146,8 @@ pub(super) fn answers(effect: &Effect, network: &Network) -> Vec<Answer> {
     let in_the_numbers = |hand_hidden: bool, words: &[&str]| Answer { hand_hidden, ..answer(site, words) };
     match &effect.physics {
         Physics::Inertia { .. } => all.push(in_the_numbers(false, &["parameters"])),
+        // A spring in series with a spring is a softer one, up to the resonance of what little lies between.
+        Physics::SeriesCompliance { .. } if springs(site, network) => all.push(in_the_numbers(false, &["parameters"])),
         Physics::Law(Law::Damper(_)) if site.is_at_ground() && held(|law| matches!(law, Law::Damper(_))) => {
             all.push(in_the_numbers(true, &["parameters"]));
         }
@@ -155,6 +157,17 @@ pub(super) fn answers(effect: &Effect, network: &Network) -> Vec<Answer> {
         _ => {}
     }
     all
+}
+
+/// Whether the elements of a joint are a spring and dampers.
+fn springs(site: &Site, network: &Network) -> bool {
+    let Site::Between(ends) = site else { return false };
+    let is_there = |e: &&Element| {
+        let places = e.between.map(|end| network.place_name(end));
+        places.iter().all(|place| ends.iter().any(|end| end == place))
+    };
+    let mut laws = network.elements.iter().filter(is_there).map(|e| &e.law);
+    laws.clone().any(|law| matches!(law, Law::Spring(_))) && laws.all(|law| matches!(law, Law::Spring(_) | Law::Damper(_)))
 }
 
 /// Whether an element joins a body that the site names.
