@@ -1,6 +1,7 @@
 //! Fits by simulation error: bounded Levenberg-Marquardt steps with differences in parallel.
 
 use crate::guide::Guide;
+use crate::normal_equations::normal_equations;
 use crate::problem::{Problem, Record};
 use crate::structure::{Number, Role, Structure};
 use nalgebra::{DMatrix, DVector};
@@ -472,37 +473,6 @@ fn may_move(number: &Number, own: f64, slope: f64, curvature: f64) -> bool {
     let (low, high) = number.bounds();
     let edge = 1e-9 * (high - low);
     curvature > 0.0 && !(own <= low + edge && slope > 0.0) && !(own >= high - edge && slope < 0.0)
-}
-
-/// `J' W J` and `J' W r`.
-pub fn normal_equations(jacobian: &[Vec<f64>], residuals: &[f64], weights: Option<&[f64]>) -> (DMatrix<f64>, DVector<f64>) {
-    let n = jacobian.len();
-    let dot = |a: &[f64], b: &[f64], range: std::ops::Range<usize>| {
-        let (a, b) = (&a[range.clone()], &b[range.clone()]);
-        match weights {
-            None => dot(a, b),
-            Some(w) => a.iter().zip(b).zip(&w[range]).map(|((a, b), w)| w * a * b).sum(),
-        }
-    };
-    // What moves one record only is 0 in all others.
-    let spans: Vec<std::ops::Range<usize>> = jacobian.iter().map(|column| span(column)).collect();
-    let product = |i: usize, j: usize| {
-        let (from, to) = (spans[i].start.max(spans[j].start), spans[i].end.min(spans[j].end));
-        if from < to { dot(&jacobian[i], &jacobian[j], from..to) } else { 0.0 }
-    };
-    let rows: Vec<Vec<f64>> = (0..n).into_par_iter().map(|i| (0..=i).map(|j| product(i, j)).collect()).collect();
-    let matrix = DMatrix::from_fn(n, n, |i, j| if j <= i { rows[i][j] } else { rows[j][i] });
-    let slope = DVector::from_iterator(n, jacobian.iter().zip(&spans).map(|(column, span)| dot(column, residuals, span.clone())));
-    (matrix, slope)
-}
-
-/// From the first to behind the last value that is not 0.
-fn span(column: &[f64]) -> std::ops::Range<usize> {
-    let is_something = |x: &f64| *x != 0.0;
-    match (column.iter().position(is_something), column.iter().rposition(is_something)) {
-        (Some(from), Some(last)) => from..last + 1,
-        _ => 0..0,
-    }
 }
 
 /// Sum of products, in four chains so that it is not the latency of one that counts.

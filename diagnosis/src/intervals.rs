@@ -1,7 +1,8 @@
 //! How sure the numbers of a fit are.
 
 use crate::clock::Moment;
-use crate::fit::{Evaluator, normal_equations};
+use crate::fit::Evaluator;
+use crate::normal_equations::normal_equations;
 use crate::search::Candidate;
 use crate::simulate::TWICE;
 use nalgebra::{DMatrix, DVector};

@@ -16,6 +16,7 @@ pub mod hypothesis;
 pub mod intervals;
 pub(crate) mod led;
 pub mod locate;
+pub(crate) mod normal_equations;
 pub mod numbers;
 pub mod parts;
 pub mod per_record;

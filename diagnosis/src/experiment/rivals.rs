@@ -2,7 +2,8 @@
 
 use super::menu::{Play, Stand, constant, scaled};
 use crate::clock::Moment;
-use crate::fit::{Effort, Evaluator, Fit, dot, measured, normal_equations};
+use crate::fit::{Effort, Evaluator, Fit, dot, measured};
+use crate::normal_equations::normal_equations;
 use crate::problem::{Problem, Record};
 use crate::simulate::predict;
 use crate::statistics::correlation_time;

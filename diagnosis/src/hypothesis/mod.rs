@@ -321,6 +321,11 @@ pub fn physics_named(name: &str) -> Option<&'static Physics> {
     PHYSICS.iter().copied().find(|p| p.name == name)
 }
 
+/// Whether one physics has another as a special or limiting case.
+pub(crate) fn contains(physics: &str, simpler: &str) -> bool {
+    PHYSICS.iter().any(|p| p.name == physics && p.contains.contains(&simpler))
+}
+
 /// Names of everything that goes when these are withheld: themselves and whatever contains one of them.
 pub fn withheld(names: &[&str]) -> Vec<&'static str> {
     let mut gone: Vec<&'static str> = PHYSICS.iter().map(|p| p.name).filter(|name| names.contains(name)).collect();

@@ -101,20 +101,39 @@ impl Course<'_> {
         seeds
     }
 
-    /// The best with each of its effects left out, where there is more than one, and where to start.
+    /// The best with each of its effects left out, where there is more than one, or as a simpler law that it contains, and where to start: from where all
+    /// else is.
     pub(super) fn fewer(&self, found: &[Candidate]) -> Vec<(Structure, Vec<f64>)> {
         let problem = self.evaluator.problem;
-        let Some(best) = found.first().filter(|c| c.structure.added.len() > 1) else { return Vec::new() };
+        let Some(best) = found.first() else { return Vec::new() };
         let (stated, of_records) = (best.structure.stated_of(problem, &best.fit.values), best.structure.of_records(&best.fit.values));
-        let values = best.structure.added_of(&best.fit.values);
-        let without = |out: usize| {
-            let rest = || best.structure.added.iter().zip(&values).enumerate().filter(move |(i, _)| *i != out).map(|(_, effect)| effect);
-            let structure = Structure::new(problem, &problem.fit, rest().map(|(h, _)| h.clone()).collect());
-            let kept: Vec<Vec<f64>> = rest().map(|(_, v)| v.clone()).collect();
-            let start = structure.values(problem, &stated, &kept, &of_records);
+        let own: Vec<(Hypothesis, Vec<f64>)> =
+            best.structure.added.iter().cloned().zip(best.structure.added_of(&best.fit.values)).collect();
+        let made = |effects: Vec<(Hypothesis, Vec<f64>)>| {
+            let (added, values): (Vec<_>, Vec<_>) = effects.into_iter().unzip();
+            let structure = Structure::new(problem, &problem.fit, added);
+            let start = structure.values(problem, &stated, &values, &of_records);
             (structure, start)
         };
-        (0..values.len()).map(without).collect()
+        let mut all = Vec::new();
+        for (out, (effect, values)) in own.iter().enumerate() {
+            if own.len() > 1 {
+                let rest = own.iter().enumerate().filter(|(i, _)| *i != out).map(|(_, effect)| effect.clone());
+                all.push(made(rest.collect()));
+            }
+            let simpler = |h: &&Hypothesis| {
+                h.place.same(&effect.place)
+                    && hypothesis::contains(effect.physics, h.physics)
+                    && h.parameters.len() < effect.parameters.len()
+            };
+            for law in self.hypotheses.iter().filter(simpler) {
+                let Some(start) = hypothesis::starts_beside(effect, values, law).into_iter().next() else { continue };
+                let mut effects = own.clone();
+                effects[out] = (law.clone(), start);
+                all.push(made(effects));
+            }
+        }
+        all
     }
 
     /// The best, and what does nearly as well with as many effects, with a law of theirs drawn more finely.

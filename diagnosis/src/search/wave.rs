@@ -47,8 +47,8 @@ impl Wave {
         match self {
             Wave::First | Wave::Laws | Wave::Elsewhere | Wave::Relatives => [3, 3],
             Wave::Singles | Wave::Plain | Wave::Exchanges | Wave::MoreSingles | Wave::Anew => [4, 2],
-            Wave::Pairs | Wave::MorePairs => [5, 3],
-            Wave::Finer | Wave::Ripples | Wave::GivenBack => [3, 2],
+            Wave::Pairs | Wave::MorePairs | Wave::GivenBack => [5, 3],
+            Wave::Finer | Wave::Ripples => [3, 2],
             Wave::Richer => [2, 1],
             Wave::More => [4, 3],
         }
