@@ -321,7 +321,7 @@ pub fn search(
         coarse: COARSE,
     };
     // A simpler law that does as well is worth a little more than the time.
-    let longer = Evaluator { until: Some(began + settings.patience.mul_f64(0.86)), ..evaluator.clone() };
+    let longer = Evaluator { until: Some(began + settings.patience.mul_f64(0.92)), ..evaluator.clone() };
     let to_the_end = Course { evaluator: &longer, ..course };
     let mut tried: Vec<Tried> = Vec::new();
     for promise in views.iter().flat_map(|v| v.simple.iter().chain(&v.rich)) {
@@ -385,7 +385,7 @@ pub fn search(
         // They are rivals of the best however little it leaves over, and so are laws of one number where it took more.
         let takes_more = |c: &Candidate| c.structure.numbers.len() > nominal.structure.numbers.len() + 1;
         let of_the_best = matches!(wave, GivenBack | Relatives | Elsewhere) || wave == Plain && found.first().is_some_and(takes_more);
-        if late(if of_the_best { 0.8 } else { 0.7 }) || (!of_the_best && done(&found, &nominal, samples)) {
+        if late(if of_the_best { 0.85 } else { 0.7 }) || (!of_the_best && done(&found, &nominal, samples)) {
             continue;
         }
         if wave == Elsewhere {
@@ -506,13 +506,13 @@ pub fn search(
     report("fitting the best to the end");
     // An effect may only have led the rest out of a wrong valley: each of the best's is left out again, the others from where they are now; and a law of many
     // numbers has to win over those that it contains.
-    let last = Evaluator { until: Some(began + settings.patience.mul_f64(0.9)), ..evaluator.clone() };
-    let fewer = to_the_end.fewer(&found);
+    let last = Evaluator { until: Some(began + settings.patience.mul_f64(0.95)), ..evaluator.clone() };
+    let fewer = [to_the_end.fewer(&found), to_the_end.revived(&found)].concat();
     let fits = fewer.into_par_iter().filter_map(|(structure, start)| Some((last.fit(&structure, &start, POLISH)?, structure)));
     let fewer: Vec<Candidate> = fits.map(|(fit, structure)| candidate(&evaluator, structure, fit)).collect();
     found.extend(fewer);
     sort(&mut found, samples);
-    let last = Evaluator { until: Some(began + settings.patience.mul_f64(0.94)), ..evaluator.clone() };
+    let last = Evaluator { until: Some(began + settings.patience.mul_f64(0.95)), ..evaluator.clone() };
     let best = found.first().map_or(f64::INFINITY, |c| c.fit.cost);
     // Those that could still win, or tie with the best.
     let unit = best / samples as f64;
