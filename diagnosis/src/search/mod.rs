@@ -492,8 +492,7 @@ pub fn search(
         let raced = match wave {
             Anew => Course { along: None, coarse: fine, ..course }.race(seeds, wave.keep()),
             Finer | Ripples => Course { along: None, ..course }.race(seeds, wave.keep()),
-            Elsewhere => Course { along: None, ..to_the_end }.race(seeds, wave.keep()),
-            Relatives => Course { along: None, ..to_the_end }.race(seeds, wave.keep()),
+            Elsewhere | Relatives => Course { along: None, ..to_the_end }.race(seeds, wave.keep()),
             _ => course.race(seeds, wave.keep()),
         };
         found.extend(raced);
