@@ -156,6 +156,8 @@ const FINEST: usize = 64;
 const BLUR: f64 = 0.02;
 /// Share of the time for screening beside a structure that was found.
 const ANEW: f64 = 0.06;
+/// Share of the time for other laws, or other places, of an effect that leaves much over, each.
+const ASIDE: f64 = 0.12;
 /// Level above which the nominal model's refit is brought to its end after the search only, floors.
 const NOMINAL_END: f64 = 5.0;
 /// Level above which fits start along the measured path, floors.
@@ -492,11 +494,22 @@ pub fn search(
         let raced = match wave {
             Anew => Course { along: None, coarse: fine, ..course }.race(seeds, wave.keep()),
             Finer | Ripples => Course { along: None, ..course }.race(seeds, wave.keep()),
-            Elsewhere | Relatives => Course { along: None, ..to_the_end }.race(seeds, wave.keep()),
+            Elsewhere | Relatives => {
+                // Where it leaves much over, another effect may be what is missing: other laws in its place have their share of the time, and no more.
+                let more_to_come = found.first().is_none_or(|c| c.fit.cost > NEAR * samples as f64);
+                let aside = Moment::now() + settings.patience.mul_f64(if more_to_come { ASIDE } else { 1.0 });
+                let evaluator = Evaluator { until: longer.until.map(|end| end.min(aside)), ..longer.clone() };
+                Course { along: None, evaluator: &evaluator, ..course }.race(seeds, wave.keep())
+            }
             _ => course.race(seeds, wave.keep()),
         };
         found.extend(raced);
         sort(&mut found, samples);
+        if wave == Finer && !late(0.6) {
+            // Before others are tried from the numbers of the best.
+            found.extend(polished(&evaluator, course.revived(&found)));
+            sort(&mut found, samples);
+        }
         if wave == Relatives {
             related = best(&found);
         }
@@ -507,8 +520,7 @@ pub fn search(
     // numbers has to win over those that it contains.
     let last = Evaluator { until: Some(began + settings.patience.mul_f64(0.95)), ..evaluator.clone() };
     let fewer = [to_the_end.fewer(&found), to_the_end.revived(&found)].concat();
-    let fits = fewer.into_par_iter().filter_map(|(structure, start)| Some((last.fit(&structure, &start, POLISH)?, structure)));
-    let fewer: Vec<Candidate> = fits.map(|(fit, structure)| candidate(&evaluator, structure, fit)).collect();
+    let fewer = polished(&last, fewer);
     found.extend(fewer);
     sort(&mut found, samples);
     let last = Evaluator { until: Some(began + settings.patience.mul_f64(0.95)), ..evaluator.clone() };
@@ -567,6 +579,12 @@ pub fn search(
     let (floor, count) = (evaluator.floor.clone(), hypotheses.len());
     let detectable = view::detectable(view, samples, &hypotheses);
     Ok(Search { floor, levels_given, nominal, found, tried, hypotheses: count, samples, unseen_samples, detectable, simulations, stopped })
+}
+
+/// Each fitted from where it starts.
+fn polished(evaluator: &Evaluator, structures: Vec<(Structure, Vec<f64>)>) -> Vec<Candidate> {
+    let fits = structures.into_par_iter().filter_map(|(structure, start)| Some((evaluator.fit(&structure, &start, POLISH)?, structure)));
+    fits.map(|(fit, structure)| candidate(evaluator, structure, fit)).collect()
 }
 
 /// Size of most of the residuals, floors, that a fit with the floors `before` left over; a few that are far off do not count.

@@ -114,8 +114,13 @@ impl Course<'_> {
         let mut all = Vec::new();
         for c in distinct_structures(found, best.structure.added.len()).filter(near).take(REVIVED) {
             let mut stated = c.structure.stated_of(problem, &c.fit.values);
-            let gone: Vec<usize> =
+            let mut gone: Vec<usize> =
                 (0..stated.len()).filter(|i| problem.stated[*i].log && stated[*i] < VANISHED * problem.stated[*i].range.0).collect();
+            // A damper or a spring may vanish beside a law that was found; a body does not.
+            let is_mass = |i: &usize| problem.stated[*i].path.starts_with("bodies.");
+            if gone.iter().any(is_mass) {
+                gone.retain(is_mass);
+            }
             for &i in &gone {
                 // Mass that one body lost another has taken on: the two share it as they did.
                 match self.heir(&stated, i) {
