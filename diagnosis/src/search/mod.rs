@@ -156,9 +156,9 @@ const FINEST: usize = 64;
 const BLUR: f64 = 0.02;
 /// Share of the time for screening beside a structure that was found.
 const ANEW: f64 = 0.06;
-/// Share of the time for other laws, or other places, of an effect that leaves much over, each.
-const ASIDE: f64 = 0.12;
-/// Level above which the nominal model's refit is brought to its end after the search only, floors.
+/// Share of the time for numbers that come back.
+const REVIVING: f64 = 0.2;
+/// Level above which the nominal model's refit is brought to its end after the search only, and vanished numbers of a law stay so until its end, floors.
 const NOMINAL_END: f64 = 5.0;
 /// Level above which fits start along the measured path, floors.
 const FAR: f64 = 2.0;
@@ -491,22 +491,24 @@ pub fn search(
         let known: HashSet<String> = found.iter().map(|c| key_of(&c.structure.added)).collect();
         seeds.retain(|s| anew || !known.contains(&key_of(s.effects.iter().map(|(h, _)| &hypotheses[*h]))));
         // What only shows beside a law that was found shows little along the path of the nominal model.
+        // Where it leaves much over, another effect may be what is missing: other laws in its place have their share of the time, and no more.
+        let more_to_come = found.first().is_none_or(|c| c.fit.cost > NEAR * samples as f64);
+        let aside = Moment::now() + settings.patience.mul_f64(if more_to_come { wave.aside() } else { 1.0 });
+        let held_against = if matches!(wave, Elsewhere | Relatives) { &longer } else { &evaluator };
+        let held_against = Evaluator { until: held_against.until.map(|end| end.min(aside)), ..held_against.clone() };
+        let course = Course { evaluator: &held_against, ..course };
         let raced = match wave {
             Anew => Course { along: None, coarse: fine, ..course }.race(seeds, wave.keep()),
-            Finer | Ripples => Course { along: None, ..course }.race(seeds, wave.keep()),
-            Elsewhere | Relatives => {
-                // Where it leaves much over, another effect may be what is missing: other laws in its place have their share of the time, and no more.
-                let more_to_come = found.first().is_none_or(|c| c.fit.cost > NEAR * samples as f64);
-                let aside = Moment::now() + settings.patience.mul_f64(if more_to_come { ASIDE } else { 1.0 });
-                let evaluator = Evaluator { until: longer.until.map(|end| end.min(aside)), ..longer.clone() };
-                Course { along: None, evaluator: &evaluator, ..course }.race(seeds, wave.keep())
-            }
+            Finer | Ripples | Elsewhere | Relatives => Course { along: None, ..course }.race(seeds, wave.keep()),
             _ => course.race(seeds, wave.keep()),
         };
         found.extend(raced);
         sort(&mut found, samples);
-        if wave == Finer && !late(0.6) {
-            // Before others are tried from the numbers of the best.
+        let comes_near = found.first().is_some_and(|c| c.levels.iter().all(|l| *l < NOMINAL_END));
+        if wave == Finer && comes_near && !late(0.6) {
+            // Before others are tried from the numbers of the best; where it leaves much over, more is missing than a mass.
+            let until = (began + settings.patience.mul_f64(0.75)).min(Moment::now() + settings.patience.mul_f64(REVIVING));
+            let evaluator = Evaluator { until: Some(until), ..evaluator.clone() };
             found.extend(polished(&evaluator, course.revived(&found)));
             sort(&mut found, samples);
         }

@@ -42,6 +42,15 @@ impl Wave {
         }
     }
 
+    /// Share of the time that it may take where the best leaves much over.
+    pub fn aside(self) -> f64 {
+        match self {
+            Wave::Relatives | Wave::Elsewhere => 0.08,
+            Wave::Finer => 0.15,
+            _ => 1.0,
+        }
+    }
+
     /// How many are fitted further, and how many to their end.
     pub fn keep(self) -> [usize; 2] {
         match self {
