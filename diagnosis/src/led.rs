@@ -15,6 +15,10 @@ const BEHIND: f64 = 2.5;
 const CLOSE: f64 = 1.2;
 /// Places whose laws are tried.
 const PLACES: usize = 2;
+/// Share of its cost that a fit may foresee to lose, at most, where it is asked whether it is behind.
+const FORESEEN: f64 = 0.95;
+/// Structures that start from a free simulation beside those that were led.
+const FREE: usize = 2;
 /// Time in which every law at a place takes its first step; starts beyond the first of each come last.
 const LAWS: Duration = Duration::from_millis(2500);
 
@@ -45,9 +49,9 @@ impl Course<'_> {
             led = self.lead(led, count);
         }
         led = self.loosen(led, count);
-        // What shows best on a free simulation may show little along the path.
-        let other = seeds.iter().find(|s| !s.guided).map(|seed| self.entry(seed));
-        led.into_iter().map(|(structure, fit)| (structure, vec![fit.values])).chain(other).collect()
+        // What shows best on a free simulation may show little along the path, and several may show there nearly as well.
+        let others = seeds.iter().filter(|s| !s.guided).take(FREE).map(|seed| self.entry(seed));
+        led.into_iter().map(|(structure, fit)| (structure, vec![fit.values])).chain(others).collect()
     }
 
     fn entry(&self, seed: &Seed) -> Entry {
@@ -147,7 +151,9 @@ fn rank(led: &mut Vec<(Structure, Fit)>, keep: usize) {
     led.sort_by(|a, b| hopeful(&a.1).total_cmp(&hopeful(&b.1)));
     distinct_fits(led);
     let best = led.first().map_or(0.0, |(_, f)| hopeful(f).max(f.residuals.len() as f64));
-    led.retain(|(_, f)| hopeful(f) < BEHIND * best);
+    // One that is still on its way is not behind yet, if its next step foresees that it comes near.
+    let on_its_way = |f: &Fit| f.cost - f.foreseen.min(FORESEEN * f.cost);
+    led.retain(|(_, f)| on_its_way(f) < BEHIND * best);
     led.truncate(keep);
 }
 

@@ -4,26 +4,42 @@ use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use std::ops::Range;
 
+/// Rows that are multiplied at a time: what some hundred columns hold there fits a core's cache.
+const ROWS: usize = 256;
+/// Pieces of the rows that are summed by themselves, on as many cores as there are: always so many, so that the sums are the same on every machine.
+const PIECES: usize = 8;
+
 /// `J' W J` and `J' W r`, J given by its columns. `weights`: one for each residual, or all 1.
 pub(crate) fn normal_equations(jacobian: &[Vec<f64>], residuals: &[f64], weights: Option<&[f64]>) -> (DMatrix<f64>, DVector<f64>) {
     let n = jacobian.len();
     // What moves one record only is 0 in all others.
     let spans: Vec<Range<usize>> = jacobian.iter().map(|column| span(column)).collect();
-    let dot = |a: &[f64], b: &[f64], range: Range<usize>| {
-        let (a, b) = (&a[range.clone()], &b[range.clone()]);
-        match weights {
-            None => crate::fit::dot(a, b),
-            Some(w) => a.iter().zip(b).zip(&w[range]).map(|((a, b), w)| w * a * b).sum(),
+    let size = residuals.len().div_ceil(PIECES).max(1);
+    let pieces: Vec<Range<usize>> = (0..PIECES).map(|i| (i * size).min(residuals.len())..((i + 1) * size).min(residuals.len())).collect();
+    let part = |piece: Range<usize>| {
+        let (mut matrix, mut slope) = (DMatrix::zeros(n, n), DVector::zeros(n));
+        for from in piece.clone().step_by(ROWS) {
+            let block = from..(from + ROWS).min(piece.end);
+            let moved: Vec<usize> = (0..n).filter(|i| spans[*i].start < block.end && block.start < spans[*i].end).collect();
+            let values = moved.iter().flat_map(|i| &jacobian[*i][block.clone()]).copied();
+            let columns = DMatrix::from_iterator(block.len(), moved.len(), values);
+            let mut rows = columns.transpose();
+            if let Some(weights) = weights {
+                rows.column_iter_mut().zip(&weights[block.clone()]).for_each(|(mut row, weight)| row *= *weight);
+            }
+            let product = &rows * &columns;
+            let right = &rows * DVector::from_column_slice(&residuals[block]);
+            for (b, j) in moved.iter().enumerate() {
+                slope[*j] += right[b];
+                for (a, i) in moved.iter().enumerate() {
+                    matrix[(*i, *j)] += product[(a, b)];
+                }
+            }
         }
+        (matrix, slope)
     };
-    let product = |i: usize, j: usize| {
-        let (from, to) = (spans[i].start.max(spans[j].start), spans[i].end.min(spans[j].end));
-        if from < to { dot(&jacobian[i], &jacobian[j], from..to) } else { 0.0 }
-    };
-    let rows: Vec<Vec<f64>> = (0..n).into_par_iter().map(|i| (0..=i).map(|j| product(i, j)).collect()).collect();
-    let matrix = DMatrix::from_fn(n, n, |i, j| if j <= i { rows[i][j] } else { rows[j][i] });
-    let slope = DVector::from_iterator(n, jacobian.iter().zip(&spans).map(|(column, span)| dot(column, residuals, span.clone())));
-    (matrix, slope)
+    let parts: Vec<(DMatrix<f64>, DVector<f64>)> = pieces.into_par_iter().map(part).collect();
+    parts.into_iter().fold((DMatrix::zeros(n, n), DVector::zeros(n)), |(m, s), (matrix, slope)| (m + matrix, s + slope))
 }
 
 /// From the first to behind the last value that is not 0.

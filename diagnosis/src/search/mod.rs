@@ -156,6 +156,8 @@ const FINEST: usize = 64;
 const BLUR: f64 = 0.02;
 /// Share of the time for screening beside a structure that was found.
 const ANEW: f64 = 0.06;
+/// Times the cost of the best up to which a law leaves less than twice as much over.
+const TWICE: f64 = 4.0;
 /// Share of the time for numbers that come back.
 const REVIVING: f64 = 0.2;
 /// Level above which the nominal model's refit is brought to its end after the search only, and vanished numbers of a law stay so until its end, floors.
@@ -619,7 +621,7 @@ fn simplest(found: &[Candidate], samples: usize) -> Option<&Candidate> {
     if best.fit.cost < NEAR * samples as f64 {
         return Some(best);
     }
-    let like = |c: &&Candidate| c.structure.added.len() == best.structure.added.len() && c.fit.cost < 2.0 * best.fit.cost;
+    let like = |c: &&Candidate| c.structure.added.len() == best.structure.added.len() && c.fit.cost < TWICE * best.fit.cost;
     found.iter().filter(like).min_by_key(|c| c.structure.numbers.len())
 }
 
