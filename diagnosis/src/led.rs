@@ -158,7 +158,7 @@ fn rank(led: &mut Vec<(Structure, Fit)>, keep: usize) {
 }
 
 /// A start with the values that another law at the same place has for what both have: keys of the same name, levels of friction.
-fn inherited(hypothesis: &Hypothesis, start: &[f64], from: &[(&str, f64)]) -> Vec<f64> {
+pub(crate) fn inherited(hypothesis: &Hypothesis, start: &[f64], from: &[(&str, f64)]) -> Vec<f64> {
     let level = |key: &str| ["force", "coulomb", "static"].contains(&key);
     let value = |key: &str| {
         let same = from.iter().find(|(other, _)| *other == key);

@@ -144,17 +144,19 @@ pub fn prove(options: &cli::Prove, folder: &Path, drawn: &Draw, stop: &AtomicBoo
     ours(folder, "diagnose", &[&"diagnose", &session, &"--out", &found, &"--patience", &patience])?;
     let verdict: Value = serde_json::from_str(&read(&found.join("verdict.json"))?).map_err(Failure::input)?;
 
+    let error = |key: &str| verdict["held_out"][key].as_f64();
+    let floors_left = |key: &str| error(key).zip(error("noise_floor")).map(|(left, floor)| left / floor).filter(|x| x.is_finite());
+
     let (mut cancellers, mut share) = (Vec::new(), None);
     if !options.no_gains {
         cancellers = all_cancellers(options, folder, &nominal, &session, &found)?;
         let (diagnosed, scaled) = (found.join("model.diagnosed.toml"), folder.join("chosen.toml"));
         let rivals = verdict["rival_models"].as_array().into_iter().flatten().filter_map(Value::as_str).map(|name| found.join(name));
         let task = Task { graph: &options.contact, high_pass_hz: options.high_pass };
-        // What is unexplained is in the device and in no model at hand: what it does to the loop nobody can say, so nothing is cancelled.
-        let chosen = match verdict["verdict"].as_str() {
-            Some("unexplained") => Chosen::nothing(),
-            _ => choose(&diagnosed, &rivals.collect::<Vec<_>>(), &scaled, &task, stop)?,
-        };
+        // What is unexplained is in the device and in no model at hand: what it does to the loop nobody can say, so nothing is cancelled. So is what
+        // an explanation leaves over that a proof would count as an effect.
+        let is_explained = verdict["verdict"] != "unexplained" && floors_left("nrmse_after").is_some_and(|floors| floors < SHOWS);
+        let chosen = if is_explained { choose(&diagnosed, &rivals.collect::<Vec<_>>(), &scaled, &task, stop)? } else { Chosen::nothing() };
         cancellers.push(Canceller { name: "chosen", model: (chosen.share > 0.0).then_some(scaled), grip: None });
         share = Some(chosen.share);
     }
@@ -184,7 +186,6 @@ pub fn prove(options: &cli::Prove, folder: &Path, drawn: &Draw, stop: &AtomicBoo
         }
     }
     let (word, findings) = (verdict["verdict"].as_str().unwrap_or_default().to_string(), findings(&verdict));
-    let error = |key: &str| verdict["held_out"][key].as_f64();
     Ok(Case {
         name: folder.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned()),
         shows_hand: drawn.shows_hand,
@@ -200,7 +201,7 @@ pub fn prove(options: &cli::Prove, folder: &Path, drawn: &Draw, stop: &AtomicBoo
             .collect(),
         nonlinear: is_nonlinear(&truth),
         held_out: ["nrmse_before", "nrmse_refit", "nrmse_after"].map(error),
-        refit_floors: error("nrmse_refit").zip(error("noise_floor")).map(|(refit, floor)| refit / floor).filter(|x| x.is_finite()),
+        refit_floors: floors_left("nrmse_refit"),
         word,
         findings,
         gains,

@@ -61,11 +61,12 @@ pub fn page(options: &cli::Prove, cases: &[Case]) -> Page {
          to 50 in steps that end at 3 %, the canceller behind a high-pass of {} Hz; \"linear, refitted\" is the nominal model with its numbers fitted to \
          the session, \"second order\" one mass on a spring and a damper fitted to the recordings in which the hand holds still, \"chosen\" the diagnosed \
          model with that share of its estimate whose worst stable gain over grips 20 % softer to 20 % firmer is best when the diagnosed model itself, or \
-         one of its rivals that explain the recordings nearly as well, is the master, and no canceller where the verdict leaves something unexplained. Edges are searched with the loop in one process; at the edges without \
+         one of its rivals that explain the recordings nearly as well, is the master, and no canceller where the verdict leaves something unexplained, or {} noise floors and more of what was held out. Edges are searched with the loop in one process; at the edges without \
          canceller, with the diagnosed and with the chosen one the graph itself is run, its processes over shared memory.",
         options.seed,
         options.contact.display(),
-        options.high_pass
+        options.high_pass,
+        SHOWS
     ));
     page.text("To check a seal: sha256sum case-NNN/sealed/truth.json gives the digest of the bags' title.");
     page

@@ -158,6 +158,8 @@ const BLUR: f64 = 0.02;
 const ANEW: f64 = 0.06;
 /// Times the cost of the best up to which a law leaves less than twice as much over.
 const TWICE: f64 = 4.0;
+/// Steps from the best to something simpler, at most.
+const SIMPLER: usize = 3;
 /// Share of the time for numbers that come back.
 const REVIVING: f64 = 0.2;
 /// Level above which the nominal model's refit is brought to its end after the search only, and vanished numbers of a law stay so until its end, floors.
@@ -326,7 +328,6 @@ pub fn search(
     };
     // A simpler law that does as well is worth a little more than the time.
     let longer = Evaluator { until: Some(began + settings.patience.mul_f64(0.92)), ..evaluator.clone() };
-    let to_the_end = Course { evaluator: &longer, ..course };
     let mut tried: Vec<Tried> = Vec::new();
     for promise in views.iter().flat_map(|v| v.simple.iter().chain(&v.rich)) {
         let id = &hypotheses[promise.hypothesis].id;
@@ -521,13 +522,20 @@ pub fn search(
     let stopped = late(1.0);
     report("fitting the best to the end");
     // An effect may only have led the rest out of a wrong valley: each of the best's is left out again, the others from where they are now; and a law of many
-    // numbers has to win over those that it contains.
+    // numbers has to win over those that it contains. One such step may open the next.
     let last = Evaluator { until: Some(began + settings.patience.mul_f64(0.95)), ..evaluator.clone() };
-    let fewer = [to_the_end.fewer(&found), to_the_end.revived(&found)].concat();
-    let fewer = polished(&last, fewer);
-    found.extend(fewer);
-    sort(&mut found, samples);
-    let last = Evaluator { until: Some(began + settings.patience.mul_f64(0.95)), ..evaluator.clone() };
+    for _ in 0..SIMPLER {
+        let before = found.first().map(|c| key_of(&c.structure.added));
+        let mut starts = course.fewer(&found);
+        if !done(&found, &nominal, samples) {
+            starts.extend(course.revived(&found));
+        }
+        found.extend(polished(&last, starts));
+        sort(&mut found, samples);
+        if found.first().map(|c| key_of(&c.structure.added)) == before {
+            break;
+        }
+    }
     let best = found.first().map_or(f64::INFINITY, |c| c.fit.cost);
     // Those that could still win, or tie with the best.
     let unit = best / samples as f64;

@@ -4,6 +4,7 @@ use super::view::{SIMPLE, View};
 use super::{Candidate, candidate, distinct_structures};
 use crate::fit::{Effort, Evaluator};
 use crate::hypothesis::{self, Hypothesis, Place};
+use crate::led::inherited;
 use crate::race::{Course, Seed};
 use crate::screen::{Promise, Screen};
 use crate::structure::Structure;
@@ -178,8 +179,10 @@ impl Course<'_> {
                     && hypothesis::contains(effect.physics, h.physics)
                     && h.parameters.len() < effect.parameters.len()
             };
+            let known: Vec<(&str, f64)> = effect.parameters.iter().zip(values).map(|(p, v)| (p.key.as_str(), *v)).collect();
             for law in self.hypotheses.iter().filter(simpler) {
                 let Some(start) = hypothesis::starts_beside(effect, values, law).into_iter().next() else { continue };
+                let start = inherited(law, &start, &known);
                 let mut effects = own.clone();
                 effects[out] = (law.clone(), start);
                 all.push(made(effects));
