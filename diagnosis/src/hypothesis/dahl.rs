@@ -4,6 +4,10 @@ use super::Physics;
 use super::builder::{ElementBuilder, friction_level, log};
 use super::sites::FRICTION;
 
+/// Forces over displacements of the recordings up to which friction builds up over a distance that could show: stiffer, it is dry friction, and a fit only
+/// imitates the steps of whoever simulated or sampled it.
+pub(super) const STIFFEST: f64 = 1e4;
+
 pub(super) const PHYSICS: Physics = Physics {
     name: "dahl",
     family: "friction",
@@ -22,7 +26,7 @@ pub(super) const PHYSICS: Physics = Physics {
             let most = 20.0 * f.max(c);
             let mut coulomb = log(1e-6 * f, most);
             coulomb.neutral = stated.is_none().then_some(1e-6 * f);
-            let new = new.number("stiffness", log(0.01 * f / x, 1e6 * f / x)).number("coulomb", coulomb);
+            let new = new.number("stiffness", log(0.01 * f / x, STIFFEST * f / x)).number("coulomb", coulomb);
             let starts =
                 vec![vec![c / (0.05 * x), c], vec![c / (0.5 * x), c], vec![c / (0.005 * x), c], vec![3.0 * c / (0.2 * x), 3.0 * c]];
             Some(new.starts(starts))

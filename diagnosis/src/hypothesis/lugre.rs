@@ -20,7 +20,7 @@ pub(super) const PHYSICS: Physics = Physics {
             let (c, neutral) = stated;
             let level = Freedom { range: (1e-6 * f, 20.0 * f.max(c)), neutral: neutral.map(|n| n.max(1e-6 * f)), log: false };
             let new = new
-                .number("stiffness", log(0.01 * f / x, 1e6 * f / x))
+                .number("stiffness", log(0.01 * f / x, super::dahl::STIFFEST * f / x))
                 .number("damping", any(0.0, 100.0 * f / v))
                 .number("coulomb", level)
                 .number("static", level)
