@@ -493,13 +493,13 @@ pub fn search(
         }
         let known: HashSet<String> = found.iter().map(|c| key_of(&c.structure.added)).collect();
         seeds.retain(|s| anew || !known.contains(&key_of(s.effects.iter().map(|(h, _)| &hypotheses[*h]))));
-        // What only shows beside a law that was found shows little along the path of the nominal model.
         // Where it leaves much over, another effect may be what is missing: other laws in its place have their share of the time, and no more.
         let more_to_come = found.first().is_none_or(|c| c.fit.cost > NEAR * samples as f64);
         let aside = Moment::now() + settings.patience.mul_f64(if more_to_come { wave.aside() } else { 1.0 });
         let held_against = if matches!(wave, Elsewhere | Relatives) { &longer } else { &evaluator };
         let held_against = Evaluator { until: held_against.until.map(|end| end.min(aside)), ..held_against.clone() };
         let course = Course { evaluator: &held_against, ..course };
+        // What only shows beside a law that was found shows little along the path of the nominal model.
         let raced = match wave {
             Anew => Course { along: None, coarse: fine, ..course }.race(seeds, wave.keep()),
             Finer | Ripples | Elsewhere | Relatives => Course { along: None, ..course }.race(seeds, wave.keep()),

@@ -106,8 +106,9 @@ impl Course<'_> {
         seeds
     }
 
-    /// The best, and what does nearly as well with as many effects, where some of their numbers have all but vanished, with these as given: searched in logarithms, a number near 0 moves nothing any more, so that
-    /// a fit that took a body's mass away does not give it back.
+    /// The best, and what does nearly as well with as many effects, where some of their numbers have all but vanished, and where to start: with a mass
+    /// shared with the neighbour that took it on, where no mass is gone with the other numbers as given. Searched in logarithms, a number near 0 moves
+    /// nothing any more, so that a fit that took a body's mass away does not give it back.
     pub(super) fn revived(&self, found: &[Candidate]) -> Vec<(Structure, Vec<f64>)> {
         let problem = self.evaluator.problem;
         let Some(best) = found.first() else { return Vec::new() };
