@@ -2,6 +2,7 @@
 
 use crate::fit::{Effort, Evaluator, measured};
 use crate::problem::{Problem, Record};
+use crate::statistics::correlation_time;
 use crate::structure::Structure;
 use serde::Serialize;
 
@@ -46,12 +47,22 @@ pub fn predictions(problem: &Problem, records: &[Record], structure: &Structure,
     records.iter().enumerate().map(one).collect()
 }
 
-/// Mean square of what a structure with these values leaves over of `records`, as fits compare it, in squares of `floor`.
-pub fn mean_square(problem: &Problem, records: &[Record], structure: &Structure, values: &[f64], floor: &[f64]) -> Option<f64> {
+/// What a structure leaves over of recordings that no fit has seen.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Unseen {
+    /// Its mean square, as fits compare it, squares of the floor.
+    pub mean_square: f64,
+    /// Its correlation time, samples: an amplitude or a drift that no law follows is off over thousands of them, and counts but once.
+    pub correlation_time: f64,
+}
+
+/// What a structure with these values leaves over of `records`, in units of `floor`.
+pub fn unseen(problem: &Problem, records: &[Record], structure: &Structure, values: &[f64], floor: &[f64]) -> Option<Unseen> {
     let ready = Ready::of(problem, records, structure, values)?;
     let evaluator = Evaluator { floor: floor.to_vec(), ..Evaluator::on(&ready.fixed, records) };
     let residuals = evaluator.residuals(&ready.own, &ready.values).filter(|r| !r.is_empty())?;
-    Some(residuals.iter().map(|r| r * r).sum::<f64>() / residuals.len() as f64)
+    let mean_square = residuals.iter().map(|r| r * r).sum::<f64>() / residuals.len() as f64;
+    Some(Unseen { mean_square, correlation_time: correlation_time(&evaluator, &residuals) })
 }
 
 /// Normalised root mean squared error of a structure with these values, averaged over the recordings and their outputs; each over the

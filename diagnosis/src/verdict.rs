@@ -117,7 +117,9 @@ fn evidence(search: &Search, base: &Candidate, better: &Candidate) -> f64 {
 /// What the recordings that no fit has seen say alone; 0 where there are none.
 fn unseen_evidence(search: &Search, base: &Candidate, better: &Candidate) -> f64 {
     match (base.unseen, better.unseen) {
-        (Some(a), Some(b)) if a > 0.0 && b > 0.0 => (search.unseen_samples as f64 / better.correlation_time) * (a / b).ln(),
+        (Some(a), Some(b)) if a.mean_square > 0.0 && b.mean_square > 0.0 => {
+            (search.unseen_samples as f64 / a.correlation_time.max(b.correlation_time)) * (a.mean_square / b.mean_square).ln()
+        }
         _ => 0.0,
     }
 }
@@ -125,7 +127,7 @@ fn unseen_evidence(search: &Search, base: &Candidate, better: &Candidate) -> f64
 fn worth(search: &Search, base: &Candidate, better: &Candidate) -> bool {
     // What no fit has seen must not speak against it: a law that is there is there in every recording, if not always to be seen.
     let seen_again = match (base.unseen, better.unseen) {
-        (Some(a), Some(b)) => b < a * 1.005,
+        (Some(a), Some(b)) => b.mean_square < a.mean_square * 1.005,
         _ => true,
     };
     evidence(search, base, better) > LEAST_ADVANTAGE && better.fit.cost < (1.0 - LEAST_SHARE) * base.fit.cost && seen_again
@@ -478,7 +480,7 @@ fn rival_models(problem: &Problem, search: &Search, best: &Candidate) -> Vec<Str
     let names = |c: &Candidate| c.structure.added.iter().map(|h| h.id.clone()).collect::<Vec<_>>();
     let near = |c: &&Candidate| {
         let unseen = match (best.unseen, c.unseen) {
-            (Some(a), Some(b)) => b <= NEARLY * a,
+            (Some(a), Some(b)) => b.mean_square <= NEARLY * a.mean_square,
             _ => true,
         };
         unseen && c.fit.cost <= NEARLY * best.fit.cost && names(c) != names(best)

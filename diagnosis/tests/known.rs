@@ -1,5 +1,6 @@
 //! Devices of known physics: what was left out is named, and nothing is named where nothing was.
 
+use backdrive_diagnosis::compare::unseen;
 use backdrive_diagnosis::fit::{Effort, Evaluator};
 use backdrive_diagnosis::intervals::Spread;
 use backdrive_diagnosis::problem::{Problem, Record};
@@ -181,6 +182,27 @@ fn a_right_model_lacks_nothing() {
         let said = verdict(&problem, &found, "after.toml").unwrap();
         assert_eq!(said.json["verdict"], "nothing_missing", "{:#}", said.json);
     }
+}
+
+#[test]
+fn a_drift_in_what_no_fit_has_seen_counts_but_once() {
+    let mut problem = recorded(NOMINAL, 5);
+    let structure = Structure::new(&problem, &problem.fit, Vec::new());
+    let given: Vec<f64> = problem.stated.iter().map(|s| s.given).collect();
+    let values = structure.values(&problem, &given, &[], &[]);
+    // As noise and encoder steps make it.
+    let floor = vec![2.02e-5];
+    let held = |problem: &Problem| unseen(problem, &problem.held_out, &structure, &values, &floor).unwrap();
+    let noise = held(&problem);
+    assert!(noise.mean_square < 1.2 && noise.correlation_time < 1.3, "{noise:?}");
+    // Half a period of a wave of six floors over the whole of the recording: one observation, or a few.
+    let samples = problem.held_out[0].outputs[0].as_mut().unwrap();
+    let length = samples.len() as f64;
+    samples.iter_mut().enumerate().for_each(|(i, y)| *y += 6.0 * floor[0] * (std::f64::consts::PI * i as f64 / length).cos());
+    let drifting = held(&problem);
+    assert!((drifting.mean_square / 19.0 - 1.0).abs() < 0.1, "{drifting:?}");
+    let independent = length / drifting.correlation_time;
+    assert!(independent < 6.0, "{independent}");
 }
 
 const SLIDE: &str = r#"

@@ -5,7 +5,7 @@ mod view;
 mod wave;
 
 use crate::clock::Moment;
-use crate::compare::mean_square;
+use crate::compare::{Unseen, unseen};
 use crate::fit::{Effort, Evaluator, Fit};
 use crate::floor;
 use crate::guide::Guide;
@@ -54,8 +54,8 @@ pub struct Candidate {
     pub slowness: f64,
     /// Root mean square of what it leaves over at each output, floors.
     pub levels: Vec<f64>,
-    /// Mean square of its residuals on the recordings that no fit has seen, floors; `None` where it was not held against them.
-    pub unseen: Option<f64>,
+    /// What it leaves over of the recordings that no fit has seen; `None` where it was not held against them.
+    pub unseen: Option<Unseen>,
 }
 
 impl Candidate {
@@ -581,7 +581,7 @@ pub fn search(
     });
     let mut finalists: Vec<&mut Candidate> = finalists.chain(std::iter::once(&mut nominal)).collect();
     finalists.par_iter_mut().for_each(|c| {
-        c.unseen = mean_square(problem, &problem.held_out, &c.structure, &c.fit.values, &evaluator.floor);
+        c.unseen = unseen(problem, &problem.held_out, &c.structure, &c.fit.values, &evaluator.floor);
     });
     for t in &mut tried {
         let single = found.iter().find(|c| c.structure.added.len() == 1 && c.structure.added[0].id == t.id);
