@@ -1,0 +1,80 @@
+//! Verdicts and numbers in words.
+
+use backdrive_report::{Cell, Tone, number};
+use backdrive_stability::energy::EnergyVerdict;
+use backdrive_stability::outcome::Outcome;
+use backdrive_stability::verdict::Word;
+
+pub(super) fn word(outcome: &Outcome) -> Word {
+    match outcome {
+        Outcome::Stable => Word::Stable,
+        Outcome::LimitCycle { .. } => Word::LimitCycle,
+        Outcome::Unstable { .. } => Word::Unstable,
+        Outcome::Limited { .. } => Word::Limited,
+    }
+}
+
+pub(super) fn tone(word: Word) -> Tone {
+    match word {
+        Word::Stable => Tone::Good,
+        Word::LimitCycle => Tone::Warning,
+        Word::Unstable => Tone::Bad,
+        Word::Limited => Tone::Limited,
+        Word::CannotTell => Tone::Unsure,
+    }
+}
+
+pub(super) fn text(word: Word) -> &'static str {
+    match word {
+        Word::Stable => "stable",
+        Word::LimitCycle => "limit cycle",
+        Word::Unstable => "unstable",
+        Word::Limited => "limited",
+        Word::CannotTell => "cannot tell",
+    }
+}
+
+pub(super) fn verdict(word: Word) -> Cell {
+    Cell::tone(text(word), tone(word))
+}
+
+pub(super) fn energy_verdict(verdict: EnergyVerdict) -> (&'static str, Tone) {
+    match verdict {
+        EnergyVerdict::Passive => ("passive", Tone::Good),
+        EnergyVerdict::Active => ("active", Tone::Warning),
+        EnergyVerdict::CannotTell => ("cannot tell", Tone::Unsure),
+    }
+}
+
+pub(super) fn interval((low, high): (f64, Option<f64>)) -> String {
+    match high {
+        Some(high) => format!("{} to {}", number(low), number(high)),
+        None => format!("{} or more", number(low)),
+    }
+}
+
+/// The last part of a path, for the title.
+pub(super) fn file_name(path: &str) -> &str {
+    path.rsplit('/').find(|part| !part.is_empty()).unwrap_or(path)
+}
+
+/// A sentence from a clause: its first letter large, a full stop at its end.
+pub(super) fn capital(clause: &str) -> String {
+    let mut chars = clause.chars();
+    let first: String = chars.next().map(|c| c.to_uppercase().collect()).unwrap_or_default();
+    let stop = if clause.is_empty() || clause.ends_with(['.', '!', '?', ':']) { "" } else { "." };
+    format!("{first}{}{stop}", chars.as_str())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn clauses_become_sentences() {
+        assert_eq!(capital("äh, no"), "Äh, no.");
+        assert_eq!(capital("Done."), "Done.");
+        assert_eq!(capital(""), "");
+        assert_eq!(file_name("a/b/session/"), "session");
+    }
+}
