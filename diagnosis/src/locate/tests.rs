@@ -1,5 +1,6 @@
 //! Devices with known hidden physics: simulated with it, located without.
 
+use super::smoother::{Data, System};
 use super::*;
 use backdrive_plant::stepper::{Options as StepOptions, simulate};
 use rand::SeedableRng;
