@@ -1,0 +1,98 @@
+//! The end of a search: the best made simpler and brought to their ends, and held against recordings that no fit has seen.
+
+use super::nominal::{Nominal, to_its_end};
+use super::{Candidate, MIDDLE, Time, candidate, done, key_of, sort};
+use crate::compare::unseen;
+use crate::fit::{Effort, Evaluator, Fit};
+use crate::race::Course;
+use crate::structure::Structure;
+use rayon::prelude::*;
+
+/// Steps from the best to something simpler, at most.
+const SIMPLER: usize = 3;
+/// The last steps of those that could still win.
+const POLISH: Effort = Effort { steps: 15, tolerance: 0.3 };
+/// Structures of so many effects that are held against recordings that no fit has seen.
+const FINALISTS: usize = 8;
+
+/// An effect may only have led the rest out of a wrong valley: each of the best's is left out again, the others from where they are now; and a law of many
+/// numbers has to win over those that it contains. One such step may open the next.
+pub(super) fn make_simpler(course: &Course, found: &mut Vec<Candidate>, time: &Time) {
+    let samples = course.nominal.fit.residuals.len();
+    let last = Evaluator { until: Some(time.at(0.95)), ..course.evaluator.clone() };
+    for _ in 0..SIMPLER {
+        let before = found.first().map(|c| key_of(&c.structure.added));
+        let mut starts = course.fewer(found);
+        if !done(found, course.nominal, samples) {
+            starts.extend(course.revived(found));
+        }
+        found.extend(polished(&last, starts));
+        sort(found, samples);
+        if found.first().map(|c| key_of(&c.structure.added)) == before {
+            break;
+        }
+    }
+}
+
+/// Brings those that could still win, or tie with the best, to their ends.
+pub(super) fn bring_to_their_ends(evaluator: &Evaluator, found: &mut [Candidate], samples: usize, time: &Time) {
+    let last = Evaluator { until: Some(time.at(0.95)), ..evaluator.clone() };
+    let best = found.first().map_or(f64::INFINITY, |c| c.fit.cost);
+    let unit = best / samples as f64;
+    let open = |c: &Candidate| c.fit.foreseen > 0.5 * unit && c.fit.cost - 2.0 * c.fit.foreseen < best + 20.0 * unit * c.correlation_time;
+    let ends: Vec<usize> = (0..found.len().min(6)).filter(|i| found[*i].fit.cost < 1.5 * best && open(&found[*i])).collect();
+    let polished: Vec<(usize, Fit)> =
+        ends.par_iter().filter_map(|i| Some((*i, last.fit(&found[*i].structure, &found[*i].fit.values, POLISH)?))).collect();
+    for (i, fit) in polished {
+        found[i] = candidate(evaluator, found[i].structure.clone(), fit);
+    }
+    sort(found, samples);
+}
+
+/// The nominal model at its end. The numbers of what was found may lead it out of a wrong basin: then there was less to find.
+pub(super) fn nominal_at_its_end(nominal: &Nominal, found: &[Candidate], time: &Time) -> Candidate {
+    let (evaluator, refitted) = (&nominal.evaluator, &nominal.refitted);
+    let problem = evaluator.problem;
+    let numbers = |c: &Candidate| (c.structure.stated_of(problem, &c.fit.values), c.structure.of_records(&c.fit.values));
+    let others = found.iter().take(2).map(numbers);
+    // Far from the noise its last thousandths say nothing.
+    let effort = if nominal.is_far { Effort { steps: 8, tolerance: 3.0 } } else { Effort::FULL };
+    let substeps = if nominal.is_far { MIDDLE } else { evaluator.substeps };
+    let last = Evaluator { until: Some(time.at(0.97)), substeps, ..evaluator.clone() };
+    let mut better = None;
+    for (stated, of_records) in others.chain(nominal.is_far.then(|| numbers(refitted))) {
+        let start = refitted.structure.values(problem, &stated, &[], &of_records);
+        let least = better.as_ref().map_or(refitted.fit.cost, |f: &Fit| f.cost);
+        if let Some(fit) = last.fit(&refitted.structure, &start, effort)
+            && fit.cost < 0.999 * least
+        {
+            better = Some(fit);
+        }
+    }
+    match better {
+        Some(fit) => candidate(evaluator, refitted.structure.clone(), to_its_end(&last, &refitted.structure, fit)),
+        None => refitted.clone(),
+    }
+}
+
+/// Holds the nominal model and the best with so many effects each against the recordings that no fit has seen: those may speak for fewer effects than
+/// fits do. How many samples there are.
+pub(super) fn hold_against_unseen(evaluator: &Evaluator, found: &mut [Candidate], nominal: &mut Candidate) -> usize {
+    let problem = evaluator.problem;
+    let mut so_many = vec![0; found.iter().map(|c| c.structure.added.len() + 1).max().unwrap_or(0)];
+    let finalists = found.iter_mut().filter(|c| {
+        let before = so_many.get_mut(c.structure.added.len());
+        before.is_some_and(|n| std::mem::replace(n, *n + 1) < FINALISTS)
+    });
+    let mut finalists: Vec<&mut Candidate> = finalists.chain(std::iter::once(nominal)).collect();
+    finalists.par_iter_mut().for_each(|c| {
+        c.unseen = unseen(problem, &problem.held_out, &c.structure, &c.fit.values, &evaluator.floor);
+    });
+    Evaluator::on(problem, &problem.held_out).len()
+}
+
+/// Each fitted from where it starts.
+pub(super) fn polished(evaluator: &Evaluator, structures: Vec<(Structure, Vec<f64>)>) -> Vec<Candidate> {
+    let fits = structures.into_par_iter().filter_map(|(structure, start)| Some((evaluator.fit(&structure, &start, POLISH)?, structure)));
+    fits.map(|(fit, structure)| candidate(evaluator, structure, fit)).collect()
+}

@@ -1,0 +1,245 @@
+//! The nominal model: refitted, and led along the recordings where it stays far from the noise.
+
+use super::{COARSE, Candidate, MIDDLE, NOMINAL_END, SearchError, Time, candidate, white};
+use crate::fit::{Effort, Evaluator, Fit};
+use crate::floor;
+use crate::guide::Guide;
+use crate::hypothesis::Scales;
+use crate::parts::Parts;
+use crate::problem::{Problem, Record};
+use crate::screen::worst_records;
+use crate::statistics::{correlation_time, levels, slowness};
+use crate::structure::Structure;
+use backdrive_plant::model::{InputKind, Model};
+
+/// Residuals beyond this many times the size of most of them count by their size, not their square, where dry friction acts on a prescribed body.
+const FAR_OFF: f64 = 6.0;
+/// Level above which fits start along the measured path, floors.
+const FAR: f64 = 2.0;
+/// Mean squared residual that the nominal model has to leave along the measured path, squares of the floor, or this share of what it leaves
+/// over without it.
+const SHOWS: f64 = 3.0;
+/// See [`SHOWS`].
+const SHARE: f64 = 0.3;
+/// Other ways to be led, until enough is left over: how much looser than at first, and whether parts of the recordings are enough. On parts the
+/// numbers of the nominal model may take on what differs from one part to the next.
+const LOOSER: [(f64, bool); 5] = [(0.2, true), (1.0, false), (0.2, false), (0.04, false), (0.008, false)];
+/// Samples that screening is shown far from the noise, about.
+pub(super) const SHOWN: usize = 5_000;
+
+/// The nominal model refitted, and what was learnt of the recordings by it.
+pub(super) struct Nominal<'a> {
+    /// Holds fits against the recordings, with the measuring error that the refit left over.
+    pub evaluator: Evaluator<'a>,
+    /// The stated numbers as given.
+    pub given: Vec<f64>,
+    /// The same as a structure takes them.
+    pub start: Vec<f64>,
+    /// The refit.
+    pub refitted: Candidate,
+    /// Level of each output with the numbers as given, floors.
+    pub levels_given: Vec<f64>,
+    /// The refitted model, before it was led.
+    pub model: Model,
+    /// How far it moves.
+    pub scales: Scales,
+    /// The recordings, with what was found of inputs that nobody measured.
+    pub seen: Vec<Record>,
+    /// Whether it stays so far from the noise that its end waits until the rest is known.
+    pub is_far: bool,
+    /// Whether it stays far enough for fits to start along the measured path.
+    pub far: bool,
+    /// Whether a path leads, by force.
+    pub held: bool,
+    /// Whether a path leads: by force, or as a motion that is prescribed.
+    pub guided: bool,
+    /// How it is led.
+    pub led: Led<'a>,
+}
+
+/// The nominal model along the measured path, or without one where none leads.
+pub(super) struct Led<'a> {
+    /// What it is held against, whole.
+    pub coarse: Evaluator<'a>,
+    /// Parts of the recordings that are enough.
+    pub parts: Option<Parts>,
+    /// Its numbers there.
+    pub fit: Fit,
+}
+
+/// What leads, and how.
+struct Path<'p> {
+    firm: &'p Guide,
+    far: bool,
+    held: bool,
+    guided: bool,
+}
+
+impl Path<'_> {
+    /// The nominal model led from some values, so much looser than at first, in parts of the recordings where those are enough.
+    fn lead<'a>(&self, evaluator: &Evaluator<'a>, structure: &Structure, from: &[f64], looser: f64, in_parts: bool) -> Option<Led<'a>> {
+        let guide = self.held.then(|| self.firm.with(looser * self.firm.strength));
+        let coarse = Evaluator { substeps: COARSE, widest: 8.0, guide, ..evaluator.clone() };
+        let at = coarse.fit(structure, from, Effort { steps: if self.held { 0 } else { 2 }, tolerance: 1.0 })?;
+        // The parts where most is left over are enough for screening; along the measured path they begin as they were measured.
+        let parts = if self.far && in_parts { Parts::of(&coarse, structure, &at, SHOWN) } else { None };
+        let base = if self.guided {
+            let effort = Effort { steps: 12, tolerance: 1.0 };
+            match &parts {
+                Some(parts) => parts.evaluator(&coarse).fit(structure, &at.values, effort),
+                None => coarse.fit(structure, &at.values, effort),
+            }
+        } else {
+            None
+        };
+        Some(Led { coarse, parts, fit: base.unwrap_or(at) })
+    }
+}
+
+impl<'a> Nominal<'a> {
+    /// Refits the nominal model, and leads it.
+    pub fn refitted(problem: &'a Problem, time: &Time<'a>, report: &(dyn Fn(&str) + Sync)) -> Result<Nominal<'a>, SearchError> {
+        let mut evaluator = Evaluator::new(problem);
+        evaluator.stop = time.stop;
+        evaluator.until = Some(time.at(0.75));
+        if friction_on_prescribed(problem) {
+            evaluator.robust = FAR_OFF;
+        }
+        report("refitting the nominal model");
+        let structure = Structure::new(problem, &problem.fit, Vec::new());
+        let given: Vec<f64> = problem.stated.iter().map(|s| s.given).collect();
+        let start = structure.values(problem, &given, &[], &[]);
+        let first = evaluator.residuals(&structure, &start).ok_or(SearchError::RunsAway)?;
+        let middle = Evaluator { substeps: MIDDLE, ..evaluator.clone() };
+        let quick = worst_first(&middle, &structure, &start, &first, [12, 3]).ok_or(SearchError::RunsAway)?;
+        // What a fit leaves over shows the measuring error better than the signal does.
+        let before = evaluator.floor.clone();
+        evaluator.floor = floors(&evaluator, &quick.residuals);
+        if evaluator.robust.is_finite() {
+            // Large is what is large beside the rest, which far from the noise is far from the noise itself.
+            evaluator.robust = FAR_OFF * bulk(&quick.residuals, &before, &evaluator).max(1.0);
+        }
+        let rescaled = |residuals: &[f64]| -> Vec<f64> {
+            levels(&evaluator, residuals).iter().zip(before.iter().zip(&evaluator.floor)).map(|(l, (b, f))| l * b / f).collect()
+        };
+        let levels_given = rescaled(&first);
+        // Far from the noise its end waits until the rest is known.
+        let is_far = rescaled(&quick.residuals).iter().any(|l| *l > NOMINAL_END);
+        let effort = if is_far { Effort { steps: 4, tolerance: 3.0 } } else { Effort::FULL };
+        let mut refitted = evaluator.fit(&structure, &quick.values, effort).ok_or(SearchError::RunsAway)?;
+        // Far from the noise the measured path shows better than a simulation what is missing, and leads the numbers out of wrong basins.
+        let model = structure.model(problem, &refitted.values).ok_or(SearchError::RunsAway)?;
+        let seen = structure.with_unknown(problem, &problem.fit, &refitted.values);
+        let scales = scales(problem, &model, &seen)?;
+        let level = levels(&evaluator, &refitted.residuals).into_iter().fold(0.0, f64::max);
+        let strength = if level > 3.0 * FAR { 1.0 } else { 0.3 };
+        let far = level > FAR;
+        let firm = Guide::new(problem, &problem.fit, &scales, &evaluator.floor, strength);
+        let held = far && !firm.is_empty();
+        // A motion that is prescribed leads the device by itself.
+        let moved = problem.model.inputs.iter().any(|i| i.kind == InputKind::Motion);
+        let guided = held || far && moved;
+        let path = Path { firm: &firm, far, held, guided };
+        let lead = |from: &[f64], looser: f64, in_parts: bool| path.lead(&evaluator, &structure, from, looser, in_parts);
+        let from = if held { &start } else { &refitted.values };
+        let mut led = lead(from, 1.0, true).ok_or(SearchError::RunsAway)?;
+        if held
+            && let Some(there) = middle.residuals(&structure, &led.fit.values)
+            && let Some(other) = worst_first(&middle, &structure, &led.fit.values, &there, [8, 2])
+            && other.cost < 0.99 * refitted.cost
+            && let Some(other) = evaluator.fit(&structure, &other.values, effort)
+            && other.cost < refitted.cost
+        {
+            refitted = other;
+        }
+        refitted = to_its_end(&evaluator, &structure, refitted);
+        // Where the nominal model explains the path as it is led there, every physics looks as good as any other.
+        let left = |fit: &Fit| fit.cost / fit.residuals.len().max(1) as f64;
+        let enough = SHOWS.min(SHARE * left(&refitted));
+        for (looser, in_parts) in if held { LOOSER.as_slice() } else { &[] } {
+            if left(&led.fit) > enough {
+                break;
+            }
+            if let Some(other) = lead(&led.fit.values, *looser, *in_parts) {
+                led = other;
+            }
+        }
+        let refitted = candidate(&evaluator, structure, refitted);
+        Ok(Nominal { evaluator, given, start, refitted, levels_given, model, scales, seen, is_far, far, held, guided, led })
+    }
+}
+
+/// How far a model moves on the recordings.
+fn scales(problem: &Problem, model: &Model, seen: &[Record]) -> Result<Scales, SearchError> {
+    let runs: Vec<(Vec<Vec<f64>>, f64)> = seen.iter().map(|r| (r.inputs.clone(), r.period)).collect();
+    let largest = |output: usize| {
+        let samples = problem.fit.iter().filter_map(|r| r.outputs.get(output)?.as_deref()).flatten();
+        samples.fold(0.0_f64, |most, y| most.max(y.abs()))
+    };
+    let measured: Vec<f64> = (0..model.outputs.len()).map(largest).collect();
+    Ok(Scales::of(model, &runs)?.with_measured(model, &measured))
+}
+
+/// A fit on the recordings that are explained worst first, where there are many samples, then on all; so many steps on either. `there` are
+/// the residuals at the start.
+fn worst_first(evaluator: &Evaluator, structure: &Structure, start: &[f64], there: &[f64], steps: [usize; 2]) -> Option<Fit> {
+    let problem = evaluator.problem;
+    let own_numbers = structure.numbers.iter().any(|n| n.records.is_some());
+    let worst = worst_records(evaluator, there, 2);
+    let effort = |steps: usize| Effort { steps, tolerance: 3.0 };
+    if own_numbers || there.len() < SHOWN || 2 * worst.len() > problem.fit.len() {
+        return evaluator.fit(structure, start, effort(steps[0]));
+    }
+    let some: Vec<Record> = worst.iter().map(|r| problem.fit[*r].clone()).collect();
+    let few = Evaluator { records: &some, ..evaluator.clone() };
+    let first = few.fit(structure, start, effort(steps[0]))?;
+    evaluator.fit(structure, &first.values, effort(steps[1]))
+}
+
+/// Size of most of the residuals, floors, that a fit with the floors `before` left over; a few that are far off do not count.
+fn bulk(residuals: &[f64], before: &[f64], evaluator: &Evaluator) -> f64 {
+    let mut sizes: Vec<f64> = Vec::with_capacity(residuals.len());
+    for (_, output, range) in evaluator.layout() {
+        let scale = before[output] / evaluator.floor[output];
+        sizes.extend(residuals.get(range).unwrap_or(&[]).iter().map(|r| scale * r.abs()));
+    }
+    let middle = sizes.len() / 2;
+    // The median of white noise is 0.6745 of its standard deviation.
+    if sizes.is_empty() { 1.0 } else { 1.4826 * *sizes.select_nth_unstable_by(middle, f64::total_cmp).1 }
+}
+
+/// Whether dry friction acts on a body whose motion is prescribed: its force then jumps with the sign of a measured motion.
+fn friction_on_prescribed(problem: &Problem) -> bool {
+    use backdrive_plant::model::{InputKind, OutputKind};
+    problem
+        .model
+        .inputs
+        .iter()
+        .any(|i| i.kind == InputKind::Motion && problem.model.outputs.iter().any(|o| o.kind == OutputKind::Reaction(i.on)))
+}
+
+/// Measuring errors by what a fit leaves over, never above what the signals showed.
+fn floors(evaluator: &Evaluator, residuals: &[f64]) -> Vec<f64> {
+    let problem = evaluator.problem;
+    let layout = evaluator.layout();
+    (0..problem.model.outputs.len())
+        .map(|output| {
+            let parts: Vec<&[f64]> = layout.iter().filter(|l| l.1 == output).filter_map(|l| residuals.get(l.2.clone())).collect();
+            let signals: Vec<&[f64]> = problem.fit.iter().filter_map(|r| r.outputs.get(output)?.as_deref()).collect();
+            let own = evaluator.floor[output];
+            let least = floor::stated(&problem.model, output, &signals);
+            let spread = problem.fit.iter().filter_map(|r| r.spread.get(output)).fold(0.0f64, |a, b| a.max(*b));
+            if parts.is_empty() { own } else { (own * floor::of_residuals(&parts, least / own, 0.0)).max(1e-6 * spread).min(own) }
+        })
+        .collect()
+}
+
+/// Near the noise the end of a fit counts: what is left over short of it looks like missing physics.
+pub(super) fn to_its_end(evaluator: &Evaluator, structure: &Structure, fit: Fit) -> Fit {
+    let near = levels(evaluator, &fit.residuals).iter().all(|l| *l < FAR);
+    if !near || white(correlation_time(evaluator, &fit.residuals), slowness(evaluator, &fit.residuals)) {
+        return fit;
+    }
+    let ended = evaluator.fit_knowing(structure, &fit.values, Effort::FULL, Some((structure, &fit)));
+    ended.filter(|e| e.cost < fit.cost).unwrap_or(fit)
+}

@@ -1,0 +1,91 @@
+//! Which of the structures is claimed, and which cannot be told from it.
+
+use crate::hypothesis::{Hypothesis, PHYSICS, physics_named, withheld};
+use crate::search::{Candidate, Search, advantage_over};
+use std::collections::HashSet;
+
+/// Improvements below this advantage (difference of information criteria) are not claimed.
+const LEAST_ADVANTAGE: f64 = 30.0;
+/// Nor those that take less than this share of the cost.
+const LEAST_SHARE: f64 = 0.02;
+/// Structures of an advantage below this over a simpler one are ties, which the simpler one wins.
+const TIE: f64 = 8.0;
+/// Explanations of an advantage below this over each other cannot be told apart.
+const ALIKE: f64 = 6.0;
+
+/// Which of the structures is claimed.
+pub fn chosen(search: &Search) -> &Candidate {
+    let mut best = &search.nominal;
+    for effects in 1..=search.found.iter().map(|c| c.structure.added.len()).max().unwrap_or(0) {
+        let next = search.found.iter().filter(|c| c.structure.added.len() == effects).min_by(|a, b| a.fit.cost.total_cmp(&b.fit.cost));
+        let Some(next) = next else { continue };
+        let next = search
+            .found
+            .iter()
+            .filter(|c| c.structure.added.len() == effects)
+            .fold(next, |best, c| if evidence(search, best, c) > 0.0 { c } else { best });
+        // Ties go to the fewest numbers, then to the physics that is named first.
+        let simplest = search
+            .found
+            .iter()
+            .filter(|c| c.structure.added.len() == effects && evidence(search, c, next) < TIE)
+            .min_by_key(|c| (c.structure.numbers.len(), c.structure.added.iter().map(order).sum::<usize>()))
+            .unwrap_or(next);
+        if worth(search, best, simplest) {
+            best = simplest;
+        }
+    }
+    best
+}
+
+fn order(h: &Hypothesis) -> usize {
+    PHYSICS.iter().position(|p| p.name == h.physics).unwrap_or(usize::MAX)
+}
+
+/// What the fits and the recordings that no fit has seen say for a candidate against another one, as a difference of information
+/// criteria with effective samples.
+pub(super) fn evidence(search: &Search, base: &Candidate, better: &Candidate) -> f64 {
+    advantage_over(base, better, search.samples) + unseen_evidence(search, base, better)
+}
+
+/// What the recordings that no fit has seen say alone; 0 where there are none.
+fn unseen_evidence(search: &Search, base: &Candidate, better: &Candidate) -> f64 {
+    match (base.unseen, better.unseen) {
+        (Some(a), Some(b)) if a.mean_square > 0.0 && b.mean_square > 0.0 => {
+            (search.unseen_samples as f64 / a.correlation_time.max(b.correlation_time)) * (a.mean_square / b.mean_square).ln()
+        }
+        _ => 0.0,
+    }
+}
+
+fn worth(search: &Search, base: &Candidate, better: &Candidate) -> bool {
+    // What no fit has seen must not speak against it: a law that is there is there in every recording, if not always to be seen.
+    let seen_again = match (base.unseen, better.unseen) {
+        (Some(a), Some(b)) => b.mean_square < a.mean_square * 1.005,
+        _ => true,
+    };
+    evidence(search, base, better) > LEAST_ADVANTAGE && better.fit.cost < (1.0 - LEAST_SHARE) * base.fit.cost && seen_again
+}
+
+/// Structures of as many effects that cannot be told from the best: another place, or a law that is no richer form of its own.
+pub(super) fn alike<'s>(search: &'s Search, best: &Candidate) -> Vec<&'s Candidate> {
+    let ids = |c: &Candidate| c.structure.added.iter().map(|h| h.id.clone()).collect::<HashSet<String>>();
+    let own = ids(best);
+    let differs = |c: &Candidate| {
+        let other: Vec<&Hypothesis> = c.structure.added.iter().filter(|h| !own.contains(&h.id)).collect();
+        let mine: Vec<&Hypothesis> = best.structure.added.iter().filter(|h| !ids(c).contains(&h.id)).collect();
+        match (other.as_slice(), mine.as_slice()) {
+            ([rival], [own]) => !(rival.place.same(&own.place) && contains(rival.physics, own)) && rival.class != own.class,
+            ([], _) => false,
+            _ => true,
+        }
+    };
+    let mut seen = HashSet::new();
+    let close = |c: &&Candidate| c.structure.added.len() == best.structure.added.len() && evidence(search, c, best) < ALIKE && differs(c);
+    search.found.iter().filter(close).filter(|c| seen.insert(c.structure.name())).take(3).collect()
+}
+
+/// Whether a physics has another one, or one of its family at the same place, as a special or limiting case.
+pub(super) fn contains(rich: &str, own: &Hypothesis) -> bool {
+    withheld(&[own.physics]).contains(&rich) || physics_named(rich).is_some_and(|p| p.family == own.family)
+}

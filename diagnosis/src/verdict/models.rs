@@ -1,0 +1,66 @@
+//! Models as they are after the diagnosis, and how they predict what no fit has seen.
+
+use super::VerdictError;
+use crate::compare::nrmse;
+use crate::hypothesis::apply_edits;
+use crate::intervals::Spread;
+use crate::numbers::stated_edits;
+use crate::problem::Problem;
+use crate::search::{Candidate, Search};
+use backdrive_plant::write::{patch, round_significant};
+use serde_json::{Value as Json, json};
+
+/// Rivals whose models are written, at most.
+const RIVALS: usize = 3;
+/// What a rival leaves over, in squares of what the claimed explanation does, at most.
+const NEARLY: f64 = 2.0;
+
+/// The nominal model's text with the fitted numbers and what was found.
+pub(super) fn model_text(problem: &Problem, best: &Candidate, spread: &Spread, use_best: bool) -> Result<String, VerdictError> {
+    if !use_best {
+        return Ok(problem.text.clone());
+    }
+    let mut edits = stated_edits(problem, best, spread);
+    let mut model = problem.model.clone();
+    apply_edits(&mut model, &edits).map_err(VerdictError::Refitted)?;
+    for (hypothesis, values) in best.structure.added.iter().zip(best.structure.added_of(&best.fit.values)) {
+        let rounded: Vec<f64> = values.iter().map(|v| round_significant(*v, 7)).collect();
+        edits.extend(hypothesis.edits(&model, &rounded)?);
+        model = hypothesis.apply(&model, &rounded)?;
+    }
+    Ok(patch(&problem.text, &edits)?)
+}
+
+/// Models of other structures that explain nearly as much of what was fitted and of what no fit has seen.
+pub(super) fn rival_models(problem: &Problem, search: &Search, best: &Candidate) -> Vec<String> {
+    let names = |c: &Candidate| c.structure.added.iter().map(|h| h.id.clone()).collect::<Vec<_>>();
+    let near = |c: &&Candidate| {
+        let unseen = match (best.unseen, c.unseen) {
+            (Some(a), Some(b)) => b.mean_square <= NEARLY * a.mean_square,
+            _ => true,
+        };
+        unseen && c.fit.cost <= NEARLY * best.fit.cost && names(c) != names(best)
+    };
+    let mut rivals: Vec<&Candidate> = search.found.iter().chain([&search.nominal]).filter(near).collect();
+    rivals.sort_by(|a, b| a.fit.cost.total_cmp(&b.fit.cost));
+    let models = rivals.into_iter().filter_map(|c| c.structure.model(problem, &c.fit.values));
+    models.take(RIVALS).map(|model| model.to_toml()).collect()
+}
+
+pub(super) fn held_out(problem: &Problem, search: &Search, best: &Candidate, use_best: bool) -> Json {
+    let records = if problem.held_out.is_empty() { &problem.fit } else { &problem.held_out };
+    let structure = &search.nominal.structure;
+    let given: Vec<f64> = problem.stated.iter().map(|s| s.given).collect();
+    let before = nrmse(problem, records, structure, &structure.values(problem, &given, &[], &[]));
+    let refit = nrmse(problem, records, structure, &search.nominal.fit.values);
+    let after = if use_best { nrmse(problem, records, &best.structure, &best.fit.values) } else { before };
+    let (mut sum, mut count) = (0.0, 0usize);
+    for record in records {
+        for output in crate::fit::measured(record) {
+            sum += search.floor[output] / record.spread[output];
+            count += 1;
+        }
+    }
+    let r = |x: Option<f64>| x.map_or(Json::Null, |x| json!(round_significant(x, 6)));
+    json!({ "nrmse_before": r(before), "nrmse_refit": r(refit), "nrmse_after": r(after), "noise_floor": r(Some(sum / count.max(1) as f64)) })
+}
