@@ -2,8 +2,9 @@
 
 use super::*;
 use crate::session::AxisSignals;
+use crate::spectra::Window;
 use backdrive_plant::excitation::Excitation;
-use nalgebra::{DVector, Matrix2, Vector2};
+use nalgebra::{Complex, DMatrix, DVector, Matrix2, Vector2};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};

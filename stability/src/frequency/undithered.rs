@@ -5,11 +5,11 @@
 //! `G_u` is told alone. So both are needed, broad-band, and the intent must be recorded.
 
 use super::AxisEstimate;
+use super::dithered::{delays, on_lines};
 use super::edge::Loop;
 use super::local::{Columns, LocalFit, MOVED, fit, shaken};
-use super::{
-    CannotTell, Column, Frequency, FrequencyError, LevelEstimate, Options, Prepared, Response, column, columns, delays, edge, on_lines,
-};
+use super::prepared::{Column, Prepared, column, columns};
+use super::{CannotTell, Frequency, FrequencyError, LevelEstimate, Options, Response, edge};
 use crate::spectra::{CrossSpectra, welch};
 use nalgebra::Complex;
 use std::ops::Range;
