@@ -68,6 +68,10 @@ pub fn page(options: &cli::Prove, cases: &[Case]) -> Page {
         options.high_pass,
         SHOWS
     ));
+    page.text(
+        "What another number of the nominal model does as well, or a constant force on a handle whose hand nobody measured, no recording can tell: there naming \
+         nothing is right. The second count, of effects that stay away from the refitted nominal model, has none of those.",
+    );
     page.text("To check a seal: sha256sum case-NNN/sealed/truth.json gives the digest of the bags' title.");
     page
 }
