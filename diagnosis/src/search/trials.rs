@@ -257,9 +257,13 @@ impl<'s, 'a> Trials<'s, 'a> {
             Wave::Anew => {
                 let fewer = || distinct_structures(found, self.effects - 1);
                 let best = fewer().next();
-                // The first step to it may have been the wrong one: so from the best without that, too.
+                // Far from the noise, from what does nearly as well with fewer numbers, too: it leaves more open. Else the first step to the best may have
+                // been the wrong one: so from the best without that.
                 let without = |first: &Hypothesis| fewer().find(|c| c.structure.added.iter().all(|h| h.physics != first.physics));
-                let other = best.and_then(|b| b.structure.added.first()).filter(|_| !self.time.is_past(0.5)).and_then(without);
+                let plain =
+                    simplest_of(fewer(), samples).filter(|c| best.is_some_and(|b| c.structure.numbers.len() < b.structure.numbers.len()));
+                let late = self.time.is_past(0.5);
+                let other = plain.or_else(|| best.and_then(|b| b.structure.added.first()).filter(|_| !late).and_then(without));
                 let mut seeds = Vec::new();
                 self.fine = COARSE;
                 for base in best.into_iter().chain(other) {
@@ -328,10 +332,16 @@ fn substeps_for(evaluator: &Evaluator, candidate: &Candidate) -> usize {
 
 /// The best, or far from the noise, where the law is open as well as its place, what does nearly as well with the fewest numbers.
 fn simplest(found: &[Candidate], samples: usize) -> Option<&Candidate> {
-    let best = found.first()?;
+    let effects = found.first()?.structure.added.len();
+    simplest_of(found.iter().filter(|c| c.structure.added.len() == effects), samples)
+}
+
+/// The same of some candidates, best first.
+fn simplest_of<'c>(candidates: impl Iterator<Item = &'c Candidate>, samples: usize) -> Option<&'c Candidate> {
+    let mut candidates = candidates.peekable();
+    let best = candidates.peek().copied()?;
     if best.fit.cost < NEAR * samples as f64 {
         return Some(best);
     }
-    let like = |c: &&Candidate| c.structure.added.len() == best.structure.added.len() && c.fit.cost < TWICE * best.fit.cost;
-    found.iter().filter(like).min_by_key(|c| c.structure.numbers.len())
+    candidates.filter(|c| c.fit.cost < TWICE * best.fit.cost).min_by_key(|c| c.structure.numbers.len())
 }
