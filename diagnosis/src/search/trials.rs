@@ -257,16 +257,17 @@ impl<'s, 'a> Trials<'s, 'a> {
             Wave::Anew => {
                 let fewer = || distinct_structures(found, self.effects - 1);
                 let best = fewer().next();
-                // Far from the noise, from what does nearly as well with fewer numbers, too: it leaves more open. Else the first step to the best may have
-                // been the wrong one: so from the best without that.
+                // The first step to it may have been the wrong one: so from the best without that, too.
                 let without = |first: &Hypothesis| fewer().find(|c| c.structure.added.iter().all(|h| h.physics != first.physics));
-                let plain =
-                    simplest_of(fewer(), samples).filter(|c| best.is_some_and(|b| c.structure.numbers.len() < b.structure.numbers.len()));
                 let late = self.time.is_past(0.5);
-                let other = plain.or_else(|| best.and_then(|b| b.structure.added.first()).filter(|_| !late).and_then(without));
+                let other = best.and_then(|b| b.structure.added.first()).filter(|_| !late).and_then(without);
+                // And far from the noise from what does nearly as well with fewer numbers: it leaves more open.
+                let has_fewer = |c: &&Candidate| best.is_some_and(|b| c.structure.numbers.len() < b.structure.numbers.len());
+                let is_other = |c: &Candidate| other.is_some_and(|o| std::ptr::eq(o, c));
+                let plain = simplest_of(fewer(), samples).filter(has_fewer).filter(|c| !is_other(c));
                 let mut seeds = Vec::new();
                 self.fine = COARSE;
-                for base in best.into_iter().chain(other) {
+                for base in best.into_iter().chain(other).chain(plain) {
                     let substeps = substeps_for(&view.evaluator, base);
                     self.fine = self.fine.max(substeps);
                     seeds.extend(course.anew(&Evaluator { substeps, ..view.evaluator.clone() }, base, self.time.share(ANEW)));
