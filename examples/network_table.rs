@@ -151,7 +151,8 @@ fn predicted_edge(bag: &Path, delay_s: f64, loss: f64, without: bool) -> Result<
     if without {
         scenario = scenario.without_canceller();
     }
-    let search = Search { lowest: LOWEST, highest: HIGHEST, tolerance: 0.02, per_decade: 20, whole_grid: false, around: false };
+    let search =
+        Search { lowest: LOWEST, floor: LOWEST, highest: HIGHEST, tolerance: 0.02, per_decade: 20, whole_grid: false, around: false };
     let found = edge(&scenario, &search, &RunOptions::default(), &|_, _| {}, &AtomicBool::new(false))?;
     Ok(found.critical_gain.map_or_else(|| format!("> {:.1}", found.at_least), |gain| format!("{gain:.2}")))
 }

@@ -180,7 +180,7 @@ fn ask(bag: &Path, gain: f64) -> (Answer, Session) {
         script: None,
         gain: Gain { mu: graph.gains.mu, lambda: gain / graph.gains.mu },
         grips: Vec::new(),
-        search: Search { lowest: LOWEST, whole_grid: false, ..Search::default() },
+        search: Search { lowest: LOWEST, floor: LOWEST, whole_grid: false, ..Search::default() },
     };
     let found = answer(&question, &|_, _, _| {}, &AtomicBool::new(false)).expect("there is an answer");
     (found, session)

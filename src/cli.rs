@@ -52,10 +52,18 @@ const TEST_BENCH_HELP: &str = "Example:
 #[derive(Debug, Subcommand)]
 pub enum Command {
     /// Run a graph: every node its own process, every topic recorded.
-    #[command(after_help = "Example:\n  backdrive run launch/contact.toml --master plant/models/rigid-mass.toml --lambda 0.2")]
+    ///
+    /// Of a graph with a master, a scaling and a slave that can touch something the run says whether its loop was stable. It is judged while the hand
+    /// holds still in contact for at least 0.45 s: a run that never does so, that lost messages or a node, or ended before its duration is not called
+    /// stable (exit 7). Of a graph without such a loop, as of one that identifies a device, nothing is claimed, and a run that went well ends with 0.
+    #[command(
+        after_help = "Example:\n  backdrive run launch/contact.toml --master plant/models/rigid-mass.toml --lambda 0.2\n\nExit codes: 0 stable, or no loop to judge; 1 not stable; 7 it cannot be told; 4 data lost, 6 a node failed, 130 interrupted."
+    )]
     Run(Run),
     /// Run a bag's graph again from its recorded operator, with what you change, and say whether it was stable.
-    #[command(after_help = "Example:\n  backdrive replay contact.mcap --mu 1 --lambda 0.6 --bag again.mcap")]
+    #[command(
+        after_help = "Example:\n  backdrive replay contact.mcap --mu 1 --lambda 0.6 --bag again.mcap\n\nExit codes: 0 stable, or no loop to judge; 1 not stable; 7 it cannot be told, as of a bag that was cut short."
+    )]
     Replay(Replay),
     /// Ask a bag whether its loop would be stable at another gain, and how far away the edge is.
     #[command(after_help = STABILITY_HELP)]

@@ -10,6 +10,8 @@ use backdrive_control::operator::Intent;
 use backdrive_msgs::{Message, Sample};
 use backdrive_nodes::graph::{Node, NodeKind, Settings};
 use backdrive_nodes::stage::Clock;
+use backdrive_stability::from_bag::cut_short;
+use backdrive_stability::unjudged::Unjudged;
 
 /// Replays a bag in lockstep, in this process.
 pub fn replay(options: &cli::Replay) -> Result<u8, Failure> {
@@ -26,6 +28,7 @@ pub fn replay(options: &cli::Replay) -> Result<u8, Failure> {
         return Err(Failure::input(format!("{}: is the bag that is replayed; name another with --bag", path.display())));
     }
 
+    let planned = graph.timing.steps.unwrap_or(0);
     if !reader.ended_cleanly() {
         eprintln!("warning: {}: was not closed; what it holds is replayed, and `backdrive bag recover` makes a clean copy", path.display());
     }
@@ -56,7 +59,13 @@ pub fn replay(options: &cli::Replay) -> Result<u8, Failure> {
     graph.timing.steps = Some(options.changes.duration.map_or(steps, |d| ((d * graph.timing.rate_hz).round() as u64).max(1)));
     graph.nodes[operator].settings = settings;
 
-    let done = run_here(&graph, &mut |_, _| {})?;
+    let mut done = run_here(&graph, &mut |_, _| {})?;
+    // The run above is whole, but the hand that moved it is not.
+    if let Some(summary) = &mut done.summary {
+        let rows = if options.changes.duration.is_some() { usize::MAX } else { steps as usize };
+        let lost = reader.completeness().map_or(0, |c| c.lost());
+        summary.hold_back(cut_short(&reader, planned as usize, rows).or((lost > 0).then_some(Unjudged::Lost { messages: lost })));
+    }
     if options.json {
         println!("{}", done.json());
     } else {

@@ -16,6 +16,7 @@ use backdrive_nodes::sequence::Sequence;
 use backdrive_nodes::stage::Clock;
 use backdrive_nodes::transport::ros2::Courier;
 use backdrive_stability::outcome::Outcome;
+use backdrive_stability::unjudged::Unjudged;
 use serde_json::json;
 use std::io::Read;
 use std::path::Path;
@@ -130,11 +131,23 @@ fn run_processes(graph: &Graph, place: &Place) -> Result<Done, Failure> {
     drop(courier);
     let bag = report.bag.clone().filter(|bag| bag.exists());
     // What is known of the run is told even where its bag cannot be read.
-    let summary = bag.as_ref().and_then(|bag| summarise(bag).map_err(|e| eprintln!("warning: {}", e.message)).ok());
+    let mut summary = bag.as_ref().and_then(|bag| summarise(bag).map_err(|e| eprintln!("warning: {}", e.message)).ok());
     let whole = |bag| Reader::open(bag).is_ok_and(|r| r.ended_cleanly() && r.completeness().is_some_and(Completeness::is_complete));
     let complete = bag.as_deref().is_some_and(whole);
     let lost = report.lost + report.unrecorded.unwrap_or(0);
+    if let Some(summary) = &mut summary {
+        summary.hold_back(fault(&report, lost));
+    }
     Ok(Done { steps: report.steps, duration_s: report.duration_s, lost, bag, complete, summary, report: Some(report) })
+}
+
+/// Why a run must not be called stable, whatever its signals look like.
+fn fault(report: &RunReport, lost: u64) -> Option<Unjudged> {
+    let died = matches!(report.cause, Cause::NodeDied { .. } | Cause::NodeFailed { .. } | Cause::EndedEarly { .. });
+    if died || !report.deaths.is_empty() {
+        return Some(Unjudged::NodeDied);
+    }
+    (lost > 0).then_some(Unjudged::Lost { messages: lost })
 }
 
 /// Runs a graph in this process, in lockstep; `hear` gets every message with its topic.
@@ -194,7 +207,9 @@ pub fn run_here(graph: &Graph, hear: &mut dyn FnMut(&str, &Message)) -> Result<D
         Ok(completeness) => completeness.map_or(0, |c| c.lost()),
         Err(e) => return Err(Failure::machine(failed.unwrap_or(e))),
     };
-    let summary = Some(traces.summary(graph));
+    let mut summary = traces.summary(graph);
+    summary.hold_back((lost > 0).then_some(Unjudged::Lost { messages: lost }));
+    let summary = Some(summary);
     Ok(Done {
         steps,
         duration_s: started.elapsed().as_secs_f64(),
@@ -207,8 +222,19 @@ pub fn run_here(graph: &Graph, hear: &mut dyn FnMut(&str, &Message)) -> Result<D
 }
 
 impl Done {
-    /// 0 fine, 1 not stable, 4 lost data, 6 a node failed, 130 interrupted.
+    /// 0 stable, or nothing was asked of a loop; 1 not stable, 7 it cannot be told; before these, of a run that did not go as it should:
+    /// 4 lost data, 6 a node failed, 130 interrupted.
     pub fn exit_code(&self) -> u8 {
+        match (self.fault_code(), self.summary.as_ref().and_then(|s| s.outcome)) {
+            (0, None | Some(Outcome::Stable)) => 0,
+            (0, Some(Outcome::NotJudged { .. })) => code::CANNOT_TELL,
+            (0, Some(Outcome::LimitCycle { .. } | Outcome::Unstable { .. } | Outcome::Limited { .. })) => code::NEGATIVE,
+            (fault, _) => fault,
+        }
+    }
+
+    /// How it went, whatever the loop did: 0 fine, 4 lost data, 6 a node failed, 130 interrupted.
+    pub fn fault_code(&self) -> u8 {
         if let Some(report) = &self.report {
             match &report.cause {
                 Cause::NodeFailed { code, .. } if *code != 0 => return *code,
@@ -218,11 +244,7 @@ impl Done {
                 Cause::Completed => {}
             }
         }
-        if self.lost > 0 {
-            return code::LOST_DATA;
-        }
-        let outcome = self.summary.as_ref().and_then(|s| s.outcome);
-        if outcome.is_none_or(|o| o == Outcome::Stable) { 0 } else { code::NEGATIVE }
+        if self.lost > 0 { code::LOST_DATA } else { 0 }
     }
 
     /// A few lines for a person.

@@ -162,7 +162,7 @@ impl Loaded {
             )));
         }
         let script = options.script.as_deref().map(Script::from_graph).transpose()?;
-        let search = Search { lowest: Search::default().lowest.min(0.5 * gain.product()), ..Search::default() };
+        let search = Search::default();
         Ok(Question {
             session: &self.session,
             recorded: self.recorded.as_ref(),

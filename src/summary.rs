@@ -6,6 +6,7 @@ use backdrive_msgs::Message;
 use backdrive_nodes::graph::{Files, Graph, Overrides};
 use backdrive_stability::collect::Collector;
 use backdrive_stability::outcome::{Outcome, Trace};
+use backdrive_stability::unjudged::Unjudged;
 use std::path::Path;
 
 /// What happened in a run.
@@ -15,7 +16,8 @@ pub struct Summary {
     pub loop_gain: f64,
     /// The same at the end: a scheduled change or the guard may have moved it.
     pub last_loop_gain: f64,
-    /// What the loop did; `None` where there is no master, slave or contact to judge by.
+    /// What the loop did; `None` where nothing was asked of it: the graph has no master, scaling and slave (an experiment that identifies a device),
+    /// or its slave has nothing to touch.
     pub outcome: Option<Outcome>,
     /// Largest magnitude of the environment's force on the slave, N or N m.
     pub peak_contact_force: Option<f64>,
@@ -48,7 +50,9 @@ pub fn summarise(path: &Path) -> Result<Summary, Failure> {
             traces.take(&entry.topic.name, &message);
         }
     }
-    Ok(traces.summary(&graph))
+    let mut summary = traces.summary(&graph);
+    summary.hold_back((!reader.ended_cleanly()).then_some(Unjudged::NotClosed));
+    Ok(summary)
 }
 
 /// Collects what a verdict needs while messages go by, from a bag or from a run.
@@ -87,6 +91,11 @@ impl Traces {
 }
 
 impl Summary {
+    /// Takes a green verdict back, where something that is not in the signals forbids it.
+    pub fn hold_back(&mut self, by: Option<Unjudged>) {
+        self.outcome = self.outcome.map(|outcome| outcome.held_back(by));
+    }
+
     /// A few lines for a person.
     pub fn text(&self) -> String {
         let mut lines = Vec::new();
@@ -101,8 +110,14 @@ impl Summary {
         if let Some(outcome) = &self.outcome {
             let moved = (self.last_loop_gain - self.loop_gain).abs() > 1e-9 * self.loop_gain.abs();
             let later = if moved { format!(" at the start and {:.4} at the end", self.last_loop_gain) } else { String::new() };
-            let open = if self.contact_s > 0.0 { "" } else { "; nothing was touched, so this says nothing of the closed loop" };
-            lines.push(format!("loop     {outcome} at mu*lambda = {}{later}{open}", self.loop_gain));
+            let gain = format!("at mu*lambda = {}{later}", self.loop_gain);
+            match outcome {
+                Outcome::NotJudged { why } => {
+                    lines.push(format!("loop     it cannot be told whether it is stable {gain}: {why}"));
+                    lines.push(format!("to do    {}", why.advice()));
+                }
+                outcome => lines.push(format!("loop     {outcome} {gain}")),
+            }
         }
         lines.join("\n")
     }

@@ -9,7 +9,7 @@ use system::{Place, file, kill, samples, until};
 fn what_is_in_a_bag() {
     let place = Place::new();
     let graph = file("launch/contact.toml");
-    assert_eq!(place.backdrive(&["run", &graph, "--transport", "inproc", "--duration", "0.5", "--bag", "run.mcap"]).code, Some(0));
+    assert_eq!(place.backdrive(&["run", &graph, "--transport", "inproc", "--duration", "0.5", "--bag", "run.mcap"]).code, Some(7));
     let found = place.backdrive(&["bag", "info", "run.mcap", "--json"]).json();
     assert_eq!(
         (&found["clock"], &found["rate_hz"], &found["complete"], &found["lost"]),
@@ -28,7 +28,7 @@ fn what_is_in_a_bag() {
 fn to_a_table_and_back() {
     let place = Place::new();
     let graph = file("launch/contact.toml");
-    assert_eq!(place.backdrive(&["run", &graph, "--transport", "inproc", "--duration", "1.2", "--bag", "run.mcap"]).code, Some(0));
+    assert_eq!(place.backdrive(&["run", &graph, "--transport", "inproc", "--duration", "1.2", "--bag", "run.mcap"]).code, Some(7));
     let topics = ["--topic", "/master/measured_js", "--topic", "/slave/measured_js"];
     let done = place.backdrive(&[&["bag", "export", "run.mcap", "--csv", "run.csv"], &topics[..]].concat());
     assert_eq!(done.code, Some(0), "{done:?}");
@@ -64,7 +64,7 @@ fn several_tables_become_a_folder_of_bags() {
 fn played_to_its_end_or_until_it_is_stopped() {
     let place = Place::new();
     let graph = file("launch/contact.toml");
-    assert_eq!(place.backdrive(&["run", &graph, "--transport", "inproc", "--duration", "0.5", "--bag", "run.mcap"]).code, Some(0));
+    assert_eq!(place.backdrive(&["run", &graph, "--transport", "inproc", "--duration", "0.5", "--bag", "run.mcap"]).code, Some(7));
     let done = place.backdrive(&["bag", "play", "run.mcap", "--speed", "5"]);
     assert_eq!(done.code, Some(0), "{done:?}");
     let sent = place.backdrive(&["bag", "info", "run.mcap", "--json"]).json()["messages"].as_u64().unwrap();

@@ -123,6 +123,7 @@ impl Guarded {
             travel: None,
             resolution: 0.0,
             noise: 0.0,
+            gaps: Default::default(),
         })
     }
 }

@@ -14,7 +14,7 @@ fn run(place: &Place, graph: &str, transport: &str, bag: &str, changes: &[&str])
     let mut arguments = vec!["run", graph, "--transport", transport, "--bag", bag, "--duration", SHORT, "--json"];
     arguments.extend(changes);
     let done = place.backdrive(&arguments);
-    assert!(matches!(done.code, Some(0 | 1)), "{done:?}");
+    assert!(matches!(done.code, Some(0 | 1 | 7)), "{done:?}");
     assert_eq!(done.json()["lost"], 0, "{done:?}");
 }
 
@@ -40,7 +40,7 @@ fn one_answer(place: &Place, graph: &str, changes: &[&str]) {
     assert!(contact.iter().any(|s| s.effort[0] < -0.1), "nothing was touched: the comparison says little");
     for bag in ["here.mcap", "apart.mcap"] {
         let replayed = place.backdrive(&["replay", bag, "--bag", "again.mcap"]);
-        assert!(matches!(replayed.code, Some(0 | 1)), "{replayed:?}");
+        assert!(matches!(replayed.code, Some(0 | 1 | 7)), "{replayed:?}");
         assert_same(place, bag, "again.mcap", 9 * 6000);
     }
 }

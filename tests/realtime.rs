@@ -75,7 +75,7 @@ fn two_graphs_side_by_side_do_not_touch() {
     assert_eq!(runs.len(), 2, "they did not run at the same time");
     for (run, bag, lambda, axes) in [(one, "one.mcap", 0.1, 1), (two, "two.mcap", 0.2, 2)] {
         let done = run.end();
-        assert!(matches!(done.code, Some(0 | 1)), "{done:?}");
+        assert!(matches!(done.code, Some(0 | 1 | 7)), "{done:?}");
         assert_eq!(done.json()["lost"], 0, "{done:?}");
         let bag = place.path(bag);
         assert_complete(&bag, 1000);
@@ -136,7 +136,7 @@ fn the_guard_lowers_the_gain_and_says_so() {
     let changes = ["--canceller", "none", "--lambda", "5"];
     let run = |bag: &str, more: &[&str]| {
         let done = place.backdrive(&[&["run", graph.as_str(), "--bag", bag, "--json"], &changes[..], more].concat());
-        assert!(matches!(done.code, Some(0 | 1)), "{done:?}");
+        assert!(matches!(done.code, Some(0 | 1 | 7)), "{done:?}");
         place.path(bag)
     };
     let (without, with) = (run("without.mcap", &[]), run("with.mcap", &["--guard"]));
@@ -242,7 +242,7 @@ fn minute_is_whole(place: &Place, rate: u64) -> bool {
     let whole = report["lost"] == 0 && report["steps"] == 60 * rate && !skipped;
     if whole {
         // On a machine that gives the nodes too little time the slave holds now and then, and the loop is not judged stable.
-        assert!([Some(0), Some(1)].contains(&done.code), "{done:?}");
+        assert!([Some(0), Some(1), Some(7)].contains(&done.code), "{done:?}");
         assert_eq!(report["complete"], true);
         assert_complete(&place.path("run.mcap"), 60 * rate);
     } else {

@@ -44,11 +44,21 @@ fn session(graph: &Graph, lambda: f64, dither: &str) -> Session {
         contact: signals.contact,
         slave: None,
         clamped: signals.clamped,
+        stale: Vec::new(),
         travel: None,
         resolution: 0.0,
         noise: 0.0,
     };
-    Session { name: "live".into(), period_s: PERIOD, axes: vec![axis], mu: vec![1.0; n], lambda: vec![lambda; n], notes: Vec::new() }
+    Session {
+        name: "live".into(),
+        period_s: PERIOD,
+        axes: vec![axis],
+        mu: vec![1.0; n],
+        lambda: vec![lambda; n],
+        notes: Vec::new(),
+        cut_short: None,
+        bridged_s: backdrive_stability::unjudged::BRIDGED_S,
+    }
 }
 
 fn answer(graph: &Graph, lambda: f64, dither: &str) -> Frequency {

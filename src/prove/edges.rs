@@ -12,7 +12,8 @@ use std::sync::atomic::AtomicBool;
 
 /// Where edges are looked for: to 50, coarser than `stability` does, for there are many. With the grip of the session, where the live graph is asked too,
 /// the loop is also looked at about the edge, since noise and dry friction make verdicts flicker there.
-const SEARCH: Search = Search { lowest: 0.05, highest: 50.0, tolerance: 0.03, per_decade: 8, whole_grid: false, around: false };
+const SEARCH: Search =
+    Search { lowest: 0.05, floor: 0.05, highest: 50.0, tolerance: 0.03, per_decade: 8, whole_grid: false, around: false };
 
 /// A model that predicts the induced motion, and with which grip.
 #[derive(Debug, Clone)]

@@ -26,14 +26,15 @@ pub struct LiveRun {
     pub gain: f64,
     /// Whether the edge lies above this gain, so that the run should be stable.
     pub below_edge: bool,
-    /// What the run did: `stable`, `limit_cycle`, `unstable`, `limited`.
+    /// What the run did: `stable`, `limit_cycle`, `unstable`, `limited`, `cannot_tell`.
     pub outcome: String,
 }
 
 impl LiveRun {
     /// Whether it did what the edge says.
     pub fn agrees(&self) -> bool {
-        (self.outcome == "stable") == self.below_edge
+        // A run that was not judged agrees with nothing.
+        self.outcome != "cannot_tell" && (self.outcome == "stable") == self.below_edge
     }
 }
 

@@ -6,12 +6,7 @@ use backdrive_stability::outcome::Outcome;
 use backdrive_stability::verdict::Word;
 
 pub(super) fn word(outcome: &Outcome) -> Word {
-    match outcome {
-        Outcome::Stable => Word::Stable,
-        Outcome::LimitCycle { .. } => Word::LimitCycle,
-        Outcome::Unstable { .. } => Word::Unstable,
-        Outcome::Limited { .. } => Word::Limited,
-    }
+    Word::of(outcome)
 }
 
 pub(super) fn tone(word: Word) -> Tone {

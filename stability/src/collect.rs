@@ -2,6 +2,7 @@
 
 use crate::outcome::{Outcome, Trace, judge};
 use crate::session::{AxisSignals, Session};
+use crate::unjudged::{Gaps, Unjudged};
 use backdrive_msgs::{Gains, Message, Sample, flag};
 use backdrive_nodes::graph::{Graph, NodeKind, Settings};
 
@@ -52,6 +53,32 @@ pub struct Collector {
     gains: Vec<(usize, f64, f64)>,
     /// The first step heard is row 0.
     origin: Option<u64>,
+    /// Rows that the graph asks for; 0 where it runs until it is stopped.
+    planned: usize,
+    /// How a loop could be closed.
+    closes: Closes,
+}
+
+/// Whether a graph has a loop whose stability can be asked about.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Closes {
+    /// No master, no scaling or no slave: there is none.
+    Never,
+    /// The slave meets nothing that the graph knows of.
+    OnlyIfTouched,
+    /// There is something to touch.
+    Yes,
+}
+
+impl Closes {
+    fn of(graph: &Graph) -> Closes {
+        let [master, scaling, slave] = [NodeKind::Master, NodeKind::Scaling, NodeKind::Slave].map(|kind| graph.node_of(kind));
+        match (master, scaling, slave.map(|n| (&n.settings, n.command.is_some()))) {
+            (Some(_), Some(_), Some((Settings::Slave(files), false))) if files.fragment.is_none() => Closes::OnlyIfTouched,
+            (Some(_), Some(_), Some(_)) => Closes::Yes,
+            _ => Closes::Never,
+        }
+    }
 }
 
 impl Collector {
@@ -103,7 +130,11 @@ impl Collector {
                 mu: Vec::new(),
                 lambda: Vec::new(),
                 notes: Vec::new(),
+                cut_short: None,
+                bridged_s: graph.stale_after_s,
             },
+            planned: graph.timing.steps.unwrap_or(0) as usize,
+            closes: Closes::of(graph),
             flags: Vec::new(),
             gains: vec![(0, graph.gains.mu, graph.gains.lambda)],
             origin: None,
@@ -205,13 +236,33 @@ impl Collector {
             travel: axis.travel,
             resolution: axis.resolution,
             noise: axis.noise,
+            gaps: self.gaps(columns),
         };
         self.axes.iter().zip(&self.blank.axes).map(trace).collect()
     }
 
-    /// The verdict on what went by: the worst of the axes. `None` where there is no master or no contact to judge by.
+    /// Which rows lack a fresh sample of a signal of the loop.
+    fn gaps(&self, columns: &Columns) -> Gaps {
+        let heard = |signal: Signal| self.topics.iter().any(|(_, s)| *s == signal);
+        // What an operator that pushes by a force wants is no position.
+        let silent = |column: &Vec<f64>| !column.is_empty() && column.iter().all(|x| x.is_nan());
+        let intent = (heard(Signal::Intent) && !silent(&columns.intent)).then_some(&columns.intent);
+        let command = (!columns.command.is_empty()).then_some(&columns.command);
+        let loops: Vec<&Vec<f64>> = [Some(&columns.master), Some(&columns.contact), intent, command].into_iter().flatten().collect();
+        let rows = loops.iter().map(|c| c.len()).max().unwrap_or(0);
+        let stale = |row: usize| self.flags.get(row).is_some_and(|f| f & flag::STALE != 0);
+        let lacks = |row: usize| stale(row) || loops.iter().any(|c| c.get(row).is_none_or(|x| x.is_nan()));
+        Gaps { at: (0..rows).map(lacks).collect(), bridged_s: self.blank.bridged_s, planned: self.planned }
+    }
+
+    /// The verdict on what went by: the worst of the axes. `None` where nothing was asked of it: the graph has no loop, or its slave has
+    /// nothing to touch and touched nothing.
     pub fn outcome(&self) -> Option<Outcome> {
-        Outcome::worst(self.traces().iter().filter(|t| !t.position.is_empty()).map(judge))
+        let touched = || self.axes.iter().any(|c| c.contact.iter().any(|f| f.is_finite() && *f != 0.0));
+        if self.closes == Closes::Never || (self.closes == Closes::OnlyIfTouched && !touched()) {
+            return None;
+        }
+        Some(Outcome::worst(self.traces().iter().map(judge)).unwrap_or(Outcome::NotJudged { why: Unjudged::Empty }))
     }
 
     /// The signals, one row per step.
@@ -225,6 +276,7 @@ impl Collector {
         let if_any = |column: &Vec<f64>| (!column.is_empty()).then(|| whole(column));
         let acted = flag::LIMITED | flag::STALE | flag::GUARDED;
         let clamped: Vec<bool> = (0..rows).map(|row| self.flags.get(row).is_some_and(|f| f & acted != 0)).collect();
+        let stale: Vec<bool> = (0..rows).map(|row| self.flags.get(row).is_some_and(|f| f & flag::STALE != 0)).collect();
         let axes = self.axes.iter().zip(&self.blank.axes).map(|(columns, blank)| AxisSignals {
             intent: if_any(&columns.intent),
             master: whole(&columns.master),
@@ -235,6 +287,7 @@ impl Collector {
             contact: whole(&columns.contact),
             slave: if_any(&columns.slave),
             clamped: clamped.clone(),
+            stale: stale.clone(),
             ..blank.clone()
         });
         let (mut mu, mut lambda) = (vec![f64::NAN; rows], vec![f64::NAN; rows]);

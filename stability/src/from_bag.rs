@@ -1,6 +1,7 @@
 //! A session from a bag of ours: the graph in the bag tells which topic is which signal.
 
 use crate::session::{AxisSignals, Session};
+use crate::unjudged::Unjudged;
 use backdrive_bags::{BagError, Reader};
 use backdrive_control::core::{Core, Events, Port, Tick};
 use backdrive_control::scaling::Backward;
@@ -202,8 +203,19 @@ impl Session {
         }
         let (mu, lambda) = gain_rows(graph, first, rows, &mut gains, &mut notes);
         let name = path.display().to_string();
-        Ok(Session { name, period_s: graph.period_s(), axes: signals, mu, lambda, notes })
+        let cut_short = cut_short(reader, graph.timing.steps.unwrap_or(0) as usize, rows);
+        Ok(Session { name, period_s: graph.period_s(), axes: signals, mu, lambda, notes, cut_short, bridged_s: graph.stale_after_s })
     }
+}
+
+/// Whether the end of a run of `planned` steps (0: until it was stopped) is not in its bag, which holds `rows` steps of it.
+pub fn cut_short(reader: &Reader, planned: usize, rows: usize) -> Option<Unjudged> {
+    if planned > rows {
+        return Some(Unjudged::CutShort { steps: rows, of: planned });
+    }
+    let recovered = reader.completeness().is_some_and(|c| c.recovered);
+    // A bag that was recovered and has every step of the plan is whole.
+    (!reader.ended_cleanly() || (recovered && planned == 0)).then_some(Unjudged::NotClosed)
 }
 
 fn values(sample: &Sample, axes: usize) -> Vec<[f64; 2]> {
@@ -269,6 +281,12 @@ fn lay(topic: &Heard, axis: usize, first: u64, signals: &mut AxisSignals) {
             && let Some(slot) = row.and_then(|r| signals.clamped.get_mut(r))
         {
             *slot = true;
+        }
+        if flags & flag::STALE != 0
+            && let Some(row) = row.filter(|r| *r < rows)
+        {
+            signals.stale.resize(rows, false);
+            signals.stale[row] = true;
         }
     }
 }

@@ -16,4 +16,5 @@ mod rosbag;
 pub mod session;
 pub mod spectra;
 pub mod transparency;
+pub mod unjudged;
 pub mod verdict;

@@ -1,4 +1,4 @@
-//! What a run did: stable, a limit cycle, unstable, or limited.
+//! What a run did: stable, a limit cycle, unstable, limited, or nothing that can be judged.
 //!
 //! One function, [`judge`], decides for a live run, a replay and a prediction alike. What it goes by:
 //!
@@ -12,10 +12,13 @@
 //! | slow wandering | the last quarter spans more than 20 um and four encoder steps, and does not settle |
 //! | limited | a clamp acted in more than 1 % of the contact, or the master left its travel |
 //! | a noisy sensor | its noise adds 5 standard deviations to what an amplitude and 10 to what a span must exceed |
+//! | nothing to judge | no contact, no hold, or only holds with a gap in them: not judged, which is never stable |
+//! | something is missing | a gap longer than `stale_after_s`, more than 1 % of the steps, or the end of the run: what looks stable is not judged |
 //! | a dither plays | what it explains (coherence) does not count: less than half of the motion unexplained is no oscillation |
 
 use crate::oscillation::{Oscillation, oscillation};
 use crate::spectra::welch;
+use crate::unjudged::{Gaps, Unjudged};
 use serde::Serialize;
 
 /// One axis of a run, one value per step.
@@ -41,6 +44,8 @@ pub struct Trace {
     pub resolution: f64,
     /// Standard deviation of that sensor's noise, m or rad.
     pub noise: f64,
+    /// What is missing.
+    pub gaps: Gaps,
 }
 
 /// The verdict on a run.
@@ -68,6 +73,13 @@ pub enum Outcome {
         /// Whether the master left its travel.
         beyond_travel: bool,
     },
+    /// There was nothing to judge, or not enough of it: neither stable nor not.
+    #[serde(rename = "cannot_tell")]
+    NotJudged {
+        /// Why.
+        #[serde(flatten)]
+        why: Unjudged,
+    },
 }
 
 impl Outcome {
@@ -78,16 +90,40 @@ impl Outcome {
             Outcome::LimitCycle { .. } => "limit_cycle",
             Outcome::Unstable { .. } => "unstable",
             Outcome::Limited { .. } => "limited",
+            Outcome::NotJudged { .. } => "cannot_tell",
         }
     }
 
-    /// How bad it is, for several axes: the worst counts.
+    /// Whether it was seen to be stable: what was not judged is not.
+    pub fn is_stable(&self) -> bool {
+        *self == Outcome::Stable
+    }
+
+    /// Whether it oscillated or ran away.
+    pub fn is_unstable(&self) -> bool {
+        matches!(self, Outcome::LimitCycle { .. } | Outcome::Unstable { .. })
+    }
+
+    /// The same, but not judged in the place of stable where something keeps a green answer back. What speaks against the loop stands.
+    pub fn held_back(self, by: Option<Unjudged>) -> Outcome {
+        match (self, by) {
+            (Outcome::Stable, Some(why)) => Outcome::NotJudged { why },
+            // That something is lost says more than that nothing was touched in what is left.
+            (Outcome::NotJudged { why: before }, Some(why)) if !before.is_loss() && why.is_loss() => Outcome::NotJudged { why },
+            (outcome, _) => outcome,
+        }
+    }
+
+    /// How bad it is, for several axes: the worst counts. An axis that touched nothing says nothing of one that did, but one of which
+    /// something is missing takes a green answer from all.
     fn rank(&self) -> u8 {
         match self {
-            Outcome::Stable => 0,
-            Outcome::Limited { .. } => 1,
-            Outcome::LimitCycle { .. } => 2,
-            Outcome::Unstable { .. } => 3,
+            Outcome::NotJudged { why } if !why.is_loss() => 0,
+            Outcome::Stable => 1,
+            Outcome::NotJudged { .. } => 2,
+            Outcome::Limited { .. } => 3,
+            Outcome::LimitCycle { .. } => 4,
+            Outcome::Unstable { .. } => 5,
         }
     }
 
@@ -109,6 +145,7 @@ impl std::fmt::Display for Outcome {
                 let travel = if *beyond_travel { "; the master left its travel" } else { "" };
                 write!(f, "limited: a clamp acted in {:.1} % of the contact{travel}", clamped_share * 100.0)
             }
+            Outcome::NotJudged { why } => write!(f, "it cannot be told whether it is stable: {why}"),
         }
     }
 }
@@ -145,7 +182,14 @@ pub fn judge(trace: &Trace) -> Outcome {
     if clamped_share > 0.01 || beyond_travel {
         return Outcome::Limited { clamped_share, beyond_travel };
     }
-    Outcome::worst(holds(trace).into_iter().filter_map(|(from, to)| judge_hold(trace, from, to))).unwrap_or(Outcome::Stable)
+    let judged = Outcome::worst(holds(trace).into_iter().filter_map(|(from, to)| judge_hold(trace, from, to)));
+    let fault = trace.gaps.fault(trace.position.len(), trace.period_s);
+    let nothing = || match contact.is_empty() {
+        _ if trace.position.is_empty() => Unjudged::Empty,
+        true => Unjudged::NoContact,
+        false => Unjudged::NoHold,
+    };
+    judged.unwrap_or_else(|| Outcome::NotJudged { why: nothing() }).held_back(fault)
 }
 
 fn judge_hold(trace: &Trace, from: usize, to: usize) -> Option<Outcome> {
@@ -244,10 +288,15 @@ fn judge_fast(found: &Oscillation, trace: &Trace) -> Outcome {
     }
 }
 
-/// Pieces in which the hand holds still and the slave touches something at least now and then; transients cut off.
+/// Pieces in which the hand holds still, the slave touches something at least now and then, and no sample is missing for longer than the loop
+/// bridges; transients cut off.
 fn holds(trace: &Trace) -> Vec<(usize, usize)> {
     let n = trace.position.len().min(trace.contact.len());
-    let still = |i: usize| trace.intent.is_empty() || i == 0 || i >= trace.intent.len() || trace.intent[i] == trace.intent[i - 1];
+    let mut open = vec![false; n];
+    for gap in trace.gaps.long(trace.period_s) {
+        open[gap.start.min(n)..gap.end.min(n)].fill(true);
+    }
+    let still = |i: usize| !open[i] && hand_still(trace, i);
     let (transient, least) = ((TRANSIENT_S / trace.period_s) as usize, (LEAST_HOLD_S / trace.period_s) as usize);
     let mut holds = Vec::new();
     let mut start = None;
@@ -266,6 +315,10 @@ fn holds(trace: &Trace) -> Vec<(usize, usize)> {
         }
     }
     holds
+}
+
+fn hand_still(trace: &Trace, i: usize) -> bool {
+    trace.intent.is_empty() || i == 0 || i >= trace.intent.len() || trace.intent[i] == trace.intent[i - 1]
 }
 
 /// Growth of a run that left all bounds: from the logarithm of its last decade of magnitude.
@@ -295,6 +348,7 @@ mod tests {
             travel: Some([-0.05, 0.05]),
             resolution: 2e-6,
             noise: 0.0,
+            gaps: Gaps::default(),
         }
     }
 
@@ -317,6 +371,34 @@ mod tests {
         assert!((frequency_hz - 5.0 / (2.0 * std::f64::consts::PI)).abs() < 0.2, "{frequency_hz}");
         assert_eq!(judge(&trace(|t| 0.005 + 1e-3 * (-4.0 * t).exp())), Outcome::Stable);
         let Outcome::Unstable { .. } = judge(&trace(|t| 0.005 + 1e-5 * (2.0 * t).exp())) else { panic!() };
+    }
+
+    #[test]
+    fn a_run_in_which_nothing_was_touched_or_held_is_not_judged() {
+        let why = |outcome: Outcome| if let Outcome::NotJudged { why } = outcome { why } else { panic!("{outcome:?}") };
+        let free = Trace { contact: vec![0.0; 10_000], ..trace(|_| 0.005) };
+        assert_eq!(why(judge(&free)), Unjudged::NoContact);
+        let moving = Trace { intent: (0..10_000).map(f64::from).collect(), ..trace(|_| 0.005) };
+        assert_eq!(why(judge(&moving)), Unjudged::NoHold);
+        let mut four = trace(|_| 0.005);
+        four.position.truncate(4);
+        assert_eq!(why(judge(&four)), Unjudged::NoHold);
+        assert_eq!(why(judge(&Trace { period_s: 2e-4, ..Trace::default() })), Unjudged::Empty);
+    }
+
+    #[test]
+    fn what_is_missing_takes_a_green_answer_and_leaves_a_negative_one() {
+        let cut = |position: &dyn Fn(f64) -> f64| {
+            let whole = trace(position);
+            judge(&Trace { gaps: Gaps { planned: 20_000, bridged_s: 0.02, ..Gaps::default() }, ..whole })
+        };
+        assert_eq!(cut(&|_| 0.005), Outcome::NotJudged { why: Unjudged::CutShort { steps: 10_000, of: 20_000 } });
+        assert_eq!(cut(&|t| 0.005 + 2e-4 * sine(t)).word(), "limit_cycle");
+        let torn = Gaps { at: (0..10_000).map(|i| (8000..8200).contains(&i)).collect(), bridged_s: 0.02, planned: 10_000 };
+        let judged = judge(&Trace { gaps: torn, ..trace(|_| 0.005) });
+        assert_eq!(judged, Outcome::NotJudged { why: Unjudged::Gaps { steps: 200, of: 10_000 } });
+        assert_eq!(Outcome::Stable.held_back(Some(Unjudged::NodeDied)).word(), "cannot_tell");
+        assert!(!judged.is_stable() && !judged.is_unstable());
     }
 
     #[test]

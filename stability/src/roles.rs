@@ -26,6 +26,7 @@ use crate::grid::{Grid, Ordered, Resampled, Series, even_period, step_of};
 use crate::phases::contacts;
 use crate::rosbag::mcap_files;
 use crate::session::{AxisSignals, Session};
+use crate::unjudged::{BRIDGED_S, Unjudged};
 use backdrive_bags::{FieldPath, Reader, Schema, Signal};
 use backdrive_plant::elements::Range;
 use backdrive_plant::model::Hold;
@@ -202,7 +203,7 @@ impl Session {
     pub fn from_roles(path: &Path, roles: &Roles) -> Result<Session, SessionError> {
         let wrong = |what: String| SessionError::Rows { path: path.to_owned(), what };
         let wanted: Vec<(Role, &Located)> = roles.axes.iter().flat_map(|a| a.signals.iter().map(|(r, l)| (*r, l))).collect();
-        let series = gather(path, roles, &wanted)?;
+        let (series, closed) = gather(path, roles, &wanted)?;
         let mut notes = Vec::new();
         let ordered = on_one_clock(&wanted, &series, &mut notes);
 
@@ -215,6 +216,7 @@ impl Session {
         }
         let grid = Grid::over(&needed, roles.rate_hz).map_err(wrong)?;
         let period_s = grid.period * 1e-9;
+        let cut_short = if closed { ends_apart(&needed, &grid) } else { Some(Unjudged::NotClosed) };
         notes.push(format!("{} rows at {:.6} Hz; {}", grid.rows, 1.0 / period_s, rate_source(roles)));
 
         let mut axes = Vec::new();
@@ -236,11 +238,30 @@ impl Session {
             }
             axes.push(axis);
         }
-        let mut session = Session { name: path.display().to_string(), period_s, axes, mu: Vec::new(), lambda: Vec::new(), notes };
+        let mut session = Session {
+            name: path.display().to_string(),
+            period_s,
+            axes,
+            mu: Vec::new(),
+            lambda: Vec::new(),
+            notes,
+            cut_short,
+            bridged_s: BRIDGED_S,
+        };
         settle_gains(&mut session, roles);
         check_signs(&mut session);
         Ok(session)
     }
+}
+
+/// Whether one of the signals ends (or begins) so much before another that whoever sent it was gone for more than 1 % of the recording.
+fn ends_apart(needed: &[&Ordered], grid: &Grid) -> Option<Unjudged> {
+    let firsts = || needed.iter().filter_map(|o| o.times.first());
+    let lasts = || needed.iter().filter_map(|o| o.times.last());
+    let all = (lasts().max()? - firsts().min()?) as f64;
+    let common = (lasts().min()? - firsts().max()?) as f64;
+    let rows = |time: f64| (time / grid.period) as usize;
+    (common < 0.99 * all).then(|| Unjudged::Gaps { steps: rows(all - common), of: rows(all) })
 }
 
 fn is_required(role: Role) -> bool {
@@ -273,12 +294,14 @@ struct Plan {
 }
 
 /// Reads every wanted signal in one pass over each file.
-fn gather(path: &Path, roles: &Roles, wanted: &[(Role, &Located)]) -> Result<Vec<Series>, SessionError> {
+fn gather(path: &Path, roles: &Roles, wanted: &[(Role, &Located)]) -> Result<(Vec<Series>, bool), SessionError> {
+    let mut closed = true;
     let mut series: Vec<Series> = wanted.iter().map(|_| Series { stamped: true, ..Series::default() }).collect();
     let mut available: Vec<String> = Vec::new();
     let mut seen = vec![false; wanted.len()];
     for file in mcap_files(path)? {
         let reader = Reader::open(&file)?;
+        closed &= reader.ended_cleanly();
         available.extend(reader.topics().iter().map(|t| t.name.clone()));
         let plans = plan(&reader, roles, wanted, &mut seen)?;
         for entry in reader.messages()? {
@@ -327,7 +350,7 @@ fn gather(path: &Path, roles: &Roles, wanted: &[(Role, &Located)]) -> Result<Vec
             series.stamps.clone_from(&series.logged);
         }
     }
-    Ok(series)
+    Ok((series, closed))
 }
 
 fn plan(reader: &Reader, roles: &Roles, wanted: &[(Role, &Located)], seen: &mut [bool]) -> Result<HashMap<usize, Plan>, SessionError> {

@@ -1,5 +1,7 @@
 //! The signals of a recorded loop, one value per step: what every answer is drawn from.
 
+use crate::unjudged::Unjudged;
+
 /// A recorded force-reflecting session.
 ///
 /// All columns have the same length, one row per step. Row k of [`AxisSignals::force`] holds from k to k+1, so the first
@@ -18,6 +20,10 @@ pub struct Session {
     pub lambda: Vec<f64>,
     /// What a reader of the answers has to know: lost samples, resampled topics, gains estimated from data. One sentence each.
     pub notes: Vec<String>,
+    /// Whether its end is missing: then nothing in it proves that a loop is stable.
+    pub cut_short: Option<Unjudged>,
+    /// Longest gap that the loop bridges by holding its last force, s.
+    pub bridged_s: f64,
 }
 
 /// One axis of a session.
@@ -43,6 +49,8 @@ pub struct AxisSignals {
     pub slave: Option<Vec<f64>>,
     /// Whether a clamp or rate limit acted, or an input was stale.
     pub clamped: Vec<bool>,
+    /// Whether an input of the master or the slave was stale, so that the loop was open; empty where it never was or nobody says.
+    pub stale: Vec<bool>,
     /// The master's limits of motion, m or rad.
     pub travel: Option<[f64; 2]>,
     /// Step of the master's position sensor, m or rad; 0 for an ideal one.

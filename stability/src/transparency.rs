@@ -351,7 +351,16 @@ mod tests {
         axis.intent = Some(vec![5e-3; rows]);
         axis.clamped = vec![false; rows];
         let (mu, lambda) = (vec![MU; rows], vec![LAMBDA; rows]);
-        Session { name: "loop".into(), period_s, axes: vec![axis], mu, lambda, notes: Vec::new() }
+        Session {
+            name: "loop".into(),
+            period_s,
+            axes: vec![axis],
+            mu,
+            lambda,
+            notes: Vec::new(),
+            cut_short: None,
+            bridged_s: crate::unjudged::BRIDGED_S,
+        }
     }
 
     #[test]

@@ -13,6 +13,7 @@ use crate::energy::{EnergyAnswer, EnergyVerdict, energy};
 use crate::frequency::{self, CannotTell, Frequency, FrequencyAnswer, FrequencyError, Parts};
 use crate::model_check::{PartCheck, check};
 use crate::outcome::{Outcome, Trace, judge};
+use crate::phases::contacts;
 use crate::resimulate::edge::{Edge, Search, edge};
 use crate::resimulate::grips::{GripEdge, grips};
 use crate::resimulate::over_cancelling::{OverCancelling, over_cancelling};
@@ -20,6 +21,7 @@ use crate::resimulate::script::Script;
 use crate::resimulate::{Gain, ResimulateError, RunOptions, Scenario};
 use crate::session::Session;
 use crate::transparency::{Transparency, transparency};
+use crate::unjudged::{Gaps, Unjudged};
 use backdrive_control::margins::Margins;
 use backdrive_control::operator::Intent;
 use backdrive_nodes::build::BuildError;
@@ -96,12 +98,14 @@ impl Word {
         }
     }
 
-    fn of(outcome: &Outcome) -> Word {
+    /// Of what a run did.
+    pub fn of(outcome: &Outcome) -> Word {
         match outcome {
             Outcome::Stable => Word::Stable,
             Outcome::LimitCycle { .. } => Word::LimitCycle,
             Outcome::Unstable { .. } => Word::Unstable,
             Outcome::Limited { .. } => Word::Limited,
+            Outcome::NotJudged { .. } => Word::CannotTell,
         }
     }
 }
@@ -208,6 +212,8 @@ pub struct Answer {
     pub warnings: Vec<String>,
     /// What to record for a better answer.
     pub advice: Option<String>,
+    /// What in the recording keeps a green answer back; `None` where nothing does, or the answer was not green.
+    pub held_back: Option<Unjudged>,
 }
 
 /// Why there is no answer at all.
@@ -362,25 +368,43 @@ fn compare_loops(measured: &Frequency, modelled: &Frequency) -> Option<LoopCheck
     Some(LoopCheck { difference, noise, agrees: difference <= SAME_LOOP || difference <= 2.0 * noise })
 }
 
-/// What the recording itself did: the same function as for a live run.
+/// What the recording itself did: the same function as for a live run. What is missing in a recording is no run-away.
 fn recorded_outcome(session: &Session) -> Option<Outcome> {
     let intents: Vec<Vec<f64>> = session.axes.iter().map(|a| a.intent.clone().unwrap_or_default()).collect();
-    let way = (intents.len() > 1).then(|| way(&intents));
-    let trace = |axis: &crate::session::AxisSignals| Trace {
-        period_s: session.period_s,
-        intent: way.clone().or(axis.intent.clone()).unwrap_or_default(),
-        position: axis.master.clone(),
-        contact: axis.contact.clone(),
-        feedback: axis.force.clone(),
-        dither: axis.dither.clone().unwrap_or_default(),
-        clamped: axis.clamped.clone(),
-        travel: axis.travel,
-        resolution: axis.resolution,
-        noise: axis.noise,
+    let way = (intents.len() > 1).then(|| way(&intents.iter().map(|x| held(x)).collect::<Vec<_>>()));
+    let judged = session.axes.iter().map(|axis| {
+        let stale = |row: usize| axis.stale.get(row).copied().unwrap_or(false);
+        let intent = axis.intent.as_ref().filter(|x| x.iter().any(|x| x.is_finite()));
+        let loops = || [Some(&axis.master), Some(&axis.contact), Some(&axis.command), intent].into_iter().flatten();
+        let lacks = |row: usize| stale(row) || loops().any(|c| c.get(row).is_none_or(|x| x.is_nan()));
+        let touched = !contacts(axis, session.period_s).is_empty();
+        let trace = Trace {
+            period_s: session.period_s,
+            intent: way.clone().unwrap_or_else(|| axis.intent.as_deref().map(held).unwrap_or_default()),
+            position: held(&axis.master),
+            contact: if touched { held(&axis.contact) } else { vec![0.0; axis.contact.len()] },
+            feedback: held(&axis.force),
+            dither: axis.dither.clone().unwrap_or_default(),
+            // A stale input opens the loop and limits nothing.
+            clamped: axis.clamped.iter().enumerate().map(|(row, acted)| *acted && !stale(row)).collect(),
+            travel: axis.travel,
+            resolution: axis.resolution,
+            noise: axis.noise,
+            gaps: Gaps { at: (0..session.len()).map(lacks).collect(), bridged_s: session.bridged_s, planned: 0 },
+        };
+        judge(&trace).held_back(session.cut_short)
+    });
+    Outcome::worst(judged)
+}
+
+/// The column with what is missing in it filled by the value before it.
+fn held(column: &[f64]) -> Vec<f64> {
+    let mut before = column.iter().copied().find(|x| x.is_finite()).unwrap_or(0.0);
+    let value = |x: &f64| {
+        before = if x.is_finite() { *x } else { before };
+        before
     };
-    // What is missing in a recording is no run-away.
-    let whole = |t: &Trace| t.position.iter().chain(&t.contact).all(|x| x.is_finite());
-    Outcome::worst(session.axes.iter().map(trace).filter(whole).map(|t| judge(&t)))
+    column.iter().map(value).collect()
 }
 
 impl Answer {
@@ -430,6 +454,7 @@ impl Answer {
             loop_check: None,
             disagreements: Vec::new(),
             warnings,
+            held_back: None,
         }
     }
 
@@ -452,11 +477,16 @@ impl Answer {
     fn conclude(&mut self, swapped: Swapped) {
         let agree = self.models_agree(swapped);
         self.find_disagreements(swapped);
+        let judged = self.resimulated.as_ref().is_some_and(|r| !matches!(r.outcome, Outcome::NotJudged { .. }));
         let told = self.frequency_answer.as_ref().is_some_and(|a| a.verdict != frequency::Verdict::CannotTell);
         let measured = self.frequency.as_ref().is_some_and(|f| f.cannot_tell.is_none());
         match (&self.resimulated, agree && self.models_are_checked()) {
-            (Some(_), true) => self.by_resimulation(),
+            (Some(_), true) if judged => self.by_resimulation(),
             _ if measured => self.by_frequency(),
+            (Some(again), true) => {
+                let why = again.outcome.to_string();
+                self.untold(&format!("when the loop is run again {why}; and the recording holds no excitation that tells the loop"));
+            }
             (Some(_), false) if agree => {
                 self.untold("nothing in the recording says whether its models are right, and it holds no excitation that tells the loop")
             }
@@ -466,9 +496,13 @@ impl Answer {
             _ => self.untold("there is no loop to run again, and the recording holds no excitation that tells the loop"),
         }
         self.by_the_recording();
+        self.hold_back();
         // Where the loop was not measured at all, how to measure it is worth saying even beside a verdict.
         if told || (measured && self.verdict != Word::CannotTell) {
             self.advice = None;
+        }
+        if let Some(why) = self.held_back {
+            self.advice = Some(why.advice().to_string());
         }
         self.warn();
     }
@@ -541,12 +575,26 @@ impl Answer {
         self.reason = more.map_or(why.to_string(), |more| format!("{why} ({more})"));
     }
 
+    /// What is cut short, has holes or never touched anything says nothing for a loop; what it says against one stands.
+    fn hold_back(&mut self) {
+        let Some(Outcome::NotJudged { why }) = self.recorded_outcome else { return };
+        // A hand that never holds still moves the loop all the same, and a frequency response is told from that.
+        if self.verdict != Word::Stable || why == Unjudged::NoHold {
+            return;
+        }
+        self.verdict = Word::CannotTell;
+        self.reason = format!("the recording does not allow a green answer: {why}; of what there is: {}", self.reason);
+        self.held_back = Some(why);
+    }
+
     /// At the very gain of the recording the recording itself is the best witness, where it speaks against.
     fn by_the_recording(&mut self) {
         let Some([low, high]) = self.recorded_gain else { return };
         let asked = self.gain.product();
         let same = (low / asked - 1.0).abs() < 0.01 && (high / asked - 1.0).abs() < 0.01;
-        let Some(outcome) = self.recorded_outcome.filter(|o| same && *o != Outcome::Stable) else { return };
+        let Some(outcome) = self.recorded_outcome.filter(|o| same && !o.is_stable() && !matches!(o, Outcome::NotJudged { .. })) else {
+            return;
+        };
         if self.verdict == Word::Stable || self.verdict == Word::CannotTell {
             self.reason = format!("at this very gain the recording itself shows: {outcome}; otherwise {}", self.reason);
             (self.verdict, self.from) = (Word::of(&outcome), Method::Recording);
@@ -568,7 +616,7 @@ impl Answer {
             let beyond = |outcome: &Outcome| matches!(outcome, Outcome::LimitCycle { .. } | Outcome::Unstable { .. });
             let differ = match answer.verdict {
                 frequency::Verdict::Stable => beyond(&again.outcome),
-                frequency::Verdict::Unstable => again.outcome == Outcome::Stable,
+                frequency::Verdict::Unstable => again.outcome.is_stable(),
                 frequency::Verdict::CannotTell => false,
             };
             if differ {
@@ -615,7 +663,7 @@ impl Answer {
             let fails: Vec<String> = again
                 .grips
                 .iter()
-                .filter_map(|g| g.at_asked.filter(|o| *o != Outcome::Stable).map(|o| format!("{} of the grip: {o}", g.scale)))
+                .filter_map(|g| g.at_asked.filter(|o| !o.is_stable()).map(|o| format!("{} of the grip: {o}", g.scale)))
                 .collect();
             if self.verdict == Word::Stable && !fails.is_empty() {
                 self.warnings
@@ -728,6 +776,7 @@ impl Answer {
             "disagreement": self.disagreements,
             "warnings": self.warnings,
             "advice": self.advice,
+            "held_back": self.held_back,
             "energy": { "recorded": self.recorded_energy_numbers() },
             "transparency": self.transparency_numbers(),
         })

@@ -168,7 +168,16 @@ impl Setup {
         axis.dither = (!self.dither.is_empty()).then_some(dither);
         axis.induced = (self.cancelled != 0.0).then_some(induced);
         axis.intent = self.hand.clone();
-        Session { name: "test".into(), period_s: PERIOD, axes: vec![axis], mu: vec![1.0; n], lambda, notes: Vec::new() }
+        Session {
+            name: "test".into(),
+            period_s: PERIOD,
+            axes: vec![axis],
+            mu: vec![1.0; n],
+            lambda,
+            notes: Vec::new(),
+            cut_short: None,
+            bridged_s: crate::unjudged::BRIDGED_S,
+        }
     }
 
     fn answer(&self) -> Frequency {
@@ -465,7 +474,16 @@ fn coupled_axes_have_the_edge_of_their_closed_loop() {
         }
         x = &ad * &x + &bd * force;
     }
-    let session = Session { name: "two".into(), period_s: PERIOD, axes, mu: vec![1.0; n], lambda: vec![lambda; n], notes: Vec::new() };
+    let session = Session {
+        name: "two".into(),
+        period_s: PERIOD,
+        axes,
+        mu: vec![1.0; n],
+        lambda: vec![lambda; n],
+        notes: Vec::new(),
+        cut_short: None,
+        bridged_s: crate::unjudged::BRIDGED_S,
+    };
     let found = analyse(&session, &Options { draws: 100, ..Options::default() }).unwrap();
     let edge = found.edge;
     assert!((edge.gain.unwrap() / truth - 1.0).abs() < 0.02, "{edge:?} {truth}");

@@ -9,8 +9,11 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 /// Over which gains an edge is looked for, and how exactly.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Search {
-    /// Lowest mu*lambda.
+    /// Lowest mu*lambda of the grid.
     pub lowest: f64,
+    /// Where not even that is stable the grid goes on downwards, in the same steps, to this; not below `lowest` where this is not below it. So the
+    /// edge is found wherever it lies, and it does not depend on the gain that is asked about.
+    pub floor: f64,
     /// Highest mu*lambda.
     pub highest: f64,
     /// Width of the bracket at the end, as a share of the gain.
@@ -26,24 +29,34 @@ pub struct Search {
 
 impl Default for Search {
     fn default() -> Search {
-        Search { lowest: 0.05, highest: 50.0, tolerance: 0.005, per_decade: 40, whole_grid: true, around: true }
+        Search { lowest: 0.05, floor: 5e-5, highest: 50.0, tolerance: 0.005, per_decade: 40, whole_grid: true, around: true }
     }
 }
 
 /// Gains that are run at a time where the grid ends at the first that is not stable.
 const AT_ONCE: usize = 6;
 
+/// More gains than this are not run below the grid.
+const MOST_BELOW: i32 = 1000;
+
 /// Where the verdict is looked at again about an edge that was found.
 const AROUND: [f64; 10] = [0.88, 0.91, 0.94, 0.96, 0.98, 1.02, 1.04, 1.06, 1.09, 1.12];
 
 impl Search {
     fn grid(&self) -> Result<Vec<f64>, ResimulateError> {
-        let Search { lowest, highest, tolerance, per_decade, .. } = *self;
+        let Search { lowest, floor, highest, tolerance, per_decade, .. } = *self;
         let good = |x: f64| x.is_finite() && x > 0.0;
-        if !(good(lowest) && good(highest) && good(tolerance) && lowest < highest && per_decade > 0) {
+        if !(good(lowest) && good(floor) && good(highest) && good(tolerance) && lowest < highest && per_decade > 0) {
             return Err(ResimulateError::Search { lowest, highest, tolerance });
         }
         Ok(log_grid(lowest, highest, ((highest / lowest).log10() * per_decade as f64).ceil() as usize + 1))
+    }
+
+    /// The gains below the grid, downwards: multiples of its lowest, so that they are the same whatever is asked.
+    fn below(&self) -> Vec<f64> {
+        let ratio = 10_f64.powf(-1.0 / self.per_decade as f64);
+        let gain = |i: i32| self.lowest * ratio.powi(i);
+        (1..=MOST_BELOW).map(gain).take_while(|gain| *gain > self.floor * 0.999_999).collect()
     }
 }
 
@@ -53,12 +66,12 @@ pub struct Edge {
     /// The lowest mu*lambda at which it oscillates or runs away; `None` where there is none in the range, or where a clamp or
     /// the travel comes first.
     pub critical_gain: Option<f64>,
-    /// The highest gain below the edge that was found stable; 0 where not even the lowest was.
+    /// The highest gain below the edge that was found stable; 0 where not even the lowest was, and where nothing could be judged.
     pub at_least: f64,
     /// Lowest gain that is not stable and highest that is, where the verdict changes more than once within 12 % of the edge: a
     /// slow growth from next to nothing, a sensor's steps and dry friction make it flicker.
     pub flickers: Option<[f64; 2]>,
-    /// The verdict just beyond: at the upper end of the last bracket.
+    /// The verdict just beyond: at the upper end of the last bracket. Where it was not judged there the edge is not known.
     pub outcome_beyond: Option<Outcome>,
     /// The lowest gain at which a clamp acts or the travel is left: exact to the tolerance where this comes before any
     /// oscillation, else to the grid. `None` where there is none.
@@ -71,6 +84,10 @@ pub struct Edge {
     pub reason: String,
     /// The grid: mu*lambda and verdict.
     pub grid: Vec<(f64, Outcome)>,
+}
+
+fn is_unjudged(outcome: &Outcome) -> bool {
+    matches!(outcome, Outcome::NotJudged { .. })
 }
 
 /// Finds the edge: a grid first, then its first bracket is narrowed. `done` hears (runs done, runs in the grid).
@@ -93,21 +110,33 @@ pub fn edge(
         for run in sweep(scenario, some, &options, &|n| done(before + n, gains.len()), cancel)? {
             grid.push(run.ok_or(ResimulateError::Cancelled)?);
         }
-        if grid.iter().any(|(_, run)| run.outcome != Outcome::Stable) {
+        if grid.iter().any(|(_, run)| !run.outcome.is_stable()) {
             break;
+        }
+    }
+    // Nothing more is learned below where nothing is judged.
+    let lost = |grid: &[(f64, Run)]| grid.first().is_some_and(|(_, run)| !run.outcome.is_stable() && !is_unjudged(&run.outcome));
+    if lost(&grid) {
+        for some in search.below().chunks(AT_ONCE) {
+            let before = grid.len();
+            let mut below = Vec::new();
+            for run in sweep(scenario, some, &options, &|n| done(before + n, gains.len().max(before + some.len())), cancel)? {
+                below.push(run.ok_or(ResimulateError::Cancelled)?);
+            }
+            below.reverse();
+            below.append(&mut grid);
+            grid = below;
+            if !lost(&grid) {
+                break;
+            }
         }
     }
     let evaluations = AtomicUsize::new(grid.len());
     let verdicts: Vec<(f64, Outcome)> = grid.iter().map(|(gain, run)| (*gain, run.outcome)).collect();
     let limited = verdicts.iter().find(|(_, o)| matches!(o, Outcome::Limited { .. })).map(|(gain, _)| *gain);
 
-    let Some(first) = grid.iter().position(|(_, run)| run.outcome != Outcome::Stable) else {
-        let untouched = grid.iter().all(|(_, run)| run.judged_s == 0.0);
-        let reason = if untouched {
-            "the slave never touches anything while the hand holds still, so this script says nothing of the closed loop".to_string()
-        } else {
-            format!("stable at every gain up to {}", search.highest)
-        };
+    let Some(first) = grid.iter().position(|(_, run)| !run.outcome.is_stable()) else {
+        let reason = format!("stable at every gain up to {}", search.highest);
         return Ok(Edge {
             critical_gain: None,
             at_least: search.highest,
@@ -120,9 +149,10 @@ pub fn edge(
             grid: verdicts,
         });
     };
-    let returns_to_stable = verdicts[first..].iter().find(|(_, o)| *o == Outcome::Stable).map(|(gain, _)| *gain);
+    let returns_to_stable = verdicts[first..].iter().find(|(_, o)| o.is_stable()).map(|(gain, _)| *gain);
     let (mut high, mut beyond) = (grid[first].0, grid[first].1.clone());
     let mut low = if first > 0 { grid[first - 1].0 } else { 0.0 };
+    let lowest = grid[0].0;
     while low > 0.0 && high > (1.0 + search.tolerance) * low {
         // Two gains at a time: one for each core at least.
         let third = (high / low).powf(1.0 / 3.0);
@@ -130,7 +160,7 @@ pub fn edge(
         let runs = between.par_iter().map(|gain| scenario.run(scenario.gain(*gain), &options, cancel)).collect::<Result<Vec<_>, _>>()?;
         evaluations.fetch_add(runs.len(), Ordering::Relaxed);
         for (gain, run) in between.into_iter().zip(runs) {
-            if run.outcome != Outcome::Stable {
+            if !run.outcome.is_stable() {
                 (high, beyond) = (gain, run);
                 break;
             }
@@ -143,14 +173,14 @@ pub fn edge(
         let probe = |factor: &f64| Ok((middle * factor, scenario.run(scenario.gain(middle * factor), &options, cancel)?));
         let probes = AROUND.par_iter().map(probe).collect::<Result<Vec<(f64, Run)>, ResimulateError>>()?;
         evaluations.fetch_add(probes.len(), Ordering::Relaxed);
-        let highest_stable = probes.iter().filter(|(_, run)| run.outcome == Outcome::Stable).map(|(gain, _)| *gain).fold(low, f64::max);
+        let highest_stable = probes.iter().filter(|(_, run)| run.outcome.is_stable()).map(|(gain, _)| *gain).fold(low, f64::max);
         let lowest = probes.iter().find(|(gain, run)| *gain < middle && run.is_unstable());
         if lowest.is_some() || highest_stable > middle {
             let first = lowest.map_or(middle, |(gain, _)| *gain);
             flickers = Some([first, highest_stable]);
         }
         if let Some((gain, run)) = lowest {
-            let below = probes.iter().filter(|(g, run)| g < gain && run.outcome == Outcome::Stable).map(|(g, _)| *g);
+            let below = probes.iter().filter(|(g, run)| g < gain && run.outcome.is_stable()).map(|(g, _)| *g);
             low = below.fold(grid.get(first.wrapping_sub(1)).map_or(low, |(g, _)| *g), f64::max).min(*gain);
             (high, beyond) = (*gain, run.clone());
         }
@@ -161,11 +191,16 @@ pub fn edge(
         None => high,
     };
     let (mut critical_gain, mut limited_from) = (None, limited);
-    let reason = if low == 0.0 {
+    let reason = if let Outcome::NotJudged { why } = beyond.outcome {
+        match low > 0.0 {
+            true => format!("stable up to {low:.4}; beyond it cannot be told: {why}"),
+            false => format!("it cannot be told at any gain from {high} on: {why}"),
+        }
+    } else if low == 0.0 {
         if !beyond.is_unstable() {
             limited_from = Some(high);
         }
-        format!("{} already at {high}, the lowest gain searched", beyond.outcome)
+        format!("{} already at {lowest:.3e}, the lowest gain searched", beyond.outcome)
     } else if beyond.is_unstable() {
         critical_gain = Some(below);
         match beyond.outcome {

@@ -13,6 +13,7 @@ pub mod sweep;
 use crate::collect::{Collector, Signal};
 use crate::outcome::{Outcome, Trace, judge};
 use crate::session::Session;
+use crate::unjudged::Unjudged;
 use backdrive_control::core::Core;
 use backdrive_control::operator::Intent;
 use backdrive_nodes::build::{BuildError, plan, plan_with};
@@ -159,7 +160,7 @@ pub struct Run {
     pub beneath: Outcome,
     /// Time in contact, s.
     pub contact_s: f64,
-    /// Time in contact while the hand held still, s: the verdict is drawn from its longer pieces. Where it is 0 the verdict says nothing.
+    /// Time in contact while the hand held still, s: the verdict is drawn from its longer pieces.
     pub judged_s: f64,
     /// Steps done; fewer than the scenario has where the master left all bounds.
     pub steps: u64,
@@ -171,9 +172,9 @@ impl Run {
     /// Whether the loop oscillated or ran away, be it against a clamp.
     pub fn is_unstable(&self) -> bool {
         match self.outcome {
-            Outcome::Stable => false,
+            Outcome::Stable | Outcome::NotJudged { .. } => false,
             Outcome::LimitCycle { .. } | Outcome::Unstable { .. } => true,
-            Outcome::Limited { .. } => self.beneath != Outcome::Stable,
+            Outcome::Limited { .. } => self.beneath.is_unstable(),
         }
     }
 }
@@ -344,7 +345,7 @@ impl Scenario {
             }
         }
         let traces = collector.traces();
-        let outcome = Outcome::worst(traces.iter().map(judge)).unwrap_or(Outcome::Stable);
+        let outcome = Outcome::worst(traces.iter().map(judge)).unwrap_or(Outcome::NotJudged { why: Unjudged::Empty });
         let unclamped = |t: Trace| Trace { clamped: Vec::new(), travel: None, ..t };
         let (contact_s, judged_s) = contact(&traces);
         let beneath = match outcome {

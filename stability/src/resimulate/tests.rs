@@ -42,7 +42,7 @@ fn linear(canceller: Option<&str>) -> Scenario {
 }
 
 fn coarse(lowest: f64, highest: f64) -> Search {
-    Search { lowest, highest, per_decade: 8, ..Search::default() }
+    Search { lowest, floor: lowest, highest, per_decade: 8, ..Search::default() }
 }
 
 fn find(scenario: &Scenario, search: &Search) -> Edge {
