@@ -2,6 +2,7 @@
 
 use crate::cli;
 use crate::failure::{Failure, code};
+use crate::output;
 use backdrive_bags::{ColumnMap, DiffOptions, ImportOptions, Quantity, Reader, diff, export_csv, import_csv, info, merge, recover};
 use std::path::Path;
 
@@ -18,24 +19,19 @@ pub fn bag(command: &cli::Bag) -> Result<u8, Failure> {
     }
 }
 
-fn print_json(value: &impl serde::Serialize) -> Result<(), Failure> {
-    println!("{}", serde_json::to_string_pretty(value).map_err(Failure::input)?);
-    Ok(())
-}
-
 fn show(bag: &Path, json: bool) -> Result<u8, Failure> {
     let info = info(bag).map_err(Failure::input)?;
     if json {
-        print_json(&info)?;
+        output::json(&info)?;
     } else {
-        print!("{info}");
+        output::text(format_args!("{info}"))?;
     }
     Ok(0)
 }
 
 fn import(csv: &[std::path::PathBuf], bag: &Path, maps: &[String]) -> Result<u8, Failure> {
     if csv.len() == 1 {
-        is_new(bag)?;
+        is_new(bag, "--bag")?;
     }
     let columns = maps.iter().map(|map| column_map(map)).collect::<Result<Vec<_>, _>>()?;
     // One table is one experiment and one bag: several go into a folder.
@@ -52,16 +48,25 @@ fn import(csv: &[std::path::PathBuf], bag: &Path, maps: &[String]) -> Result<u8,
         let options = ImportOptions { columns: columns.clone(), ..ImportOptions::default() };
         let report = import_csv(table, &into(table), &options).map_err(Failure::input)?;
         for column in &report.skipped {
-            eprintln!("warning: {}: column \"{column}\" holds something that is no number and was left out", table.display());
+            output::note(format_args!(
+                "warning: {}: column \"{column}\" holds something that is no number and was left out",
+                table.display()
+            ));
         }
-        println!("{}: {} rows, {} topics -> {}", table.display(), report.rows, report.topics.len(), into(table).display());
+        output::line(format_args!(
+            "{}: {} rows, {} topics -> {}",
+            table.display(),
+            report.rows,
+            report.topics.len(),
+            into(table).display()
+        ))?;
     }
     Ok(0)
 }
 
-fn is_new(bag: &Path) -> Result<(), Failure> {
-    match bag.exists() {
-        true => Err(Failure::input(format!("{}: exists already; name another with --bag", bag.display()))),
+fn is_new(file: &Path, option: &str) -> Result<(), Failure> {
+    match file.exists() && !output::is_stream(file) {
+        true => Err(Failure::input(format!("{}: exists already; name another with {option}", file.display()))),
         false => Ok(()),
     }
 }
@@ -86,42 +91,44 @@ fn column_map(text: &str) -> Result<ColumnMap, Failure> {
 }
 
 fn export(bag: &Path, csv: &Path, topics: &[String]) -> Result<u8, Failure> {
+    is_new(csv, "--csv")?;
     let reader = Reader::open(bag).map_err(Failure::input)?;
-    let rows = export_csv(&reader, csv, (!topics.is_empty()).then_some(topics)).map_err(Failure::input)?;
-    println!("{}: {rows} rows", csv.display());
+    let topics = (!topics.is_empty()).then_some(topics);
+    let rows = output::replace(csv, |to| export_csv(&reader, to, topics).map_err(Failure::input))?;
+    output::line(format_args!("{}: {rows} rows", csv.display()))?;
     Ok(0)
 }
 
 fn save(damaged: &Path, bag: &Path) -> Result<u8, Failure> {
-    is_new(bag)?;
+    is_new(bag, "--bag")?;
     let report = recover(damaged, bag).map_err(Failure::input)?;
     if report.was_clean {
-        println!("{}: had ended cleanly; copied", damaged.display());
+        output::line(format_args!("{}: had ended cleanly; copied", damaged.display()))?;
     }
     let until = report.last_step.map_or(String::new(), |step| format!(", up to step {step}"));
-    println!("{}: {} messages saved{until}", bag.display(), report.messages);
+    output::line(format_args!("{}: {} messages saved{until}", bag.display(), report.messages))?;
     for place in &report.damaged {
-        eprintln!("warning: damaged and left out: {place}");
+        output::note(format_args!("warning: damaged and left out: {place}"));
     }
     let lost = report.completeness.as_ref().is_some_and(|c| c.lost() > 0);
     Ok(if lost { code::LOST_DATA } else { 0 })
 }
 
 fn join(a: &Path, b: &Path, bag: &Path, offset_s: Option<f64>, json: bool) -> Result<u8, Failure> {
-    is_new(bag)?;
+    is_new(bag, "--bag")?;
     let report = merge(a, b, bag, offset_s).map_err(Failure::input)?;
     if json {
-        print_json(&report)?;
+        output::json(&report)?;
     } else {
         let (one, other) = report.in_one;
-        println!(
+        output::line(format_args!(
             "{}: {} messages, {} of them in both, {one} in the first only, {other} in the second only",
             bag.display(),
             report.messages,
             report.in_both
-        );
+        ))?;
         if let Some((least, most)) = report.offset_s {
-            println!("clock    the second is {least:.6} to {most:.6} s ahead, known to {:.6} s", report.uncertainty_s);
+            output::line(format_args!("clock    the second is {least:.6} to {most:.6} s ahead, known to {:.6} s", report.uncertainty_s))?;
         }
     }
     Ok(if report.completeness.lost() > 0 { code::LOST_DATA } else { 0 })
@@ -144,9 +151,9 @@ fn compare(a: &Path, b: &Path, tolerances: &[String], ignore: &[String], json: b
     let (a, b) = (Reader::open(a).map_err(Failure::input)?, Reader::open(b).map_err(Failure::input)?);
     let report = diff(&a, &b, &options).map_err(Failure::input)?;
     if json {
-        print_json(&report)?;
+        output::json(&report)?;
     } else {
-        print!("{report}");
+        output::text(format_args!("{report}"))?;
     }
     Ok(if report.same { 0 } else { code::NEGATIVE })
 }

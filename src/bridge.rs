@@ -7,6 +7,7 @@ use crate::cli;
 use crate::failure::{Failure, code};
 use crate::interrupt;
 use crate::network::network;
+use crate::output;
 use backdrive_launch::join::read_graph;
 use backdrive_launch::{Place, RunHome, RunPaths, Wire};
 use backdrive_msgs::Message;
@@ -56,7 +57,13 @@ pub fn bridge(options: &cli::Bridge) -> Result<u8, Failure> {
     let place = Place { network, ..place };
     let courier = if place.host.is_some() { None } else { Courier::start(&place.network).map_err(Failure::machine)? };
     let (out, back) = crossings(&graph, place.host.as_deref());
-    eprintln!("run {}: {} topics to ROS domain {}, {} from there", paths.id(), out.len(), place.network.domain, back.len());
+    output::note(format_args!(
+        "run {}: {} topics to ROS domain {}, {} from there",
+        paths.id(),
+        out.len(),
+        place.network.domain,
+        back.len()
+    ));
     let (over, stop) = (AtomicBool::new(false), interrupt::heard()?);
     let ended = || stop.load(Ordering::SeqCst) || !lives(&paths);
     let (out, back) = std::thread::scope(|scope| -> Result<_, TransportError> {
@@ -79,10 +86,10 @@ pub fn bridge(options: &cli::Bridge) -> Result<u8, Failure> {
     drop(courier);
     if options.json {
         let told = |c: Crossed| json!({ "messages": c.messages, "lost": c.lost });
-        println!("{}", json!({ "run": paths.id(), "out": told(out), "in": told(back) }));
+        output::line(json!({ "run": paths.id(), "out": told(out), "in": told(back) }))?;
     } else {
-        println!("out      {} messages, {} lost before the bridge", out.messages, out.lost);
-        println!("in       {} messages, {} lost before the bridge", back.messages, back.lost);
+        output::line(format_args!("out      {} messages, {} lost before the bridge", out.messages, out.lost))?;
+        output::line(format_args!("in       {} messages, {} lost before the bridge", back.messages, back.lost))?;
     }
     Ok(if out.lost + back.lost > 0 { code::LOST_DATA } else { 0 })
 }
@@ -169,7 +176,7 @@ fn carry(from: &mut dyn Transport, to: &mut dyn Transport, crossings: &[Crossing
                     Err(e) => {
                         if lane.complained.is_none_or(|at| at.elapsed() >= Duration::from_secs(1)) {
                             lane.complained = Some(Instant::now());
-                            eprintln!("warning: {e}");
+                            output::note(format_args!("warning: {e}"));
                         }
                         if crossing.topic.kind == Kind::Sample {
                             break;

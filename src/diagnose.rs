@@ -5,6 +5,7 @@ use crate::diagnose_page::{Shown, page};
 use crate::diagnose_text::text;
 use crate::failure::{Failure, code};
 use crate::interrupt;
+use crate::output;
 use crate::progress;
 use crate::recordings::{self, Opened};
 use backdrive_diagnosis::audit::{self, Remark};
@@ -50,19 +51,19 @@ pub fn diagnose(options: &cli::Diagnose) -> Result<u8, Failure> {
 
     let opened = recordings::open(&options.set, options.model.as_deref(), options.grip.as_deref())?;
     for note in &opened.notes {
-        eprintln!("note: {note}");
+        output::note(format_args!("note: {note}"));
     }
     let patience = Duration::from_secs_f64(options.patience);
     let settings = Settings { without: options.without.clone(), effects: usize::from(options.effects), patience };
     let Diagnosed { found, written } = diagnose_into(opened, &settings, &options.out, !options.no_report, &stop)?;
     let seconds = began.elapsed().as_secs_f64();
     let path = options.out.join("time.txt");
-    std::fs::write(&path, format!("{seconds:.2}\n")).map_err(|e| Failure::write(&path, e))?;
+    output::file(&path, format!("{seconds:.2}\n"))?;
     if options.json {
-        println!("{}", serde_json::to_string_pretty(&found.said.json).map_err(Failure::input)?);
+        output::json(&found.said.json)?;
     } else {
-        println!("{}", text(&found));
-        println!("wrote     {}: {} ({seconds:.1} s)", shown(&options.out), written.join(", "));
+        output::line(text(&found))?;
+        output::line(format_args!("wrote     {}: {} ({seconds:.1} s)", shown(&options.out), written.join(", ")))?;
     }
     if stop.load(Ordering::SeqCst) {
         return Err(Failure { code: code::INTERRUPTED, message: "stopped; what was found until then is written".to_string() });
@@ -85,13 +86,10 @@ pub struct Diagnosed {
 /// When the folder cannot be written, or the nominal model cannot be simulated on the recordings.
 pub fn diagnose_into(opened: Opened, settings: &Settings, out: &Path, with_report: bool, stop: &AtomicBool) -> Result<Diagnosed, Failure> {
     // A folder that cannot be written is told before the work, not after it.
-    std::fs::create_dir_all(out).map_err(|e| Failure::write(out, e))?;
+    output::folder(out)?;
     let found = progress::at_most(settings.patience, |report| find(opened.problem, settings, stop, report))?;
 
-    let write = |name: &str, text: &str| {
-        let path = out.join(name);
-        std::fs::write(&path, text).map_err(|e| Failure::write(&path, e))
-    };
+    let write = |name: &str, text: &str| output::file(&out.join(name), text);
     let json = serde_json::to_string_pretty(&found.said.json).map_err(Failure::input)?;
     write("verdict.json", &format!("{json}\n"))?;
     write(MODEL, &found.said.model)?;
@@ -109,8 +107,7 @@ pub fn diagnose_into(opened: Opened, settings: &Settings, out: &Path, with_repor
     }
     if with_report {
         let shown = Shown { found: &found, name: &opened.name, notes: &opened.notes };
-        let path = out.join("report.html");
-        page(&shown).write(&path).map_err(|e| Failure::write(&path, e))?;
+        output::file(&out.join("report.html"), page(&shown).html())?;
         written.push("report.html");
     }
     Ok(Diagnosed { found, written })

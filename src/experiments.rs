@@ -2,6 +2,7 @@
 
 use crate::cli;
 use crate::failure::Failure;
+use crate::output;
 use crate::run::{Way, run_graph};
 use backdrive_bags::{Reader, Signal, signals};
 use backdrive_control::shaft::{SENSORS, TORQUES};
@@ -39,7 +40,13 @@ pub fn run(options: &cli::Run, way: &Way, graph: &Graph, changes: &Overrides) ->
             }
         };
         sets[set].add(experiment, &device).map_err(|message| at(graph, experiment, message))?;
-        eprintln!("{}/{}  {}{}", index + 1, graph.experiments.len(), experiment.name, if experiment.held_out { " (held out)" } else { "" });
+        output::note(format_args!(
+            "{}/{}  {}{}",
+            index + 1,
+            graph.experiments.len(),
+            experiment.name,
+            if experiment.held_out { " (held out)" } else { "" }
+        ));
         let done = run_graph(&each.clone().on_one_host(), way)?;
         // Of an experiment it does not matter whether a loop was stable: there is none. Losses do.
         let code = done.fault_code();
@@ -55,10 +62,15 @@ pub fn run(options: &cli::Run, way: &Way, graph: &Graph, changes: &Overrides) ->
     }
     if options.json {
         let sets: Vec<_> = sets.iter().map(|s| json!({ "set": s.folder, "fit": s.fit, "held_out": s.held_out })).collect();
-        println!("{}", json!({ "sets": sets }));
+        output::line(json!({ "sets": sets }))?;
     } else {
         for set in &sets {
-            println!("{}: {} recordings to fit, {} held out", set.folder.join("set.toml").display(), set.fit.len(), set.held_out.len());
+            output::line(format_args!(
+                "{}: {} recordings to fit, {} held out",
+                set.folder.join("set.toml").display(),
+                set.fit.len(),
+                set.held_out.len()
+            ))?;
         }
     }
     Ok(0)
@@ -243,5 +255,5 @@ fn differences(model: &Model, other: &Model) -> Option<Vec<(String, f64)>> {
 }
 
 fn put(path: &Path, text: &str) -> Result<(), Failure> {
-    std::fs::write(path, text).map_err(|e| Failure::write(path, e))
+    output::file(path, text)
 }

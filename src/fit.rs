@@ -4,6 +4,7 @@ use crate::cli;
 use crate::columns::columns;
 use crate::failure::{Failure, code};
 use crate::interrupt;
+use crate::output;
 use crate::progress;
 use crate::recordings::{self, file_name};
 use backdrive_diagnosis::clock::Moment;
@@ -38,13 +39,13 @@ pub fn fit(options: &cli::Fit) -> Result<u8, Failure> {
     let stop = interrupt::heard()?;
     let opened = recordings::open(&options.set, Some(&options.model), options.grip.as_deref())?;
     for note in &opened.notes {
-        eprintln!("note: {note}");
+        output::note(format_args!("note: {note}"));
     }
     let problem = opened.problem;
     let patience = Duration::from_secs_f64(options.patience);
     let fitted = progress::at_most(patience, |report| fitted(&problem, patience, &stop, report))?;
     if let Some(out) = &options.out {
-        std::fs::write(out, &fitted.model).map_err(|e| Failure::write(out, e))?;
+        output::file(out, &fitted.model)?;
     }
     let disagree = !fitted.per_record.disagreements().is_empty();
     if options.json {
@@ -57,12 +58,12 @@ pub fn fit(options: &cli::Fit) -> Result<u8, Failure> {
             "records": fitted.per_record,
             "agree": !disagree,
         });
-        println!("{}", serde_json::to_string_pretty(&all).map_err(Failure::input)?);
+        output::json(&all)?;
     } else {
-        println!("{}", text(&problem, &fitted));
+        output::line(text(&problem, &fitted))?;
     }
     if let Some(out) = &options.out {
-        eprintln!("wrote {}", out.display());
+        output::note(format_args!("wrote {}", out.display()));
     }
     if stop.load(Ordering::SeqCst) {
         return Err(Failure { code: code::INTERRUPTED, message: "stopped; the numbers are those reached until then".to_string() });

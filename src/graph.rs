@@ -2,6 +2,7 @@
 
 use crate::cli;
 use crate::failure::Failure;
+use crate::output;
 use backdrive_nodes::build::{plan, topics};
 use backdrive_nodes::graph::{Graph, NodeKind, Overrides, draw as draw_graph};
 
@@ -16,13 +17,13 @@ pub fn check(options: &cli::Graph) -> Result<u8, Failure> {
         buildable(each)?;
     }
     let experiments = if graphs.is_empty() { String::new() } else { format!(", {} experiments", graphs.len()) };
-    println!(
+    output::line(format_args!(
         "{}: fine: {} nodes, {} connections, {} topics{experiments}",
         options.graph.display(),
         graph.nodes.len(),
         graph.connections.len(),
         topics(&graph).len()
-    );
+    ))?;
     Ok(0)
 }
 
@@ -36,6 +37,6 @@ pub fn buildable(graph: &Graph) -> Result<(), Failure> {
 
 /// Draws a graph as text.
 pub fn draw(options: &cli::Graph) -> Result<u8, Failure> {
-    print!("{}", draw_graph(&Graph::load(&options.graph, &Overrides::default())?));
+    output::text(draw_graph(&Graph::load(&options.graph, &Overrides::default())?))?;
     Ok(0)
 }

@@ -1,5 +1,8 @@
 //! The command line as a library: [`main`] parses, dispatches, and maps errors to exit codes; studies run the code of its verbs.
 
+// Printing panics where the other end is full or gone.
+#![cfg_attr(not(test), warn(clippy::print_stdout, clippy::print_stderr))]
+
 mod bag;
 mod bridge;
 mod cli;
@@ -16,6 +19,7 @@ mod interrupt;
 mod model;
 mod network;
 mod node;
+pub mod output;
 mod play;
 mod progress;
 mod prove;
@@ -30,7 +34,6 @@ mod test_bench;
 
 pub use run::{Done, run_here};
 
-use clap::Parser;
 use cli::{Cli, Command};
 use std::process::ExitCode;
 
@@ -39,7 +42,10 @@ pub fn main() -> ExitCode {
     // A file that reaches the size a user is allowed is an error of its writer, with a name, and no end without a word.
     // SAFETY: ignoring a signal runs no code of ours.
     let _ = unsafe { nix::sys::signal::signal(nix::sys::signal::Signal::SIGXFSZ, nix::sys::signal::SigHandler::SigIgn) };
-    let command = Cli::parse().command;
+    let command = match output::parsed::<Cli>() {
+        Ok(cli) => cli.command,
+        Err(code) => return code,
+    };
     end_with_the_reader(&command);
     let result = match command {
         Command::Run(options) => run::run(&options),
@@ -62,10 +68,7 @@ pub fn main() -> ExitCode {
     };
     match result {
         Ok(code) => ExitCode::from(code),
-        Err(failure) => {
-            eprintln!("error: {}", failure.message);
-            ExitCode::from(failure.code)
-        }
+        Err(failure) => output::fail(&failure),
     }
 }
 

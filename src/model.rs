@@ -2,6 +2,7 @@
 
 use crate::cli;
 use crate::failure::Failure;
+use crate::output;
 use crate::simulate::held_model;
 use backdrive_plant::describe::{Severity, check as remarks, describe};
 use backdrive_plant::linear::Operating;
@@ -20,16 +21,20 @@ fn check(file: &cli::ModelFile) -> Result<u8, Failure> {
     let path = file.model.display();
     match ModelFile::load(&file.model)? {
         ModelFile::Fragment(fragment) => {
-            println!("{path}: fine: a fragment of {} elements", fragment.network.elements.len());
+            output::line(format_args!("{path}: fine: a fragment of {} elements", fragment.network.elements.len()))?;
         }
         ModelFile::Device(_) => {
             let model = held_model(&file.model, file.grip.as_deref())?;
             // What cannot be stepped is told now, not at the start of a run.
             let plant = Plant::new(&model, 2e-4, &Options::default()).map_err(|e| Failure::input(format!("{path}: {e}")))?;
             for remark in remarks(&model, &Operating::small()) {
-                eprintln!("{}: {path}: {}", if remark.severity == Severity::Note { "note" } else { "warning" }, remark.message);
+                output::note(format_args!(
+                    "{}: {path}: {}",
+                    if remark.severity == Severity::Note { "note" } else { "warning" },
+                    remark.message
+                ));
             }
-            println!(
+            output::line(format_args!(
                 "{path}: fine: {} bodies, {} elements, {} inputs, {} outputs, {} axes; {} substeps at 5 kHz",
                 model.bodies.len(),
                 model.elements.len(),
@@ -37,7 +42,7 @@ fn check(file: &cli::ModelFile) -> Result<u8, Failure> {
                 model.outputs.len(),
                 model.axes.len(),
                 plant.substeps()
-            );
+            ))?;
         }
     }
     Ok(0)
@@ -54,9 +59,9 @@ fn show(file: &cli::ModelFile) -> Result<u8, Failure> {
         ModelFile::Device(_) => describe(&held_model(&file.model, file.grip.as_deref())?, &at),
     };
     if file.json {
-        println!("{}", serde_json::to_string_pretty(&description).map_err(Failure::input)?);
+        output::json(&description)?;
     } else {
-        print!("{description}");
+        output::text(format_args!("{description}"))?;
     }
     Ok(0)
 }

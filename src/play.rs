@@ -1,6 +1,7 @@
 //! `backdrive bag play`: a bag's messages again, verbatim, for whoever listens.
 
 use crate::failure::{Failure, code};
+use crate::output;
 use backdrive_bags::{BagError, Entry, PlayOptions, Reader, Sink, play as play_bag};
 use backdrive_launch::RunHome;
 use backdrive_msgs::Message;
@@ -38,18 +39,18 @@ pub fn play(bag: &Path, speed: f64) -> Result<u8, Failure> {
             publishers.insert(topic.name.clone(), one);
         }
     }
-    eprintln!(
+    output::note(format_args!(
         "playing {} topics of {} at {speed} times real time, in the run {}",
         publishers.len(),
         bag.display(),
         run.paths().root().display()
-    );
+    ));
     let mut sink = Speaker { publishers };
     let report = play_bag(&reader, &PlayOptions { rate: speed, ..PlayOptions::default() }, &mut sink).map_err(Failure::input);
     drop((sink, transport));
     run.remove().map_err(Failure::from)?;
     let report = report?;
-    println!("{}: {} messages sent, the latest {:.3} ms late", bag.display(), report.sent, report.latest_s * 1e3);
+    output::line(format_args!("{}: {} messages sent, the latest {:.3} ms late", bag.display(), report.sent, report.latest_s * 1e3))?;
     Ok(if report.finished { 0 } else { code::INTERRUPTED })
 }
 

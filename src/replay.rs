@@ -2,6 +2,7 @@
 
 use crate::cli;
 use crate::failure::Failure;
+use crate::output;
 use crate::run::run_here;
 use crate::summary::graph_of;
 use backdrive_bags::Reader;
@@ -30,7 +31,10 @@ pub fn replay(options: &cli::Replay) -> Result<u8, Failure> {
 
     let planned = graph.timing.steps.unwrap_or(0);
     if !reader.ended_cleanly() {
-        eprintln!("warning: {}: was not closed; what it holds is replayed, and `backdrive bag recover` makes a clean copy", path.display());
+        output::note(format_args!(
+            "warning: {}: was not closed; what it holds is replayed, and `backdrive bag recover` makes a clean copy",
+            path.display()
+        ));
     }
     let sources = |n: &Node| matches!(n.kind, NodeKind::Operator | NodeKind::Cycle);
     let Some(operator) = graph.nodes.iter().position(sources) else {
@@ -40,7 +44,10 @@ pub fn replay(options: &cli::Replay) -> Result<u8, Failure> {
         let topic = graph.topic_of(operator, port).name;
         let missing = reader.completeness().and_then(|c| c.topics.iter().find(|t| t.topic == topic)).map_or(0, |t| t.lost);
         if missing > 0 {
-            eprintln!("warning: {}: {missing} messages of {topic} are missing; what they would change rests where it was", path.display());
+            output::note(format_args!(
+                "warning: {}: {missing} messages of {topic} are missing; what they would change rests where it was",
+                path.display()
+            ));
         }
         rows_of(&reader, &topic, graph.nodes[operator].axes, read)
     };
@@ -67,9 +74,9 @@ pub fn replay(options: &cli::Replay) -> Result<u8, Failure> {
         summary.hold_back(cut_short(&reader, planned as usize, rows).or((lost > 0).then_some(Unjudged::Lost { messages: lost })));
     }
     if options.json {
-        println!("{}", done.json());
+        output::line(done.json())?;
     } else {
-        println!("{}", done.text());
+        output::line(done.text())?;
     }
     Ok(done.exit_code())
 }

@@ -4,6 +4,7 @@ use crate::cli::{self, Transport};
 use crate::failure::{Failure, code};
 use crate::graph::buildable;
 use crate::network::place;
+use crate::output;
 use crate::progress;
 use crate::summary::{Summary, Traces, summarise};
 use backdrive_bags::{Completeness, Reader, Recorder};
@@ -38,9 +39,9 @@ pub fn run(options: &cli::Run) -> Result<u8, Failure> {
     }
     let done = run_graph(&graph, &way)?;
     if options.json {
-        println!("{}", done.json());
+        output::line(done.json())?;
     } else {
-        println!("{}", done.text());
+        output::line(done.text())?;
     }
     Ok(done.exit_code())
 }
@@ -131,7 +132,7 @@ fn run_processes(graph: &Graph, place: &Place) -> Result<Done, Failure> {
     drop(courier);
     let bag = report.bag.clone().filter(|bag| bag.exists());
     // What is known of the run is told even where its bag cannot be read.
-    let mut summary = bag.as_ref().and_then(|bag| summarise(bag).map_err(|e| eprintln!("warning: {}", e.message)).ok());
+    let mut summary = bag.as_ref().and_then(|bag| summarise(bag).map_err(|e| output::note(format_args!("warning: {}", e.message))).ok());
     let whole = |bag| Reader::open(bag).is_ok_and(|r| r.ended_cleanly() && r.completeness().is_some_and(Completeness::is_complete));
     let complete = bag.as_deref().is_some_and(whole);
     let lost = report.lost + report.unrecorded.unwrap_or(0);
@@ -195,7 +196,7 @@ pub fn run_here(graph: &Graph, hear: &mut dyn FnMut(&str, &Message)) -> Result<D
             }
         };
         sequence.run(some, Some(&mut tap));
-        bar.suspend(|| told.drain(..).for_each(|line| eprintln!("{line}")));
+        bar.suspend(|| told.drain(..).for_each(|line| output::note(format_args!("{line}"))));
         if let Some(recorder) = &mut recorder {
             recorder.checkpoint();
         }
@@ -314,16 +315,16 @@ impl Done {
 pub fn clean() -> Result<u8, Failure> {
     let swept = RunHome::system().sweep(Duration::from_secs(60));
     for run in &swept.removed {
-        println!("removed {} and {} files in shared memory", run.root.display(), run.shm.len());
+        output::line(format_args!("removed {} and {} files in shared memory", run.root.display(), run.shm.len()))?;
     }
     for run in &swept.alive {
-        println!("{run} is alive and was left alone");
+        output::line(format_args!("{run} is alive and was left alone"))?;
     }
     for failure in &swept.failed {
-        eprintln!("error: {failure}");
+        output::note(format_args!("error: {failure}"));
     }
     if swept.removed.is_empty() && swept.failed.is_empty() {
-        println!("nothing to remove");
+        output::line(format_args!("nothing to remove"))?;
     }
     Ok(if swept.failed.is_empty() { 0 } else { code::MACHINE })
 }

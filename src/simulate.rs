@@ -2,6 +2,7 @@
 
 use crate::cli;
 use crate::failure::Failure;
+use crate::output;
 use backdrive_bags::{Reader, recording};
 use backdrive_plant::excitation::{Excitation, load_experiments};
 use backdrive_plant::model::{Fragment, Hold, Model, OutputKind};
@@ -19,14 +20,14 @@ pub fn simulate(options: &cli::Simulate) -> Result<u8, Failure> {
         let model = under(&model, &condition, &drive.name)?;
         let prediction = predict(&model, &drive, options)?;
         if let Some(folder) = out.parent().filter(|f| !f.as_os_str().is_empty()) {
-            std::fs::create_dir_all(folder).map_err(|e| Failure::write(folder, e))?;
+            output::folder(folder)?;
         }
-        write_csv(&prediction, &out)?;
+        output::replace(&out, |to| Ok(write_csv(&prediction, to)?))?;
         let fits = compare(&model, &drive, &prediction);
         if !options.json {
-            println!("{} -> {}: {} samples of {:.6} s", drive.name, out.display(), prediction.len(), prediction.period);
+            output::line(format_args!("{} -> {}: {} samples of {:.6} s", drive.name, out.display(), prediction.len(), prediction.period))?;
             for (output, nrmse) in &fits {
-                println!("  {output:<24} nrmse {nrmse:.4}");
+                output::line(format_args!("  {output:<24} nrmse {nrmse:.4}"))?;
             }
         }
         let fits: serde_json::Map<_, _> = fits.into_iter().map(|(name, nrmse)| (name, json!(nrmse))).collect();
@@ -35,7 +36,7 @@ pub fn simulate(options: &cli::Simulate) -> Result<u8, Failure> {
         );
     }
     if options.json {
-        println!("{}", json!({ "model": model.name, "runs": results }));
+        output::line(json!({ "model": model.name, "runs": results }))?;
     }
     Ok(0)
 }
@@ -56,7 +57,7 @@ fn under(model: &Model, condition: &[(String, Condition)], recording: &str) -> R
                 model.set_values_at(path, &[*value]).map_err(|e| Failure::input(format!("{recording}: condition {path}: {e}")))?
             }
             Condition::Free | Condition::Shared(_) => {
-                eprintln!("note: {recording}: {path} is free in this file; the model's own number is used")
+                output::note(format_args!("note: {recording}: {path} is free in this file; the model's own number is used"))
             }
         }
     }

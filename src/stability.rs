@@ -3,6 +3,7 @@
 use crate::cli;
 use crate::failure::{Failure, code};
 use crate::interrupt;
+use crate::output;
 use crate::progress;
 use crate::summary::graph_of;
 use backdrive_bags::Reader;
@@ -32,11 +33,7 @@ pub fn stability(options: &cli::Stability) -> Result<u8, Failure> {
     let question = loaded.question(options)?;
     if let Some(html) = &options.html {
         // A report that cannot be written is told before the work, not after it.
-        let existed = html.exists();
-        std::fs::OpenOptions::new().append(true).create(true).open(html).map_err(|e| Failure::write(html, e))?;
-        if !existed {
-            let _ = std::fs::remove_file(html);
-        }
+        output::writable(html)?;
     }
     let curve = match &options.sweep {
         Some(gains) => Some(curve(&question, &gains.0, &cancel)?),
@@ -61,13 +58,13 @@ pub fn stability(options: &cli::Stability) -> Result<u8, Failure> {
         if let Some(curve) = &curve {
             all["sweep"] = Value::Array(curve.iter().flatten().map(point_json).collect());
         }
-        println!("{all}");
+        output::line(format_args!("{all}"))?;
     } else {
         if let Some(curve) = &curve {
-            println!("{}", curve_text(curve));
+            output::line(curve_text(curve))?;
         }
         if let Some(found) = &found {
-            println!("{}", text(found));
+            output::line(text(found))?;
         }
     }
     let interrupted = || Failure { code: code::INTERRUPTED, message: "stopped; what was done until then is above".to_string() };
@@ -75,8 +72,8 @@ pub fn stability(options: &cli::Stability) -> Result<u8, Failure> {
     if let Some(html) = &options.html {
         let points: Vec<&Point> = curve.iter().flatten().flatten().collect();
         let page = crate::stability_page::page(&found, question.session, &points);
-        page.write(html).map_err(|e| Failure::write(html, e))?;
-        eprintln!("wrote {}", html.display());
+        output::file(html, page.html())?;
+        output::note(format_args!("wrote {}", html.display()));
     }
     if cancel.load(Ordering::SeqCst) {
         return Err(interrupted());

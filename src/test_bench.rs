@@ -3,6 +3,7 @@
 use crate::cli;
 use crate::columns::columns;
 use crate::failure::Failure;
+use crate::output;
 use backdrive_bench::lag::Observation;
 use backdrive_bench::{Asked, BenchError, Identified, Record, Validation, identify, validate};
 use backdrive_control::engine::Ripple;
@@ -29,11 +30,11 @@ pub fn test_bench(options: &cli::TestBench) -> Result<u8, Failure> {
     };
     write(&options.out, &found)?;
     if options.json {
-        println!("{}", serde_json::to_string_pretty(&as_json(&asked, &found, validation.as_ref())).map_err(Failure::input)?);
+        output::json(&as_json(&asked, &found, validation.as_ref()))?;
     } else {
-        println!("{}", text(&asked, &found, validation.as_ref()));
+        output::line(text(&asked, &found, validation.as_ref()))?;
     }
-    eprintln!("wrote engine.toml, dynamometer.toml and shaft.toml into {}", options.out.display());
+    output::note(format_args!("wrote engine.toml, dynamometer.toml and shaft.toml into {}", options.out.display()));
     Ok(0)
 }
 
@@ -53,11 +54,8 @@ fn asked(options: &cli::TestBench, steps: &Record) -> Asked {
 }
 
 fn write(out: &Path, found: &Identified) -> Result<(), Failure> {
-    std::fs::create_dir_all(out).map_err(|e| Failure::write(out, e))?;
-    let put = |name: &str, text: String| {
-        let path = out.join(name);
-        std::fs::write(&path, text).map_err(|e| Failure::write(&path, e))
-    };
+    output::folder(out)?;
+    let put = |name: &str, text: String| output::file(&out.join(name), text);
     // Combustion's ripple is above what the observer passes on.
     let engine = EngineFile { engine: found.bench.engine.clone(), ripple: Ripple { per_revolution: 0.0, share: 0.0 } };
     put("engine.toml", engine.to_toml("Engine, identified"))?;

@@ -8,6 +8,9 @@
 //! Payloads are CDR with ros2msg schemas whatever the live transport was; the graph, the models and a
 //! verdict on completeness are in the file.
 
+// Printing panics where the other end is full or gone.
+#![cfg_attr(not(test), warn(clippy::print_stdout, clippy::print_stderr))]
+
 mod cdr;
 mod clock_offset;
 mod completeness;

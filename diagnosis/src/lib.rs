@@ -4,6 +4,9 @@
 //! [`hypothesis::Hypothesis`] is a physics at a place; [`search`] finds which of them the recordings ask for, and
 //! [`verdict`] says what follows, as a file and a model.
 
+// Printing panics where the other end is full or gone.
+#![cfg_attr(not(test), warn(clippy::print_stdout, clippy::print_stderr))]
+
 pub mod audit;
 pub mod clock;
 pub mod compare;

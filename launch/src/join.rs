@@ -12,7 +12,7 @@ use backdrive_nodes::realtime;
 use backdrive_nodes::recorder::{RecorderPlan, run_recorder};
 use backdrive_nodes::stage::Clock;
 use std::collections::BTreeMap;
-use std::io::IsTerminal;
+use std::io::{IsTerminal, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -153,10 +153,11 @@ fn host() -> String {
 /// Says why the node cannot begin, to the supervisor, or to whoever started it by hand.
 fn fail(error: String, code: u8) -> ExitCode {
     let line = serde_json::to_string(&FromNode::Failed { error: error.clone(), code });
-    println!("{}", line.unwrap_or_default());
+    // A supervisor that is gone hears nothing, and that is no second error.
+    let _ = writeln!(std::io::stdout(), "{}", line.unwrap_or_default());
     // The supervisor has heard it, and shows it with the node's name.
     if code == 2 || std::io::stdout().is_terminal() || std::io::stderr().is_terminal() {
-        eprintln!("{error}");
+        let _ = writeln!(std::io::stderr(), "{error}");
     }
     ExitCode::from(code)
 }

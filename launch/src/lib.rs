@@ -13,6 +13,9 @@
 //! The supervisor holds a lock in the directory for as long as it lives. A run whose lock is free is dead,
 //! and whoever starts next removes it.
 
+// Printing panics where the other end is full or gone.
+#![cfg_attr(not(test), warn(clippy::print_stdout, clippy::print_stderr))]
+
 mod child;
 mod error;
 mod hosts;

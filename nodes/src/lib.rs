@@ -1,5 +1,8 @@
 //! Processes around the cores, and the transports between them.
 
+// Printing panics where the other end is full or gone.
+#![cfg_attr(not(test), warn(clippy::print_stdout, clippy::print_stderr))]
+
 mod book;
 pub mod build;
 pub mod clock;

@@ -198,7 +198,9 @@ fn read_lines(control: &Control, start: &SyncSender<Start>) {
             }
             Ok(ToNode::Stop) => control.stop(),
             Ok(ToNode::Gains { mu, lambda, ramp_s }) => control.set_gains(mu, lambda, ramp_s),
-            Err(e) => eprintln!("not understood from the supervisor: {e}: {line}"),
+            Err(e) => {
+                let _ = writeln!(std::io::stderr(), "not understood from the supervisor: {e}: {line}");
+            }
         }
     }
 }

@@ -3,6 +3,9 @@
 //! A [`model::Model`] is what a model file says. It compiles to a stepper, is linearised, is driven
 //! by a recording or an excitation, and takes fragments (a grip, an environment) at a port.
 
+// Printing panics where the other end is full or gone.
+#![cfg_attr(not(test), warn(clippy::print_stdout, clippy::print_stderr))]
+
 pub mod correlation;
 pub mod describe;
 pub mod elements;

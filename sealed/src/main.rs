@@ -1,5 +1,8 @@
 //! Draws a truth and seals it, or is the device that a truth describes.
 
+// Printing panics where the other end is full or gone.
+#![cfg_attr(not(test), warn(clippy::print_stdout, clippy::print_stderr))]
+
 use backdrive_sealed::draw::{DrawOptions, draw};
 use backdrive_sealed::master::{MasterOptions, SealedMaster};
 use backdrive_sealed::network::{Grip, Network};
@@ -100,19 +103,23 @@ fn main() -> ExitCode {
             let named = ["model", "grip", "truth", "number", "firmness", "rate"];
             Options::sort(arguments, &named, &[]).and_then(|options| run(&options))
         }
-        Some("--help" | "-h" | "help") => {
-            print!("{USAGE}");
-            Ok(())
-        }
+        Some("--help" | "-h" | "help") => put(USAGE),
         _ => Err(misused("say draw or run")),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,
         Err(Failure(sentence, code)) => {
-            eprintln!("{sentence}");
+            let _ = writeln!(std::io::stderr(), "{sentence}");
             ExitCode::from(code)
         }
     }
+}
+
+/// A result on standard output.
+fn put(text: &str) -> Result<(), Failure> {
+    let mut stdout = std::io::stdout().lock();
+    let written = stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush());
+    written.map_err(|error| Failure(format!("standard output: cannot be written: {error}"), 5))
 }
 
 fn misused(what: impl std::fmt::Display) -> Failure {
@@ -143,8 +150,7 @@ fn draw_truth(options: &Options) -> Result<(), Failure> {
     let (bytes, hash) = seal(&truth).map_err(wrong)?;
     let written = OpenOptions::new().write(true).create_new(true).open(&out).and_then(|mut file| file.write_all(&bytes));
     written.map_err(|error| Failure(format!("{}: cannot be written: {error}", out.display()), 5))?;
-    println!("{hash}  {}", out.display());
-    Ok(())
+    put(&format!("{hash}  {}\n", out.display()))
 }
 
 fn run(options: &Options) -> Result<(), Failure> {

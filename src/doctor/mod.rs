@@ -6,6 +6,7 @@ mod net;
 use crate::cli;
 use crate::failure::{Failure, code};
 use crate::network::network;
+use crate::output;
 use serde::Serialize;
 use std::fmt;
 
@@ -64,9 +65,9 @@ pub fn doctor(options: &cli::Doctor) -> Result<u8, Failure> {
     let mut findings = machine::look();
     findings.extend(net::look(&network, options.listen_s));
     if options.json {
-        println!("{}", serde_json::to_string_pretty(&findings).map_err(Failure::machine)?);
+        output::json(&findings)?;
     } else {
-        findings.iter().for_each(|f| println!("{f}"));
+        findings.iter().try_for_each(output::line)?;
     }
     Ok(if findings.iter().any(|f| f.grade == Grade::Bad) { code::MACHINE } else { 0 })
 }

@@ -9,6 +9,7 @@ use super::score::{Finding, Handed, Mark, findings, is_nonlinear, mark, name_of}
 use super::session::hand_over;
 use crate::cli;
 use crate::failure::Failure;
+use crate::output;
 use backdrive_sealed::seal::hash;
 use backdrive_sealed::truth::Truth;
 use serde::Serialize;
@@ -120,7 +121,7 @@ pub fn prove(options: &cli::Prove, folder: &Path, drawn: &Draw, stop: &AtomicBoo
     let digest = draw(options, &hidden, drawn)?;
     let hand = if drawn.shows_hand { "" } else { "; nobody measures the hand" };
     let masked = if drawn.refitted { "; the nominal numbers were refitted" } else { "" };
-    println!("{}: sealed, SHA-256 {digest}{hand}{masked}", folder.display());
+    output::line(format_args!("{}: sealed, SHA-256 {digest}{hand}{masked}", folder.display()))?;
 
     // From here to the verdict only the hidden plant's process opens the truth.
     let record = |nominal: &Nominal, name: &str| {
@@ -389,5 +390,5 @@ fn read(path: &Path) -> Result<String, Failure> {
 }
 
 pub(super) fn write(path: &Path, text: &str) -> Result<(), Failure> {
-    std::fs::write(path, text).map_err(|e| Failure::write(path, e))
+    crate::output::file(path, text)
 }

@@ -83,5 +83,5 @@ fn write_scaled(text: &str, model: &Path, path: &Path, share: f64) -> Result<(),
     for (output, known) in outputs.into_iter().flat_map(|t| t.iter_mut()).zip(&parsed.outputs) {
         output["gain"] = value(share * known.gain);
     }
-    std::fs::write(path, document.to_string()).map_err(|e| Failure::write(path, e))
+    crate::output::file(path, document.to_string())
 }

@@ -13,6 +13,7 @@ mod summary;
 use crate::cli;
 use crate::failure::{Failure, code};
 use crate::interrupt;
+use crate::output;
 use case::{Case, Draw};
 use std::path::Path;
 use std::process::ExitCode;
@@ -46,12 +47,12 @@ pub fn prove(options: &cli::Prove) -> Result<u8, Failure> {
         let folder = options.out.join(format!("case-{:03}", index + 1));
         match case::prove(options, &folder, &drawn, &stop) {
             Ok(case) => {
-                println!("{}\n", case.text());
+                output::line(format_args!("{}\n", case.text()))?;
                 cases.push(case);
             }
             // What is wrong with the command shows in the first case; one of many that breaks must not cost the others.
             Err(failure) if !cases.is_empty() && !stop.load(Ordering::SeqCst) => {
-                println!("  not ended   {}\n", failure.message);
+                output::line(format_args!("  not ended   {}\n", failure.message))?;
                 broken = Some(failure);
             }
             Err(failure) => return Err(failure),
@@ -63,7 +64,7 @@ pub fn prove(options: &cli::Prove) -> Result<u8, Failure> {
         }
     }
     if cases.len() > 1 {
-        println!("{} cases: {}", cases.len(), Summary::of(&cases).text());
+        output::line(format_args!("{} cases: {}", cases.len(), Summary::of(&cases).text()))?;
     }
     if let Some(failure) = broken {
         let not_ended = options.cases - cases.len();
@@ -100,9 +101,9 @@ fn write(options: &cli::Prove, cases: &[Case]) -> Result<(), Failure> {
     let all: Vec<serde_json::Value> = cases.iter().map(Case::json).collect();
     let json = serde_json::json!({ "schema": 1, "summary": Summary::of(cases), "cases": all });
     let path = options.out.join("proof.json");
-    std::fs::write(&path, serde_json::to_string_pretty(&json).map_err(Failure::input)?).map_err(|e| Failure::write(&path, e))?;
+    output::file(&path, serde_json::to_string_pretty(&json).map_err(Failure::input)?)?;
     let html = options.html.clone().unwrap_or_else(|| options.out.join("proof.html"));
-    page::page(options, cases).write(&html).map_err(|e| Failure::write(&html, e))
+    output::file(&html, page::page(options, cases).html())
 }
 
 /// Joins a run in the place of its master, with a hidden plant's process behind.

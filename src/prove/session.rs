@@ -85,5 +85,5 @@ fn hide_hand(path: &Path, hand_hz: f64) -> Result<(), Failure> {
         unknown.insert(hand, value(how));
     }
     set.insert("unknown", Item::Table(unknown));
-    std::fs::write(path, set.to_string()).map_err(|e| Failure::write(path, e))
+    crate::output::file(path, set.to_string())
 }

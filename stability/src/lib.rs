@@ -1,5 +1,8 @@
 //! Is the loop stable at this gain? Answers from what a run or a replay did.
 
+// Printing panics where the other end is full or gone.
+#![cfg_attr(not(test), warn(clippy::print_stdout, clippy::print_stderr))]
+
 pub mod collect;
 pub mod energy;
 pub mod frequency;

@@ -1,6 +1,10 @@
 //! `study`: runs a study and prints its table.
 
-use backdrive::failure::code;
+// Printing panics where the other end is full or gone.
+#![cfg_attr(not(test), warn(clippy::print_stdout, clippy::print_stderr))]
+
+use backdrive::failure::{Failure, code};
+use backdrive::output;
 use backdrive_studies::data::Data;
 use backdrive_studies::{STUDIES, Study, StudyError, study_named};
 use clap::Parser;
@@ -43,50 +47,51 @@ const CODES: &str = "Exit code: 0 every bar of the tables is met, 1 a bar is mis
                      no such study, 5 this machine does not let it, 7 none of the recordings are here.";
 
 fn main() -> ExitCode {
-    let options = Options::parse();
+    let options = match output::parsed::<Options>() {
+        Ok(options) => options,
+        Err(code) => return code,
+    };
     if options.list {
-        for study in STUDIES {
-            println!("{:<22} {}", study.name, study.about);
-        }
-        return ExitCode::SUCCESS;
+        let lines: Vec<String> = STUDIES.iter().map(|study| format!("{:<22} {}", study.name, study.about)).collect();
+        return output::line(lines.join("\n")).map_or_else(|failure| output::fail(&failure), |()| ExitCode::SUCCESS);
     }
     // A name that is wrong is told before the first study takes its minutes.
     let asked: Result<Vec<&Study>, StudyError> =
         if options.all { Ok(STUDIES.to_vec()) } else { options.names.iter().map(|name| study_named(name)).collect() };
     match asked {
-        Ok(studies) => ExitCode::from(run(&studies, &options)),
+        Ok(studies) => run(&studies, &options).map_or_else(|failure| output::fail(&failure), ExitCode::from),
         Err(error) => {
-            eprintln!("error: {error}");
+            output::note(format_args!("error: {error}"));
             ExitCode::from(error.code())
         }
     }
 }
 
 /// Runs one after the other; a study that fails does not keep the next one from its turn.
-fn run(studies: &[&Study], options: &Options) -> u8 {
+fn run(studies: &[&Study], options: &Options) -> Result<u8, Failure> {
     let data = Data::find(options.data.as_deref());
     let (mut failed, mut missed, mut skipped) = (None, false, 0);
     for study in studies {
         match study.run(&data, &options.out, options.quick, options.longer) {
             Ok(report) => {
-                println!("{}", report.text());
-                println!("wrote {}", options.out.join(study.name).display());
+                output::line(report.text())?;
+                output::line(format_args!("wrote {}", options.out.join(study.name).display()))?;
                 missed |= report.missed() > 0;
             }
             Err(StudyError::NoData(message)) => {
-                println!("skipped {message}");
+                output::line(format_args!("skipped {message}"))?;
                 skipped += 1;
             }
             Err(error) => {
-                eprintln!("error: {}: {error}", study.name);
+                output::note(format_args!("error: {}: {error}", study.name));
                 failed = failed.or(Some(error.code()));
             }
         }
     }
-    match failed {
+    Ok(match failed {
         Some(code) => code,
         None if missed => code::NEGATIVE,
         None if skipped == studies.len() => code::CANNOT_TELL,
         None => 0,
-    }
+    })
 }

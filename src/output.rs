@@ -1,0 +1,228 @@
+//! The one way out of this program: what a verb says, and the files that it writes.
+//!
+//! Results go to standard output. One that cannot be written ends the verb with exit code 5 and a sentence; a reader who has enough
+//! (`| head`) is no error. Everything else goes to standard error, where nobody can be told that it failed. A file that was asked for is
+//! there whole or not at all: it is written beside its place and then moved there.
+
+#![allow(clippy::print_stdout, clippy::print_stderr)]
+
+use crate::failure::{Failure, code};
+use clap::Parser;
+use std::fmt::Display;
+use std::fs::File;
+use std::io::{self, ErrorKind, Write};
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+/// A result on standard output, with a line feed behind it.
+///
+/// # Errors
+/// When it cannot be written; not when the reader has closed the pipe.
+pub fn line(result: impl Display) -> Result<(), Failure> {
+    text(format_args!("{result}\n"))
+}
+
+/// A result on standard output, as it is.
+///
+/// # Errors
+/// As [`line()`].
+pub fn text(result: impl Display) -> Result<(), Failure> {
+    // At once: a text that is half written before the error tells no more than none.
+    let bytes = result.to_string();
+    let mut stdout = io::stdout().lock();
+    written(stdout.write_all(bytes.as_bytes()).and_then(|()| stdout.flush()))
+}
+
+/// A result on standard output as JSON that a person can read.
+///
+/// # Errors
+/// As [`line()`].
+pub fn json(result: &impl serde::Serialize) -> Result<(), Failure> {
+    line(serde_json::to_string_pretty(result).map_err(Failure::input)?)
+}
+
+fn written(result: io::Result<()>) -> Result<(), Failure> {
+    match result {
+        Err(e) if e.kind() != ErrorKind::BrokenPipe => Err(Failure::machine(format!("standard output: cannot be written: {e}"))),
+        _ => Ok(()),
+    }
+}
+
+/// A line on standard error: a note, a warning, an error. Where that is full or closed it is lost.
+pub fn note(told: impl Display) {
+    let line = format!("{told}\n");
+    let _ = io::stderr().lock().write_all(line.as_bytes());
+}
+
+/// How a program ends that fails: its one message, and its exit code.
+pub fn fail(failure: &Failure) -> ExitCode {
+    note(format_args!("error: {}", failure.message));
+    ExitCode::from(failure.code)
+}
+
+/// The command line of this program, or how it ends: wrong usage with 2, help and version with 0.
+///
+/// # Errors
+/// The exit code; everything is said by then.
+pub fn parsed<P: Parser>() -> Result<P, ExitCode> {
+    P::try_parse().map_err(|told| {
+        let printed = told.print().and_then(|()| io::stdout().flush());
+        match written(printed) {
+            Err(failure) if !told.use_stderr() => fail(&failure),
+            _ => ExitCode::from(if told.use_stderr() { 2 } else { 0 }),
+        }
+    })
+}
+
+/// A file with these contents, in place of one that is there.
+///
+/// # Errors
+/// When it cannot be written; then what was there is there still, and nothing new.
+pub fn file(path: &Path, contents: impl AsRef<[u8]>) -> Result<(), Failure> {
+    replace(path, |beside| std::fs::write(beside, contents).map_err(|e| Failure::write(beside, e)))
+}
+
+/// A file that `write` makes: at a path beside the one that is asked for, where nothing is yet and to which it may return as often as it
+/// likes. Once it is whole it is moved to its place; onto a device or a pipe it is copied.
+///
+/// # Errors
+/// What `write` says, with the path that was asked for, and exit code 5 where that is about the file.
+pub fn replace<T>(path: &Path, write: impl FnOnce(&Path) -> Result<T, Failure>) -> Result<T, Failure> {
+    let failed = |e: io::Error| Failure::write(path, e);
+    let name = path.file_name().ok_or_else(|| Failure::machine(format!("{}: is no name of a file", path.display())))?;
+    let stream = is_stream(path);
+    // A link stays a link: what it points at is replaced.
+    let place = if path.is_file() { path.canonicalize().map_err(failed)? } else { path.to_path_buf() };
+    if path.is_dir() {
+        return Err(failed(io::Error::from(ErrorKind::IsADirectory)));
+    }
+    let folder = if stream { std::env::temp_dir() } else { folder_of(&place) };
+    let beside = tempfile::Builder::new().prefix(".backdrive-").tempdir_in(&folder).map_err(|e| {
+        // The name of a folder that nobody knows of would not help.
+        failed(e.raw_os_error().map_or_else(|| io::Error::from(e.kind()), io::Error::from_raw_os_error))
+    })?;
+    let made = beside.path().join(name);
+    let result = write(&made).map_err(|failure| about(failure, &made, path))?;
+    let moved = match stream {
+        true => copy(&made, path),
+        false => finish(&made, &place),
+    };
+    moved.map(|()| result).map_err(failed)
+}
+
+/// Whether a path is a device or a pipe: what is written there cannot be read again.
+pub fn is_stream(path: &Path) -> bool {
+    std::fs::metadata(path).is_ok_and(|m| !m.is_file() && !m.is_dir())
+}
+
+/// Tells before long work whether a file could be written after it.
+///
+/// # Errors
+/// When it could not.
+pub fn writable(path: &Path) -> Result<(), Failure> {
+    if is_stream(path) {
+        return Ok(());
+    }
+    match path.is_dir() {
+        true => Err(Failure::write(path, io::Error::from(ErrorKind::IsADirectory))),
+        false => tempfile::tempfile_in(folder_of(path)).map(drop).map_err(|e| Failure::write(path, e)),
+    }
+}
+
+/// Makes a folder for files, with those above it, if it is not there.
+///
+/// # Errors
+/// When it cannot be made.
+pub fn folder(path: &Path) -> Result<(), Failure> {
+    if path.as_os_str().is_empty() {
+        return Ok(());
+    }
+    std::fs::create_dir_all(path).map_err(|e| Failure::write(path, e))
+}
+
+fn folder_of(path: &Path) -> PathBuf {
+    path.parent().filter(|f| !f.as_os_str().is_empty()).map_or_else(|| PathBuf::from("."), Path::to_path_buf)
+}
+
+/// A failure about the file beside is one about the file that was asked for.
+fn about(failure: Failure, made: &Path, path: &Path) -> Failure {
+    let ours = made.display().to_string();
+    match failure.message.contains(&ours) {
+        true => Failure { code: code::MACHINE, message: failure.message.replace(&ours, &path.display().to_string()) },
+        false => failure,
+    }
+}
+
+fn finish(made: &Path, place: &Path) -> io::Result<()> {
+    let file = File::open(made)?;
+    if let Ok(before) = std::fs::metadata(place) {
+        file.set_permissions(before.permissions())?;
+    }
+    // What a disk refuses late it refuses here, and the file of before is still there.
+    file.sync_all()?;
+    std::fs::rename(made, place)
+}
+
+fn copy(made: &Path, stream: &Path) -> io::Result<()> {
+    let mut to = File::options().write(true).open(stream)?;
+    match io::copy(&mut File::open(made)?, &mut to).and_then(|_| to.flush()) {
+        Err(e) if e.kind() != ErrorKind::BrokenPipe => Err(e),
+        _ => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn names(folder: &Path) -> Vec<String> {
+        std::fs::read_dir(folder).unwrap().flatten().map(|e| e.file_name().to_string_lossy().into_owned()).collect()
+    }
+
+    #[test]
+    fn a_file_is_there_whole_or_as_it_was() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.csv");
+        file(&path, "one").unwrap();
+        let failure = replace(&path, |beside| -> Result<(), Failure> {
+            std::fs::write(beside, "tw").unwrap();
+            Err(Failure::input(format!("{}: No space left on device", beside.display())))
+        });
+        let failure = failure.unwrap_err();
+        assert_eq!((failure.code, failure.message), (code::MACHINE, format!("{}: No space left on device", path.display())));
+        assert_eq!(std::fs::read_to_string(&path).unwrap(), "one");
+        assert_eq!(names(folder.path()), ["a.csv"]);
+    }
+
+    #[test]
+    fn what_is_no_matter_of_the_file_keeps_its_code() {
+        let folder = tempfile::tempdir().unwrap();
+        let failure = replace(&folder.path().join("a"), |_| -> Result<(), Failure> { Err(Failure::input("b: holds nothing")) });
+        assert_eq!(failure.unwrap_err().code, code::BAD_INPUT);
+        assert!(names(folder.path()).is_empty());
+    }
+
+    #[test]
+    fn a_full_device_and_a_folder_that_is_not_there_are_told_with_the_path_that_was_asked_for() {
+        let full = file(Path::new("/dev/full"), "x").unwrap_err();
+        assert_eq!(full.code, code::MACHINE);
+        assert!(full.message.starts_with("/dev/full: cannot be written: No space left"), "{}", full.message);
+        let absent = file(Path::new("/no/such/folder/x"), "x").unwrap_err();
+        assert_eq!(absent.code, code::MACHINE);
+        assert!(absent.message.starts_with("/no/such/folder/x: cannot be written: No such file"), "{}", absent.message);
+    }
+
+    #[test]
+    fn a_link_and_the_rights_of_a_file_stay() {
+        use std::os::unix::fs::PermissionsExt;
+        let folder = tempfile::tempdir().unwrap();
+        let (path, link) = (folder.path().join("a"), folder.path().join("b"));
+        std::fs::write(&path, "one").unwrap();
+        std::fs::set_permissions(&path, PermissionsExt::from_mode(0o640)).unwrap();
+        std::os::unix::fs::symlink("a", &link).unwrap();
+        file(&link, "two").unwrap();
+        assert_eq!(std::fs::read_to_string(&path).unwrap(), "two");
+        assert!(link.is_symlink());
+        assert_eq!(std::fs::metadata(&path).unwrap().permissions().mode() & 0o777, 0o640);
+    }
+}
