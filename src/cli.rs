@@ -29,7 +29,7 @@ Exit codes: 0 stable, 1 not, 7 it cannot be told.";
 
 const DIAGNOSE_HELP: &str = "Examples:
   backdrive run launch/identify.toml --out identify
-  backdrive diagnose identify --model plant/models/impulse-engine-linear.toml --out diagnosis
+  backdrive diagnose identify --model plant/models/impulse-engine-linear.toml --grip plant/grips/normal.toml --out diagnosis
   backdrive diagnose session.csv held-out.csv --model model.toml --out diagnosis --patience 60
   backdrive diagnose set/ --without coulomb --out diagnosis
 
@@ -406,16 +406,21 @@ pub struct Diagnose {
     /// The nominal model; without this the set's own.
     #[arg(long, value_name = "FILE")]
     pub model: Option<PathBuf>,
-    /// The grip that holds the nominal model, where it holds no hand itself.
-    #[arg(long, value_name = "FILE")]
+    /// The grip that holds the nominal model, where it holds no hand itself; `none` for no hand.
+    #[arg(long, value_name = "FILE|none")]
     pub grip: Option<PathBuf>,
+    /// A recorded input that may have no place in the model, such as a hand that was at rest; may be given several times. In set.toml:
+    /// ignore = ["NAME"].
+    #[arg(long, value_name = "NAME")]
+    pub ignore_signal: Vec<String>,
     /// A physics that is not to be considered, and with it all that contain it as a special case; may be given several times.
     #[arg(long, value_name = "KIND", value_parser = physics)]
     pub without: Vec<String>,
     /// How many physics may be missing at once, at most; more take more time.
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u8).range(1..=8))]
     pub effects: u8,
-    /// How long to search, at most. On a busy machine it takes up to 1.4 times that, so that the result depends less on what else runs.
+    /// How long to search. On a busy machine up to 1.4 times that, so that the result depends less on what else runs; deciding, the next
+    /// experiment and the report come after it, and the bar tells the limit of all.
     #[arg(long, value_name = "SECONDS", value_parser = positive, default_value_t = 24.0, allow_negative_numbers = true)]
     pub patience: f64,
     /// Print the verdict as JSON.
@@ -434,12 +439,20 @@ pub struct Fit {
     /// A folder with set.toml, a set.toml, a folder of recordings, or recordings (CSV or MCAP).
     #[arg(required = true, value_name = "SET")]
     pub set: Vec<PathBuf>,
-    /// The grip that holds the model, where it holds no hand itself.
-    #[arg(long, value_name = "FILE")]
+    /// The grip that holds the model, where it holds no hand itself; `none` for no hand.
+    #[arg(long, value_name = "FILE|none")]
     pub grip: Option<PathBuf>,
-    /// Write the refitted model, with what was given and the intervals in comments.
+    /// A recorded input that may have no place in the model, such as a hand that was at rest; may be given several times. In set.toml:
+    /// ignore = ["NAME"].
+    #[arg(long, value_name = "NAME")]
+    pub ignore_signal: Vec<String>,
+    /// Write the refitted model, with what was given and the intervals in comments. Parameters that the recordings do not determine keep
+    /// their nominal values.
     #[arg(long, value_name = "FILE")]
     pub out: Option<PathBuf>,
+    /// Let --out take the place of the model that is read.
+    #[arg(long)]
+    pub overwrite: bool,
     /// How long to fit, at most; up to 1.4 times that on a busy machine.
     #[arg(long, value_name = "SECONDS", value_parser = positive, default_value_t = 60.0, allow_negative_numbers = true)]
     pub patience: f64,

@@ -9,7 +9,7 @@ use crate::output;
 use crate::progress;
 use crate::recordings::{self, Opened};
 use backdrive_diagnosis::audit::{self, Remark};
-use backdrive_diagnosis::clock::Moment;
+use backdrive_diagnosis::clock::{Moment, longest};
 use backdrive_diagnosis::evidence;
 use backdrive_diagnosis::locate::{self, Location, locate};
 use backdrive_diagnosis::per_record::{PerRecord, fit_each};
@@ -27,6 +27,9 @@ pub const MODEL: &str = "model.diagnosed.toml";
 const PER_RECORD: Duration = Duration::from_secs(4);
 /// And at least, where the search has taken all of its time.
 const LEAST: Duration = Duration::from_millis(500);
+
+/// What comes after a search at most: its last fit, the next experiment, each record by itself, the force located.
+const AFTERWARDS: Duration = Duration::from_secs(6);
 
 /// Everything that was found.
 pub struct Found {
@@ -49,7 +52,10 @@ pub fn diagnose(options: &cli::Diagnose) -> Result<u8, Failure> {
     let began = Instant::now();
     let stop = interrupt::heard()?;
 
-    let opened = recordings::open(&options.set, options.model.as_deref(), options.grip.as_deref())?;
+    let opened = recordings::open(&options.set, options.model.as_deref(), options.grip.as_deref(), &options.ignore_signal)?;
+    for name in [MODEL, EXPERIMENT_FILE] {
+        recordings::not_onto(&options.out.join(name), &opened.files, false)?;
+    }
     for note in &opened.notes {
         output::note(format_args!("note: {note}"));
     }
@@ -87,7 +93,7 @@ pub struct Diagnosed {
 pub fn diagnose_into(opened: Opened, settings: &Settings, out: &Path, with_report: bool, stop: &AtomicBool) -> Result<Diagnosed, Failure> {
     // A folder that cannot be written is told before the work, not after it.
     output::folder(out)?;
-    let found = progress::at_most(settings.patience, |report| find(opened.problem, settings, stop, report))?;
+    let found = progress::at_most(longest(settings.patience + AFTERWARDS), |report| find(opened.problem, settings, stop, report))?;
 
     let write = |name: &str, text: &str| output::file(&out.join(name), text);
     let json = serde_json::to_string_pretty(&found.said.json).map_err(Failure::input)?;

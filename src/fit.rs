@@ -1,4 +1,4 @@
-//! `backdrive fit`: a model's numbers refitted to recordings, its structure as it is.
+//! `backdrive fit`: a model's parameters refitted to recordings, its structure as it is.
 
 use crate::cli;
 use crate::columns::columns;
@@ -7,7 +7,7 @@ use crate::interrupt;
 use crate::output;
 use crate::progress;
 use crate::recordings::{self, file_name};
-use backdrive_diagnosis::clock::Moment;
+use backdrive_diagnosis::clock::{Moment, longest};
 use backdrive_diagnosis::compare::{Quality, predictions, qualities};
 use backdrive_diagnosis::hypothesis::PHYSICS;
 use backdrive_diagnosis::intervals::Spread;
@@ -15,6 +15,7 @@ use backdrive_diagnosis::numbers::{Pair, Row, correlated, refitted_text, rows};
 use backdrive_diagnosis::per_record::{PerRecord, fit_each};
 use backdrive_diagnosis::problem::Problem;
 use backdrive_diagnosis::search::{Search, Settings, search};
+use backdrive_diagnosis::structure::{Number, Role, Structure};
 use backdrive_report::{number, percent};
 use serde_json::json;
 use std::fmt::Write as _;
@@ -24,6 +25,9 @@ use std::time::Duration;
 /// Correlations from here on are named.
 const CORRELATED: f64 = 0.9;
 
+/// Computing time for a fit of what is determined, at least.
+const LEAST: Duration = Duration::from_secs(1);
+
 /// What a fit says.
 struct Fitted {
     rows: Vec<Row>,
@@ -31,19 +35,24 @@ struct Fitted {
     given: Vec<Quality>,
     fitted: Vec<Quality>,
     per_record: PerRecord,
+    /// Names of the parameters that the recordings do not determine.
+    kept: Vec<String>,
     model: String,
 }
 
 /// Fits, writes, and says how sure the numbers are.
 pub fn fit(options: &cli::Fit) -> Result<u8, Failure> {
     let stop = interrupt::heard()?;
-    let opened = recordings::open(&options.set, Some(&options.model), options.grip.as_deref())?;
+    let opened = recordings::open(&options.set, Some(&options.model), options.grip.as_deref(), &options.ignore_signal)?;
+    if let Some(out) = &options.out {
+        recordings::not_onto(out, &opened.files, options.overwrite)?;
+    }
     for note in &opened.notes {
         output::note(format_args!("note: {note}"));
     }
     let problem = opened.problem;
     let patience = Duration::from_secs_f64(options.patience);
-    let fitted = progress::at_most(patience, |report| fitted(&problem, patience, &stop, report))?;
+    let fitted = progress::at_most(longest(patience), |report| fitted(&problem, patience, &stop, report))?;
     if let Some(out) = &options.out {
         output::file(out, &fitted.model)?;
     }
@@ -56,59 +65,105 @@ pub fn fit(options: &cli::Fit) -> Result<u8, Failure> {
             "given": fitted.given,
             "fitted": fitted.fitted,
             "records": fitted.per_record,
-            "agree": !disagree,
+            "agree": fitted.per_record.agree(),
+            "kept": fitted.kept,
+            "compared": fitted.per_record.compared(),
         });
         output::json(&all)?;
     } else {
         output::line(text(&problem, &fitted))?;
     }
     if let Some(out) = &options.out {
-        output::note(format_args!("wrote {}", out.display()));
+        let kept = match fitted.kept.len() {
+            0 => String::new(),
+            1 => format!("; {} is not determined by the recordings and keeps its nominal value", fitted.kept[0]),
+            n => format!("; {n} parameters are not determined by the recordings and keep their nominal values: {}", fitted.kept.join(", ")),
+        };
+        output::note(format_args!("wrote {}{kept}", out.display()));
     }
     if stop.load(Ordering::SeqCst) {
-        return Err(Failure { code: code::INTERRUPTED, message: "stopped; the numbers are those reached until then".to_string() });
+        return Err(Failure { code: code::INTERRUPTED, message: "stopped; the parameters are those reached until then".to_string() });
     }
     Ok(if disagree { code::NEGATIVE } else { 0 })
 }
 
+/// How often parameters that the recordings do not determine are taken out and the rest is fitted again, at most.
+const ROUNDS: usize = 3;
+
 fn fitted(problem: &Problem, patience: Duration, stop: &AtomicBool, report: &(dyn Fn(&str) + Sync)) -> Result<Fitted, Failure> {
     let until = Moment::now() + patience;
     // With every physics withheld a search is the refit of the nominal model alone.
-    let without = PHYSICS.iter().map(|p| p.name.to_string()).collect();
-    let settings = Settings { without, patience, ..Settings::default() };
-    let Search { nominal, floor, .. } = search(problem, &settings, Some(stop), report).map_err(Failure::input)?;
+    let without: Vec<String> = PHYSICS.iter().map(|p| p.name.to_string()).collect();
+    let refit = |problem: &Problem, patience: Duration| {
+        let settings = Settings { without: without.clone(), patience, ..Settings::default() };
+        search(problem, &settings, Some(stop), report).map_err(Failure::input)
+    };
+    let Search { mut nominal, floor, .. } = refit(problem, patience)?;
     report("fitting each record by itself");
     let per_record = fit_each(problem, &nominal, &floor, Some(stop), Some(until));
-    let spread = Spread::of(&nominal);
     let stated: Vec<f64> = problem.stated.iter().map(|s| s.given).collect();
-    let given = nominal.structure.values(problem, &stated, &[], &[]);
-    let quality = |values: &[f64]| -> Vec<Quality> {
-        let of = |records: &[_], seen| {
-            predictions(problem, records, &nominal.structure, values)
-                .map(|p| qualities(problem, records, &p, &floor, seen))
-                .unwrap_or_default()
+    let given = quality(problem, &nominal.structure, &nominal.structure.values(problem, &stated, &[], &[]), &floor);
+    // What the recordings do not determine keeps its nominal value, and the rest is fitted around it: written as fitted, such parameters
+    // would be arbitrary, and put back alone they would take the fit of the others along.
+    let (mut free, mut kept) = (problem.clone(), Vec::new());
+    let mut spread = Spread::of(&nominal);
+    for _ in 0..ROUNDS {
+        let found = rows(&free, &nominal, &spread);
+        let loose = |(number, row): (&Number, &Row)| match number.role {
+            Role::Stated(i) if !row.determined => Some((i, row.clone())),
+            _ => None,
         };
-        let mut all = of(&problem.fit, true);
-        all.extend(of(&problem.held_out, false));
-        all
+        let loose: Vec<(usize, Row)> = nominal.structure.numbers.iter().zip(&found).filter_map(loose).collect();
+        if loose.is_empty() || loose.len() == free.stated.len() && free.stated.len() == nominal.structure.numbers.len() {
+            kept.extend(loose.into_iter().map(|l| l.1));
+            break;
+        }
+        let mut index = 0;
+        free.stated.retain(|_| {
+            index += 1;
+            !loose.iter().any(|(i, _)| i + 1 == index)
+        });
+        kept.extend(loose.into_iter().map(|l| l.1));
+        report("fitting what is determined");
+        nominal = refit(&free, until.since(Moment::now()).max(LEAST))?.nominal;
+        spread = Spread::of(&nominal);
+    }
+    let mut all: Vec<Row> = rows(&free, &nominal, &spread).into_iter().filter(|r| !kept.iter().any(|k| k.name == r.name)).collect();
+    all.extend(kept.iter().map(|row| Row { value: row.given.unwrap_or(row.value), at_bound: false, moved_sd: None, ..row.clone() }));
+    all.sort_by_key(|row| problem.stated.iter().position(|s| row.name.starts_with(&s.path)).unwrap_or(usize::MAX));
+    // Nothing that was kept stands in what is edited, so that it stays in the text as it was.
+    let model = match free.stated.iter().all(|s| kept.iter().any(|k| k.name == s.path)) {
+        true => problem.text.clone(),
+        false => refitted_text(&free, &nominal, &spread).map_err(Failure::input)?,
     };
     Ok(Fitted {
-        rows: rows(problem, &nominal, &spread),
-        pairs: correlated(problem, &nominal, &spread, CORRELATED),
-        given: quality(&given),
-        fitted: quality(&nominal.fit.values),
+        rows: all,
+        pairs: correlated(&free, &nominal, &spread, CORRELATED),
+        given,
+        fitted: quality(&free, &nominal.structure, &nominal.fit.values, &floor),
         per_record,
-        model: refitted_text(problem, &nominal, &spread).map_err(Failure::input)?,
+        kept: kept.into_iter().map(|k| k.name).collect(),
+        model,
     })
+}
+
+/// How well a structure with these values does on every recording.
+fn quality(problem: &Problem, structure: &Structure, values: &[f64], floor: &[f64]) -> Vec<Quality> {
+    let of = |records: &[_], seen| {
+        predictions(problem, records, structure, values).map(|p| qualities(problem, records, &p, floor, seen)).unwrap_or_default()
+    };
+    let mut all = of(&problem.fit, true);
+    all.extend(of(&problem.held_out, false));
+    all
 }
 
 /// A few tables for a person.
 fn text(problem: &Problem, fitted: &Fitted) -> String {
-    let mut table = vec![["number", "unit", "given", "fitted", "std. error", "95 % interval", "moved (sd)"].map(String::from).to_vec()];
+    let mut table = vec![["parameter", "unit", "given", "fitted", "std. error", "95 % interval", "moved (sd)"].map(String::from).to_vec()];
     for row in &fitted.rows {
         let (error, interval) = match row.determined {
             true => (number(row.standard_error), format!("{} to {}", number(row.ci95[0]), number(row.ci95[1]))),
-            false => ("–".to_string(), "not determined".to_string()),
+            false => ("–".to_string(), "not determined: kept as given".to_string()),
         };
         let moved = row.moved_sd.filter(|s| s.is_finite() && row.determined).map_or("–".to_string(), |s| format!("{s:.1}"));
         let value = if row.at_bound { format!("{} (at its bound)", number(row.value)) } else { number(row.value) };
@@ -123,7 +178,7 @@ fn text(problem: &Problem, fitted: &Fitted) -> String {
         );
     }
     let _ = writeln!(out);
-    let mut table = vec![["record", "output", "nrmse as given", "fitted", "in noises", ""].map(String::from).to_vec()];
+    let mut table = vec![["record", "output", "nrmse as given", "fitted", "in noise sd", ""].map(String::from).to_vec()];
     for (q, given) in fitted.fitted.iter().zip(&fitted.given) {
         let seen = if q.fitted { "fitted" } else { "held out" };
         table.push(vec![
@@ -139,7 +194,7 @@ fn text(problem: &Problem, fitted: &Fitted) -> String {
     let fits = &fitted.per_record;
     if fits.records.len() > 1 {
         let _ = writeln!(out);
-        let mut header = vec!["number, by record".to_string()];
+        let mut header = vec!["parameter, by record".to_string()];
         header.extend(fits.records.iter().map(|r| file_name(r).to_string()));
         header.push("chance".to_string());
         let mut table = vec![header];
@@ -150,7 +205,7 @@ fn text(problem: &Problem, fitted: &Fitted) -> String {
                 false => "–".to_string(),
             }));
             let enough = across.own.iter().filter(|o| o.determined).count() > 1;
-            row.push(if enough { number(across.p_value) } else { "–".to_string() });
+            row.push(if enough { backdrive_diagnosis::words::share(across.p_value) } else { "–".to_string() });
             table.push(row);
         }
         out.push_str(&columns(&table));

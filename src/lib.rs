@@ -26,6 +26,7 @@ mod prove;
 pub mod recordings;
 mod replay;
 mod run;
+mod set_checks;
 mod simulate;
 mod stability;
 mod stability_page;

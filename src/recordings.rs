@@ -1,6 +1,7 @@
 //! Recordings and the model that they are held against, as `diagnose` and `fit` are given them.
 
 use crate::failure::Failure;
+use crate::set_checks;
 use backdrive_bags::Reader;
 use backdrive_diagnosis::audit;
 use backdrive_diagnosis::problem::{Problem, ProblemError};
@@ -17,11 +18,18 @@ pub struct Opened {
     pub name: String,
     /// What a reader should know before the results.
     pub notes: Vec<String>,
+    /// The files that were read: the model, the grip, the recordings.
+    pub files: Vec<PathBuf>,
 }
 
 /// Opens a set, a folder of recordings, or recordings. Where nothing says what is held out, the last of several recordings is.
-/// A grip is put on the axes of the model.
-pub fn open(paths: &[PathBuf], model: Option<&Path>, grip: Option<&Path>) -> Result<Opened, Failure> {
+/// A grip is put on the axes of the model; `none` is no hand. `ignored` are recorded inputs that may be left out.
+///
+/// # Errors
+/// When a file is missing or wrong, a recording is fitted and held out at once, an input that was recorded has no place in the model, or the
+/// recordings cannot be fitted.
+pub fn open(paths: &[PathBuf], model: Option<&Path>, grip: Option<&Path>, ignored: &[String]) -> Result<Opened, Failure> {
+    let grip = grip.filter(|g| *g != Path::new("none"));
     let mut notes = Vec::new();
     let (mut set, told) = match paths {
         [one] if is_recording(one) => (of_files(paths)?, false),
@@ -58,6 +66,7 @@ pub fn open(paths: &[PathBuf], model: Option<&Path>, grip: Option<&Path>) -> Res
             }
         }
     }
+    notes.extend(set_checks::repeated(&set)?);
     notes.extend(set.fit.iter().chain(&set.held_out).filter_map(|file| unfinished(&set.folder.join(file))));
     let problem = match grip {
         None => Problem::of_set(&set, model),
@@ -68,9 +77,15 @@ pub fn open(paths: &[PathBuf], model: Option<&Path>, grip: Option<&Path>) -> Res
         }
     };
     let problem = problem.map_err(|e| told_failure(&e, model, &set))?;
+    notes.extend(set_checks::left_out(&set, &problem.model, ignored, grip.is_some())?);
+    if !set.mixed_rates {
+        audit::rates(&problem).map_err(Failure::input)?;
+    }
     audit::usable(&problem).map_err(Failure::input)?;
+    let inputs = [model.map(Path::to_path_buf).or_else(|| set.model.clone()), grip.map(Path::to_path_buf)];
+    let files = inputs.into_iter().flatten().chain(set.fit.iter().chain(&set.held_out).map(|f| set.path_of(f))).collect();
     let name = paths.first().map_or(String::new(), |p| p.file_name().map_or(p.display().to_string(), |n| n.to_string_lossy().into_owned()));
-    Ok(Opened { problem, name, notes })
+    Ok(Opened { problem, name, notes, files })
 }
 
 /// The text of a model with a grip on its axes.
@@ -97,6 +112,20 @@ fn unfinished(path: &Path) -> Option<String> {
         Some(damage) => Some(format!("{name} is damaged ({damage}): {recover}")),
         None if !reader.ended_cleanly() => Some(format!("{name} was not closed: {recover}")),
         None => None,
+    }
+}
+
+/// Refuses to write onto a file that was read.
+///
+/// # Errors
+/// When `out` is one of `files`: a recording in any case, the model or the grip where `overwrite` does not allow it.
+pub fn not_onto(out: &Path, files: &[PathBuf], overwrite: bool) -> Result<(), Failure> {
+    let Some(file) = files.iter().find(|f| set_checks::is_same_file(f, out)) else { return Ok(()) };
+    let name = out.display();
+    match (is_recording(file), overwrite) {
+        (true, _) => Err(Failure::input(format!("{name}: is a recording that is read; write to another file"))),
+        (false, false) => Err(Failure::input(format!("{name}: is read here and would be lost; write to another file, or say --overwrite"))),
+        (false, true) => Ok(()),
     }
 }
 
@@ -130,6 +159,8 @@ fn of_files(paths: &[PathBuf]) -> Result<RecordingSet, Failure> {
         columns: Columns::new(),
         files: Vec::new(),
         sessions: Vec::new(),
+        ignore: Vec::new(),
+        mixed_rates: false,
     })
 }
 

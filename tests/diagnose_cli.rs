@@ -163,7 +163,7 @@ fn a_right_model_is_left_alone_and_its_numbers_are_found() {
     let stiffness = Model::from_toml(&text, "fitted").unwrap().values_at("elements.cable.stiffness").unwrap()[0];
     assert!((stiffness - of("value")).abs() < 1e-3 * stiffness);
     let done = place.backdrive(&["fit", "off.toml", "set.toml"]);
-    for said in ["number", "std. error", "elements.cable.stiffness", "in noises", "sweep.csv", "agree within their errors"] {
+    for said in ["parameter", "std. error", "elements.cable.stiffness", "in noise sd", "sweep.csv", "agree within their errors"] {
         assert!(done.stdout.contains(said), "\"{said}\" is missing: {}", done.stdout);
     }
 }
@@ -296,4 +296,110 @@ fn what_cannot_be_diagnosed_is_told_in_one_line() {
     assert!(done.code == Some(2) && done.stderr.contains("gravity") && done.stderr.contains("coulomb"), "{done:?}");
     let done = place.backdrive(&["fit", "model.toml", "nothing"]);
     assert!(done.code == Some(3) && done.stderr.contains("no recordings"), "{done:?}");
+}
+
+#[test]
+fn what_a_fit_has_seen_is_not_held_out_too() {
+    let place = Place::new();
+    record(&place, NOMINAL);
+    std::fs::copy(place.path("sweep.csv"), place.path("copy.csv")).unwrap();
+    std::fs::create_dir(place.path("set")).unwrap();
+    for file in ["model.toml", "sweep.csv", "copy.csv"] {
+        std::fs::copy(place.path(file), place.path(&format!("set/{file}"))).unwrap();
+    }
+    place.write("set/set.toml", "model = 'model.toml'\nfit = ['sweep.csv']\nheld_out = ['copy.csv']\n");
+    let cases: [&[&str]; 6] = [
+        &["diagnose", "sweep.csv", "sweep.csv", "--model", "model.toml", "--out", "out"],
+        &["diagnose", "sweep.csv", "./sweep.csv", "--model", "model.toml", "--out", "out"],
+        &["diagnose", "sweep.csv", "copy.csv", "--model", "model.toml", "--out", "out"],
+        &["diagnose", "set", "--out", "out"],
+        &["fit", "model.toml", "sweep.csv", "copy.csv"],
+        &["fit", "model.toml", "set"],
+    ];
+    for arguments in cases {
+        let done = place.backdrive(arguments);
+        assert_eq!(done.code, Some(3), "{arguments:?}: {done:?}");
+        assert!(done.stderr.contains("held out") && !done.stderr.contains("no fit sees it"), "{arguments:?}: {done:?}");
+        assert!(!place.path("out").exists(), "{arguments:?}");
+    }
+}
+
+#[test]
+fn a_hand_that_was_recorded_and_that_nothing_takes_stops_a_diagnosis() {
+    let place = Place::new();
+    record(&place, NOMINAL);
+    for file in ["sweep.csv", "triangle.csv", "multisine.csv"] {
+        let text = read(&place, file);
+        let more = |(k, line): (usize, &str)| if k == 0 { format!("{line},normal.hand,comment") } else { format!("{line},0,1") };
+        place.write(file, &text.lines().enumerate().map(more).collect::<Vec<_>>().join("\n"));
+    }
+    let done = place.backdrive(&["diagnose", ".", "--out", "out"]);
+    assert_eq!(done.code, Some(3), "{done:?}");
+    for said in ["normal.hand", "nothing takes it", "--grip normal.toml", "--ignore-signal normal.hand", "set.toml"] {
+        assert!(done.stderr.contains(said), "\"{said}\" is missing: {}", done.stderr);
+    }
+    assert_eq!(place.backdrive(&["fit", "model.toml", "."]).code, Some(3));
+    // Told to, it goes on; what else is not used is a note.
+    let done = place.backdrive(&["fit", "model.toml", ".", "--ignore-signal", "normal.hand", "--grip", "none"]);
+    assert_eq!(done.code, Some(0), "{done:?}");
+    assert!(done.stderr.contains("not used") && done.stderr.contains("comment"), "{done:?}");
+    place.write("set.toml", &format!("{SET}ignore = ['normal.hand']\n"));
+    let done = place.backdrive(&["fit", "model.toml", "."]);
+    assert_eq!(done.code, Some(0), "{done:?}");
+}
+
+#[test]
+fn time_that_is_not_in_seconds_is_told_and_not_explained_by_physics() {
+    let place = Place::new();
+    record(&place, NOMINAL);
+    let rewritten = |file: &str, every: usize, scale: f64| {
+        let text = read(&place, file);
+        let rows = text.lines().skip(1).step_by(every).map(|line| {
+            let (t, rest) = line.split_once(',').unwrap();
+            format!("{},{rest}", t.parse::<f64>().unwrap() * scale)
+        });
+        format!("t,force,position\n{}\n", rows.collect::<Vec<_>>().join("\n"))
+    };
+    place.write("ms.csv", &rewritten("sweep.csv", 1, 1e3));
+    place.write("slow.csv", &rewritten("triangle.csv", 10, 1.0));
+    for (files, says) in [
+        (&["ms.csv"][..], &["ms.csv", "milliseconds", "scale = 1e-3"][..]),
+        (&["ms.csv", "triangle.csv"], &["ms.csv", "milliseconds", "scale = 1e-3"]),
+        (&["sweep.csv", "slow.csv"], &["slow.csv", "every 0.0100 s", "sweep.csv", "mixed_rates"]),
+    ] {
+        let all: Vec<&str> =
+            ["diagnose"].into_iter().chain(files.iter().copied()).chain(["--model", "model.toml", "--out", "out"]).collect();
+        let done = place.backdrive(&all);
+        assert_eq!(done.code, Some(3), "{files:?}: {done:?}");
+        for text in says {
+            assert!(done.stderr.contains(text), "{files:?}: \"{text}\" is missing: {}", done.stderr);
+        }
+    }
+    // In seconds nothing is wrong with it, and a set may say that its rates differ on purpose.
+    place.write("set.toml", "fit = ['ms.csv']\n[columns]\nt = { column = 't', scale = 1e-3 }\n");
+    assert_eq!(place.backdrive(&["fit", "model.toml", "."]).code, Some(0));
+    place.write("set.toml", "fit = ['sweep.csv', 'slow.csv']\nmixed_rates = true\n");
+    let done = place.backdrive(&["fit", "model.toml", "."]);
+    assert!(done.code == Some(0) || done.code == Some(1), "{done:?}");
+}
+
+#[test]
+fn a_fit_does_not_lose_the_model_that_it_read() {
+    let place = Place::new();
+    record(&place, NOMINAL);
+    // A mass that the recordings say nothing of: it hangs on a spring that is as good as none.
+    let idle = format!("{}[[elements]]\nname = 'idle'\nkind = 'spring'\nbetween = ['motor', 'ground']\nstiffness = 1e-6\n", NOMINAL);
+    place.write("model.toml", &idle);
+    let done = place.backdrive(&["fit", "model.toml", ".", "--out", "model.toml"]);
+    assert_eq!(done.code, Some(3), "{done:?}");
+    assert!(done.stderr.contains("--overwrite"), "{done:?}");
+    assert_eq!(read(&place, "model.toml"), idle);
+    let done = place.backdrive(&["fit", "model.toml", ".", "--out", "sweep.csv", "--overwrite"]);
+    assert!(done.code == Some(3) && read(&place, "sweep.csv").starts_with("t,force"), "{done:?}");
+    let done = place.backdrive(&["fit", "model.toml", ".", "--out", "model.toml", "--overwrite"]);
+    assert_eq!(done.code, Some(0), "{done:?}");
+    let written = Model::from_toml(&read(&place, "model.toml"), "written").unwrap();
+    assert_eq!(written.values_at("elements.idle.stiffness").unwrap(), [1e-6], "{}", read(&place, "model.toml"));
+    assert!(done.stderr.contains("elements.idle.stiffness") && done.stderr.contains("nominal"), "{done:?}");
+    assert!(done.stdout.contains("not determined: kept as given"), "{done:?}");
 }

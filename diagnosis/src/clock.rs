@@ -7,6 +7,11 @@ use std::time::{Duration, Instant};
 /// How many times longer than it was granted a search may last where others share the processors, or it cannot use them all.
 const LONGEST: f64 = 1.4;
 
+/// How long on the wall what was granted this much computing time may last.
+pub fn longest(granted: Duration) -> Duration {
+    granted.mul_f64(LONGEST)
+}
+
 /// A point in computing time: processor time of this process per thread of the pool, or the time on the wall divided by 1.4,
 /// whichever is more. With all processors for itself it is nearly the time on the wall.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]

@@ -32,3 +32,4 @@ pub mod statistics;
 pub mod structure;
 pub mod unknown;
 pub mod verdict;
+pub mod words;

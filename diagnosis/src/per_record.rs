@@ -117,13 +117,36 @@ impl PerRecord {
         all
     }
 
+    /// How many parameters at least two records determine each by itself, so that they can be compared.
+    pub fn compared(&self) -> usize {
+        self.numbers.iter().filter(|n| n.own.iter().filter(|o| o.determined).count() > 1).count()
+    }
+
+    /// Whether the records agree; `None` where no parameter can be compared.
+    pub fn agree(&self) -> Option<bool> {
+        (self.compared() > 0).then(|| self.disagreements().is_empty())
+    }
+
     /// In one sentence.
     pub fn sentence(&self) -> String {
         if self.records.len() < 2 {
-            return "there is one record only: nothing to hold its numbers against".to_string();
+            return "there is one record only: nothing to hold its parameters against".to_string();
         }
         match self.disagreements().as_slice() {
-            [] => format!("the {} records agree within their errors", self.records.len()),
+            [] => {
+                let (records, compared, all) = (self.records.len(), self.compared(), self.numbers.len());
+                match compared {
+                    0 => format!(
+                        "whether the {records} records agree cannot be told: none of the {all} parameters is determined by two of them"
+                    ),
+                    _ if compared == all => format!("the {records} records agree within their errors in all {all} parameters"),
+                    _ => format!(
+                        "the {records} records agree within their errors in the {compared} of {all} parameters that at least two of them \
+                         determine; the other {} cannot be compared",
+                        all - compared
+                    ),
+                }
+            }
             all => {
                 let names: Vec<&str> = all.iter().take(3).map(|n| n.name.as_str()).collect();
                 let more = if all.len() > 3 { format!(" and {} more", all.len() - 3) } else { String::new() };
@@ -144,5 +167,18 @@ mod tests {
         let (far, p) = disagreement(&[(1.0, 0.01), (1.1, 0.01)]);
         assert!((far - 50.0).abs() < 1e-9 && p < 1e-10, "{far} {p}");
         assert_eq!(disagreement(&[(1.0, 0.1)]), (0.0, 1.0));
+    }
+
+    #[test]
+    fn what_no_two_records_determine_is_not_said_to_agree() {
+        let own = |determined| Own { value: 1.0, ci95: [0.9, 1.1], determined };
+        let across = |both| Across { name: "n".to_string(), own: vec![own(true), own(both)], chi_square: 0.0, p_value: 1.0 };
+        let of = |numbers| PerRecord { records: vec!["a".to_string(), "b".to_string()], levels: Vec::new(), numbers };
+        let none = of(vec![across(false), across(false)]);
+        assert_eq!((none.compared(), none.agree()), (0, None));
+        assert!(none.sentence().contains("cannot be told: none of the 2 parameters"), "{}", none.sentence());
+        let some = of(vec![across(true), across(false), across(false)]);
+        assert!(some.sentence().contains("1 of 3 parameters") && some.sentence().contains("other 2 cannot"), "{}", some.sentence());
+        assert_eq!(some.agree(), Some(true));
     }
 }

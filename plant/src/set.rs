@@ -56,6 +56,10 @@ pub struct RecordingSet {
     pub files: Vec<(String, FileRules)>,
     /// Names of the sessions, in their order, and the paths that each of them has a condition for.
     pub sessions: Vec<(String, Vec<String>)>,
+    /// Recorded inputs that may have no place in the model.
+    pub ignore: Vec<String>,
+    /// Whether recordings of rates that differ by more than a factor of two belong together.
+    pub mixed_rates: bool,
 }
 
 impl RecordingSet {
@@ -83,6 +87,8 @@ impl RecordingSet {
                     columns: Columns::new(),
                     files: Vec::new(),
                     sessions: Vec::new(),
+                    ignore: Vec::new(),
+                    mixed_rates: false,
                 })
             }
         }
@@ -221,9 +227,11 @@ fn read(mut top: Table, folder: PathBuf) -> Result<RecordingSet, FileError> {
             sessions.push((name, condition.into_iter().map(|(path, _)| path).collect()));
         }
     }
+    let ignore = top.strings("ignore")?.unwrap_or_default();
+    let mixed_rates = top.boolean("mixed_rates")?.unwrap_or_default();
     top.finish()?;
     let model = model.map(|name| folder.join(name));
-    Ok(RecordingSet { model, folder, fit, held_out, initial, unknown: unknown_inputs, columns, files, sessions })
+    Ok(RecordingSet { model, folder, fit, held_out, initial, unknown: unknown_inputs, columns, files, sessions, ignore, mixed_rates })
 }
 
 fn shown(folder: &Path) -> String {

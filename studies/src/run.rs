@@ -46,7 +46,7 @@ pub fn diagnose(context: &Context, ask: &Ask) -> Result<Found, StudyError> {
     let resolved = resolve(&given(ask.set)?, &[context.out, context.data]).map_err(|e| StudyError::File(format!("{}: {e}", ask.set)))?;
     let set = out.join("set.toml");
     write(&set, &resolved)?;
-    let opened = recordings::open(std::slice::from_ref(&set), None, None)?;
+    let opened = recordings::open(std::slice::from_ref(&set), None, None, &[])?;
     let settings = Settings {
         without: ask.without.iter().map(|s| s.to_string()).collect(),
         effects: ask.effects,

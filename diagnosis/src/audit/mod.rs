@@ -1,7 +1,10 @@
 //! What the recordings themselves say, before any physics: their clock, their sensors, and what that limits.
 
+mod rates;
 mod signals;
 mod units;
+
+pub use rates::rates;
 
 use crate::problem::{Problem, Record};
 use backdrive_plant::model::{InputKind, OutputKind};
@@ -114,7 +117,7 @@ pub fn audit(problem: &Problem) -> Vec<Remark> {
 /// Whether there is anything to fit: a sentence says what is wrong and what to do where there is not.
 ///
 /// # Errors
-/// When nothing drives the device, nothing that was measured moves, or a unit is off by so much that no fit can be meant.
+/// When nothing drives the device, nothing that was measured moves, or a unit, that of time among them, is off by so much that no fit can be meant.
 pub fn usable(problem: &Problem) -> Result<(), String> {
     let model = &problem.model;
     let file = |r: &Record| file_name(&r.name).to_string();
@@ -135,6 +138,9 @@ pub fn usable(problem: &Problem) -> Result<(), String> {
         let names: Vec<&str> = model.outputs.iter().map(|o| o.name.as_str()).collect();
         let them = names.join(", ");
         return Err(format!("{first}: {them} is constant in every recording: the sensor is dead, or the column is another one"));
+    }
+    if let Some(text) = rates::unit_of_time(problem) {
+        return Err(text);
     }
     match units::remarks(problem).into_iter().find(|r| r.weight == Weight::Unusable) {
         Some(remark) => Err(format!("{first}: {remark}")),

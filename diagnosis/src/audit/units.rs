@@ -85,7 +85,7 @@ fn rounded(x: f64) -> f64 {
 }
 
 /// Measured over predicted by least squares, and their correlation; of differences over `lag` samples where that is not 0.
-fn factor(measured: &[f64], predicted: &[f64], lag: usize) -> (f64, f64) {
+pub(super) fn factor(measured: &[f64], predicted: &[f64], lag: usize) -> (f64, f64) {
     let centred = |x: &[f64]| -> Vec<f64> {
         let x: Vec<f64> = if lag > 0 { x.iter().skip(lag).zip(x).map(|(a, b)| a - b).collect() } else { x.to_vec() };
         let mean = x.iter().sum::<f64>() / x.len().max(1) as f64;

@@ -85,6 +85,16 @@ pub(super) fn alike<'s>(search: &'s Search, best: &Candidate) -> Vec<&'s Candida
     search.found.iter().filter(close).filter(|c| seen.insert(c.structure.name())).take(3).collect()
 }
 
+/// The structures of as many effects that come nearest to the best, at most two.
+pub(super) fn nearest<'s>(search: &'s Search, best: &Candidate) -> Vec<&'s Candidate> {
+    let name = best.structure.name();
+    let mut rivals: Vec<&Candidate> =
+        search.found.iter().filter(|c| c.structure.added.len() == best.structure.added.len() && c.structure.name() != name).collect();
+    rivals.sort_by(|a, b| evidence(search, a, best).total_cmp(&evidence(search, b, best)));
+    rivals.truncate(2);
+    rivals
+}
+
 /// Whether a physics has another one, or one of its family at the same place, as a special or limiting case.
 pub(super) fn contains(rich: &str, own: &Hypothesis) -> bool {
     withheld(&[own.physics]).contains(&rich) || physics_named(rich).is_some_and(|p| p.family == own.family)

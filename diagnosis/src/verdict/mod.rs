@@ -15,7 +15,9 @@ use crate::problem::Problem;
 use crate::search::{AT_FLOOR, Candidate, Search};
 use crate::statistics::advantage;
 use crate::structure::{Number, Role, Structure};
-use choice::alike;
+use crate::words;
+use backdrive_plant::write::round_significant;
+use choice::{alike, nearest};
 use findings::{adequacy, detectable, findings, moved};
 use models::{held_out, model_text, rival_models};
 use serde_json::{Value as Json, json};
@@ -85,8 +87,9 @@ pub fn verdict(problem: &Problem, search: &Search, model_name: &str) -> Result<V
     let nominal = &search.nominal;
     let off = given_is_off(problem, search) && (added || spread.is_far(nominal, &stated_in(problem, &nominal.structure)));
     let wanders = nominal.slowness > WANDERS && nominal.levels.iter().any(|l| *l > AT_FLOOR);
+    let findings = findings(search, best, &spread, adequacy(best));
     let word = match () {
-        () if added && (at_floor || explained > 0.99) && !alike.is_empty() => "ambiguous",
+        () if added && (at_floor || explained > 0.99) && (!alike.is_empty() || is_outdone(&findings)) => "ambiguous",
         () if added && (at_floor || explained > 0.99) => "missing",
         () if added => "unexplained",
         () if !bursts.is_empty() => "unexplained",
@@ -97,7 +100,10 @@ pub fn verdict(problem: &Problem, search: &Search, model_name: &str) -> Result<V
     };
     let until = Moment::now() + EXPERIMENT;
     let planned = match word {
-        "ambiguous" => Some(separate(problem, &[&[best], alike.as_slice()].concat(), &search.floor, until)),
+        "ambiguous" => {
+            let rivals = if alike.is_empty() { nearest(search, best) } else { alike.clone() };
+            Some(separate(problem, &[&[best], rivals.as_slice()].concat(), &search.floor, until))
+        }
         "cannot_tell" => best.structure.model(problem, &best.fit.values).map(|model| {
             let all: Vec<usize> = (0..best.structure.numbers.len()).collect();
             excite(problem, &model, &best.structure, &best.fit.values, &all, &search.floor, until)
@@ -109,12 +115,10 @@ pub fn verdict(problem: &Problem, search: &Search, model_name: &str) -> Result<V
         Some(Err(reason)) => (json!({ "sentence": reason.to_string() }), None),
         None => (Json::Null, None),
     };
-    let adequacy = adequacy(best);
-    let findings = findings(search, best, &spread, adequacy);
     let held = held_out(problem, search, best, off || added);
     let model = model_text(problem, best, &spread, off || added)?;
     let parameters = if off || added { moved(problem, best, &spread) } else { json!({}) };
-    let sentence = sentence(word, best);
+    let sentence = sentence(word, best, &findings, next["sentence"].as_str().is_none() && experiment.is_some());
     let rivals = rival_models(problem, search, best);
     let json = json!({
         "schema": 1,
@@ -165,18 +169,64 @@ fn is_excited(problem: &Problem, search: &Search) -> bool {
     search.floor.iter().enumerate().any(moves)
 }
 
-fn sentence(word: &str, best: &Candidate) -> String {
+/// Whether a rival of the first finding is more likely than the finding itself: then the finding is not asserted.
+fn is_outdone(findings: &[Json]) -> bool {
+    let confidence = |f: &Json| f["confidence"].as_f64().unwrap_or(0.0);
+    let Some(first) = findings.first() else { return false };
+    first["alternatives"].as_array().into_iter().flatten().any(|rival| confidence(rival) >= confidence(first))
+}
+
+/// What is known where the explanations cannot be told apart: the first finding and the rivals that are at least half as likely, at most three.
+fn known(findings: &[Json]) -> String {
+    let confidence = |f: &Json| f["confidence"].as_f64().unwrap_or(0.0);
+    let Some(first) = findings.first() else { return "something".to_string() };
+    let rivals = first["alternatives"].as_array().into_iter().flatten();
+    let near: Vec<&Json> = rivals.filter(|rival| confidence(rival) >= 0.5 * confidence(first)).take(3).collect();
+    words::any_of(&[&[first], near.as_slice()].concat())
+}
+
+fn sentence(word: &str, best: &Candidate, findings: &[Json], planned: bool) -> String {
     let level = best.levels.iter().fold(0.0f64, |a, b| a.max(*b));
-    let end = if level < AT_FLOOR { "down to the noise".to_string() } else { format!("to {level:.2} floors") };
+    let times = round_significant(level, 2);
+    // Below this the residual is the sensor's noise up to chance and rounding.
+    let end = if level < LEFT_OVER { "down to the sensor noise".to_string() } else { format!("to {times} times the sensor noise") };
+    let still = if level < LEFT_OVER { String::new() } else { format!("; the residual is still {times} times the sensor noise") };
+    let all = findings.iter().map(words::finding).collect::<Vec<_>>().join(", and ");
     match word {
-        "ambiguous" => format!("the model leaves out {} or something that the recordings cannot tell from it", best.structure.name()),
+        "ambiguous" => {
+            let others = match findings.get(1..) {
+                Some(others) if !others.is_empty() => {
+                    format!(", beside {}", others.iter().map(words::finding).collect::<Vec<_>>().join(", and "))
+                }
+                _ => String::new(),
+            };
+            let next = if planned { ", the next experiment would" } else { "" };
+            format!("the model leaves out {}{others}: the recordings cannot tell which{next}{still}", known(findings))
+        }
         "cannot_tell" => "the recordings hardly move the device: they cannot tell what is missing".to_string(),
-        "missing" => format!("the model leaves out {}; with it the recordings are explained {end}", best.structure.name()),
+        "missing" if still.is_empty() => format!("the model leaves out {all}; with it the recordings are explained {end}"),
+        "missing" => format!("the model leaves out {all}{still}"),
         "unexplained" if best.structure.added.is_empty() => {
             format!("something is missing that none of the laws tried explains; refitted, the model comes {end}")
         }
-        "unexplained" => format!("something is missing that no known physics explains; the nearest is {}, {end}", best.structure.name()),
-        "parameters" => format!("nothing is missing, but the model's numbers are off; refitted they explain the recordings {end}"),
+        "unexplained" => format!("something is missing that no known physics explains; the nearest is {all}{still}"),
+        "parameters" => format!("nothing is missing, but the model's parameters are off; refitted they explain the recordings {end}"),
         _ => format!("the model explains the recordings {end}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_finding_that_is_less_likely_than_its_rival_is_not_asserted() {
+        let rival = |c: f64| json!({ "physics": "coulomb", "between": ["drum", "ground"], "confidence": c });
+        let first =
+            |c: f64, r: f64| json!({ "physics": "coulomb", "between": ["motor", "ground"], "confidence": c, "alternatives": [rival(r)] });
+        assert!(is_outdone(&[first(0.04, 0.10)]));
+        assert!(!is_outdone(&[first(0.97, 0.03)]) && !is_outdone(&[]));
+        assert_eq!(known(&[first(0.04, 0.10)]), "dry friction, at the motor or at the drum");
+        assert_eq!(known(&[first(0.97, 0.03)]), "dry friction, at the motor");
     }
 }

@@ -1,0 +1,88 @@
+//! Sample times that cannot be right: recordings of different rates in one set, and time in another unit than seconds.
+
+use super::file_name;
+use super::units::factor;
+use crate::fit::measured;
+use crate::problem::{Problem, Record};
+use crate::simulate::predict;
+use backdrive_plant::stepper::segments;
+
+/// Ratio of sample times from which on one recording shows what lies beyond the band of another: the faster one's upper octaves.
+const APART: f64 = 2.0;
+/// Units that time is recorded in, s, and how its values read.
+const UNITS: [(f64, &str); 3] = [(1e-3, "milliseconds"), (1e-6, "microseconds"), (1e-9, "nanoseconds")];
+/// How near a ratio of sample times must be to that of two units, as a factor.
+const NEAR: f64 = 1.3;
+/// Sample time above which a device of this kind is not sampled, s: from there on another unit is tried.
+const SLOW: f64 = 0.02;
+/// Share of the error's power that another unit of time must take away.
+const TAKEN: f64 = 0.75;
+/// Correlation of measured and predicted in that unit.
+const ALIKE: f64 = 0.85;
+
+/// Whether the sample times of a set's recordings fit together: between samples an input runs as its hold says, so that a slow recording does not
+/// say what drives the device where a fast one shows that it does.
+///
+/// # Errors
+/// One sentence where two recordings differ by more than a factor of two, with what to do.
+pub fn rates(problem: &Problem) -> Result<(), String> {
+    let all: Vec<&Record> = problem.fit.iter().chain(&problem.held_out).collect();
+    let by_period = |a: &&&Record, b: &&&Record| a.period.total_cmp(&b.period);
+    let (Some(fast), Some(slow)) = (all.iter().min_by(by_period), all.iter().max_by(by_period)) else { return Ok(()) };
+    let ratio = slow.period / fast.period;
+    if ratio <= APART {
+        return Ok(());
+    }
+    let (slow_name, fast_name) = (file_name(&slow.name), file_name(&fast.name));
+    let unit = UNITS.iter().find(|(unit, _)| (ratio * unit).max(1.0 / (ratio * unit)) < NEAR);
+    let advice = match unit {
+        Some((unit, word)) => format!(
+            "its time looks like {word}: say t = {{ column = \"t\", scale = {unit:e} }} under [columns] of a set.toml for these files, or convert it"
+        ),
+        None => "what the input does between the slow samples is not known: record all at one rate, diagnose them apart, or say \
+                 mixed_rates = true in set.toml if the slow input really is held between its samples"
+            .to_string(),
+    };
+    Err(format!(
+        "{slow_name}: has a sample every {:.4} s, {fast_name} one every {:.4} s ({ratio:.3} times); {advice}",
+        slow.period, fast.period
+    ))
+}
+
+/// Whether time is in seconds, as far as the nominal model can tell: a sentence where another unit makes measured and predicted agree.
+pub(super) fn unit_of_time(problem: &Problem) -> Option<String> {
+    let record = problem.fit.iter().max_by(|a, b| a.period.total_cmp(&b.period)).filter(|r| r.period > SLOW)?;
+    let as_given = left_over(problem, record, record.period)?;
+    let (left, unit, word) = UNITS
+        .iter()
+        .filter_map(|(unit, word)| Some((left_over(problem, record, record.period * unit)?, *unit, *word)))
+        .min_by(|a, b| a.0.total_cmp(&b.0))?;
+    let better = left < (1.0 - TAKEN) * as_given && left < 1.0 - ALIKE * ALIKE;
+    better.then(|| {
+        format!(
+            "{}: has a sample every {:.4} s, and the model does not move like that; read as {word} it explains {:.0} % of the motion's variance \
+             in place of {:.0} %: say t = {{ column = \"t\", scale = {unit:e} }} under [columns] of set.toml, or convert the column to seconds",
+            file_name(&record.name),
+            record.period,
+            100.0 * (1.0 - left),
+            100.0 * (1.0 - as_given)
+        )
+    })
+}
+
+/// Least share of a measured output's variance that the nominal model, scaled, leaves when samples come at this period; of differences over
+/// a lag where nothing holds the position.
+fn left_over(problem: &Problem, record: &Record, period: f64) -> Option<f64> {
+    let mut record = record.clone();
+    record.period = period;
+    record.segments =
+        problem.model.inputs.iter().zip(&record.inputs).map(|(input, samples)| segments(input.hold, samples, period)).collect();
+    let predicted = predict(&problem.model, &record, &[], 16)?;
+    let share = |(place, output): (usize, usize)| {
+        let column = predicted.get(place * record.len..(place + 1) * record.len)?;
+        let samples = record.outputs.get(output)?.as_deref()?;
+        let correlation = factor(samples, column, problem.lag.get(output).copied().unwrap_or(0)).1;
+        Some(1.0 - correlation.max(0.0).powi(2)).filter(|s| s.is_finite())
+    };
+    measured(&record).enumerate().filter_map(share).min_by(f64::total_cmp)
+}
