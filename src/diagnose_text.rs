@@ -5,6 +5,7 @@ use crate::recordings::file_name;
 use backdrive_diagnosis::audit::Weight;
 use backdrive_diagnosis::intervals::Spread;
 use backdrive_diagnosis::numbers::rows;
+use backdrive_diagnosis::words;
 use backdrive_report::{number, si};
 use serde_json::Value;
 use std::fmt::Write as _;
@@ -92,7 +93,7 @@ fn recordings(found: &Found) -> String {
     )
 }
 
-/// What refitting the numbers alone does.
+/// What refitting the parameters alone does.
 fn refit(found: &Found) -> String {
     let search = &found.search;
     let level = |levels: &[f64]| levels.iter().fold(0.0f64, |a, b| a.max(*b));
@@ -105,7 +106,7 @@ fn refit(found: &Found) -> String {
         format!("; {} moved most, {} to {} ({:.0} sd)", r.name, number(given), si(r.value, &r.unit), r.moved_sd.unwrap_or(0.0).abs())
     });
     format!(
-        "the numbers alone: {} floors as given, {} refitted{most}; {}",
+        "residual {} times the sensor noise as given, {} with the parameters refitted{most}; {}",
         number(level(&search.levels_given)),
         number(level(&search.nominal.levels)),
         found.per_record.sentence()
@@ -116,28 +117,26 @@ fn list(value: &Value) -> &[Value] {
     value.as_array().map_or(&[], Vec::as_slice)
 }
 
-/// `between drum and ground`, `at feedback_force`.
-pub fn place_of(finding: &Value) -> String {
-    match (&finding["between"], &finding["signal"]) {
-        (Value::Array(ends), _) => {
-            let ends: Vec<&str> = ends.iter().filter_map(Value::as_str).collect();
-            match ends.as_slice() {
-                [body, "ground"] => format!("{body} to ground"),
-                _ => ends.join(" to "),
-            }
-        }
-        (_, Value::String(signal)) => format!("at {signal}"),
-        _ => String::new(),
-    }
+/// `dry friction at the drum`.
+pub fn named(finding: &Value) -> String {
+    format!("{} {}", words::physics(finding["physics"].as_str().unwrap_or("")), words::place(finding))
 }
 
-/// `coulomb, drum to ground`.
-pub fn named(finding: &Value) -> String {
-    format!("{} {}", finding["physics"].as_str().unwrap_or("?").replace('_', " "), place_of(finding))
+/// `likely (97 %)`, in words and percent.
+pub fn confidence(finding: &Value) -> String {
+    let share = finding["confidence"].as_f64().unwrap_or(0.0);
+    let word = match share {
+        s if s > 0.95 => "nearly certain",
+        s if s > 0.8 => "likely",
+        s if s > 0.4 => "possible",
+        s if s > 0.05 => "doubtful",
+        _ => "unlikely",
+    };
+    format!("{word} ({})", words::share(share))
 }
 
 fn with_confidence(finding: &Value) -> String {
-    format!("{} ({:.2})", named(finding), finding["confidence"].as_f64().unwrap_or(0.0))
+    format!("{} ({})", named(finding), words::share(finding["confidence"].as_f64().unwrap_or(0.0)))
 }
 
 /// A parameter of a verdict: value and interval, or lists of them.
@@ -163,7 +162,7 @@ fn described(finding: &Value) -> String {
         .unwrap_or_default();
     let replaced: Vec<&str> = list(&finding["replaces"]).iter().filter_map(Value::as_str).collect();
     let instead = if replaced.is_empty() { String::new() } else { format!(", in place of {}", replaced.join(" and ")) };
-    format!("{}{instead}: {}; confidence {:.2}", named(finding), parameters.join(", "), finding["confidence"].as_f64().unwrap_or(0.0))
+    format!("{}{instead}: {}; {}", named(finding), parameters.join(", "), confidence(finding))
 }
 
 /// When, at which frequencies and in which state.
@@ -215,7 +214,7 @@ mod tests {
             "physics": "coulomb", "between": ["drum", "ground"], "confidence": 0.97, "replaces": [],
             "parameters": { "force": { "value": 0.101, "ci95": [0.098, 0.104], "unit": "N" } },
         });
-        assert_eq!(described(&finding), "coulomb drum to ground: force 101 mN (95 %: 98.0 mN to 104 mN); confidence 0.97");
+        assert_eq!(described(&finding), "dry friction at the drum: force 101 mN (95 %: 98.0 mN to 104 mN); nearly certain (97 %)");
         let slip = json!({ "value": [1.0, 2.0], "ci95": [[0.5, 1.5], [1.0, 3.0]], "unit": "N" });
         assert_eq!(parameter(&slip), "1.00 N (95 %: 500 mN to 1.50 N); 2.00 N (95 %: 1.00 N to 3.00 N)");
     }

@@ -107,14 +107,19 @@ fn friction_that_was_left_out_is_named_and_written() {
     let model = Model::from_toml(&text, "diagnosed").unwrap();
     assert!(model.elements.iter().any(|e| e.law.kind().name == "coulomb"), "{text}");
     assert!(text.contains("# kg"), "{text}");
-    for said in ["audit ", "refit ", "MISSING", "coulomb motor to ground", "held out", "out: verdict.json"] {
+    for said in ["audit ", "refit ", "MISSING", "dry friction at the motor", "held out", "out: verdict.json"] {
         assert!(done.stdout.contains(said), "\"{said}\" is missing: {}", done.stdout);
     }
     assert!(done.stdout.lines().count() < 20, "{}", done.stdout);
     let report = read(&place, "out/report.html");
-    for said in
-        ["Where the models part most", "coulomb@motor-ground: force against velocity", "Every hypothesis", "sensor&#39;s noise", "held out"]
-    {
+    for said in [
+        "Where the models part most",
+        "Dry friction at the motor: force against velocity",
+        "What to do now",
+        "Every hypothesis",
+        "sensor&#39;s noise",
+        "held out",
+    ] {
         assert!(report.contains(said), "the report does not say \"{said}\"");
     }
     let seconds: f64 = read(&place, "out/time.txt").trim().parse().unwrap();
@@ -203,7 +208,7 @@ rows = [155, 1900]
     let held = &verdict["held_out"];
     let of = |key: &str| held[key].as_f64().unwrap();
     assert!(of("nrmse_after") < 0.2 * of("nrmse_refit"), "{verdict:#}");
-    assert!(read(&place, "out/report.html").contains("@motor-ground"));
+    assert!(read(&place, "out/report.html").contains("at the motor: force against"));
 
     // A bag that was cut off is used as far as it goes, and that is said.
     let whole = std::fs::read(place.path("bags/sweep.mcap")).unwrap();

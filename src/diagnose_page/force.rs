@@ -7,6 +7,7 @@ use backdrive_diagnosis::evidence::{Against, Curve, Evidence, Trace, evidence};
 use backdrive_diagnosis::hypothesis::Place;
 use backdrive_diagnosis::locate::{Candidate as Located, Location, Variable};
 use backdrive_diagnosis::search::Candidate;
+use backdrive_diagnosis::words;
 use backdrive_plant::describe::unit_for;
 use backdrive_report::{Cell, Colour, Dash, Figure, Page, Plot, Series, Table, Tone, number, percent, si};
 
@@ -23,11 +24,11 @@ pub(super) fn section(page: &mut Page, found: &Found, best: &Candidate) {
         for which in 0..best.structure.added.len() {
             match evidence(&found.problem, best, &found.search.floor, which) {
                 Some(evidence) => {
-                    finding(page, &evidence);
+                    finding(page, &evidence, &in_words(best, which));
                     drawn = true;
                 }
                 None => {
-                    page.text(&format!("The force of {} cannot be estimated from these sensors.", best.structure.added[which].id));
+                    page.text(&format!("The force of {} cannot be estimated from these sensors.", in_words(best, which)));
                 }
             }
         }
@@ -40,6 +41,16 @@ pub(super) fn section(page: &mut Page, found: &Found, best: &Candidate) {
         map(page, found, first);
     }
     places(page, found, location);
+}
+
+/// A finding's physics and place in words, as a title.
+fn in_words(best: &Candidate, which: usize) -> String {
+    let Some(own) = best.structure.added.get(which) else { return String::new() };
+    let place = match &own.place {
+        Place::Between(a, b) => serde_json::json!({ "between": [a, b] }),
+        Place::Signal(name) => serde_json::json!({ "signal": name }),
+    };
+    super::capital(&format!("{} {}", words::physics(own.physics), words::place(&place))).trim_end_matches('.').to_string()
 }
 
 /// How a place reads.
@@ -63,7 +74,7 @@ fn variable_name(against: Against) -> &'static str {
 }
 
 /// What the recordings ask for at a finding's place, with the law over it.
-fn finding(page: &mut Page, evidence: &Evidence) {
+fn finding(page: &mut Page, evidence: &Evidence, name: &str) {
     let place = shown(&evidence.place);
     let what = if matches!(evidence.place, Place::Between(..)) { "force" } else { "error of the signal" };
     // The record in which the law does most shows it best.
@@ -71,15 +82,16 @@ fn finding(page: &mut Page, evidence: &Evidence) {
     let Some(main) = evidence.traces.iter().max_by(|a, b| size(a).total_cmp(&size(b))) else { return };
 
     let over = variable_name(evidence.against);
-    let mut map = Plot::new(&format!("{}: {what} against {over}", evidence.id)).x_axis(over, &evidence.variable_unit);
+    let mut map = Plot::new(&format!("{name}: {what} against {over}")).x_axis(over, &evidence.variable_unit);
     map = map.y_axis(what, &evidence.force_unit);
     let (x, y) = cloud(&evidence.traces);
     map = map.series(Series::points("asked for by the recordings", &x, &y).colour(Colour::Muted).width(1.3));
     map = map.series(law(evidence, main));
     let mut figures: Vec<Figure> = vec![map.into()];
-    if !main.latent.displacement.is_empty() {
+    // A law of velocity over displacement is a fence of jumps that says nothing: loops are drawn of what depends on the path.
+    if !main.latent.displacement.is_empty() && !matches!(evidence.against, Against::Velocity | Against::Acceleration | Against::Time) {
         let part = fullest(&main.latent);
-        let mut turn = Plot::new(&format!("{}: {what} against displacement, loops", evidence.id));
+        let mut turn = Plot::new(&format!("{name}: {what} against displacement, loops"));
         turn = turn.x_axis("displacement", &evidence.displacement_unit).y_axis(what, &evidence.force_unit);
         let cut = |x: &[f64]| x.get(part.clone()).unwrap_or(&[]).to_vec();
         let (x, y) = (cut(&main.latent.displacement), cut(&main.latent.force));
@@ -101,8 +113,8 @@ fn finding(page: &mut Page, evidence: &Evidence) {
     let edge = |sign: f64| force.iter().zip(&deviation).map(|(f, d)| f + sign * 2.0 * d).collect::<Vec<f64>>();
     let mut course = Plot::new("").x_axis("time", "s").y_axis(what, &evidence.force_unit).height(220.0);
     course = course.series(Series::band("its 95 % interval", &time, &edge(-1.0), &edge(1.0)).colour(Colour::Muted));
-    course = course.series(Series::line("asked for by the recordings", &time, &force).colour(Colour::Muted).dash(Dash::Solid));
     course = course.series(Series::line("the law found", &time, &cut(&main.law.force)).colour(Colour::Nth(1)).dash(Dash::Solid));
+    course = course.series(Series::line("asked for by the recordings", &time, &force).colour(Colour::Ink).dash(Dash::Dotted));
     page.figure(course, &format!("The same in time, in {}.", file_name(&main.record)));
 }
 

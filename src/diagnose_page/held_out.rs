@@ -45,7 +45,7 @@ pub(super) fn section(page: &mut Page, found: &Found, best: &Candidate) {
     if pairs.len() > DRAWN {
         page.details(&format!("{} more", pairs.len() - DRAWN), |inside| pairs[DRAWN..].iter().for_each(|pair| draw(inside, *pair)));
     }
-    let mut table = Table::new(["record", "output", "as given", "refitted", "diagnosed", "left over, in noises", "fitted"]);
+    let mut table = Table::new(["record", "output", "as given", "refitted", "diagnosed", "residual, in noise sd", "fitted"]);
     let sets = [(problem.fit.as_slice(), true), (problem.held_out.as_slice(), false)];
     for (records, fitted) in sets {
         let quality = |structure, values: &[f64]| {
@@ -93,38 +93,40 @@ fn figures(page: &mut Page, found: &Found, three: &Three, output: usize) {
 
     let mut whole = Plot::new(&format!("{name}: {label}")).x_axis("time", "s").y_axis(label, &unit);
     whole = whole.region(span.0, span.1, Tone::Limited, "below");
-    whole = whole.series(Series::line("measured", &time, measured).colour(Colour::Ink).dash(Dash::Solid));
     if let Some(refitted) = &refitted {
-        whole = whole.series(Series::line("numbers refitted", &time, refitted).colour(Colour::Nth(0)).dash(Dash::Solid).outside_limits());
+        whole =
+            whole.series(Series::line("parameters refitted", &time, refitted).colour(Colour::Nth(0)).dash(Dash::Solid).outside_limits());
     }
     if let Some(diagnosed) = &diagnosed {
         whole = whole.series(Series::line("diagnosed", &time, diagnosed).colour(Colour::Nth(1)).dash(Dash::Solid).outside_limits());
     }
+    // Last, so that it lies above the predictions.
+    whole = whole.series(Series::line("measured", &time, measured).colour(Colour::Ink).dash(Dash::Dotted));
     page.figure(whole, "");
 
     let part = |x: &[f64]| x.get(from..to).unwrap_or(&[]).to_vec();
     let near = part(&time);
     let mut zoom = Plot::new("Where the models part most").x_axis("time", "s").y_axis(label, &unit);
-    zoom = zoom.series(Series::line("measured", &near, &part(measured)).colour(Colour::Ink).dash(Dash::Solid));
     if let Some(given) = &given {
         zoom = zoom.series(Series::line("as given", &near, &part(given)).colour(Colour::Muted).dash(Dash::Dotted).outside_limits());
     }
     if let Some(refitted) = &refitted {
-        zoom = zoom.series(Series::line("numbers refitted", &near, &part(refitted)).colour(Colour::Nth(0)).dash(Dash::Dashed));
+        zoom = zoom.series(Series::line("parameters refitted", &near, &part(refitted)).colour(Colour::Nth(0)).dash(Dash::Dashed));
     }
     if let Some(diagnosed) = &diagnosed {
         zoom = zoom.series(Series::line("diagnosed", &near, &part(diagnosed)).colour(Colour::Nth(1)).dash(Dash::Solid));
     }
+    zoom = zoom.series(Series::line("measured", &near, &part(measured)).colour(Colour::Ink).dash(Dash::Dotted));
     page.figure(zoom, "");
 
     let floor = found.search.floor.get(output).copied().unwrap_or(0.0);
     let error = |p: &Option<Vec<f64>>| p.as_ref().map(|p| measured.iter().zip(p).map(|(y, p)| y - p).collect::<Vec<f64>>());
     let (e_given, e_refitted, e_diagnosed) = (error(&given), error(&refitted), error(&diagnosed));
-    let mut left = Plot::new("Left over, in time").x_axis("time", "s").y_axis("measured less predicted", &unit);
-    let mut spectrum = Plot::new("Left over, by frequency").x_axis("frequency", "Hz").y_axis("density", &per_hertz(&unit)).x_log().y_log();
+    let mut left = Plot::new("Residual, in time").x_axis("time", "s").y_axis("measured less predicted", &unit);
+    let mut spectrum = Plot::new("Residual, by frequency").x_axis("frequency", "Hz").y_axis("density", &per_hertz(&unit)).x_log().y_log();
     let looks = [
         ("as given", &e_given, Colour::Muted, true),
-        ("numbers refitted", &e_refitted, Colour::Nth(0), false),
+        ("parameters refitted", &e_refitted, Colour::Nth(0), false),
         ("diagnosed", &e_diagnosed, Colour::Nth(1), false),
     ];
     for (name, error, colour, only_frequency) in looks {

@@ -4,12 +4,13 @@ mod force;
 mod held_out;
 mod tables;
 
-use crate::diagnose::Found;
-use crate::diagnose_text::{named, next_experiment, parameter, place_of, shows};
+use crate::diagnose::{Found, MODEL};
+use crate::diagnose_text::{confidence, named, next_experiment, parameter, shows};
 use backdrive_diagnosis::audit::Weight;
 use backdrive_diagnosis::search::Candidate;
 use backdrive_diagnosis::verdict::chosen;
-use backdrive_report::{Cell, Page, Table, Tone, number, percent};
+use backdrive_diagnosis::words;
+use backdrive_report::{Cell, Page, Table, Tone, percent};
 use serde_json::Value;
 
 /// What a report shows.
@@ -30,9 +31,7 @@ pub fn page(shown: &Shown) -> Page {
     let mut page = Page::new(&format!("Diagnosis of {} against {}", shown.name, found.problem.model.name));
     page.lead(tone(json), &capital(&found.said.sentence));
     page.text(&summary(found));
-    if let Some(next) = next_experiment(&json["next_experiment"]) {
-        page.note(&format!("To record next: {next}"));
-    }
+    to_do(&mut page, found);
     for note in shown.notes {
         page.note(&capital(note));
     }
@@ -49,13 +48,75 @@ pub fn page(shown: &Shown) -> Page {
     force::section(&mut page, found, best);
     page.section("Every hypothesis that was tried");
     tables::hypotheses(&mut page, found, best);
-    page.section("Numbers before and after");
+    page.section("Parameters before and after");
     tables::numbers(&mut page, found, best);
     page.section("Each record by itself");
     tables::per_record(&mut page, found);
     page.section("The recordings themselves");
     tables::audit(&mut page, found);
+    glossary(&mut page);
     page
+}
+
+/// The terms of the page, and what made it.
+fn glossary(page: &mut Page) {
+    page.section("Terms");
+    let mut table = Table::new(["term", "meaning"]);
+    for (term, meaning) in [
+        ("residual", "what was measured less what a model predicts"),
+        (
+            "sensor noise",
+            "standard deviation of the measuring error of an output, estimated from the recordings: a residual of 1 cannot be improved on",
+        ),
+        ("nrmse", "root mean square of the residual over the standard deviation of the measured signal"),
+        ("held out", "a recording that no fit has seen"),
+        ("refitted", "the same structure, its parameters fitted to the recordings"),
+        ("diagnosed", "the structure with the physics that was found, all parameters fitted"),
+        ("sd", "standard deviations of a parameter's own error"),
+    ] {
+        table.push([term, meaning]);
+    }
+    page.table(table);
+    let command: Vec<String> = std::env::args().skip(1).collect();
+    page.text(&format!("Made by backdrive {}: backdrive {}", env!("CARGO_PKG_VERSION"), command.join(" ")));
+}
+
+/// What to do now, most useful first, with commands to copy.
+fn to_do(page: &mut Page, found: &Found) {
+    let json = &found.said.json;
+    let held = &json["held_out"];
+    page.section("What to do now");
+    let use_it = format!("backdrive run launch/contact.toml --canceller {MODEL}");
+    let (before, after) = (held["nrmse_before"].as_f64().unwrap_or(f64::NAN), held["nrmse_after"].as_f64().unwrap_or(f64::NAN));
+    let worth = format!("it predicts to {} of the motion, the model as given to {}", percent(after), percent(before));
+    match json["verdict"].as_str() {
+        Some("missing" | "parameters") => {
+            page.text(&format!("Use the diagnosed model where the motion is predicted: {use_it}. What it is worth: {worth}."));
+        }
+        Some("ambiguous") => {
+            page.text(&format!(
+                "The diagnosed model may be used ({use_it}; {worth}), but hold what is built on it against the rival models beside it too."
+            ));
+        }
+        Some("nothing_missing") => {
+            page.text("Keep the model: the recordings ask for nothing more.");
+        }
+        Some("unexplained") => {
+            page.text(
+                "Do not build on a law yet: look below at when and where the residual shows, and check the sensors named there first.",
+            );
+        }
+        _ => {}
+    }
+    if let Some(next) = next_experiment(&json["next_experiment"]) {
+        page.text(&format!("Record next: {next}"));
+    }
+    if let Some(remark) = found.remarks.iter().find(|r| r.weight > Weight::Note && !r.signal.is_empty()) {
+        page.text(&format!("Check this signal: {remark}"));
+    }
+    if found.search.stopped {
+        page.text("Give the search longer: the same command with a larger --patience.");
+    }
 }
 
 /// The physics that a candidate adds, or nothing.
@@ -84,7 +145,7 @@ fn summary(found: &Found) -> String {
         (of("nrmse_before"), of("nrmse_refit"), of("nrmse_after"), of("noise_floor"))
     {
         text = format!(
-            "On {on} the error is {} of what was measured with the model as given, {} with its numbers refitted, {} with the diagnosed model; \
+            "On {on} the error is {} of what was measured with the model as given, {} with its parameters refitted, {} with the diagnosed model; \
              the sensors' own noise is {}.",
             percent(before),
             percent(refit),
@@ -114,7 +175,7 @@ fn findings(page: &mut Page, json: &Value) {
     }
     let claimed = matches!(json["verdict"].as_str(), Some("missing" | "ambiguous"));
     let mut table =
-        Table::new([if claimed { "missing" } else { "nearest" }, "where", "numbers", "in place of", "confidence", "or instead"]);
+        Table::new([if claimed { "missing" } else { "nearest" }, "where", "parameters", "in place of", "confidence", "or instead"]);
     for finding in all {
         let numbers: Vec<String> = finding["parameters"]
             .as_object()
@@ -126,16 +187,15 @@ fn findings(page: &mut Page, json: &Value) {
             .into_iter()
             .flatten()
             .take(3)
-            .map(|a| format!("{} ({})", named(a), number(a["confidence"].as_f64().unwrap_or(0.0))))
+            .map(|a| format!("{} ({})", named(a), words::share(a["confidence"].as_f64().unwrap_or(0.0))))
             .collect();
-        let confidence = finding["confidence"].as_f64().unwrap_or(0.0);
-        let sure = if confidence > 0.8 { Tone::Good } else { Tone::Unsure };
+        let sure = if finding["confidence"].as_f64().unwrap_or(0.0) > 0.8 { Tone::Good } else { Tone::Unsure };
         table.push([
-            Cell::from(finding["physics"].as_str().unwrap_or("?").replace('_', " ")),
-            place_of(finding).into(),
+            Cell::from(words::physics(finding["physics"].as_str().unwrap_or(""))),
+            words::place(finding).into(),
             numbers.join("; ").into(),
             replaced.join(", ").into(),
-            Cell::tone(number(confidence), sure),
+            Cell::tone(confidence(finding), sure),
             others.join("; ").into(),
         ]);
     }

@@ -23,7 +23,7 @@ pub(super) fn hypotheses(page: &mut Page, found: &Found, best: &Candidate) {
         search.found.len(),
         search.simulations
     ));
-    let mut fitted = Table::new(["structure fitted", "numbers", "left over, in noises", "behind the chosen one", ""]);
+    let mut fitted = Table::new(["structure fitted", "parameters", "residual, in noise sd", "behind the chosen one", ""]);
     let level = |c: &Candidate| c.levels.iter().fold(0.0f64, |a, b| a.max(*b));
     let mut push = |c: &Candidate| {
         let behind = -advantage_over(best, c, search.samples);
@@ -31,7 +31,7 @@ pub(super) fn hypotheses(page: &mut Page, found: &Found, best: &Candidate) {
             () if c.structure.name() == best.structure.name() => ("chosen".to_string(), Tone::Good),
             () if c.structure.added.len() < best.structure.added.len() && behind > ALIKE => ("too simple".to_string(), Tone::Neutral),
             () if behind.abs() <= ALIKE && c.structure.numbers.len() > best.structure.numbers.len() => {
-                ("as good, more numbers".to_string(), Tone::Unsure)
+                ("as good, more parameters".to_string(), Tone::Unsure)
             }
             () if behind.abs() <= ALIKE => ("as good".to_string(), Tone::Unsure),
             () if behind < 0.0 => ("better, not by enough".to_string(), Tone::Unsure),
@@ -49,7 +49,7 @@ pub(super) fn hypotheses(page: &mut Page, found: &Found, best: &Candidate) {
     push(&search.nominal);
     search.found.iter().take(SHOWN).for_each(&mut push);
     page.table(fitted.caption(
-        "Left over: root mean square of what the worst output is missed by. Behind: difference of the information criterion, each number paid for.",
+        "Residual: root mean square of the worst output. Behind: difference of the information criterion, each parameter paid for.",
     ));
 
     let mut all: Vec<_> = search.tried.iter().collect();
@@ -62,7 +62,7 @@ pub(super) fn hypotheses(page: &mut Page, found: &Found, best: &Candidate) {
             let is_chosen = best.structure.added.iter().any(|h| h.id == tried.id);
             let why = match tried.taken {
                 _ if is_chosen => Cell::tone("part of what is claimed", Tone::Good),
-                Some(taken) if taken < 0.01 => Cell::from("alone it explains nothing once the numbers are free"),
+                Some(taken) if taken < 0.01 => Cell::from("alone it explains nothing once the parameters are free"),
                 Some(_) => Cell::from("others explain more"),
                 None if tried.promised < least => Cell::from("promised less than all that were fitted"),
                 None => Cell::from("others like it promised more, or ended the search"),
@@ -70,7 +70,7 @@ pub(super) fn hypotheses(page: &mut Page, found: &Found, best: &Candidate) {
             let taken = tried.taken.map_or("not fitted".to_string(), percent);
             table.push([Cell::from(physics.replace('_', " ")), place.into(), percent(tried.promised).into(), taken.into(), why]);
         }
-        table.caption("Shares of what the refitted nominal model leaves over.")
+        table.caption("Shares of the residual of the refitted nominal model.")
     };
     let (first, rest) = all.split_at(all.len().min(SHOWN));
     page.details(&format!("Single effects, {} of {}", first.len(), all.len()), |inside| {
@@ -89,9 +89,9 @@ pub(super) fn numbers(page: &mut Page, found: &Found, best: &Candidate) {
     let (before_spread, after_spread) = (Spread::of(nominal), Spread::of(best));
     let (before, after) = (rows(problem, nominal, &before_spread), rows(problem, best, &after_spread));
     let added = adds(best);
-    let mut header = vec!["number", "unit", "given", "refitted alone", "moved, in sd"];
+    let mut header = vec!["parameter", "unit", "nominal", "refitted alone", "change", "moved, in sd"];
     if added {
-        header.extend(["diagnosed", "95 % interval", "moved, in sd"]);
+        header.extend(["diagnosed", "95 % interval", "change", "moved, in sd"]);
     } else {
         header.push("95 % interval");
     }
@@ -101,6 +101,10 @@ pub(super) fn numbers(page: &mut Page, found: &Found, best: &Candidate) {
     let moved = |r: Option<&Row>| match r.and_then(|r| r.moved_sd.filter(|s| s.is_finite() && r.determined)) {
         Some(sd) => Cell::tone(number(sd), if sd.abs() > 5.0 { Tone::Warning } else { Tone::Neutral }),
         None => Cell::from("–"),
+    };
+    let change = |r: Option<&Row>| match r.and_then(|r| Some((r.value, r.given.filter(|g| *g != 0.0 && r.determined)?))) {
+        Some((value, given)) => format!("{:+.1} %", 100.0 * (value - given) / given.abs()),
+        None => "–".to_string(),
     };
     let mut names: Vec<&Row> = before.iter().collect();
     names.extend(after.iter().filter(|r| !before.iter().any(|b| b.name == r.name)));
@@ -114,17 +118,20 @@ pub(super) fn numbers(page: &mut Page, found: &Found, best: &Candidate) {
             row.unit.clone().into(),
             row.given.map_or("–".to_string(), number).into(),
             value(b).into(),
+            change(b).into(),
             moved(b),
         ];
         if added {
-            cells.extend([value(a).into(), a.map_or("–".to_string(), interval).into(), moved(a)]);
+            cells.extend([value(a).into(), a.map_or("–".to_string(), interval).into(), change(a).into(), moved(a)]);
         } else {
             cells.push(b.map_or("–".to_string(), interval).into());
         }
         table.push(cells);
     }
     page.table(
-        table.caption("Missing physics hides in numbers: what moves far when refitted alone, and back once the physics is there, hid it."),
+        table.caption(
+            "Missing physics hides in parameters: what moves far when refitted alone, and back once the physics is there, hid it.",
+        ),
     );
     let (which, spread) = if added { (best, &after_spread) } else { (nominal, &before_spread) };
     let pairs = correlated(problem, which, spread, CORRELATED);
@@ -140,7 +147,7 @@ pub(super) fn per_record(page: &mut Page, found: &Found) {
     if fits.records.len() < 2 {
         return;
     }
-    let mut header = vec!["number".to_string()];
+    let mut header = vec!["parameter".to_string()];
     header.extend(fits.records.iter().map(|r| crate::recordings::file_name(r).to_string()));
     header.push("chance of this much scatter".to_string());
     let mut table = Table::new(header);
@@ -156,12 +163,16 @@ pub(super) fn per_record(page: &mut Page, found: &Found) {
             }
         }));
         let tone = if disagree { Tone::Bad } else { Tone::Neutral };
-        let chance = if across.own.iter().filter(|o| o.determined).count() < 2 { "–".to_string() } else { number(across.p_value) };
+        let chance = if across.own.iter().filter(|o| o.determined).count() < 2 {
+            "–".to_string()
+        } else {
+            backdrive_diagnosis::words::share(across.p_value)
+        };
         cells.push(Cell::tone(chance, tone));
         table.push(cells);
     }
     page.table(table.caption(
-        "With half the width of the 95 % intervals. A device has one set of numbers: where records disagree, the structure is wrong.",
+        "With half the width of the 95 % intervals. A device has one set of parameters: where records disagree, the structure is wrong.",
     ));
 }
 
