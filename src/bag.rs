@@ -3,17 +3,19 @@
 use crate::cli;
 use crate::failure::{Failure, code};
 use crate::output;
-use backdrive_bags::{ColumnMap, DiffOptions, ImportOptions, Quantity, Reader, diff, export_csv, import_csv, info, merge, recover};
+use backdrive_bags::{
+    ColumnMap, DiffOptions, ImportOptions, Quantity, Reader, check_target, diff, export_csv, import_csv, info, merge, recover,
+};
 use std::path::Path;
 
 /// Does what `backdrive bag` is asked.
 pub fn bag(command: &cli::Bag) -> Result<u8, Failure> {
     match command {
         cli::Bag::Info { bag, json } => show(bag, *json),
-        cli::Bag::Import { csv, bag, map } => import(csv, bag, map),
-        cli::Bag::Export { bag, csv, topic } => export(bag, csv, topic),
-        cli::Bag::Recover { damaged, bag } => save(damaged, bag),
-        cli::Bag::Merge { a, b, bag, offset, json } => join(a, b, bag, *offset, *json),
+        cli::Bag::Import { csv, bag, overwrite, map } => import(csv, bag, *overwrite, map),
+        cli::Bag::Export { bag, csv, overwrite, topic } => export(bag, csv, *overwrite, topic),
+        cli::Bag::Recover { damaged, bag, overwrite } => save(damaged, bag, *overwrite),
+        cli::Bag::Merge { a, b, bag, overwrite, offset, json } => join([a, b], bag, *overwrite, *offset, *json),
         cli::Bag::Play { bag, speed } => crate::play::play(bag, *speed),
         cli::Bag::Diff { a, b, tolerance, ignore, json } => compare(a, b, tolerance, ignore, *json),
     }
@@ -26,13 +28,11 @@ fn show(bag: &Path, json: bool) -> Result<u8, Failure> {
     } else {
         output::text(format_args!("{info}"))?;
     }
-    Ok(0)
+    let lossy = info.damage.is_some() || !info.ended_cleanly;
+    Ok(if lossy { code::LOST_DATA } else { 0 })
 }
 
-fn import(csv: &[std::path::PathBuf], bag: &Path, maps: &[String]) -> Result<u8, Failure> {
-    if csv.len() == 1 {
-        is_new(bag, "--bag")?;
-    }
+fn import(csv: &[std::path::PathBuf], bag: &Path, overwrite: bool, maps: &[String]) -> Result<u8, Failure> {
     let columns = maps.iter().map(|map| column_map(map)).collect::<Result<Vec<_>, _>>()?;
     // One table is one experiment and one bag: several go into a folder.
     let into = |table: &Path| -> std::path::PathBuf {
@@ -45,8 +45,11 @@ fn import(csv: &[std::path::PathBuf], bag: &Path, maps: &[String]) -> Result<u8,
         std::fs::create_dir_all(bag).map_err(|e| Failure::write(bag, e))?;
     }
     for table in csv {
-        let options = ImportOptions { columns: columns.clone(), ..ImportOptions::default() };
-        let report = import_csv(table, &into(table), &options).map_err(Failure::input)?;
+        check_target(&into(table), overwrite).map_err(Failure::bag)?;
+    }
+    for table in csv {
+        let options = ImportOptions { columns: columns.clone(), overwrite, ..ImportOptions::default() };
+        let report = import_csv(table, &into(table), &options).map_err(Failure::bag)?;
         for column in &report.skipped {
             output::note(format_args!(
                 "warning: {}: column \"{column}\" holds something that is no number and was left out",
@@ -64,9 +67,10 @@ fn import(csv: &[std::path::PathBuf], bag: &Path, maps: &[String]) -> Result<u8,
     Ok(0)
 }
 
-fn is_new(file: &Path, option: &str) -> Result<(), Failure> {
-    match file.exists() && !output::is_stream(file) {
-        true => Err(Failure::input(format!("{}: exists already; name another with {option}", file.display()))),
+/// A table that is there already is replaced only where that was asked for.
+pub fn may_replace(table: &Path, overwrite: bool) -> Result<(), Failure> {
+    match table.exists() && !output::is_stream(table) && !overwrite {
+        true => Err(Failure::input(format!("{}: exists already; --overwrite replaces it, or name another", table.display()))),
         false => Ok(()),
     }
 }
@@ -90,8 +94,8 @@ fn column_map(text: &str) -> Result<ColumnMap, Failure> {
     Ok(ColumnMap { column: column.to_string(), topic: topic.to_string(), quantity, axis, scale: 1.0, offset: 0.0 })
 }
 
-fn export(bag: &Path, csv: &Path, topics: &[String]) -> Result<u8, Failure> {
-    is_new(csv, "--csv")?;
+fn export(bag: &Path, csv: &Path, overwrite: bool, topics: &[String]) -> Result<u8, Failure> {
+    may_replace(csv, overwrite)?;
     let reader = Reader::open(bag).map_err(Failure::input)?;
     let topics = (!topics.is_empty()).then_some(topics);
     let rows = output::replace(csv, |to| export_csv(&reader, to, topics).map_err(Failure::input))?;
@@ -99,24 +103,35 @@ fn export(bag: &Path, csv: &Path, topics: &[String]) -> Result<u8, Failure> {
     Ok(0)
 }
 
-fn save(damaged: &Path, bag: &Path) -> Result<u8, Failure> {
-    is_new(bag, "--bag")?;
-    let report = recover(damaged, bag).map_err(Failure::input)?;
-    if report.was_clean {
-        output::line(format_args!("{}: had ended cleanly; copied", damaged.display()))?;
+fn save(damaged: &Path, bag: &Path, overwrite: bool) -> Result<u8, Failure> {
+    let report = recover(damaged, bag, overwrite).map_err(Failure::bag)?;
+    if !report.is_lossy() {
+        output::line(format_args!("{}: had ended cleanly and is whole; copied", damaged.display()))?;
     }
+    let of = report.expected.map_or(String::new(), |all| format!(" of {all}"));
     let until = report.last_step.map_or(String::new(), |step| format!(", up to step {step}"));
-    output::line(format_args!("{}: {} messages saved{until}", bag.display(), report.messages))?;
-    for place in &report.damaged {
-        output::note(format_args!("warning: damaged and left out: {place}"));
+    output::line(format_args!("{}: {}{of} messages saved{until}", bag.display(), report.messages))?;
+    for (topic, messages) in &report.missing {
+        output::line(format_args!("  {topic}: {messages} lost in damaged chunks"))?;
     }
-    let lost = report.completeness.as_ref().is_some_and(|c| c.lost() > 0);
-    Ok(if lost { code::LOST_DATA } else { 0 })
+    for place in &report.damaged {
+        output::note(format_args!("warning: damaged: {}", place.trim_end_matches("; `backdrive bag recover` saves what is whole")));
+    }
+    if report.unconfirmed > 0 {
+        output::note(format_args!(
+            "warning: {} of the saved messages stand in a damaged chunk: index and type agree, but no checksum vouches for their values",
+            report.unconfirmed
+        ));
+    }
+    if !report.was_clean {
+        output::note(format_args!("warning: {}: had not been closed; what its end held is not known", damaged.display()));
+    }
+    Ok(if report.is_lossy() { code::LOST_DATA } else { 0 })
 }
 
-fn join(a: &Path, b: &Path, bag: &Path, offset_s: Option<f64>, json: bool) -> Result<u8, Failure> {
-    is_new(bag, "--bag")?;
-    let report = merge(a, b, bag, offset_s).map_err(Failure::input)?;
+fn join([a, b]: [&Path; 2], bag: &Path, overwrite: bool, offset_s: Option<f64>, json: bool) -> Result<u8, Failure> {
+    check_target(bag, overwrite).map_err(Failure::bag)?;
+    let report = merge(a, b, bag, offset_s, overwrite).map_err(Failure::bag)?;
     if json {
         output::json(&report)?;
     } else {

@@ -198,6 +198,10 @@ pub struct Changes {
     /// The bag to record.
     #[arg(long, value_name = "FILE")]
     pub bag: Option<PathBuf>,
+    /// Replace a bag that exists, whether --bag, --out or the graph file names it; without this it is an error. A bag that
+    /// another run is writing is never replaced.
+    #[arg(long)]
+    pub overwrite: bool,
 }
 
 fn number(text: &str) -> Result<f64, String> {
@@ -246,6 +250,7 @@ impl Changes {
             dither: self.dither.clone(),
             guard: self.guard.then_some(true),
             bag: self.bag.clone(),
+            overwrite: self.overwrite,
             clock: clock.map(|c| if matches!(c, Clock::Lockstep) { "lockstep" } else { "realtime" }.to_string()),
             rate_hz: self.rate,
             duration_s: self.duration,
@@ -550,6 +555,9 @@ pub struct Simulate {
     pub model: PathBuf,
     /// A recording (CSV or bag), a folder with a set.toml, an excitation file, or an excitation such as `steps:amplitude=1,duration=2`.
     pub drive: String,
+    /// Replace files that exist.
+    #[arg(long)]
+    pub overwrite: bool,
     /// Where the prediction goes, as CSV; for a set a folder.
     #[arg(long, value_name = "FILE")]
     pub out: PathBuf,
@@ -624,6 +632,9 @@ pub enum Bag {
         /// The new bag; of several CSV files the folder in which each becomes one.
         #[arg(long, value_name = "FILE")]
         bag: PathBuf,
+        /// Replace a bag that exists.
+        #[arg(long)]
+        overwrite: bool,
         /// Which column is what, as `motor_position=/master/measured_js.position[0]`; repeatable.
         #[arg(long, value_name = "COLUMN=TOPIC.FIELD[AXIS]")]
         map: Vec<String>,
@@ -636,6 +647,9 @@ pub enum Bag {
         /// The CSV file.
         #[arg(long, value_name = "FILE")]
         csv: PathBuf,
+        /// Replace a file that exists.
+        #[arg(long)]
+        overwrite: bool,
         /// Only these topics; repeatable.
         #[arg(long)]
         topic: Vec<String>,
@@ -648,6 +662,9 @@ pub enum Bag {
         /// The new bag.
         #[arg(long, value_name = "FILE")]
         bag: PathBuf,
+        /// Replace a bag that exists.
+        #[arg(long)]
+        overwrite: bool,
     },
     /// One bag from those that two hosts recorded of the same run.
     #[command(after_help = "Example:\n  backdrive bag merge contact-desk.mcap contact-robot.mcap --bag contact.mcap")]
@@ -659,6 +676,9 @@ pub enum Bag {
         /// The new bag.
         #[arg(long, value_name = "FILE")]
         bag: PathBuf,
+        /// Replace a bag that exists.
+        #[arg(long)]
+        overwrite: bool,
         /// By how much the second's clock is ahead, s, in place of what the bags say.
         #[arg(long, value_name = "S", allow_negative_numbers = true)]
         offset: Option<f64>,

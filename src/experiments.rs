@@ -4,7 +4,7 @@ use crate::cli;
 use crate::failure::Failure;
 use crate::output;
 use crate::run::{Way, run_graph};
-use backdrive_bags::{Reader, Signal, signals};
+use backdrive_bags::{Reader, Signal, check_target, signals};
 use backdrive_control::shaft::{SENSORS, TORQUES};
 use backdrive_nodes::graph::{DeviceFiles, Experiment, Graph, NodeKind, Overrides, Settings};
 use backdrive_plant::model::Model;
@@ -28,6 +28,9 @@ pub fn run(options: &cli::Run, way: &Way, graph: &Graph, changes: &Overrides) ->
         Ok((folder, Graph::load_experiment(&options.graph, &changes, &e.name)?))
     };
     let graphs = graph.experiments.iter().map(load).collect::<Result<Vec<_>, Failure>>()?;
+    for bag in graphs.iter().filter_map(|(_, g)| g.bag.as_deref()).filter(|b| b.exists()) {
+        check_target(bag, changes.overwrite).map_err(Failure::bag)?;
+    }
     let mut sets: Vec<Set> = Vec::new();
     for (index, (experiment, (folder, each))) in graph.experiments.iter().zip(graphs).enumerate() {
         std::fs::create_dir_all(&folder).map_err(|e| Failure::write(&folder, e))?;

@@ -1,5 +1,6 @@
 //! Why a command fails, and the exit code that goes with it.
 
+use backdrive_bags::BagError;
 use backdrive_launch::LaunchError;
 use backdrive_nodes::build::BuildError;
 use backdrive_plant::tomlfile::FileError;
@@ -41,6 +42,15 @@ impl Failure {
     /// This machine does not let it.
     pub fn machine(message: impl Display) -> Failure {
         Failure { code: code::MACHINE, message: message.to_string() }
+    }
+
+    /// A bag or a table cannot be read, or not written.
+    pub fn bag(error: BagError) -> Failure {
+        let code = match &error {
+            BagError::Create { .. } | BagError::Write { .. } => code::MACHINE,
+            _ => code::BAD_INPUT,
+        };
+        Failure { code, message: error.to_string() }
     }
 
     /// A file of ours cannot be written.

@@ -45,5 +45,5 @@ pub fn place(graph: &Graph, transport: Option<Transport>, host: Option<&str>, op
         }
         network.peers.extend(graph.hosts.iter().filter(|h| h.name != name).filter_map(|h| h.address));
     }
-    Ok(Place { wire, network, host: host.map(str::to_string) })
+    Ok(Place { wire, network, host: host.map(str::to_string), overwrite: false })
 }

@@ -7,7 +7,7 @@ use crate::network::place;
 use crate::output;
 use crate::progress;
 use crate::summary::{Summary, Traces, summarise};
-use backdrive_bags::{Completeness, Reader, Recorder};
+use backdrive_bags::{Completeness, Reader, Recorder, check_target};
 use backdrive_launch::join::{recorder_options, recording};
 use backdrive_launch::{Cause, Place, RunHome, RunReport, SuperviseOptions};
 use backdrive_msgs::Message;
@@ -19,7 +19,6 @@ use backdrive_nodes::transport::ros2::Courier;
 use backdrive_stability::outcome::Outcome;
 use backdrive_stability::unjudged::Unjudged;
 use serde_json::json;
-use std::io::Read;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
@@ -60,6 +59,8 @@ pub struct Done {
     pub bag: Option<std::path::PathBuf>,
     /// Whether its recorder ended and nothing is missing in it.
     pub complete: bool,
+    /// Why the bag cannot be read, where it cannot.
+    pub unreadable: Option<String>,
     /// What happened.
     pub summary: Option<Summary>,
 }
@@ -96,26 +97,8 @@ pub fn run_graph(graph: &Graph, way: &Way) -> Result<Done, Failure> {
 /// What would stop a run is told before it begins.
 fn ready(graph: &Graph, host: Option<&str>) -> Result<(), Failure> {
     buildable(graph)?;
-    graph.bag_of(host).as_deref().map_or(Ok(()), writable)
-}
-
-/// A run that ends with its last step, for a bag that cannot be written, would be lost whole. A bag that exists is
-/// replaced, anything else is not.
-fn writable(bag: &Path) -> Result<(), Failure> {
-    let existed = bag.exists();
-    if std::fs::metadata(bag).is_ok_and(|m| m.is_file() && m.len() > 0) && !begins_as_bag(bag) {
-        return Err(Failure::input(format!("{}: exists and is not a bag, so it is not replaced; name another with --bag", bag.display())));
-    }
-    std::fs::OpenOptions::new().append(true).create(true).open(bag).map_err(|e| Failure::write(bag, e))?;
-    if !existed {
-        let _ = std::fs::remove_file(bag);
-    }
-    Ok(())
-}
-
-fn begins_as_bag(path: &Path) -> bool {
-    let mut start = [0; 8];
-    std::fs::File::open(path).and_then(|mut file| file.read_exact(&mut start)).is_ok() && start == *b"\x89MCAP0\r\n"
+    // A run that ends with its last step, for a bag that cannot be written, would be lost whole.
+    graph.bag_of(host).map_or(Ok(()), |bag| check_target(&bag, graph.overwrite).map_err(Failure::bag))
 }
 
 /// How long hosts may take to find each other: somebody walks from one to the other.
@@ -128,18 +111,37 @@ fn run_processes(graph: &Graph, place: &Place) -> Result<Done, Failure> {
     if place.host.is_some() {
         options.ready_timeout = HOSTS_TIMEOUT;
     }
-    let report = backdrive_launch::run(graph, place, options)?;
+    let place = Place { overwrite: graph.overwrite, ..place.clone() };
+    let report = backdrive_launch::run(graph, &place, options)?;
     drop(courier);
     let bag = report.bag.clone().filter(|bag| bag.exists());
     // What is known of the run is told even where its bag cannot be read.
     let mut summary = bag.as_ref().and_then(|bag| summarise(bag).map_err(|e| output::note(format_args!("warning: {}", e.message))).ok());
-    let whole = |bag| Reader::open(bag).is_ok_and(|r| r.ended_cleanly() && r.completeness().is_some_and(Completeness::is_complete));
-    let complete = bag.as_deref().is_some_and(whole);
+    let (complete, mut unreadable) = bag.as_deref().map_or((false, None), whole);
+    if report.bag.as_deref().is_some_and(|bag| !bag.exists()) {
+        unreadable = Some("is not there any more".to_string());
+    }
     let lost = report.lost + report.unrecorded.unwrap_or(0);
     if let Some(summary) = &mut summary {
         summary.hold_back(fault(&report, lost));
     }
-    Ok(Done { steps: report.steps, duration_s: report.duration_s, lost, bag, complete, summary, report: Some(report) })
+    Ok(Done { steps: report.steps, duration_s: report.duration_s, lost, bag, complete, unreadable, summary, report: Some(report) })
+}
+
+/// Whether a run's bag was ended and nothing is missing in it, and what keeps it from being read.
+fn whole(bag: &Path) -> (bool, Option<String>) {
+    if output::is_stream(bag) {
+        return (false, None); // nothing can be read back
+    }
+    match Reader::open(bag) {
+        Ok(reader) => {
+            let complete = reader.ended_cleanly() && reader.completeness().is_some_and(Completeness::is_complete);
+            let broken = || reader.messages().map_or_else(|e| Some(e.to_string()), |mut m| m.find_map(|e| e.err().map(|e| e.to_string())));
+            let unreadable = reader.damage().first().cloned().or_else(broken);
+            (complete && unreadable.is_none(), unreadable)
+        }
+        Err(error) => (false, Some(error.to_string())),
+    }
 }
 
 /// Why a run must not be called stable, whatever its signals look like.
@@ -172,7 +174,7 @@ pub fn run_here(graph: &Graph, hear: &mut dyn FnMut(&str, &Message)) -> Result<D
     let names: Vec<String> = sequence.topics().iter().map(|t| t.name.clone()).collect();
     let place: Vec<Option<usize>> = names.iter().map(|name| record.topics.iter().position(|t| t.name == *name)).collect();
     let mut recorder = match &graph.bag {
-        Some(bag) => Some(Recorder::create(bag, &header, &recorder_options(graph)).map_err(Failure::machine)?),
+        Some(bag) => Some(Recorder::create(bag, &header, &recorder_options(graph)).map_err(Failure::bag)?),
         None => None,
     };
     let bar = progress::steps(steps, &graph.title);
@@ -211,13 +213,15 @@ pub fn run_here(graph: &Graph, hear: &mut dyn FnMut(&str, &Message)) -> Result<D
     let mut summary = traces.summary(graph);
     summary.hold_back((lost > 0).then_some(Unjudged::Lost { messages: lost }));
     let summary = Some(summary);
+    let unreadable = graph.bag.as_deref().and_then(|bag| whole(bag).1);
     Ok(Done {
         steps,
         duration_s: started.elapsed().as_secs_f64(),
         report: None,
         lost,
+        complete: lost == 0 && unreadable.is_none(),
+        unreadable,
         bag: graph.bag.clone(),
-        complete: lost == 0,
         summary,
     })
 }
@@ -245,7 +249,7 @@ impl Done {
                 Cause::Completed => {}
             }
         }
-        if self.lost > 0 { code::LOST_DATA } else { 0 }
+        if self.lost > 0 || self.unreadable.is_some() { code::LOST_DATA } else { 0 }
     }
 
     /// A few lines for a person.
@@ -274,11 +278,15 @@ impl Done {
         }
         if let Some(bag) = &self.bag {
             let complete = match self.lost {
+                _ if self.unreadable.is_some() => "cannot be read".to_string(),
                 0 if self.complete => "complete".to_string(),
                 0 => "cut off; `backdrive bag recover` makes a clean copy of what it holds".to_string(),
                 lost => format!("{lost} messages lost"),
             };
             lines.push(format!("bag      {} ({complete})", bag.display()));
+        }
+        if let Some(why) = &self.unreadable {
+            lines.push(format!("UNREADABLE {why}"));
         }
         lines.retain(|l| !l.is_empty());
         lines.join("\n")
@@ -297,6 +305,7 @@ impl Done {
             "missed_deadlines": report.map(|r| r.missed_deadlines),
             "lost": self.lost,
             "bag": self.bag,
+            "unreadable": self.unreadable,
             "complete": self.bag.as_ref().map(|_| self.complete),
             "loop_gain": summary.map(|s| s.loop_gain),
             "last_loop_gain": summary.map(|s| s.last_loop_gain),

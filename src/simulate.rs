@@ -1,5 +1,6 @@
 //! `backdrive simulate`: a model run on recordings or on an excitation.
 
+use crate::bag::may_replace;
 use crate::cli;
 use crate::failure::Failure;
 use crate::output;
@@ -16,7 +17,9 @@ use std::path::{Path, PathBuf};
 pub fn simulate(options: &cli::Simulate) -> Result<u8, Failure> {
     let model = held_model(&options.model, options.grip.as_deref())?;
     let mut results = Vec::new();
-    for Drive { recording: drive, out, condition } in drives(options, &model)? {
+    let drives = drives(options, &model)?;
+    drives.iter().try_for_each(|drive| may_replace(&drive.out, options.overwrite))?;
+    for Drive { recording: drive, out, condition } in drives {
         let model = under(&model, &condition, &drive.name)?;
         let prediction = predict(&model, &drive, options)?;
         if let Some(folder) = out.parent().filter(|f| !f.as_os_str().is_empty()) {

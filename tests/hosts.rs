@@ -263,7 +263,7 @@ fn a_cut_link_a_killed_and_a_restarted_host_and_the_force_decays_and_comes_back(
         assert!(count(&robot, "joined_late") >= 1, "{robot:?}\n{robot_told}");
         // What the killed host had recorded can be saved, and tells of the cut.
         let saved = folder.path().join("saved.mcap");
-        backdrive_bags::recover(&folder.path().join("killed.mcap"), &saved).unwrap();
+        backdrive_bags::recover(&folder.path().join("killed.mcap"), &saved, false).unwrap();
         let killed = events(&Reader::open(&saved).unwrap());
         assert!(count(&killed, "slave_holds") >= 1 && count(&killed, "slave_follows") >= 1, "{killed:?}");
         // The desk ran on to its end, at its rate.

@@ -64,7 +64,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let bytes = std::fs::read(&path)?;
     std::fs::write(&path, &bytes[..bytes.len() - 100])?;
     let begin = Instant::now();
-    assert_eq!(recover(&path, &saved)?.messages, MESSAGES);
+    assert_eq!(recover(&path, &saved, false)?.messages, MESSAGES);
     report("recover", begin);
     Ok(())
 }

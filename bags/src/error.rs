@@ -14,6 +14,28 @@ pub enum BagError {
         /// What it said.
         source: std::io::Error,
     },
+    /// It cannot be written, or not created.
+    #[error("{}: cannot be written: {source}", path.display())]
+    Create {
+        /// The file.
+        path: PathBuf,
+        /// What the operating system said.
+        source: std::io::Error,
+    },
+    /// What is there already was not given up.
+    #[error("{}: exists {}", path.display(), if *is_bag { "already; --overwrite replaces it, or name another" } else { "and is not a bag, so it is not replaced; name another" })]
+    Exists {
+        /// The file.
+        path: PathBuf,
+        /// Whether it is a bag, which may be replaced if that is asked for.
+        is_bag: bool,
+    },
+    /// Somebody else writes it at this moment.
+    #[error("{}: is being written by another run; wait for its end, or name another", path.display())]
+    InUse {
+        /// The file.
+        path: PathBuf,
+    },
     /// It is something else.
     #[error("{} is not an MCAP file: it does not start with the MCAP magic bytes", path.display())]
     NotMcap {

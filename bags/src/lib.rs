@@ -12,6 +12,7 @@
 #![cfg_attr(not(test), warn(clippy::print_stdout, clippy::print_stderr))]
 
 mod cdr;
+mod claim;
 mod clock_offset;
 mod completeness;
 mod diff;
@@ -31,6 +32,7 @@ mod without;
 mod writer;
 
 pub use cdr::{FieldPath, Schema};
+pub use claim::check_target;
 pub use clock_offset::{CLOCK_OFFSET, ClockOffset};
 pub use completeness::{Completeness, TopicCompleteness};
 pub use diff::{DiffOptions, DiffReport, Divergence, TopicDiff, diff};

@@ -5,6 +5,7 @@
 //! merged bag is as complete as all of them together. Log times are told in the first bag's clock: what the bags say of
 //! the clocks (events of kind [`CLOCK_OFFSET`]) is applied at the time nearest to each message.
 
+use crate::claim::not_itself;
 use crate::clock_offset::{CLOCK_OFFSET, ClockOffset};
 use crate::header::Clock;
 use crate::{BagError, BagHeader, Completeness, Reader, Recorder, RecorderOptions, WhenFull};
@@ -41,7 +42,9 @@ type Key = (usize, u32, u64, i64);
 /// # Errors
 /// A bag cannot be read or is none of a run, they are of different graphs, or in real time neither says what the clocks
 /// were and `offset_s` is not given; `to` exists or cannot be written.
-pub fn merge(first: &Path, second: &Path, to: &Path, offset_s: Option<f64>) -> Result<MergeReport, BagError> {
+pub fn merge(first: &Path, second: &Path, to: &Path, offset_s: Option<f64>, overwrite: bool) -> Result<MergeReport, BagError> {
+    not_itself(first, to)?;
+    not_itself(second, to)?;
     let (a, b) = (Reader::open(first)?, Reader::open(second)?);
     let (head, other) = (header(&a, first)?, header(&b, second)?);
     let wrong =
@@ -99,7 +102,7 @@ pub fn merge(first: &Path, second: &Path, to: &Path, offset_s: Option<f64>) -> R
     let mut all: Vec<(i64, usize, Message)> =
         held.into_iter().map(|((topic, ..), (log_ns, message, _))| (log_ns, topic, message)).collect();
     all.sort_by_key(|(log_ns, topic, message)| (*log_ns, message.step(), *topic, message.sequence()));
-    let options = RecorderOptions { when_full: WhenFull::Wait, ..RecorderOptions::default() };
+    let options = RecorderOptions { when_full: WhenFull::Wait, overwrite, ..RecorderOptions::default() };
     let mut recorder = Recorder::create(to, &merged, &options)?;
     for (log_ns, topic, message) in all {
         recorder.push(topic, message, log_ns)?;

@@ -410,6 +410,16 @@ fn u64_at(body: &[u8], at: usize) -> Option<u64> {
 ///
 /// Of a chunk that the file's end cuts off: those that are whole, and no error. Of a chunk that is damaged: none, and the error.
 pub(crate) fn records(path: &Path, frame: &Frame, body: &[u8]) -> (Vec<Record<'static>>, Option<BagError>) {
+    read_records(path, frame, body, true)
+}
+
+/// What can still be read inside a damaged chunk, its checksum aside: all records before the first that breaks off, those left
+/// out that cannot be parsed. Nothing of it can be believed without a second witness.
+pub(crate) fn salvage(path: &Path, frame: &Frame, body: &[u8]) -> Vec<Record<'static>> {
+    read_records(path, frame, body, false).0
+}
+
+fn read_records(path: &Path, frame: &Frame, body: &[u8], strict: bool) -> (Vec<Record<'static>>, Option<BagError>) {
     if frame.opcode != op::CHUNK {
         if frame.cut {
             return (Vec::new(), None);
@@ -428,9 +438,9 @@ pub(crate) fn records(path: &Path, frame: &Frame, body: &[u8]) -> (Vec<Record<'s
     let options = LinearReaderOptions::default()
         .with_skip_start_magic(true)
         .with_skip_end_magic(true)
-        .with_validate_chunk_crcs(!frame.cut)
-        .with_prevalidate_chunk_crcs(!frame.cut)
-        .with_record_length_limit(LARGEST_CHUNK);
+        .with_validate_chunk_crcs(strict && !frame.cut)
+        .with_prevalidate_chunk_crcs(strict && !frame.cut)
+        .with_record_length_limit(if strict { LARGEST_CHUNK } else { body.len().saturating_mul(256).min(LARGEST_CHUNK) });
     let (mut reader, mut source) = (LinearReader::new_with_options(options), head.chain(data));
     let mut found = Vec::new();
     while let Some(event) = reader.next_event() {
@@ -450,11 +460,12 @@ pub(crate) fn records(path: &Path, frame: &Frame, body: &[u8]) -> (Vec<Record<'s
                     found.push(record.into_owned());
                     continue;
                 }
+                Err(_) if !strict => continue,
                 Err(error) => error,
             },
             Err(error) => damaged(format!("chunk: {}", crate::writer::reason(&error))),
         };
-        return if frame.cut { (found, None) } else { (Vec::new(), Some(error)) };
+        return if frame.cut || !strict { (found, None) } else { (Vec::new(), Some(error)) };
     }
     (found, None)
 }

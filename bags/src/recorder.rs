@@ -1,12 +1,12 @@
 //! Records while a graph runs: a bounded queue, and a thread that writes.
 
+use crate::claim::claim;
 use crate::completeness::{Completeness, Tracker};
 use crate::header::BagHeader;
 use crate::order::{Arrived, MOST_HELD, Order, Ordered};
 use crate::writer::{BagWriter, Store, WriteError};
 use crate::{BagError, TopicInfo};
 use backdrive_msgs::Message;
-use std::fs::File;
 use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, TryRecvError, TrySendError, sync_channel};
@@ -43,7 +43,7 @@ pub struct RecorderOptions {
     pub chunk_bytes: u64,
     /// Write in the order (step, topic, sequence) whatever the order of arrival. For a lockstep run.
     pub ordered: bool,
-    /// Replace a file that exists; otherwise it is an error.
+    /// Replace a bag that exists; otherwise it is an error. One that is being written is never replaced.
     pub overwrite: bool,
 }
 
@@ -106,10 +106,11 @@ enum Item {
 impl Recorder {
     /// Starts a bag at `path`. When it returns, header, graph and files are on their way to the disk.
     ///
-    /// Errors: the file exists and may not be overwritten, or cannot be written.
+    /// The file is locked until the bag is finished. Errors: it exists and may not be overwritten, is being written by
+    /// somebody else, or cannot be written.
     pub fn create(path: &Path, header: &BagHeader, options: &RecorderOptions) -> Result<Recorder, BagError> {
-        let file = if options.overwrite { File::create(path) } else { File::create_new(path) };
-        Recorder::to_store(Box::new(file.map_err(BagError::io(path))?), path.display().to_string(), header, options)
+        let file = claim(path, options.overwrite)?;
+        Recorder::to_store(Box::new(file), path.display().to_string(), header, options)
     }
 
     /// Writes to something else than a file; `name` stands in error messages.

@@ -137,7 +137,7 @@ fn bags_of_any_making_are_summed_up_and_read_by_field() {
         let error = signals(&reader, &[Signal::new("x", "/notes", "text")]).expect_err("it is JSON").to_string();
         assert!(error.contains("json"), "{error}");
         let saved = dir.path().join(format!("{name} saved"));
-        assert_eq!(recover(&path, &saved).expect(name).messages, 1_251);
+        assert_eq!(recover(&path, &saved, false).expect(name).messages, 1_251);
         assert_eq!(info(&saved).expect(name).topics, summary.topics);
         let half = std::fs::read(&path).expect("it reads");
         let cut = dir.path().join(format!("{name} cut"));

@@ -69,7 +69,7 @@ fn kill_one(dir: &Path, name: &str) -> bool {
     let summary = info(&path).expect("it is summed up");
     assert!(!summary.ended_cleanly && summary.damage.is_none() && summary.lost == Some(0), "{summary}");
     let saved = dir.join(format!("saved-{name}"));
-    let report = recover(&path, &saved).expect("it is recovered");
+    let report = recover(&path, &saved, false).expect("it is recovered");
     println!("{name}: {} of {} messages", report.messages, 2 * pushed.len());
     let copy = Reader::open(&saved).expect("it opens");
     assert!(copy.ended_cleanly());

@@ -213,7 +213,7 @@ fn a_bag_is_not_overwritten_unless_asked_for() {
     let dir = tempfile::tempdir().expect("a directory");
     let path = dir.path().join("run.mcap");
     std::fs::write(&path, "precious").expect("it writes");
-    assert!(matches!(Recorder::create(&path, &common::header(), &RecorderOptions::default()), Err(BagError::Io { .. })));
+    assert!(matches!(Recorder::create(&path, &common::header(), &RecorderOptions::default()), Err(BagError::Exists { .. })));
     assert_eq!(std::fs::read(&path).expect("it reads"), b"precious");
     assert!(Recorder::create(&path, &common::header(), &RecorderOptions { overwrite: true, ..Default::default() }).is_ok());
 }

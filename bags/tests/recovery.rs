@@ -22,7 +22,7 @@ fn cut_and_recover(dir: &Path, bytes: &[u8], at: usize, all: &[String]) -> usize
     let (cut, saved) = (dir.join("cut.mcap"), dir.join("saved.mcap"));
     std::fs::write(&cut, &bytes[..at]).expect("it writes");
     let _ = std::fs::remove_file(&saved);
-    let report = recover(&cut, &saved).expect("a cut file is recovered");
+    let report = recover(&cut, &saved, false).expect("a cut file is recovered");
     let kept = common::texts(&common::read(&saved));
     assert_eq!(kept, all[..kept.len()], "cut at {at}: what is kept is the beginning, unchanged");
     assert_eq!(report.messages, kept.len() as u64);
@@ -75,7 +75,7 @@ fn graph_and_models_survive() {
     common::record(&path, 1_500);
     let bytes = std::fs::read(&path).expect("it reads");
     std::fs::write(&cut, &bytes[..bytes.len() / 2]).expect("it writes");
-    let report = recover(&cut, &saved).expect("it is recovered");
+    let report = recover(&cut, &saved, false).expect("it is recovered");
     assert_eq!(Reader::open(&saved).expect("it opens").header(), Some(&common::header()));
     assert!(report.completeness.is_some_and(|verdict| verdict.recovered && !verdict.is_complete()));
     assert!(report.last_step.is_some_and(|step| step > 100));
@@ -88,11 +88,11 @@ fn a_clean_bag_is_copied_with_its_verdict() {
     let dir = tempfile::tempdir().expect("a directory");
     let (path, saved) = (dir.path().join("run.mcap"), dir.path().join("saved.mcap"));
     common::record(&path, 300);
-    let report = recover(&path, &saved).expect("it is copied");
+    let report = recover(&path, &saved, false).expect("it is copied");
     assert!(report.was_clean);
     assert_eq!(Reader::open(&saved).expect("it opens").completeness(), Reader::open(&path).expect("it opens").completeness());
     assert_eq!(common::texts(&common::read(&saved)), common::texts(&common::read(&path)));
-    assert!(recover(&path, &saved).is_err(), "a file that exists is not overwritten");
+    assert!(recover(&path, &saved, false).is_err(), "a file that exists is not overwritten");
 }
 
 #[test]
@@ -109,8 +109,12 @@ fn a_damaged_chunk_is_left_out_and_told_with_its_place() {
     let error = Reader::open(&path).expect("it opens").messages().expect("it reads").find_map(Result::err).expect("damage is an error");
     assert!(error.to_string().contains(&format!("byte {from}")), "{error}");
     assert!(info(&path).expect("it is summed up").damage.is_some());
-    let report = recover(&path, &saved).expect("the rest is saved");
+    let report = recover(&path, &saved, false).expect("the rest is saved");
     assert_eq!(report.damaged.len(), 1);
+    let whole = info(&path).is_ok().then(|| Reader::open(&path).expect("it opens").counts().iter().sum::<u64>());
+    assert_eq!(report.expected, whole, "the statistics say how many there were");
+    assert_eq!(report.messages + report.missing.values().sum::<u64>(), whole.expect("it is summed up"));
+    assert!(report.is_lossy());
     assert!(report.damaged[0].contains(&format!("byte {from}")), "{:?}", report.damaged);
     let verdict = report.completeness.expect("it has a verdict");
     assert!(verdict.lost() > 0, "the hole is counted");
@@ -138,7 +142,7 @@ fn any_byte_may_be_wrong() {
         let _ = std::fs::remove_file(&saved);
         // Errors are welcome, panics and endless loops are not.
         let _ = info(&bad);
-        if recover(&bad, &saved).is_ok() {
+        if recover(&bad, &saved, false).is_ok() {
             let copy = Reader::open(&saved).expect("the copy opens");
             assert!(copy.ended_cleanly() && copy.damage().is_empty(), "round {round}: {:?}", copy.damage());
             assert!(copy.messages().expect("it reads").all(|entry| entry.is_ok()), "round {round}");

@@ -2,7 +2,7 @@
 
 use crate::place::{Place, Wire};
 use crate::rundir::RunPaths;
-use backdrive_bags::{BagHeader, Recorder, RecorderOptions, TopicInfo};
+use backdrive_bags::{BagError, BagHeader, Recorder, RecorderOptions, TopicInfo};
 use backdrive_control::core::Core;
 use backdrive_nodes::build::{self, GraphTopic, credit_listeners, listeners_on, topics};
 use backdrive_nodes::graph::{Files, Graph, Node, NodeKind, Overrides};
@@ -79,8 +79,11 @@ where
         }
         let (plan, header) = recording(&graph, name, place.host.as_deref());
         let path = graph.bag_of(place.host.as_deref()).unwrap_or_else(|| PathBuf::from("run.mcap"));
-        return match Recorder::create(&path, &header, &recorder_options(&graph)) {
+        let options = RecorderOptions { overwrite: place.overwrite, ..recorder_options(&graph) };
+        return match Recorder::create(&path, &header, &options) {
             Ok(recorder) => run_recorder(&plan, &graph.timing, transport, Box::new(recorder)),
+            // Another run was faster since the supervisor looked.
+            Err(e @ (BagError::Exists { .. } | BagError::InUse { .. })) => fail(e.to_string(), 3),
             Err(e) => fail(e.to_string(), 5),
         };
     }
@@ -136,13 +139,13 @@ pub fn recording(graph: &Graph, name: &str, host: Option<&str>) -> (RecorderPlan
     (plan, header)
 }
 
-/// How a graph's bag is written. A bag that exists is replaced: a run is asked for by name, and asked for again.
+/// How a graph's bag is written. One that exists is replaced only where the graph was read with leave to do so.
 pub fn recorder_options(graph: &Graph) -> RecorderOptions {
     let options = match graph.timing.clock {
         Clock::Lockstep => RecorderOptions::lockstep(),
         Clock::Realtime => RecorderOptions::default(),
     };
-    RecorderOptions { overwrite: true, ..options }
+    RecorderOptions { overwrite: graph.overwrite, ..options }
 }
 
 /// Name of this machine. A lockstep bag is the same wherever it was made, so it is left out there by the caller's choice of clock.

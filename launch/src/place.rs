@@ -29,6 +29,9 @@ pub struct Place {
     pub network: Network,
     /// Which of the graph's hosts this is.
     pub host: Option<String>,
+    /// Whether a bag that exists may be replaced.
+    #[serde(default)]
+    pub overwrite: bool,
 }
 
 impl Place {

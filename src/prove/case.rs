@@ -128,7 +128,7 @@ pub fn prove(options: &cli::Prove, folder: &Path, drawn: &Draw, stop: &AtomicBoo
         let graph = folder.join(format!("{name}.toml"));
         write(&graph, &graph_of(template.clone(), options, &hidden, nominal, &digest)?)?;
         let (recorded, session) = (folder.join("recorded"), folder.join(name));
-        ours(folder, &format!("run-{name}"), &[&"run", &graph, &"--out", &recorded])?;
+        ours(folder, &format!("run-{name}"), &[&"run", &graph, &"--out", &recorded, &"--overwrite"])?;
         hand_over(&recorded, &session, drawn.shows_hand, options.hand_bandwidth)?;
         Ok::<PathBuf, Failure>(session)
     };

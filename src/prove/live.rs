@@ -94,7 +94,7 @@ pub fn about(
         text["gains"]["lambda"] = value(gain / graph.gains.mu);
         let path = folder.join(format!("{name}.toml"));
         write(&path, &text.to_string())?;
-        let said = ours(folder, &name, &[&"run", &path, &"--json"])?;
+        let said = ours(folder, &name, &[&"run", &path, &"--json", &"--overwrite"])?;
         let json = said.lines().find_map(|line| serde_json::from_str::<Value>(line).ok());
         let outcome = json.and_then(|v| v["outcome"].as_str().map(str::to_string));
         let outcome = outcome.ok_or_else(|| Failure::input(format!("{}: the run does not say what the loop did", path.display())))?;

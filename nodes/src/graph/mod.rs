@@ -51,6 +51,8 @@ pub struct Graph {
     pub stale_after_s: f64,
     /// The bag to record, if there is a recorder.
     pub bag: Option<PathBuf>,
+    /// Whether a bag that exists may be replaced.
+    pub overwrite: bool,
     /// Where nodes run, in the order of the file; empty for a graph that runs on one host.
     pub hosts: Vec<Host>,
     /// In the order of the file.

@@ -33,6 +33,8 @@ pub struct Overrides {
     pub guard: Option<bool>,
     /// The bag.
     pub bag: Option<PathBuf>,
+    /// Whether a bag that exists may be replaced; stands in no text, for it is about this run alone.
+    pub overwrite: bool,
     /// `lockstep` or `realtime`.
     pub clock: Option<String>,
     /// Steps per second.

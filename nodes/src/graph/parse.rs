@@ -94,6 +94,7 @@ impl Graph {
             gains,
             stale_after_s,
             bag: None,
+            overwrite: changes.overwrite,
             hosts: read_hosts(&mut top)?,
             nodes: Vec::new(),
             connections: Vec::new(),
