@@ -140,6 +140,7 @@ pub fn read_recording(path: &Path, model: &Model, columns: &Columns, piece: &Pie
             )));
         }
     }
+    recording.check_units(model).map_err(Failure::input)?;
     recording.regular_for(model).map_err(Failure::input)
 }
 

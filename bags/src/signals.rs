@@ -189,7 +189,7 @@ pub fn recording(
             Some(Source::Column(column)) => (crate::table::topic_of(column), "position[0]".to_owned()),
             None => (crate::table::topic_of(name), "position[0]".to_owned()),
         };
-        let (scale, offset) = rule(name).map_or((1.0, 0.0), |rule| (rule.scale, rule.offset));
+        let (scale, offset) = rule(name).map_or((1.0, 0.0), |rule| (rule.factor(), rule.offset));
         Signal { name: name.to_owned(), topic, field, scale, offset, hold: hold(name) }
     };
     let mut wanted = match names {
@@ -214,7 +214,9 @@ pub fn recording(
         Some((name, _)) if name == "t" => found.pop().map(|(_, t)| t).unwrap_or_default(),
         _ => pick(&table.t),
     };
-    Ok(Recording::new(reader.path().display().to_string(), t, found)?)
+    let units =
+        columns.iter().filter_map(|(signal, rule)| Some((signal.clone(), rule.checked_unit()?))).filter(|(s, _)| s != "t").collect();
+    Ok(Recording { units, ..Recording::new(reader.path().display().to_string(), t, found)? })
 }
 
 fn by_step(series: &[Series], sparse: &[bool], trim: bool, rate_hz: f64, clock: Option<Series>) -> Signals {

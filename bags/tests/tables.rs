@@ -56,7 +56,7 @@ fn a_lost_message_is_a_gap_of_the_recording() {
     let reader = Reader::open(&path).expect("it opens");
     let rule = |topic: &str, field: &str| {
         let source = Source::Topic { topic: topic.to_owned(), field: field.to_owned() };
-        ColumnRule { source, scale: 1.0, offset: 0.0 }
+        ColumnRule::of(source)
     };
     let columns =
         vec![("x".to_owned(), rule("/master/measured_js", "position[0]")), ("f".to_owned(), rule("/master/servo_jf", "effort[0]"))];
@@ -81,14 +81,7 @@ fn what_is_not_there_is_told_with_what_is() {
     let never = recording(
         &reader,
         Some(&["x"]),
-        &vec![(
-            "x".to_owned(),
-            ColumnRule {
-                source: Source::Topic { topic: "/master/measured_js".to_owned(), field: "effort[0]".to_owned() },
-                scale: 1.0,
-                offset: 0.0,
-            },
-        )],
+        &vec![("x".to_owned(), ColumnRule::of(Source::Topic { topic: "/master/measured_js".to_owned(), field: "effort[0]".to_owned() }))],
         &Piece::default(),
         &|_| Hold::Linear,
     );

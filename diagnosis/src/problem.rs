@@ -190,6 +190,7 @@ fn record(set: &RecordingSet, file: &str, model: &Model, unknown: &[Unknown]) ->
     let is_bag = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("mcap"));
     let recording =
         if is_bag { from_bag(&path, model, &set.columns, &rules.piece)? } else { from_csv(&path, model, &set.columns, &rules.piece)? };
+    recording.check_units(model)?;
     Record::knowing(&recording, model, rules.condition, unknown)
 }
 

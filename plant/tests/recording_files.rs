@@ -33,7 +33,7 @@ fn message<T: std::fmt::Debug>(result: Result<T, FileError>) -> String {
 fn reads_by_name_with_other_names_and_units() {
     let text = "time_ms, disp_in ,note, force\n0,1,a,2\n2,2,,3\n5,3,b,4\n";
     let column = |name: &str, heading: &str, scale: f64, offset: f64| {
-        (name.to_string(), ColumnRule { source: Source::Column(heading.into()), scale, offset })
+        (name.to_string(), ColumnRule { scale: Some(scale), offset, ..ColumnRule::of(Source::Column(heading.into())) })
     };
     let columns = vec![column("t", "time_ms", 1e-3, 0.0), column("position", "disp_in", 0.0254, 1.0)];
     let r = read_text(text, Some(&["force", "position"]), &columns, &Piece::default()).unwrap();
@@ -45,6 +45,51 @@ fn reads_by_name_with_other_names_and_units() {
     assert!(r.need_signal("speed").unwrap_err().to_string().ends_with("has no signal \"speed\"; it has force, position"));
     let all = read_text("t,a,b\n0,1,2\n1,3,4\n", None, &Columns::new(), &Piece::default()).unwrap();
     assert_eq!(all.signals, [("a".to_string(), vec![1.0, 3.0]), ("b".to_string(), vec![2.0, 4.0])]);
+}
+
+const MOTOR: &str = "name = 'm'\nmotion = 'rotation'\n[bodies]\nrotor = 1e-4\n[[inputs]]\nname = 'torque'\nkind = 'force'\non = 'rotor'\n\
+                     [[outputs]]\nname = 'angle'\nkind = 'position'\nof = 'rotor'\n";
+
+#[test]
+fn a_heading_may_name_its_unit_and_so_may_a_rule() {
+    let text = "t [ms],angle [deg],torque [mN m],speed [furlong]\n0,0,1000,1\n2,180,2000,2\n4,360,3000,3\n";
+    let r = read_text(text, None, &Columns::new(), &Piece::default()).unwrap();
+    assert_eq!(r.t, [0.0, 0.002, 0.004]);
+    assert!((r.signal("angle").unwrap()[1] - std::f64::consts::PI).abs() < 1e-12);
+    assert_eq!(r.signal("torque").unwrap(), [1.0, 2.0, 3.0]);
+    let model = Model::from_toml(MOTOR, "motor.toml").unwrap();
+    assert_eq!(r.check_units(&model), Ok(()));
+
+    // What a set says goes before what the heading says; a current becomes a torque by its constant, a count an angle by its size.
+    let set = "[columns]\nt = { column = 'time', unit = 'us' }\ntorque = { column = 'i', unit = 'mA', scale = 0.05 }\n\
+               angle = { column = 'encoder', unit = 'counts', scale = 1.5e-3 }\n";
+    let text = "time,i,encoder\n0,1000,0\n100,2000,1000\n200,3000,2000\n";
+    let dir = folder(&[("set.toml", set), ("x.csv", text)]);
+    let set = RecordingSet::open(dir.path()).unwrap();
+    let r = set.read_csv("x.csv", &["torque", "angle"]).unwrap();
+    assert!((r.period - 1e-4).abs() < 1e-15);
+    assert!((r.signal("torque").unwrap()[1] - 0.1).abs() < 1e-15 && (r.signal("angle").unwrap()[1] - 1.5).abs() < 1e-12);
+    assert_eq!(r.check_units(&model), Ok(()));
+}
+
+#[test]
+fn a_unit_that_is_not_known_or_does_not_go_with_the_signal_is_told() {
+    let read = |text: &str| read_text(text, Some(&["torque", "angle"]), &Columns::new(), &Piece::default());
+    let told = message(read("t,torque [furlong],angle\n0,1,2\n1,2,3\n"));
+    assert!(told.starts_with("x.csv:1: torque [furlong]: unknown unit \"furlong\"; known are s, ms"), "{told}");
+    assert!(told.contains("say scale for \"torque\" under [columns]"), "{told}");
+    let told = message(read("t [mm],torque,angle\n0,1,2\n1,2,3\n"));
+    assert_eq!(told, "x.csv:1: t [mm]: is in mm, a length (m), expected a time such as s or ms");
+    let model = Model::from_toml(MOTOR, "motor.toml").unwrap();
+    for (text, unit) in
+        [("t,torque [A],angle\n0,1,2\n1,2,3\n", "in A, a current (A)"), ("t,torque,angle [mm]\n0,1,2\n1,2,3\n", "in mm, a length (m)")]
+    {
+        let told = read(text).unwrap().check_units(&model).unwrap_err().to_string();
+        assert!(told.contains(unit) && told.contains("say scale under [columns]"), "{told}");
+    }
+    let dir = folder(&[("set.toml", "[columns]\nx = { column = 'y', unit = 'mmm' }\n"), ("x.csv", "t,y\n0,1\n1,2\n")]);
+    let told = message(RecordingSet::open(dir.path()));
+    assert!(told.starts_with("set.toml:2: columns.x.unit: unknown unit \"mmm\""), "{told}");
 }
 
 #[test]
@@ -86,7 +131,7 @@ fn wrong_recordings_are_refused_at_their_line() {
         read("time,x\n0,1\n1,1\n"),
         "x.csv:1: unknown column \"t\"; there is time, x ([columns] t = \"...\" says which column it is)"
     );
-    let rule = |source: Source| vec![("y".to_string(), ColumnRule { source, scale: 1.0, offset: 0.0 })];
+    let rule = |source: Source| vec![("y".to_string(), ColumnRule::of(source))];
     let with = |columns: &Columns| message(read_text("t,x\n0,1\n1,1\n", Some(&["y"]), columns, &Piece::default()));
     assert_eq!(with(&rule(Source::Column("xx".into()))), "x.csv:1: [columns] y: unknown column \"xx\"; did you mean \"x\"?");
     assert_eq!(
@@ -155,7 +200,7 @@ condition = { "inputs.position.offset" = "free" }
     assert_eq!((s.fit.len(), s.held_out.as_slice(), s.initial), (2, ["c.csv".to_string()].as_slice(), Initial::Free));
     assert_eq!(s.model, Some(dir.path().join("model.toml")));
     assert_eq!(s.columns[2].1.source, Source::Topic { topic: "/master/servo_jf".into(), field: "effort[0]".into() });
-    assert_eq!((s.columns[2].1.scale, s.columns[2].1.offset), (2.0, 1.0));
+    assert_eq!((s.columns[2].1.scale, s.columns[2].1.offset), (Some(2.0), 1.0));
     assert_eq!(s.columns[3].1.source, Source::Column("speed".into()));
     let rules = s.rules_of("a.csv");
     assert_eq!(rules.piece.rows, Some([10, 20]));

@@ -1,5 +1,6 @@
 //! Where files name things differently, or in other units; and which piece of a file counts.
 
+use super::units::{self, Unit};
 use crate::elements::Range;
 use crate::tomlfile::{FileError, Table};
 
@@ -22,10 +23,30 @@ pub enum Source {
 pub struct ColumnRule {
     /// Where it stands.
     pub source: Source,
-    /// Factor.
-    pub scale: f64,
+    /// The unit of the values; `None` where the rule names none.
+    pub unit: Option<Unit>,
+    /// Factor on the value in SI units of `unit`, or on the bare value. With a factor the kind of the unit is not checked, for it may be a
+    /// motor's constant (N/A) or the size of a count; `None` is 1.
+    pub scale: Option<f64>,
     /// Added after that.
     pub offset: f64,
+}
+
+impl ColumnRule {
+    /// The value as it stands there, from this source.
+    pub fn of(source: Source) -> ColumnRule {
+        ColumnRule { source, unit: None, scale: None, offset: 0.0 }
+    }
+
+    /// Factor from the file's value to SI units.
+    pub fn factor(&self) -> f64 {
+        self.unit.map_or(1.0, |u| u.factor) * self.scale.unwrap_or(1.0)
+    }
+
+    /// The unit whose kind has to go with the signal.
+    pub fn checked_unit(&self) -> Option<Unit> {
+        self.unit.filter(|_| self.scale.is_none())
+    }
 }
 
 /// Rules by signal name (or `t`); a signal without one has a column of its own name.
@@ -59,12 +80,12 @@ impl Cell {
     }
 }
 
-/// Takes the rules of a `[columns]` table: `name = "heading"`, `{ column, scale, offset }` or `{ topic, field, scale, offset }`.
+/// Takes the rules of a `[columns]` table: `name = "heading"`, `{ column, unit, scale, offset }` or `{ topic, field, unit, scale, offset }`.
 pub fn read_columns(mut table: Table) -> Result<Columns, FileError> {
     let mut columns = Columns::new();
     for name in table.keys() {
         let rule = match table.is_string(&name) {
-            true => ColumnRule { source: Source::Column(table.need_string(&name)?), scale: 1.0, offset: 0.0 },
+            true => ColumnRule::of(Source::Column(table.need_string(&name)?)),
             false => match table.is_table(&name) {
                 true => read_rule(&mut table, &name)?,
                 false => {
@@ -91,11 +112,15 @@ fn read_rule(columns: &mut Table, name: &str) -> Result<ColumnRule, FileError> {
         (None, Some(_), None) => return Err(table.missing("field")),
         (None, None, Some(_)) => return Err(table.missing("topic")),
     };
-    let scale = table.number_or("scale", Range::Any, 1.0)?;
-    if scale == 0.0 {
+    let unit = match table.string("unit")? {
+        Some(unit) => Some(units::parse(&unit).map_err(|message| table.error_at("unit", message))?),
+        None => None,
+    };
+    let scale = table.number("scale", Range::Any)?;
+    if scale == Some(0.0) {
         return Err(table.error_at("scale", "must not be 0"));
     }
     let offset = table.number_or("offset", Range::Any, 0.0)?;
     table.finish()?;
-    Ok(ColumnRule { source, scale, offset })
+    Ok(ColumnRule { source, unit, scale, offset })
 }

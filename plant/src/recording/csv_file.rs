@@ -1,5 +1,6 @@
 //! CSV recordings.
 
+use super::units::{self, Kind, Unit};
 use super::{Columns, Piece, Recording, RecordingError, Source};
 use crate::tomlfile::{self, FileError};
 use csv::{ReaderBuilder, StringRecord, Trim};
@@ -10,13 +11,16 @@ struct Wanted {
     signal: String,
     heading: String,
     index: usize,
-    scale: f64,
+    factor: f64,
     offset: f64,
+    /// The unit whose kind has to go with the signal.
+    unit: Option<Unit>,
 }
 
 /// Reads the named signals of a CSV file, or all of its columns where `signals` is `None`.
 ///
-/// The first line is the heading; time is the column `t` unless `columns` says otherwise. Cells of other
+/// The first line is the heading, `name` or `name [unit]`; time is the column `t` unless `columns` says otherwise. A unit that `columns` names
+/// goes before one in the heading, and so does a scale. Samples are in SI units. Cells of other
 /// columns are not looked at. A cell that is no finite number, or a time that does not rise, is an error at its line.
 pub fn read_csv(path: &Path, signals: Option<&[&str]>, columns: &Columns, piece: &Piece) -> Result<Recording, FileError> {
     let name = path.display().to_string();
@@ -29,6 +33,14 @@ pub fn read_csv(path: &Path, signals: Option<&[&str]>, columns: &Columns, piece:
     }
     let file = Headings { name: &name, headings: &headings };
     let time = file.find("t", columns)?;
+    if let Some(unit) = time.unit.filter(|unit| unit.kind != Kind::Time) {
+        return Err(FileError::at(
+            &name,
+            1,
+            &time.heading,
+            format!("is in {}, {}, expected a time such as s or ms", unit.name, unit.kind.text()),
+        ));
+    }
     let wanted = match signals {
         Some(signals) => signals.iter().map(|s| file.find(s, columns)).collect::<Result<Vec<_>, _>>()?,
         None => file.all(columns, &time)?,
@@ -74,8 +86,10 @@ pub fn read_csv(path: &Path, signals: Option<&[&str]>, columns: &Columns, piece:
     if t.is_empty() && !piece.keep.is_empty() {
         return Err(FileError::whole(&name, "no row has the values that where asks for"));
     }
+    let units = wanted.iter().filter_map(|w| Some((w.signal.clone(), w.unit?))).collect();
     let signals = wanted.into_iter().map(|w| w.signal).zip(samples).collect();
-    Recording::new(&name, t, signals).map_err(|e| match e {
+    let recording = Recording::new(&name, t, signals).map(|recording| Recording { units, ..recording });
+    recording.map_err(|e| match e {
         RecordingError::NotRising { index, before, now, .. } => {
             let mut message = format!("time does not rise: {now} s after {before} s");
             if now < before {
@@ -95,7 +109,7 @@ fn number(name: &str, line: usize, record: &StringRecord, column: &Wanted) -> Re
     if !value.is_finite() {
         return Err(wrong(format!("\"{cell}\"; leave such rows out, or give a piece without them with rows")));
     }
-    Ok(value * column.scale + column.offset)
+    Ok(value * column.factor + column.offset)
 }
 
 struct Headings<'a> {
@@ -106,7 +120,10 @@ struct Headings<'a> {
 impl Headings<'_> {
     fn index_of(&self, heading: &str, signal: &str, asked_by: &str) -> Result<usize, FileError> {
         let mut found = self.headings.iter().enumerate().filter(|h| h.1 == heading).map(|h| h.0);
-        match (found.next(), found.next()) {
+        // Without its unit a heading is meant too, where no column is called exactly so.
+        let mut bare = self.headings.iter().enumerate().filter(|h| units::split(h.1).0 == heading).map(|h| h.0);
+        let pair = (found.next(), found.next());
+        match if pair.0.is_some() { pair } else { (bare.next(), bare.next()) } {
             (Some(index), None) => Ok(index),
             (Some(_), Some(_)) => Err(FileError::at(self.name, 1, heading, "two columns have this heading")),
             (None, _) => {
@@ -130,13 +147,20 @@ impl Headings<'_> {
             }
         };
         let asked_by = if rule.is_some() && heading != signal { format!("[columns] {signal}") } else { String::new() };
-        Ok(Wanted {
-            signal: signal.to_string(),
-            heading: heading.to_string(),
-            index: self.index_of(heading, signal, &asked_by)?,
-            scale: rule.map_or(1.0, |r| r.scale),
-            offset: rule.map_or(0.0, |r| r.offset),
-        })
+        let index = self.index_of(heading, signal, &asked_by)?;
+        let heading = self.headings.get(index).unwrap_or(heading).to_string();
+        let (factor, unit) = match rule.filter(|r| r.unit.is_some() || r.scale.is_some()) {
+            Some(rule) => (rule.factor(), rule.checked_unit()),
+            None => {
+                let unit = units::split(&heading).1.map(units::parse).transpose();
+                let unit = unit.map_err(|message| {
+                    FileError::at(self.name, 1, &heading, format!("{message}; or say scale for \"{signal}\" under [columns] of set.toml"))
+                })?;
+                (unit.map_or(1.0, |u| u.factor), unit)
+            }
+        };
+        let offset = rule.map_or(0.0, |r| r.offset);
+        Ok(Wanted { signal: signal.to_string(), heading, index, factor, offset, unit })
     }
 
     /// Every signal that `columns` names, and every other column by its own heading.
@@ -145,10 +169,19 @@ impl Headings<'_> {
         let mut wanted = ruled.map(|s| self.find(s, columns)).collect::<Result<Vec<_>, _>>()?;
         for heading in self.headings {
             let index = self.index_of(heading, heading, "")?;
-            if index != time.index && !wanted.iter().any(|w| w.index == index || w.signal == heading) {
-                let (signal, heading) = (heading.to_string(), heading.to_string());
-                wanted.push(Wanted { signal, heading, index, scale: 1.0, offset: 0.0 });
+            let (name, unit) = units::split(heading);
+            if index == time.index || wanted.iter().any(|w| w.index == index || w.signal == heading) {
+                continue;
             }
+            let heading = heading.to_string();
+            // A column that nobody asked for may be in any unit: where it is not known, the column keeps its whole heading as its name.
+            let known = unit.map(units::parse).transpose().ok().filter(|_| !wanted.iter().any(|w| w.signal == name));
+            wanted.push(match known {
+                Some(unit) => {
+                    Wanted { signal: name.to_string(), heading, index, factor: unit.map_or(1.0, |u| u.factor), offset: 0.0, unit }
+                }
+                None => Wanted { signal: heading.clone(), heading, index, factor: 1.0, offset: 0.0, unit: None },
+            });
         }
         Ok(wanted)
     }

@@ -3,12 +3,14 @@
 mod columns;
 mod csv_file;
 mod hold;
+pub mod units;
 
 pub use columns::{Cell, ColumnRule, Columns, Piece, Source, read_columns};
 pub use csv_file::{read_csv, write_csv};
 pub use hold::{resample, segments};
 
 use crate::model::{Hold, Model};
+use units::Unit;
 
 /// One experiment: signals on one time axis.
 #[derive(Debug, Clone, PartialEq)]
@@ -23,6 +25,8 @@ pub struct Recording {
     pub signals: Vec<(String, Vec<f64>)>,
     /// How regular the time axis is.
     pub jitter: Jitter,
+    /// Units that the file names for its signals, which are in SI units all the same.
+    pub units: Vec<(String, Unit)>,
 }
 
 /// How far a time axis is from a regular grid.
@@ -94,6 +98,22 @@ pub enum RecordingError {
         /// NaN or infinite.
         value: f64,
     },
+    /// The file names a unit that the signal cannot have.
+    #[error(
+        "{name}: \"{signal}\" is in {unit}, {is}; the model's signal is {expected}: name another column or unit, or say scale under [columns]"
+    )]
+    WrongUnit {
+        /// The recording.
+        name: String,
+        /// The signal.
+        signal: String,
+        /// As the file says.
+        unit: &'static str,
+        /// What that measures.
+        is: &'static str,
+        /// What the signal measures.
+        expected: &'static str,
+    },
     /// The recording has no such signal.
     #[error("{name}: has no signal \"{signal}\"; it has {there}")]
     NoSignal {
@@ -107,6 +127,19 @@ pub enum RecordingError {
 }
 
 impl Recording {
+    /// Whether the units that the file names go with the model's signals.
+    ///
+    /// # Errors
+    /// [`RecordingError::WrongUnit`] for the first that does not.
+    pub fn check_units(&self, model: &Model) -> Result<(), RecordingError> {
+        for (signal, unit) in &self.units {
+            let Some(expected) = units::kind_of(model, signal).filter(|kind| *kind != unit.kind) else { continue };
+            let (name, signal) = (self.name.clone(), signal.clone());
+            return Err(RecordingError::WrongUnit { name, signal, unit: unit.name, is: unit.kind.text(), expected: expected.text() });
+        }
+        Ok(())
+    }
+
     /// A recording from samples in SI units; checks what its fields promise and measures the jitter.
     pub fn new(name: impl Into<String>, t: Vec<f64>, signals: Vec<(String, Vec<f64>)>) -> Result<Recording, RecordingError> {
         let name = name.into();
@@ -131,7 +164,7 @@ impl Recording {
         };
         let period = (last - first) / (count - 1) as f64;
         let jitter = Jitter::of(&t, period);
-        Ok(Recording { name, t, period, signals, jitter })
+        Ok(Recording { name, t, period, signals, jitter, units: Vec::new() })
     }
 
     /// Number of samples.

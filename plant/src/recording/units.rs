@@ -1,0 +1,208 @@
+//! Units that recordings come in, as they stand in a heading (`x [mm]`) or in `[columns]` (`unit = "mm"`).
+//!
+//! A table of its own and no crate: the crates for units check them when a program is compiled, and those that read text know either far more
+//! (parsing whole expressions) or not the kinds that a model's signals have.
+
+use crate::model::{InputKind, Model, Motion, OutputKind};
+
+/// What a unit measures.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// s
+    Time,
+    /// m
+    Length,
+    /// rad
+    Angle,
+    /// m/s
+    Speed,
+    /// rad/s
+    AngularSpeed,
+    /// m/s²
+    Acceleration,
+    /// rad/s²
+    AngularAcceleration,
+    /// N
+    Force,
+    /// N m
+    Torque,
+    /// A: a force or a torque only by a motor's constant, as `scale`.
+    Current,
+    /// Counts of an encoder or a converter: a length or a force only by `scale`.
+    Count,
+}
+
+impl Kind {
+    /// In words, with its SI unit.
+    pub fn text(self) -> &'static str {
+        match self {
+            Kind::Time => "a time (s)",
+            Kind::Length => "a length (m)",
+            Kind::Angle => "an angle (rad)",
+            Kind::Speed => "a speed (m/s)",
+            Kind::AngularSpeed => "an angular speed (rad/s)",
+            Kind::Acceleration => "an acceleration (m/s^2)",
+            Kind::AngularAcceleration => "an angular acceleration (rad/s^2)",
+            Kind::Force => "a force (N)",
+            Kind::Torque => "a torque (N m)",
+            Kind::Current => "a current (A)",
+            Kind::Count => "a count",
+        }
+    }
+}
+
+/// A unit: what it measures, and its size in the SI unit of that.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Unit {
+    /// As it is written.
+    pub name: &'static str,
+    /// What it measures.
+    pub kind: Kind,
+    /// Its size in SI units.
+    pub factor: f64,
+}
+
+const TURN: f64 = std::f64::consts::TAU;
+const DEGREE: f64 = TURN / 360.0;
+/// Exact by definition: 1959 international yard and pound, and standard gravity (CGPM 1901).
+const INCH: f64 = 0.0254;
+const POUND: f64 = 0.453_592_37;
+const GRAVITY: f64 = 9.806_65;
+
+const fn unit(name: &'static str, kind: Kind, factor: f64) -> Unit {
+    Unit { name, kind, factor }
+}
+
+/// Every unit that is known. Where one has several spellings the first is the usual one.
+pub const UNITS: &[Unit] = &[
+    unit("s", Kind::Time, 1.0),
+    unit("ms", Kind::Time, 1e-3),
+    unit("us", Kind::Time, 1e-6),
+    unit("ns", Kind::Time, 1e-9),
+    unit("min", Kind::Time, 60.0),
+    unit("m", Kind::Length, 1.0),
+    unit("cm", Kind::Length, 1e-2),
+    unit("mm", Kind::Length, 1e-3),
+    unit("um", Kind::Length, 1e-6),
+    unit("nm", Kind::Length, 1e-9),
+    unit("in", Kind::Length, INCH),
+    unit("rad", Kind::Angle, 1.0),
+    unit("mrad", Kind::Angle, 1e-3),
+    unit("deg", Kind::Angle, DEGREE),
+    unit("rev", Kind::Angle, TURN),
+    unit("m/s", Kind::Speed, 1.0),
+    unit("mm/s", Kind::Speed, 1e-3),
+    unit("cm/s", Kind::Speed, 1e-2),
+    unit("in/s", Kind::Speed, INCH),
+    unit("rad/s", Kind::AngularSpeed, 1.0),
+    unit("deg/s", Kind::AngularSpeed, DEGREE),
+    unit("rev/s", Kind::AngularSpeed, TURN),
+    unit("rpm", Kind::AngularSpeed, TURN / 60.0),
+    unit("m/s^2", Kind::Acceleration, 1.0),
+    unit("mm/s^2", Kind::Acceleration, 1e-3),
+    unit("g", Kind::Acceleration, GRAVITY),
+    unit("rad/s^2", Kind::AngularAcceleration, 1.0),
+    unit("deg/s^2", Kind::AngularAcceleration, DEGREE),
+    unit("N", Kind::Force, 1.0),
+    unit("mN", Kind::Force, 1e-3),
+    unit("kN", Kind::Force, 1e3),
+    unit("lbf", Kind::Force, POUND * GRAVITY),
+    unit("kgf", Kind::Force, GRAVITY),
+    unit("N m", Kind::Torque, 1.0),
+    unit("mN m", Kind::Torque, 1e-3),
+    unit("kN m", Kind::Torque, 1e3),
+    unit("N cm", Kind::Torque, 1e-2),
+    unit("N mm", Kind::Torque, 1e-3),
+    unit("lbf in", Kind::Torque, POUND * GRAVITY * INCH),
+    unit("A", Kind::Current, 1.0),
+    unit("mA", Kind::Current, 1e-3),
+    unit("counts", Kind::Count, 1.0),
+];
+
+/// The unit that a text names: `N*m`, `N.m`, `Nm` and `N·m` are `N m`; `µm` is `um`; `°` is `deg`; `m/s²` and `m/s2` are `m/s^2`.
+///
+/// # Errors
+/// A sentence that lists what is known.
+pub fn parse(text: &str) -> Result<Unit, String> {
+    let plain = |text: &str| -> String {
+        let text = text.replace(['µ', 'μ'], "u").replace("°", "deg").replace('²', "^2").replace("s2", "s^2");
+        text.chars().filter(|c| !c.is_whitespace() && !['*', '.', '·'].contains(c)).collect()
+    };
+    let asked = match text.trim() {
+        "sec" => "s".to_string(),
+        "degrees" | "degree" => "deg".to_string(),
+        "count" | "cts" | "ticks" => "counts".to_string(),
+        other => plain(other),
+    };
+    UNITS.iter().find(|unit| plain(unit.name) == asked).copied().ok_or_else(|| {
+        let known: Vec<&str> = UNITS.iter().map(|u| u.name).collect();
+        format!("unknown unit \"{}\"; known are {}", text.trim(), known.join(", "))
+    })
+}
+
+/// A heading's name and the text of its unit: `x [mm]` is `x` in `mm`; `x []`, `position[0]` and `x` have none.
+pub fn split(heading: &str) -> (&str, Option<&str>) {
+    let parts = heading.strip_suffix(']').and_then(|rest| rest.rsplit_once('['));
+    match parts {
+        Some((name, unit)) if name.ends_with(char::is_whitespace) || unit.parse::<usize>().is_err() => {
+            (name.trim_end(), Some(unit.trim()).filter(|u| !u.is_empty() && *u != "-"))
+        }
+        _ => (heading, None),
+    }
+}
+
+/// What a model's signal, or the time `t`, measures; `None` for what the model does not have.
+pub fn kind_of(model: &Model, signal: &str) -> Option<Kind> {
+    let pick = |translation, rotation| match model.motion {
+        Motion::Translation => translation,
+        Motion::Rotation => rotation,
+    };
+    let force = pick(Kind::Force, Kind::Torque);
+    let position = pick(Kind::Length, Kind::Angle);
+    if let Some(input) = model.inputs.iter().find(|i| i.name == signal) {
+        return Some(if input.kind == InputKind::Force { force } else { position });
+    }
+    model.outputs.iter().find(|o| o.name == signal).map(|output| match output.kind {
+        OutputKind::Position(_) => position,
+        OutputKind::Velocity(_) => pick(Kind::Speed, Kind::AngularSpeed),
+        OutputKind::Acceleration(_) => pick(Kind::Acceleration, Kind::AngularAcceleration),
+        OutputKind::Force(_) | OutputKind::Reaction(_) => force,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn units_are_what_they_are_called() {
+        let size = |text: &str| parse(text).unwrap().factor;
+        assert_eq!((size("ms"), size("mm"), size("rad")), (1e-3, 1e-3, 1.0));
+        // 3000 rpm are 50 turns a second; 180 degrees are pi.
+        assert!((3000.0 * size("rpm") - 50.0 * TURN).abs() < 1e-9 && (180.0 * size("°") - 0.5 * TURN).abs() < 1e-12);
+        // NIST SP 811: 1 lbf = 4.448222 N, 1 lbf in = 0.1129848 N m.
+        assert!((size("lbf") - 4.448_222).abs() < 1e-6 && (size("lbf in") - 0.112_984_8).abs() < 1e-7);
+        for same in ["N m", "Nm", "N*m", "N.m", "N·m"] {
+            assert_eq!(parse(same).unwrap().name, "N m");
+        }
+        assert_eq!((parse("µm").unwrap().name, parse("m/s²").unwrap().name, parse("m/s2").unwrap().name), ("um", "m/s^2", "m/s^2"));
+        let told = parse("furlong").unwrap_err();
+        assert!(told.starts_with("unknown unit \"furlong\"; known are s, ms"), "{told}");
+    }
+
+    #[test]
+    fn no_two_units_read_alike() {
+        for unit in UNITS {
+            assert_eq!(parse(unit.name).unwrap(), *unit);
+        }
+    }
+
+    #[test]
+    fn a_heading_is_a_name_and_perhaps_a_unit() {
+        assert_eq!(split("t [ms]"), ("t", Some("ms")));
+        assert_eq!(split("tau[N m]"), ("tau", Some("N m")));
+        assert_eq!(split("x []"), ("x", None));
+        assert_eq!(split("position[0]"), ("position[0]", None));
+        assert_eq!(split("x"), ("x", None));
+    }
+}
