@@ -1,10 +1,13 @@
 //! CycloneDDS and Fast DDS on the other host: they hear every topic, they are heard, and how long a sample takes beside Cyclone to Cyclone.
 
 mod netns;
+#[path = "common/skipped.rs"]
+mod skipped;
 
 use backdrive_bags::Reader;
 use netns::Hosts;
 use serde_json::Value;
+use skipped::skipped;
 use std::ffi::OsString;
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -21,7 +24,7 @@ fn python() -> Option<OsString> {
     }
     let why = "BACKDRIVE_PYTHON is not set: it names a Python that has tests/python/requirements.txt";
     assert!(std::env::var("BACKDRIVE_REQUIRE_PYTHON").as_deref() != Ok("1"), "{why}");
-    eprintln!("SKIPPED: {why}");
+    skipped(why);
     None
 }
 
@@ -161,12 +164,12 @@ fn fast_dds_hears_every_topic_of_a_run_and_publishes_it_for_us() {
     let built = Command::new("c++").args(["-std=c++17", "-O1", "-o"]).arg(&peer).arg(&source).args(["-lfastrtps", "-lfastcdr"]).output();
     let hint = "on Debian: apt install g++ libfastrtps-dev";
     match built {
-        Err(e) => return eprintln!("SKIPPED: Fast DDS: there is no C++ compiler ({hint}): {e}"),
+        Err(e) => return skipped(format_args!("Fast DDS: there is no C++ compiler ({hint}): {e}")),
         Ok(built) if !built.status.success() => {
             let why = String::from_utf8_lossy(&built.stderr);
             let there = Path::new("/usr/include/fastdds/dds/domain/DomainParticipant.hpp").exists();
             assert!(!there, "Fast DDS is there and {} is not built: {why}", source.display());
-            return eprintln!("SKIPPED: Fast DDS is not here ({hint}): {}", why.lines().next().unwrap_or_default());
+            return skipped(format_args!("Fast DDS is not here ({hint}): {}", why.lines().next().unwrap_or_default()));
         }
         Ok(_) => {}
     }

@@ -1,6 +1,8 @@
 //! Sessions: from a bag of ours, and the same run in the dress of other people's recordings.
 
 mod common;
+#[path = "common/skipped.rs"]
+mod skipped;
 
 use backdrive_bags::{BagHeader, Clock, Reader, Recorder, RecorderOptions, TopicInfo};
 use backdrive_msgs::{Message, Sample, flag};
@@ -12,6 +14,7 @@ use backdrive_stability::roles::Roles;
 use backdrive_stability::session::Session;
 use backdrive_stability::transparency::transparency;
 use mcap::records::MessageHeader;
+use skipped::skipped;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -548,7 +551,7 @@ fn python() -> Option<PathBuf> {
     }
     let why = "BACKDRIVE_PYTHON is not set: it names a Python that has tests/python/requirements.txt";
     assert!(std::env::var_os("BACKDRIVE_REQUIRE_PYTHON").is_none_or(|required| required != "1"), "{why}");
-    eprintln!("skipped: {why}");
+    skipped(why);
     None
 }
 

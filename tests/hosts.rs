@@ -1,11 +1,14 @@
 //! Graphs on two hosts, which here are two network namespaces.
 
 mod netns;
+#[path = "common/skipped.rs"]
+mod skipped;
 
 use backdrive_bags::{CLOCK_OFFSET, ClockOffset, DiffOptions, Reader, diff};
 use backdrive_msgs::Message;
 use netns::{ADDRESSES, Hosts, Link};
 use serde_json::Value;
+use skipped::skipped;
 use std::io::Read;
 use std::ops::{Deref, DerefMut};
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
@@ -399,7 +402,7 @@ fn a_wall_clock_that_is_stepped_by_a_minute_stops_nobody() {
         std::fs::write(&offset, 0_i64.to_ne_bytes()).unwrap();
         let built = Command::new("cc").args(["-shared", "-fPIC", "-O1", "-o"]).arg(&library).arg(&source).status();
         if !built.is_ok_and(|s| s.success()) {
-            return eprintln!("SKIPPED: there is no C compiler to make a clock that can be stepped");
+            return skipped("there is no C compiler to make a clock that can be stepped");
         }
         // Longer than the ten seconds after which a participant says again that it is there: its first word may be lost.
         let desk = run_on(&hosts, 0, folder.path(), &["--duration", "24"]);

@@ -1,10 +1,13 @@
 //! `backdrive prove`: the seal, what the bags do not tell, and that the diagnosis does not need the truth.
 
+#[path = "common/skipped.rs"]
+mod skipped;
 mod system;
 
 use backdrive_bags::Reader;
 use backdrive_plant::model::Model;
 use sha2::{Digest, Sha256};
+use skipped::skipped;
 use std::path::{Path, PathBuf};
 use system::{Place, file};
 
@@ -12,7 +15,7 @@ use system::{Place, file};
 fn hidden_plant() -> Option<PathBuf> {
     let path = Path::new(env!("CARGO_BIN_EXE_backdrive")).with_file_name("backdrive-sealed");
     if !path.is_file() {
-        println!("skipped: there is no {}; cargo build -p backdrive-sealed makes it", path.display());
+        skipped(format_args!("there is no {}; cargo build -p backdrive-sealed makes it", path.display()));
     }
     Some(path).filter(|p| p.is_file())
 }

@@ -3,6 +3,10 @@
 //! `BACKDRIVE_PYTHON` names a Python that has `tests/python/requirements.txt`; `tests/run` makes one. Without it these are
 //! skipped, unless `BACKDRIVE_REQUIRE_PYTHON=1`. The independent simulator is looked for in `../shared/concealed`.
 
+#[path = "common/skipped.rs"]
+mod skipped;
+
+use skipped::skipped;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -13,7 +17,7 @@ fn python() -> Option<PathBuf> {
     }
     let why = "BACKDRIVE_PYTHON is not set: it names a Python that has tests/python/requirements.txt";
     assert!(std::env::var_os("BACKDRIVE_REQUIRE_PYTHON").is_none_or(|required| required != "1"), "{why}");
-    eprintln!("skipped: {why}");
+    skipped(why);
     None
 }
 
@@ -60,7 +64,7 @@ fn agrees_with_the_independent_simulator() {
     if folder.join("core.py").exists() {
         run("independent_simulator.py", &[&folder]);
     } else {
-        eprintln!("skipped: the independent simulator is not at {}", folder.display());
+        skipped(format_args!("the independent simulator is not at {}", folder.display()));
     }
 }
 

@@ -4,9 +4,12 @@
 //! skipped, unless `BACKDRIVE_REQUIRE_PYTHON=1`.
 
 mod common;
+#[path = "../../tests/common/skipped.rs"]
+mod skipped;
 
 use backdrive_bags::{Reader, recover};
 use serde_json::{Value, json};
+use skipped::skipped;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -17,7 +20,7 @@ fn python() -> Option<PathBuf> {
     }
     let why = "BACKDRIVE_PYTHON is not set: it names a Python with mcap, mcap-ros2-support, rosbags and numpy";
     assert!(std::env::var_os("BACKDRIVE_REQUIRE_PYTHON").is_none_or(|required| required != "1"), "{why}");
-    eprintln!("skipped: {why}");
+    skipped(why);
     None
 }
 

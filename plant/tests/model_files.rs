@@ -1,9 +1,13 @@
 //! Model files: what is read, what is written, and how the wrong ones are refused.
 
+#[path = "../../tests/common/skipped.rs"]
+mod skipped;
+
 use backdrive_plant::elements::{Damper, Law, Spring};
 use backdrive_plant::model::{Fragment, Hold, InputKind, Model, OutputKind};
 use backdrive_plant::parse::ModelFile;
 use backdrive_plant::write::{Edit, ElementSpec, PatchError, Value, patch, round_significant};
+use skipped::skipped;
 use std::path::{Path, PathBuf};
 
 fn here(folder: &str) -> PathBuf {
@@ -108,7 +112,7 @@ fn every_file_of_ours_reads_and_round_trips() {
 fn every_concealed_case_reads_and_round_trips() {
     let dev = here("../../shared/concealed/dev");
     let Ok(cases) = std::fs::read_dir(&dev) else {
-        eprintln!("skipped: no concealed cases beside the workspace");
+        skipped("no concealed cases beside the workspace");
         return;
     };
     for case in cases {

@@ -1,9 +1,13 @@
 //! Recordings and sets: what is read, and how the wrong ones are refused.
 
+#[path = "../../tests/common/skipped.rs"]
+mod skipped;
+
 use backdrive_plant::model::{Hold, Model};
 use backdrive_plant::recording::{Cell, ColumnRule, Columns, Piece, Recording, Source, read_csv, signals_of, write_csv};
 use backdrive_plant::set::{Condition, Initial, RecordingSet};
 use backdrive_plant::tomlfile::FileError;
+use skipped::skipped;
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
 
@@ -277,7 +281,7 @@ fn wrong_sets_are_refused() {
 fn every_concealed_set_reads() {
     let shared: PathBuf = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared");
     let Ok(cases) = std::fs::read_dir(shared.join("concealed/dev")) else {
-        eprintln!("skipped: no concealed cases beside the workspace");
+        skipped("no concealed cases beside the workspace");
         return;
     };
     for (count, case) in cases.enumerate() {

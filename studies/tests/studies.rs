@@ -1,9 +1,13 @@
 //! Each study where its recordings are: what it names, and its figures with margins. Where they are not, a message and nothing else.
 //! The short parts; with BACKDRIVE_STUDIES=1 whole studies, which take up to a quarter of an hour together.
 
+#[path = "../../tests/common/skipped.rs"]
+mod skipped;
+
 use backdrive_studies::data::Data;
 use backdrive_studies::table::Report;
 use backdrive_studies::{StudyError, study_named};
+use skipped::skipped;
 use std::sync::Mutex;
 
 /// One after the other: each search uses all processors, and counts what the process computes.
@@ -25,7 +29,7 @@ fn report(name: &str) -> Option<Report> {
             Some(report)
         }
         Err(StudyError::NoData(message)) => {
-            println!("skipped {message}");
+            skipped(message);
             None
         }
         Err(error) => panic!("{error}"),
@@ -80,7 +84,7 @@ fn emps() {
 #[test]
 fn emps_from_its_published_models() {
     if !long() {
-        println!("skipped: BACKDRIVE_STUDIES=1 asks for it");
+        skipped("BACKDRIVE_STUDIES=1 asks for it");
         return;
     }
     let Some(report) = report("emps") else { return };

@@ -3,9 +3,12 @@
 #![allow(dead_code)] // each test program uses its own part
 
 mod relay;
+#[path = "../common/skipped.rs"]
+mod skipped;
 
 pub use relay::{Link, Relay};
 
+use skipped::skipped;
 use std::path::Path;
 use std::process::{Command, Output};
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -45,7 +48,7 @@ impl Hosts {
             Ok(()) => Some(hosts),
             Err(why) => {
                 assert!(std::env::var("BACKDRIVE_REQUIRE_NETNS").as_deref() != Ok("1"), "network namespaces cannot be made: {why}");
-                eprintln!("SKIPPED: network namespaces cannot be made here: {why}");
+                skipped(format_args!("network namespaces cannot be made here: {why}"));
                 None
             }
         }
