@@ -25,7 +25,8 @@ pub(crate) struct Signals {
 }
 
 impl Signals {
-    /// Signals that were ignored, as under nohup, stay ignored.
+    /// Signals that were ignored, as under nohup, stay ignored; not SIGINT, which shells have their background jobs ignore: whoever sends
+    /// it to a run means it.
     pub fn watch() -> Result<Signals, LaunchError> {
         let mut watching = WATCHING.lock().unwrap_or_else(PoisonError::into_inner);
         if watching.0 == 0 {
@@ -34,7 +35,7 @@ impl Signals {
                 // SAFETY: the handler only adds to an atomic number.
                 let before = unsafe { sigaction(signal, &action) }
                     .map_err(|e| LaunchError::Runtime { what: signal.as_str(), reason: e.to_string() })?;
-                if matches!(before.handler(), SigHandler::SigIgn) {
+                if signal != Signal::SIGINT && matches!(before.handler(), SigHandler::SigIgn) {
                     // SAFETY: puts back what was there.
                     let _ = unsafe { sigaction(signal, &before) };
                 } else {

@@ -28,15 +28,19 @@ pub struct ProcessOptions {
     pub realtime: realtime::Options,
 }
 
-/// Time from the supervisor's death, or a stop, to the end of a process whose loop does not end by itself.
-const GRACE: Duration = Duration::from_secs(3);
+/// Time from a stop to the end of a process whose loop does not end by itself; for a recorder, which has a file to close, from the supervisor's
+/// death too.
+pub(crate) const GRACE: Duration = Duration::from_secs(3);
+
+/// Time from the supervisor's death to the end of a node whose loop does not end by itself.
+const ORPHANED: Duration = Duration::from_millis(700);
 
 /// Runs a node as this process until its steps are done, the supervisor stops it or is gone, or it fails.
 /// The last line that it says is `done` or `failed`; the exit code is 0 or that of the failure.
 ///
 /// `listeners` names how many listeners each topic has in the graph: the node is ready when they are all there.
 pub fn run_process(plan: NodePlan, timing: &Timing, transport: Box<dyn Transport>, options: ProcessOptions) -> ExitCode {
-    let line = Line::open();
+    let line = Line::open(ORPHANED);
     let timing = timing.clone();
     line.supervised(|line| {
         let mut runner = Runner::new(plan, &timing, transport, options.run)?;
@@ -77,8 +81,8 @@ extern "C" fn on_terminate(_: i32) {
 }
 
 impl Line {
-    /// Starts to listen and to talk.
-    pub fn open() -> Line {
+    /// Starts to listen and to talk; a process whose loop does not end by itself ends `orphaned` after the supervisor.
+    pub fn open(orphaned: Duration) -> Line {
         // An interrupt from the keyboard goes to the whole group; the supervisor stops us in order.
         // SAFETY: the handlers do nothing but store to an atomic.
         unsafe {
@@ -98,12 +102,12 @@ impl Line {
             read_lines(&reader, &to_start);
             drop(to_start);
             reader.stop();
-            std::thread::sleep(GRACE);
+            std::thread::sleep(orphaned);
             // The loop is stuck in a step: better gone than an orphan.
             std::process::exit(5);
         });
         let watched = Arc::clone(&control);
-        std::thread::spawn(move || watch(&watched));
+        std::thread::spawn(move || watch(&watched, orphaned));
         Line { control, start, out, writer: Mutex::new(Some(writer)) }
     }
 
@@ -206,13 +210,14 @@ fn read_lines(control: &Control, start: &SyncSender<Start>) {
 }
 
 /// Stops the loop on SIGTERM, or when the parent has died while something else still holds our standard input open.
-fn watch(control: &Control) {
+fn watch(control: &Control, orphaned: Duration) {
     let parent = nix::unistd::getppid();
     while !control.is_stopped() {
         std::thread::sleep(Duration::from_millis(100));
-        if TERMINATED.load(Ordering::SeqCst) || nix::unistd::getppid() != parent {
+        let alone = nix::unistd::getppid() != parent;
+        if TERMINATED.load(Ordering::SeqCst) || alone {
             control.stop();
-            std::thread::sleep(GRACE);
+            std::thread::sleep(if alone { orphaned } else { GRACE });
             std::process::exit(5);
         }
     }

@@ -5,7 +5,7 @@
 //! is ever lost. In real time the buffers cover the time between two polls many times over, and a hole is counted.
 
 use crate::clock::now_ns;
-use crate::process::Line;
+use crate::process::{GRACE, Line};
 use crate::protocol::NodeStatus;
 use crate::runner::{Report, RunError, Told};
 use crate::sentences::sentence;
@@ -263,7 +263,7 @@ impl Recording {
 /// Records as this process until every topic has reached its last step, or the supervisor says stop (see [`crate::process::run_process`]).
 /// The exit code is 4 when messages were lost.
 pub fn run_recorder(plan: &RecorderPlan, timing: &Timing, transport: Box<dyn Transport>, sink: Box<dyn Sink>) -> ExitCode {
-    Line::open().supervised(|line| {
+    Line::open(GRACE).supervised(|line| {
         let mut recording = Recording::new(plan, timing, transport, sink)?;
         let Some(_start) = line.meet(|| recording.missing()) else {
             return recording.finish();
