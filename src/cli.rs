@@ -7,6 +7,8 @@ use std::path::PathBuf;
 /// Run force-reflecting telerobots, record them, and ask whether they are stable.
 ///
 /// Results go to standard output, everything else to standard error.
+/// What is written is named alike in every verb: --bag a bag, --csv a table, --html a page, --out what else a verb makes (a model, a folder);
+/// --json prints the result for programs.
 /// Exit codes: 0 fine; 1 the finding is negative (not stable, bags differ); 2 usage; 3 bad input;
 /// 4 data was lost; 5 this machine does not let it (shared memory, disk, permission); 6 a node failed;
 /// 7 it cannot be told; 130 interrupted.
@@ -25,7 +27,7 @@ const STABILITY_HELP: &str = "Examples:
   backdrive stability push-and-hold.mcap --gain 1 --canceller plant/models/impulse-engine.toml --canceller-grip plant/grips/normal.toml
   backdrive stability session/ --roles roles.toml --gain 1
 
-Exit codes: 0 stable, 1 not, 7 it cannot be told.";
+Exit codes: 0 stable, 1 not, 2 usage, 3 the bag or a file is wrong, 5 the report cannot be written, 7 it cannot be told, 130 interrupted.";
 
 const DIAGNOSE_HELP: &str = "Examples:
   backdrive run launch/identify.toml --out identify
@@ -35,18 +37,22 @@ const DIAGNOSE_HELP: &str = "Examples:
 
 Writes verdict.json, model.diagnosed.toml, report.html and time.txt. Ctrl-C ends the search and writes what was found until then.
 
-Exit codes: 0 nothing is missing (numbers may be off), 1 something is missing, unexplained or ambiguous, 7 it cannot be told.";
+Exit codes: 0 nothing is missing (numbers may be off), 1 something is missing, unexplained or ambiguous, 2 usage,
+3 a recording or the model is wrong, 5 a file cannot be written, 7 it cannot be told, 130 interrupted.";
 
 const FIT_HELP: &str = "Examples:
   backdrive fit model.toml set/ --out model.fitted.toml
   backdrive fit model.toml sweep.csv steps.csv --json
 
-Exit codes: 0 fitted, 1 the records disagree: the structure is not the device's.";
+Exit codes: 0 fitted, 1 the records disagree: the structure is not the device's; 2 usage; 3 a recording or the model is wrong;
+5 the model cannot be written; 130 interrupted.";
 
 const TEST_BENCH_HELP: &str = "Example:
   backdrive run launch/engine-test-bench-identify.toml --out bench --transport inproc
   backdrive test-bench bench/unfired.mcap bench/map.mcap bench/lag.mcap --dragged bench/unfired-other.mcap --cycle bench/validation.mcap \\
-    --engine-inertia 0.9 --stiffness 2e4 --power 240e3 --out identified";
+    --engine-inertia 0.9 --stiffness 2e4 --power 240e3 --out identified
+
+Exit codes: 0 identified, 2 usage, 3 a bag does not hold what is needed, 5 the folder cannot be written.";
 
 /// The verbs.
 #[derive(Debug, Subcommand)]
@@ -78,15 +84,21 @@ pub enum Command {
     #[command(after_help = TEST_BENCH_HELP)]
     TestBench(TestBench),
     /// Check a graph file; errors point at the line.
-    #[command(after_help = "Example:\n  backdrive check launch/contact.toml")]
+    #[command(
+        after_help = "Example:\n  backdrive check launch/contact.toml\n\nExit codes: 0 fine, 2 usage, 3 the graph or a file that it names is wrong."
+    )]
     Check(Graph),
     /// Draw a graph.
-    #[command(after_help = "Example:\n  backdrive graph launch/contact.toml")]
+    #[command(
+        after_help = "Example:\n  backdrive graph launch/contact.toml\n\nExit codes: 0 drawn, 2 usage, 3 the graph is wrong, 5 standard output cannot be written."
+    )]
     Graph(Graph),
     /// Run a model on a recording, a set of recordings, or a named excitation.
     #[command(after_help = "Examples:
   backdrive simulate plant/models/impulse-engine.toml sweep:amplitude=2,from=1,to=200,duration=10 --out sweep.csv
-  backdrive simulate model.toml recording.csv --out predicted.csv")]
+  backdrive simulate model.toml recording.csv --out predicted.csv
+
+Exit codes: 0 simulated, 2 usage, 3 a file is wrong, 5 the prediction cannot be written.")]
     Simulate(Simulate),
     /// Look at a model file.
     #[command(subcommand)]
@@ -95,17 +107,37 @@ pub enum Command {
     #[command(subcommand)]
     Bag(Bag),
     /// Remove what dead runs left in shared memory and on disk; live runs are not touched.
-    #[command(after_help = "Example:\n  backdrive clean")]
+    #[command(
+        after_help = "Example:\n  backdrive clean\n\nExit codes: 0 removed, or nothing to remove; 2 usage; 5 something could not be removed."
+    )]
     Clean,
     /// Put the topics of a local graph on ROS 2, and take what other hosts tell from there.
-    #[command(after_help = "Example:\n  backdrive run launch/contact.toml --clock realtime &\n  backdrive bridge --domain 7")]
+    #[command(
+        after_help = "Example:\n  backdrive run launch/contact.toml --clock realtime &\n  backdrive bridge --domain 7\n\nExit codes: 0 carried until the run ended, 2 usage, 3 no run is alive or several are, 4 messages were lost, 5 the network does not let it."
+    )]
     Bridge(Bridge),
     /// Say what of this machine would hurt a run: shared memory, real-time rights, timers, multicast, socket buffers.
-    #[command(after_help = "Example:\n  backdrive doctor --interface eth0")]
+    #[command(
+        after_help = "Example:\n  backdrive doctor --interface eth0\n\nExit codes: 0 runs work here, 2 usage, 3 no such interface, 5 something is bad."
+    )]
     Doctor(Doctor),
     /// Conceal effects in a master, find them from the bags of a session, and show what that is worth on the graph.
     #[command(after_help = PROVE_EXAMPLE)]
     Prove(Prove),
+    /// Print what a shell needs to complete this program's verbs and options.
+    #[command(after_help = "Examples:
+  backdrive completions bash > ~/.local/share/bash-completion/completions/backdrive
+  backdrive completions zsh > ~/.zfunc/_backdrive
+  backdrive completions fish > ~/.config/fish/completions/backdrive.fish
+
+Exit codes: 0 done, 2 usage, 5 standard output cannot be written.")]
+    Completions(Completions),
+    /// Write manual pages: one for this program and one for every verb.
+    #[command(after_help = "Example:
+  backdrive man --out ~/.local/share/man/man1 && man backdrive-run
+
+Exit codes: 0 done, 2 usage, 5 the folder cannot be written.")]
+    Man(Man),
     /// One node of a running graph; the supervisor starts it.
     #[command(hide = true)]
     Node(Node),
@@ -289,9 +321,25 @@ pub struct Network {
     /// Name or address of a network interface to use; may be given again. All without.
     #[arg(long, value_name = "NAME")]
     pub interface: Vec<String>,
-    /// Address of a host to tell by unicast, where there is no multicast; may be given again.
-    #[arg(long, value_name = "ADDRESS")]
-    pub peer: Vec<std::net::Ipv4Addr>,
+    /// Address (IPv4) or name of a host to tell by unicast, where there is no multicast; may be given again.
+    #[arg(long, value_name = "HOST")]
+    pub peer: Vec<String>,
+}
+
+/// `backdrive completions`
+#[derive(Debug, Args)]
+pub struct Completions {
+    /// The shell.
+    #[arg(value_enum)]
+    pub shell: clap_complete::Shell,
+}
+
+/// `backdrive man`
+#[derive(Debug, Args)]
+pub struct Man {
+    /// Folder for the pages; made if it is not there.
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
 }
 
 /// `backdrive bridge`
@@ -559,7 +607,7 @@ pub struct Simulate {
     #[arg(long)]
     pub overwrite: bool,
     /// Where the prediction goes, as CSV; for a set a folder.
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, alias = "csv", value_name = "FILE")]
     pub out: PathBuf,
     /// Grip or environment to attach at the model's user's body.
     #[arg(long, value_name = "FILE")]
@@ -588,10 +636,14 @@ pub struct Simulate {
 #[derive(Debug, Subcommand)]
 pub enum Model {
     /// Print the network, its modes and its frequency response.
-    #[command(after_help = "Example:\n  backdrive model show plant/models/impulse-engine.toml --grip plant/grips/normal.toml")]
+    #[command(
+        after_help = "Example:\n  backdrive model show plant/models/impulse-engine.toml --grip plant/grips/normal.toml\n\nExit codes: 0 shown, 2 usage, 3 a file is wrong or too large to look at, 5 standard output cannot be written."
+    )]
     Show(ModelFile),
     /// Check a model file; errors point at the line.
-    #[command(after_help = "Example:\n  backdrive model check plant/models/impulse-engine.toml")]
+    #[command(
+        after_help = "Example:\n  backdrive model check plant/models/impulse-engine.toml\n\nExit codes: 0 fine, 2 usage, 3 the file is wrong, or holds nothing that moves."
+    )]
     Check(ModelFile),
 }
 
@@ -615,7 +667,9 @@ pub struct ModelFile {
 #[derive(Debug, Subcommand)]
 pub enum Bag {
     /// What is in a bag, and whether it is complete.
-    #[command(after_help = "Example:\n  backdrive bag info contact.mcap")]
+    #[command(
+        after_help = "Example:\n  backdrive bag info contact.mcap\n\nExit codes: 0 whole, 2 usage, 3 cannot be read, 4 damaged, cut off or with losses."
+    )]
     Info {
         /// The bag; any MCAP file.
         bag: PathBuf,
@@ -624,13 +678,15 @@ pub enum Bag {
         json: bool,
     },
     /// CSV recordings into a bag.
-    #[command(after_help = "Example:\n  backdrive bag import sweep.csv --bag sweep.mcap")]
+    #[command(
+        after_help = "Example:\n  backdrive bag import sweep.csv --bag sweep.mcap\n\nExit codes: 0 imported, 2 usage, 3 a table is wrong or the bag exists, 5 the bag cannot be written."
+    )]
     Import {
         /// CSV files with a column `t`, s.
         #[arg(required = true)]
         csv: Vec<PathBuf>,
         /// The new bag; of several CSV files the folder in which each becomes one.
-        #[arg(long, value_name = "FILE")]
+        #[arg(long, alias = "out", value_name = "FILE")]
         bag: PathBuf,
         /// Replace a bag that exists.
         #[arg(long)]
@@ -640,12 +696,14 @@ pub enum Bag {
         map: Vec<String>,
     },
     /// A bag's signals as CSV.
-    #[command(after_help = "Example:\n  backdrive bag export contact.mcap --csv contact.csv")]
+    #[command(
+        after_help = "Example:\n  backdrive bag export contact.mcap --csv contact.csv\n\nExit codes: 0 exported, 2 usage, 3 the bag is wrong or the table exists, 5 the table cannot be written."
+    )]
     Export {
         /// The bag.
         bag: PathBuf,
         /// The CSV file.
-        #[arg(long, value_name = "FILE")]
+        #[arg(long, alias = "out", value_name = "FILE")]
         csv: PathBuf,
         /// Replace a file that exists.
         #[arg(long)]
@@ -655,26 +713,30 @@ pub enum Bag {
         topic: Vec<String>,
     },
     /// What can be saved of a bag that was cut off.
-    #[command(after_help = "Example:\n  backdrive bag recover contact.mcap --bag saved.mcap")]
+    #[command(
+        after_help = "Example:\n  backdrive bag recover contact.mcap --bag saved.mcap\n\nExit codes: 0 all was saved, 2 usage, 3 it is no bag or the copy exists, 4 something was lost, 5 the copy cannot be written."
+    )]
     Recover {
         /// The damaged bag; it is not changed.
         damaged: PathBuf,
         /// The new bag.
-        #[arg(long, value_name = "FILE")]
+        #[arg(long, alias = "out", value_name = "FILE")]
         bag: PathBuf,
         /// Replace a bag that exists.
         #[arg(long)]
         overwrite: bool,
     },
     /// One bag from those that two hosts recorded of the same run.
-    #[command(after_help = "Example:\n  backdrive bag merge contact-desk.mcap contact-robot.mcap --bag contact.mcap")]
+    #[command(
+        after_help = "Example:\n  backdrive bag merge contact-desk.mcap contact-robot.mcap --bag contact.mcap\n\nExit codes: 0 merged, 2 usage, 3 a bag is wrong or the new one exists, 4 messages are missing, 5 the bag cannot be written."
+    )]
     Merge {
         /// One bag; its clock is kept.
         a: PathBuf,
         /// The other.
         b: PathBuf,
         /// The new bag.
-        #[arg(long, value_name = "FILE")]
+        #[arg(long, alias = "out", value_name = "FILE")]
         bag: PathBuf,
         /// Replace a bag that exists.
         #[arg(long)]
@@ -687,7 +749,9 @@ pub enum Bag {
         json: bool,
     },
     /// Publish a bag's messages again, verbatim and at their times.
-    #[command(after_help = "Example:\n  backdrive bag play contact.mcap --speed 0.5")]
+    #[command(
+        after_help = "Example:\n  backdrive bag play contact.mcap --speed 0.5\n\nExit codes: 0 played, 2 usage, 3 the bag is wrong, 5 shared memory does not let it, 130 interrupted."
+    )]
     Play {
         /// The bag.
         bag: PathBuf,
@@ -696,7 +760,9 @@ pub enum Bag {
         speed: f64,
     },
     /// Where two bags part; exit code 1 if they do.
-    #[command(after_help = "Example:\n  backdrive bag diff a.mcap b.mcap --tolerance /master/measured_js=1e-6")]
+    #[command(
+        after_help = "Example:\n  backdrive bag diff a.mcap b.mcap --tolerance /master/measured_js=1e-6\n\nExit codes: 0 the same, 1 they differ, 2 usage, 3 a bag cannot be read."
+    )]
     Diff {
         /// One bag.
         a: PathBuf,
@@ -733,7 +799,8 @@ The hidden plant is a program of its own: `cargo build --release --workspace` pu
 first: its SHA-256 is printed before anything is recorded, and only that program opens it until the verdict is written. Of several cases
 every fifth conceals nothing, and in every second one nobody measures the hand; its search may take 2.5 times as long. Each case has a
 folder: sealed/, session/ (bags and set), diagnosis/, and logs; proof.json and proof.html are about all of them.
-Exit code 0 when all was found by family and place and nothing where nothing was, 1 when not.";
+Exit code 0 when all was found by family and place and nothing where nothing was, 1 when not, 2 usage, 3 a file is wrong,
+5 a file cannot be written, 6 a node failed, 130 interrupted.";
 
 /// `backdrive prove`
 #[derive(Debug, Args)]

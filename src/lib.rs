@@ -27,6 +27,7 @@ pub mod recordings;
 mod replay;
 mod run;
 mod set_checks;
+mod shell;
 mod simulate;
 mod stability;
 mod stability_page;
@@ -64,6 +65,8 @@ pub fn main() -> ExitCode {
         Command::Bridge(options) => bridge::bridge(&options),
         Command::Doctor(options) => doctor::doctor(&options),
         Command::Prove(options) => prove::prove(&options),
+        Command::Completions(options) => shell::completions(&options),
+        Command::Man(options) => shell::man(&options),
         Command::Node(options) => return node::node(&options),
         Command::SealedMaster(options) => return prove::sealed_master(&options),
     };

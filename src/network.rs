@@ -5,6 +5,7 @@ use crate::failure::Failure;
 use backdrive_launch::{Place, Wire};
 use backdrive_nodes::graph::Graph;
 use backdrive_nodes::transport::ros2::{MAX_DOMAIN, Network};
+use std::net::{Ipv4Addr, ToSocketAddrs};
 
 /// The domain of `--domain` or `ROS_DOMAIN_ID`, and the interfaces and peers that are named.
 pub fn network(options: &cli::Network) -> Result<Network, Failure> {
@@ -16,8 +17,27 @@ pub fn network(options: &cli::Network) -> Result<Network, Failure> {
     for interface in &options.interface {
         network.add_interface(interface).map_err(|e| Failure::input(format!("--interface: {e}")))?;
     }
-    network.peers.clone_from(&options.peer);
+    network.peers = options.peer.iter().map(|name| address(name)).collect::<Result<_, _>>()?;
     Ok(network)
+}
+
+/// The IPv4 address of a host. RTPS, over which the nodes meet, is spoken over IPv4 only.
+fn address(name: &str) -> Result<Ipv4Addr, Failure> {
+    if let Ok(address) = name.parse() {
+        return Ok(address);
+    }
+    let only = "nodes meet over IPv4 only: name an IPv4 address of that host (on it: `ip -4 address`)";
+    if name.trim_matches(['[', ']']).parse::<std::net::Ipv6Addr>().is_ok() {
+        return Err(Failure::input(format!("--peer {name}: is an IPv6 address, and {only}")));
+    }
+    let found = (name, 0).to_socket_addrs().map_err(|e| {
+        Failure::input(format!("--peer {name}: no host of that name is found ({e}); check its spelling, or name its IPv4 address"))
+    })?;
+    let first = found.into_iter().find_map(|found| match found.ip() {
+        std::net::IpAddr::V4(address) => Some(address),
+        std::net::IpAddr::V6(_) => None,
+    });
+    first.ok_or_else(|| Failure::input(format!("--peer {name}: has IPv6 addresses only, and {only}")))
 }
 
 /// Where the nodes of a graph meet, on one of its hosts if one is named.

@@ -1,7 +1,46 @@
-//! Progress bars: on standard error, and only where that is a terminal.
+//! Progress on standard error: bars where that is a terminal, else a line every 5 s of what takes longer.
 
+use crate::output;
 use indicatif::{ProgressBar, ProgressState, ProgressStyle};
 use std::fmt::Write;
+use std::io::IsTerminal;
+use std::time::Duration;
+
+/// Time between two lines where there is no terminal.
+const EVERY: Duration = Duration::from_secs(5);
+
+/// Tells of a bar until it is finished or gone, where standard error is no terminal to draw it on. `line` says how far it is.
+fn tell(bar: &ProgressBar, line: impl Fn(&ProgressBar) -> String + Send + 'static) {
+    if std::io::stderr().is_terminal() {
+        return;
+    }
+    let weak = bar.downgrade();
+    std::thread::spawn(move || {
+        loop {
+            std::thread::sleep(EVERY);
+            match weak.upgrade().filter(|bar| !bar.is_finished()) {
+                Some(bar) => output::note(line(&bar)),
+                None => return,
+            }
+        }
+    });
+}
+
+fn counted(bar: &ProgressBar) -> String {
+    let (done, all) = (bar.position(), bar.length().unwrap_or(0));
+    format!("{}: {done} of {all}, after {:.0} s", bar.message(), bar.elapsed().as_secs_f64())
+}
+
+/// Does what may take long and tells no steps; a line says that it goes on.
+pub fn busy<T>(title: &str, work: impl FnOnce() -> T) -> T {
+    let bar = ProgressBar::new_spinner();
+    bar.set_message(title.to_string());
+    bar.enable_steady_tick(Duration::from_millis(100));
+    tell(&bar, |bar| format!("{}: {:.0} s", bar.message(), bar.elapsed().as_secs_f64()));
+    let result = work();
+    bar.finish_and_clear();
+    result
+}
 
 /// A bar that counts steps.
 pub fn steps(total: u64, title: &str) -> ProgressBar {
@@ -13,6 +52,7 @@ pub fn steps(total: u64, title: &str) -> ProgressBar {
         bar.set_style(style.with_key("rate", rate));
     }
     bar.set_message(title.to_string());
+    tell(&bar, counted);
     bar
 }
 
@@ -22,6 +62,7 @@ pub fn work() -> ProgressBar {
     if let Ok(style) = ProgressStyle::with_template("{msg:28!} {wide_bar} {pos} of {len}, {eta} left") {
         bar.set_style(style);
     }
+    tell(&bar, counted);
     bar
 }
 
@@ -35,6 +76,7 @@ pub fn at_most<T>(limit: std::time::Duration, work: impl FnOnce(&(dyn Fn(&str) +
         };
         bar.set_style(style.with_key("elapsed_of", of));
     }
+    tell(&bar, move |bar| format!("{}: {:.0} s, at most {:.0} s", bar.message(), bar.elapsed().as_secs_f64(), limit.as_secs_f64()));
     let done = std::sync::atomic::AtomicBool::new(false);
     let result = std::thread::scope(|scope| {
         scope.spawn(|| {

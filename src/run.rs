@@ -260,7 +260,7 @@ impl Done {
         lines.push(format!("ran      {} steps in {:.3} s{rate}", self.steps, self.duration_s));
         if let Some(report) = &self.report {
             if let (Some(p50), Some(p99), Some(node)) = (report.loop_p50_us, report.loop_p99_us, &report.loop_node) {
-                lines.push(format!("timing   {node}: p50 {p50:.1} us, p99 {p99:.1} us; {} missed deadlines", report.missed_deadlines));
+                lines.push(format!("timing   {node}: p50 {p50:.1} us, p99 {p99:.1} us; {}", missed(report, self.steps)));
             }
             if report.cause != Cause::Completed {
                 lines.push(format!("ended    {}", report.cause));
@@ -318,6 +318,23 @@ impl Done {
             "run": report,
         })
     }
+}
+
+/// Share of a node's steps that may miss their deadline before it is worth a word of advice.
+const MANY_MISSED: f64 = 1e-3;
+
+/// How many deadlines were missed, by whom most, and what helps where they are many.
+fn missed(report: &RunReport, steps: u64) -> String {
+    let Some((node, most)) = &report.latest_node else { return "0 missed deadlines".to_string() };
+    let all = report.missed_deadlines;
+    let whose = if *most == all { format!("by {node}") } else { format!("in all nodes, {most} of them by {node}") };
+    let advice = match (*most as f64) > MANY_MISSED * steps as f64 {
+        true => {
+            "\n         that is many: `backdrive doctor` says what this machine lacks (real-time rights, timers); else a lower --rate, or fewer programs beside the run"
+        }
+        false => "",
+    };
+    format!("{all} missed deadlines {whose}{advice}")
 }
 
 /// Removes what dead runs left.

@@ -23,7 +23,7 @@ pub fn test_bench(options: &cli::TestBench) -> Result<u8, Failure> {
     let record = |path: &Path| Record::of_bag(path).map_err(bad);
     let (unfired, map, steps) = (record(&options.unfired)?, record(&options.map)?, record(&options.lag)?);
     let asked = asked(options, &steps);
-    let found = identify(&asked, &unfired, &map, &steps).map_err(bad)?;
+    let found = crate::progress::busy("identifying the bench", || identify(&asked, &unfired, &map, &steps)).map_err(bad)?;
     let validation = match (&options.dragged, &options.cycle) {
         (Some(dragged), Some(cycle)) => Some(validate(&found.bench, &asked.observation, &record(dragged)?, &record(cycle)?).map_err(bad)?),
         _ => None,

@@ -32,6 +32,9 @@ pub struct RunReport {
     pub loop_p99_us: Option<f64>,
     /// Steps that ended after their deadline, over all nodes.
     pub missed_deadlines: u64,
+    /// The node that missed most of them, if one missed any, and how many.
+    #[serde(default)]
+    pub latest_node: Option<(String, u64)>,
     /// Samples that a node other than the recorder did not get.
     pub lost: u64,
     /// Messages that the recorder did not get; `None` without a recorder.

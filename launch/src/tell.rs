@@ -146,6 +146,12 @@ impl Supervisor {
         (slot.map(|s| s.plan.name.clone()), status.map(|t| t.loop_p50_us), status.map(|t| t.loop_p99_us))
     }
 
+    fn latest_node(&self) -> Option<(String, u64)> {
+        let missed = |s: &Slot| s.status.as_ref().map_or(0, |t| t.missed_deadlines);
+        let slot = self.slots.iter().filter(|s| !s.plan.records && missed(s) > 0).max_by_key(|s| missed(s))?;
+        Some((slot.plan.name.clone(), missed(slot)))
+    }
+
     /// What is known when all have ended.
     pub fn report(&mut self) -> RunReport {
         let now = Instant::now();
@@ -176,6 +182,7 @@ impl Supervisor {
             loop_p50_us,
             loop_p99_us,
             missed_deadlines,
+            latest_node: self.latest_node(),
             lost,
             unrecorded: recorder.map(|s| s.lost),
             bag: self.plan.bag.clone(),

@@ -1,0 +1,126 @@
+//! The command line itself: what it says of its exit codes, what shells and `man` get of it, and settings that cannot be meant.
+
+mod system;
+
+use std::process::{Command, Stdio};
+use system::{Place, file};
+
+/// Every verb that a person can give, as the words that name it.
+const VERBS: &[&[&str]] = &[
+    &["run"],
+    &["replay"],
+    &["stability"],
+    &["diagnose"],
+    &["fit"],
+    &["test-bench"],
+    &["check"],
+    &["graph"],
+    &["simulate"],
+    &["model", "show"],
+    &["model", "check"],
+    &["bag", "info"],
+    &["bag", "import"],
+    &["bag", "export"],
+    &["bag", "recover"],
+    &["bag", "merge"],
+    &["bag", "play"],
+    &["bag", "diff"],
+    &["clean"],
+    &["bridge"],
+    &["doctor"],
+    &["prove"],
+    &["completions"],
+    &["man"],
+];
+
+#[test]
+fn every_help_says_what_the_exit_codes_mean() {
+    let place = Place::new();
+    for verb in VERBS {
+        let done = place.backdrive(&[verb, &["--help"][..]].concat());
+        assert_eq!(done.code, Some(0), "{verb:?}: {done:?}");
+        assert!(done.stdout.contains("Exit code"), "{verb:?}: {}", done.stdout);
+    }
+}
+
+#[test]
+fn bash_completes_verbs_and_options_with_what_completions_prints() {
+    let place = Place::new();
+    let done = place.backdrive(&["completions", "bash"]);
+    assert_eq!(done.code, Some(0), "{done:?}");
+    let script = place.write("completions.bash", &done.stdout);
+    let asked = format!(
+        "source {}; COMP_WORDS=(backdrive stab); COMP_CWORD=1; _backdrive backdrive stab backdrive; echo ${{COMPREPLY[@]}}; \
+         COMP_WORDS=(backdrive stability --ht); COMP_CWORD=2; _backdrive backdrive --ht stability; echo ${{COMPREPLY[@]}}",
+        script.display()
+    );
+    let bash = Command::new("bash").args(["--norc", "-c", &asked]).stdin(Stdio::null()).output().unwrap();
+    assert_eq!(String::from_utf8_lossy(&bash.stdout), "stability\n--html\n", "{bash:?}");
+    for shell in ["zsh", "fish"] {
+        let done = place.backdrive(&["completions", shell]);
+        assert!(done.code == Some(0) && done.stdout.contains("stability"), "{shell}: {done:?}");
+    }
+}
+
+#[test]
+fn man_writes_a_page_for_every_verb() {
+    let place = Place::new();
+    let done = place.backdrive(&["man", "--out", "man1"]);
+    assert_eq!(done.code, Some(0), "{done:?}");
+    for verb in VERBS {
+        let page = place.path("man1").join(format!("backdrive-{}.1", verb.join("-")));
+        let text = std::fs::read_to_string(&page).unwrap_or_else(|e| panic!("{}: {e}", page.display()));
+        assert!(text.contains(".TH") && text.contains("Exit code"), "{}", page.display());
+    }
+    assert!(place.path("man1/backdrive.1").exists());
+    assert!(!place.path("man1/backdrive-sealed-master.1").exists(), "what the supervisor starts is no verb of a person");
+}
+
+#[test]
+fn what_cannot_be_meant_is_refused_with_what_to_do() {
+    let place = Place::new();
+    let (graph, grip) = (file("launch/contact.toml"), file("plant/grips/normal.toml"));
+    place.write("empty.toml", "");
+    let bodies: String = (0..10_000).map(|i| format!("b{i} = 1.0\n")).collect();
+    place.write("huge.toml", &format!("name = \"huge\"\n[bodies]\n{bodies}"));
+    let cases: &[(&[&str], &[&str])] = &[
+        (&["run", &graph, "--transport", "inproc", "--lambda", "1e300"], &["lambda", "1e300", "at most 1e6"]),
+        (&["run", &graph, "--transport", "inproc", "--mu", "1e300"], &["mu", "at most 1e6"]),
+        (&["run", &graph, "--transport", "inproc", "--environment", &grip], &["is a grip", "--grip"]),
+        (&["model", "check", "empty.toml"], &["empty.toml", "has no [bodies]"]),
+        (&["model", "show", "huge.toml"], &["10000 bodies", "at most 300"]),
+        (&["doctor", "--listen", "0", "--peer", "::1"], &["::1", "IPv4 only"]),
+        (&["doctor", "--listen", "0", "--peer", "no-such-host.invalid"], &["no-such-host.invalid", "no host of that name"]),
+    ];
+    for (verb, says) in cases {
+        let done = place.backdrive(verb);
+        assert_eq!(done.code, Some(3), "{verb:?}: {done:?}");
+        for text in *says {
+            assert!(done.stderr.contains(text), "{verb:?} does not say \"{text}\": {}", done.stderr);
+        }
+    }
+    let named = place.backdrive(&["doctor", "--listen", "0", "--peer", "localhost"]);
+    assert!(named.code != Some(2) && named.code != Some(3), "{named:?}");
+}
+
+#[test]
+fn an_interrupt_ends_a_run_that_a_shell_has_put_into_the_background() {
+    let place = Place::new();
+    let mut command = Command::new("bash");
+    // Without job control a shell has its background jobs ignore interrupts.
+    let script = format!(
+        "{} run {} --clock realtime --duration 30 --bag b.mcap & P=$!; sleep 3; kill -INT $P; for i in $(seq 50); do kill -0 $P 2>/dev/null || break; sleep 0.1; done; \
+         if kill -0 $P 2>/dev/null; then kill -9 $P; echo deaf; else wait $P; echo code $?; fi",
+        env!("CARGO_BIN_EXE_backdrive"),
+        file("launch/contact.toml")
+    );
+    let like = place.command("true");
+    command.args(["--norc", "-c", &script]).current_dir(like.get_current_dir().unwrap_or(std::path::Path::new(".")));
+    for (name, value) in like.get_envs() {
+        if let Some(value) = value {
+            command.env(name, value);
+        }
+    }
+    let done = command.stdin(Stdio::null()).output().unwrap();
+    assert_eq!(String::from_utf8_lossy(&done.stdout).lines().last(), Some("code 130"), "{done:?}");
+}
