@@ -1,13 +1,11 @@
 //! CycloneDDS and Fast DDS on the other host: they hear every topic, they are heard, and how long a sample takes beside Cyclone to Cyclone.
 
 mod netns;
-#[path = "common/skipped.rs"]
-mod skipped;
 
 use backdrive_bags::Reader;
 use netns::Hosts;
+use netns::skipped::skipped;
 use serde_json::Value;
-use skipped::skipped;
 use std::ffi::OsString;
 use std::io::Read;
 use std::path::{Path, PathBuf};

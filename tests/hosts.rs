@@ -1,14 +1,12 @@
 //! Graphs on two hosts, which here are two network namespaces.
 
 mod netns;
-#[path = "common/skipped.rs"]
-mod skipped;
 
 use backdrive_bags::{CLOCK_OFFSET, ClockOffset, DiffOptions, Reader, diff};
 use backdrive_msgs::Message;
+use netns::skipped::skipped;
 use netns::{ADDRESSES, Hosts, Link};
 use serde_json::Value;
-use skipped::skipped;
 use std::io::Read;
 use std::ops::{Deref, DerefMut};
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};

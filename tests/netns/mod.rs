@@ -4,7 +4,7 @@
 
 mod relay;
 #[path = "../common/skipped.rs"]
-mod skipped;
+pub mod skipped;
 
 pub use relay::{Link, Relay};
 
