@@ -85,6 +85,9 @@ pub fn stability(options: &cli::Stability) -> Result<u8, Failure> {
     })
 }
 
+/// Gain products that can be asked about. Beyond them the rounding of forces and positions decides, not the loop.
+const SENSIBLE: [f64; 2] = [1e-6, 1e6];
+
 /// What a bag holds.
 struct Loaded {
     session: Session,
@@ -107,6 +110,9 @@ impl Loaded {
             let roles = Roles::load(roles)?;
             let session = Session::from_roles(path, &roles).map_err(Failure::input)?;
             return Ok(Loaded { session, recorded: None, asked: None, intents: None });
+        }
+        if path.is_dir() {
+            return Err(Failure::input(which_bag(path)));
         }
         let reader = Reader::open(path).map_err(Failure::input)?;
         let hint = |f: Failure| Failure { message: format!("{}; a bag that we did not record needs --roles FILE", f.message), ..f };
@@ -158,6 +164,16 @@ impl Loaded {
                 gain.product()
             )));
         }
+        if !(SENSIBLE[0]..=SENSIBLE[1]).contains(&gain.product()) {
+            return Err(Failure::input(format!(
+                "mu*lambda = {:e} is beyond any sense: gains from {:e} to {:e} can be asked about, and edges are looked for from {:e} to {}",
+                gain.product(),
+                SENSIBLE[0],
+                SENSIBLE[1],
+                Search::default().floor,
+                Search::default().highest
+            )));
+        }
         let script = options.script.as_deref().map(Script::from_graph).transpose()?;
         let search = Search::default();
         Ok(Question {
@@ -184,6 +200,22 @@ impl Loaded {
         let mu = median(&self.session.mu).or(graph.map(|g| g.0)).unwrap_or(1.0);
         let lambda = median(&self.session.lambda).or(graph.map(|g| g.1)).unwrap_or(1.0);
         Gain { mu: if mu == 0.0 { 1.0 } else { mu }, lambda }
+    }
+}
+
+/// What of a folder to name.
+fn which_bag(folder: &std::path::Path) -> String {
+    let entries = std::fs::read_dir(folder).into_iter().flatten().filter_map(|e| e.ok().map(|e| e.path()));
+    let mut bags: Vec<String> = entries.filter(|p| p.extension().is_some_and(|e| e == "mcap")).map(|p| p.display().to_string()).collect();
+    bags.sort();
+    let name = folder.display();
+    match &bags[..] {
+        [] => format!("{name}: is a folder without a bag; name the .mcap file of a run"),
+        [one] => format!("{name}: is a folder; name the bag in it, {one}, or with --roles FILE the folder as a rosbag2 recording"),
+        [first, rest @ ..] => format!(
+            "{name}: is a folder of {} bags; name one of them, such as {first}, or with --roles FILE the folder as a rosbag2 recording",
+            rest.len() + 1
+        ),
     }
 }
 
@@ -266,18 +298,33 @@ fn text(found: &Answer) -> String {
                 Some(_) => ", where it runs away without oscillating".to_string(),
                 None => String::new(),
             };
-            line("edge", format!("mu*lambda = {critical:.3}{ci}{hz}{recorded}"));
+            let by = found.decided_by.as_deref().map_or(String::new(), |by| format!(", by {by}"));
+            line("edge", format!("mu*lambda = {critical:.3}{ci}{hz}{by}{recorded}"));
         }
         (None, Some(least)) => line("edge", format!("none up to mu*lambda = {least:.3}{recorded}")),
         _ => {}
     }
-    if let Some(m) = &found.margins {
-        let of = |value: Option<f64>, unit: &str| value.map_or("unlimited".to_string(), |v| format!("{v:.2} {unit}"));
+    let gain_db = found.gain_margin_db();
+    let at_least = found.at_least.filter(|_| found.critical_gain.is_none()).map(|least| 20.0 * (least / gain.product()).log10());
+    let of = |value: Option<f64>, unit: &str| value.map_or("unlimited".to_string(), |v| format!("{v:.2} {unit}"));
+    let to_edge = match (gain_db, at_least) {
+        (Some(db), _) => Some(format!("gain {db:.2} dB to the edge")),
+        (None, Some(db)) if db > 0.0 => Some(format!("gain at least {db:.2} dB")),
+        _ => None,
+    };
+    // Margins of another edge than the one told would contradict it.
+    let measured = found.margins.as_ref().filter(|_| found.margins_are_of_the_edge());
+    if measured.is_none()
+        && let Some(to_edge) = &to_edge
+    {
+        line("margins", to_edge.clone());
+    }
+    if let Some(m) = measured {
         line(
             "margins",
             format!(
-                "gain {}, phase {}, delay {}, modulus {:.3} (measured)",
-                of(m.gain_db, "dB"),
+                "{}, phase {}, delay {}, modulus {:.3} (measured)",
+                to_edge.unwrap_or_else(|| "gain not known".to_string()),
                 of(m.phase_deg, "deg"),
                 of(m.delay_ms, "ms"),
                 m.modulus
@@ -295,6 +342,7 @@ fn text(found: &Answer) -> String {
                 .iter()
                 .map(|g| match g.edge.critical_gain {
                     Some(gain) => format!("x{}: {gain:.2}", g.scale),
+                    None if g.edge.at_least == 0.0 => format!("x{}: not known", g.scale),
                     None => format!("x{}: above {:.2}", g.scale, g.edge.at_least),
                 })
                 .collect();

@@ -116,7 +116,7 @@ impl Outcome {
 
     /// How bad it is, for several axes: the worst counts. An axis that touched nothing says nothing of one that did, but one of which
     /// something is missing takes a green answer from all.
-    fn rank(&self) -> u8 {
+    pub(crate) fn rank(&self) -> u8 {
         match self {
             Outcome::NotJudged { why } if !why.is_loss() => 0,
             Outcome::Stable => 1,
@@ -150,6 +150,8 @@ impl std::fmt::Display for Outcome {
     }
 }
 
+/// An oscillation whose last quarter is larger than its first by this factor grows.
+const GROWS: f64 = 1.5;
 /// Slower than this is the hand moving, not the loop oscillating, Hz.
 const LOWEST_HZ: f64 = 8.0;
 /// The first part of a hold is the transient of getting there, s.
@@ -182,7 +184,8 @@ pub fn judge(trace: &Trace) -> Outcome {
     if clamped_share > 0.01 || beyond_travel {
         return Outcome::Limited { clamped_share, beyond_travel };
     }
-    let judged = Outcome::worst(holds(trace).into_iter().filter_map(|(from, to)| judge_hold(trace, from, to)));
+    let pieces = holds(trace).into_iter().flat_map(|hold| of_one_level(trace, hold));
+    let judged = Outcome::worst(pieces.filter_map(|(from, to)| judge_hold(trace, from, to)));
     let fault = trace.gaps.fault(trace.position.len(), trace.period_s);
     let nothing = || match contact.is_empty() {
         _ if trace.position.is_empty() => Unjudged::Empty,
@@ -201,6 +204,53 @@ fn judge_hold(trace: &Trace, from: usize, to: usize) -> Option<Outcome> {
     // The edges of a slow wandering have lines at every frequency, the strongest of them at the lowest.
     let spills_over = found.frequency_hz < 1.5 * LOWEST_HZ && slow != Outcome::Stable;
     Some(if fast == Outcome::Stable || spills_over { slow } else { fast })
+}
+
+/// The frequency at which a run oscillated, Hz: of the strongest oscillation while the hand held still, or on the way out of all bounds; 0 where it
+/// ran away without oscillating.
+pub fn frequency_hz(trace: &Trace) -> f64 {
+    let pieces = holds(trace).into_iter().filter_map(|(from, to)| oscillation(&trace.position[from..to], trace.period_s, LOWEST_HZ));
+    let strongest = pieces.filter(|o| judge_fast(o, trace) != Outcome::Stable).max_by(|a, b| a.amplitude.total_cmp(&b.amplitude));
+    if let Some(found) = strongest {
+        return found.frequency_hz;
+    }
+    let span = trace.travel.map_or(1.0, |[low, high]| high - low);
+    let from = trace.contact.iter().position(|f| *f != 0.0).unwrap_or(0).min(trace.position.len());
+    let bounded: Vec<f64> = trace.position[from..].iter().copied().take_while(|x| x.is_finite() && x.abs() <= 10.0 * span).collect();
+    if bounded.len() == trace.position.len() - from || bounded.len() < 2 {
+        return 0.0;
+    }
+    // The last half of the way out: half a period lies between two of its turns.
+    let last = &bounded[bounded.len() / 2..];
+    let largest = last.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+    let turns = turns(last, 1e-3 * largest);
+    if turns < 3 { 0.0 } else { turns as f64 / (2.0 * last.len() as f64 * trace.period_s) }
+}
+
+/// Pieces of a hold in which the dither keeps its level: one whose level rises makes the master move more, which is no growth of the loop's.
+fn of_one_level(trace: &Trace, (from, to): (usize, usize)) -> Vec<(usize, usize)> {
+    let window = ((SEGMENT_S / trace.period_s) as usize).max(1);
+    let Some(dither) = trace.dither.get(from..to).filter(|d| d.len() >= 2 * window && d.iter().any(|f| *f != 0.0)) else {
+        return vec![(from, to)];
+    };
+    let rms = |piece: &[f64]| (piece.iter().map(|f| f * f).sum::<f64>() / piece.len() as f64).sqrt();
+    let (transient, least) = ((TRANSIENT_S / trace.period_s) as usize, (LEAST_HOLD_S / trace.period_s) as usize);
+    let mut pieces = Vec::new();
+    let (mut start, mut level) = (from, rms(&dither[..window]));
+    for (index, piece) in dither.chunks_exact(window).enumerate().skip(1) {
+        let now = rms(piece);
+        // As much as an oscillation must grow to count.
+        if now > GROWS * level || level > GROWS * now {
+            let at = from + index * window;
+            // The step may lie anywhere in the window before or in this one.
+            pieces.push((start, at.saturating_sub(window)));
+            (start, level) = (at + transient, now);
+        }
+    }
+    pieces.push((start, to));
+    // A single window may hold the step itself.
+    pieces.retain(|(from, to)| *to >= from + least + window);
+    pieces
 }
 
 /// Where a dither plays: the share of the motion's power that it does not explain, 0 to 1.
@@ -277,7 +327,7 @@ fn turns(signal: &[f64], least: f64) -> usize {
 
 fn judge_fast(found: &Oscillation, trace: &Trace) -> Outcome {
     let floor = LEAST_AMPLITUDE.max(4.0 * trace.resolution) + NOISE * trace.noise;
-    let grows = found.amplitude > 1.5 * found.amplitude_before && found.growth_per_s > 0.2;
+    let grows = found.amplitude > GROWS * found.amplitude_before && found.growth_per_s > 0.2;
     let dies = found.amplitude < 0.7 * found.amplitude_before && found.growth_per_s < -0.2;
     if found.amplitude <= floor || dies {
         Outcome::Stable
@@ -371,6 +421,24 @@ mod tests {
         assert!((frequency_hz - 5.0 / (2.0 * std::f64::consts::PI)).abs() < 0.2, "{frequency_hz}");
         assert_eq!(judge(&trace(|t| 0.005 + 1e-3 * (-4.0 * t).exp())), Outcome::Stable);
         let Outcome::Unstable { .. } = judge(&trace(|t| 0.005 + 1e-5 * (2.0 * t).exp())) else { panic!() };
+    }
+
+    #[test]
+    fn a_dither_whose_level_rises_is_no_growth_of_the_loop() {
+        let level = |t: f64| {
+            if t < 0.7 {
+                0.15
+            } else if t < 1.4 {
+                0.4
+            } else {
+                1.0
+            }
+        };
+        // Friction takes more of a small force, so that no one response explains all levels.
+        let moved = |t: f64| 0.005 + 1e-4 * (level(t) - 0.1) * (sine(t - 0.003 * level(t)) + sine(1.7 * t));
+        let mut shaken = trace(moved);
+        shaken.dither = (0..10_000).map(|i| f64::from(i) * 2e-4).map(|t| level(t) * (sine(t) + sine(1.7 * t))).collect();
+        assert_eq!(judge(&shaken), Outcome::Stable);
     }
 
     #[test]

@@ -6,11 +6,15 @@
 //!   physics that the models leave out.
 //! - Where neither tells, it cannot be told, and the answer says what to record.
 //!
+//! The method that leads gives the reason; the headline (verdict, edge, frequency) is then the least favourable of all that counts: see
+//! [`crate::headline`]. A recording that is cut short, has holes in it or never touched anything gives no green answer, whatever a method says.
+//!
 //! Energy never leads: passivity is enough for stability, and not needed for it.
 
 use crate::collect::way;
 use crate::energy::{EnergyAnswer, EnergyVerdict, energy};
 use crate::frequency::{self, CannotTell, Frequency, FrequencyAnswer, FrequencyError, Parts};
+use crate::headline::Witness;
 use crate::model_check::{PartCheck, check};
 use crate::outcome::{Outcome, Trace, judge};
 use crate::phases::contacts;
@@ -214,6 +218,10 @@ pub struct Answer {
     pub advice: Option<String>,
     /// What in the recording keeps a green answer back; `None` where nothing does, or the answer was not green.
     pub held_back: Option<Unjudged>,
+    /// Everything that counted, the method that leads first.
+    pub witnesses: Vec<Witness>,
+    /// Whose edge and frequency the headline has.
+    pub decided_by: Option<String>,
 }
 
 /// Why there is no answer at all.
@@ -455,6 +463,8 @@ impl Answer {
             disagreements: Vec::new(),
             warnings,
             held_back: None,
+            witnesses: Vec::new(),
+            decided_by: None,
         }
     }
 
@@ -495,6 +505,8 @@ impl Answer {
             }
             _ => self.untold("there is no loop to run again, and the recording holds no excitation that tells the loop"),
         }
+        self.least_favourable();
+        self.name_the_edge();
         self.by_the_recording();
         self.hold_back();
         // Where the loop was not measured at all, how to measure it is worth saying even beside a verdict.
@@ -517,11 +529,7 @@ impl Answer {
             Some(critical) => {
                 self.critical_gain = Some(critical);
                 self.critical_gain_ci95 = self.interval_about(critical);
-                self.critical_frequency_hz = match edge.outcome_beyond {
-                    Some(Outcome::LimitCycle { frequency_hz, .. }) => Some(frequency_hz),
-                    _ => self.frequency_answer.as_ref().and_then(|a| a.frequency_hz),
-                };
-                self.reason += &format!("; the edge lies at mu*lambda = {critical:.3}");
+                self.critical_frequency_hz = edge.frequency_hz;
             }
             None => {
                 self.at_least = Some(edge.at_least);
@@ -531,7 +539,7 @@ impl Answer {
     }
 
     /// The interval of a re-simulated edge: as wide as the recording leaves the loop near its crossover uncertain.
-    fn interval_about(&self, critical: f64) -> Option<(f64, Option<f64>)> {
+    pub(crate) fn interval_about(&self, critical: f64) -> Option<(f64, Option<f64>)> {
         let frequency = self.frequency.as_ref().filter(|f| f.cannot_tell.is_none())?;
         let measured = match (frequency.edge.gain, frequency.edge.ci95) {
             (Some(gain), Some((low, high))) if !frequency.amplitude_dependent => Some((low / gain, high.map(|h| h / gain))),
@@ -638,11 +646,11 @@ impl Answer {
                     (None, None) => "nowhere".to_string(),
                 };
                 let text = format!(
-                    "the edge is {} by the frequency response and {} by the re-simulation{}",
+                    "the edge is {} by the frequency response and {} by the re-simulation: act on the lower{}",
                     edge(answer.critical_gain, answer.at_least),
                     edge(again.edge.critical_gain, Some(again.edge.at_least)),
                     if swapped.any() || answer.amplitude_dependent {
-                        ": a loop that is not linear has an edge for each motion"
+                        "; a loop that is not linear has an edge for each motion"
                     } else {
                         ""
                     }
@@ -665,7 +673,7 @@ impl Answer {
                 .iter()
                 .filter_map(|g| g.at_asked.filter(|o| !o.is_stable()).map(|o| format!("{} of the grip: {o}", g.scale)))
                 .collect();
-            if self.verdict == Word::Stable && !fails.is_empty() {
+            if !fails.is_empty() && again.outcome.is_stable() {
                 self.warnings
                     .push(format!("stable with this grip, but not with every grip at mu*lambda = {asked:.3}: {}", fails.join("; ")));
             }
@@ -700,7 +708,8 @@ impl Answer {
     pub fn json(&self) -> Value {
         let again = self.resimulated.as_ref();
         let frequency = self.frequency_answer.as_ref();
-        let margins = self.margins.as_ref();
+        // One margin: to the headline's edge. Those of the measured response beside it where they are of the same edge.
+        let margins = self.margins.as_ref().filter(|_| self.margins_are_of_the_edge());
         let cycle = again.filter(|_| self.from == Method::Resimulation).map(|a| a.outcome);
         let cycle = if self.from == Method::Recording { self.recorded_outcome } else { cycle };
         let limit_cycle = match cycle {
@@ -726,7 +735,7 @@ impl Answer {
             "critical_gain_ci95": self.critical_gain_ci95,
             "critical_frequency_hz": self.critical_frequency_hz,
             "margins": {
-                "gain_db": margins.and_then(|m| m.gain_db),
+                "gain_db": self.gain_margin_db(),
                 "phase_deg": margins.and_then(|m| m.phase_deg),
                 "delay_ms": margins.and_then(|m| m.delay_ms),
                 "modulus": margins.map(|m| m.modulus),
@@ -741,6 +750,7 @@ impl Answer {
                     "at_least": f.at_least,
                     "critical_gain_ci95": f.critical_gain_ci95,
                     "frequency_hz": f.frequency_hz,
+                    "margins": self.margins,
                     "amplitude_dependent": f.amplitude_dependent,
                     "method": self.frequency.as_ref().map(|f| &f.method),
                     "delays": self.frequency.as_ref().map(|f| &f.delays),
@@ -753,6 +763,7 @@ impl Answer {
                         "outcome": a.outcome,
                         "script": a.script,
                         "critical_gain": a.edge.critical_gain,
+                        "frequency_hz": a.edge.frequency_hz,
                         "at_least": a.edge.at_least,
                         "limited_from": a.edge.limited_from,
                         "returns_to_stable": a.edge.returns_to_stable,
@@ -769,6 +780,7 @@ impl Answer {
             "grips": again.map(|a| a.grips.iter().map(|g| json!({
                 "scale": g.scale,
                 "critical_gain": g.edge.critical_gain,
+                "frequency_hz": g.edge.frequency_hz,
                 "at_least": g.edge.at_least,
                 "verdict": g.at_asked.map(|o| Word::of(&o)),
             })).collect::<Vec<_>>()),
@@ -777,6 +789,8 @@ impl Answer {
             "warnings": self.warnings,
             "advice": self.advice,
             "held_back": self.held_back,
+            "decided_by": self.decided_by,
+            "witnesses": self.witnesses,
             "energy": { "recorded": self.recorded_energy_numbers() },
             "transparency": self.transparency_numbers(),
         })

@@ -71,7 +71,9 @@ impl Frequency {
         let all = self.levels.iter().map(|level| (level, margins_at(level, gain), level_verdict(level, gain)));
         let all: Vec<_> = all.collect();
         let worst = all.iter().map(|(_, m, _)| *m).min_by(|a, b| distance(a).total_cmp(&distance(b)));
-        answer.margins = worst;
+        // The margin is to the edge that is told, not to where single lines would have it.
+        let to_edge = self.edge.gain.map(|edge| 20.0 * (edge / gain).log10());
+        answer.margins = worst.map(|m| Margins { gain_db: to_edge, ..m });
         let of = |verdict: Verdict| all.iter().filter(move |a| a.2.0 == verdict).collect::<Vec<_>>();
         let (unstable, open) = (of(Verdict::Unstable), of(Verdict::CannotTell));
         let decides = unstable.first().or(open.first()).copied().or(all.first());

@@ -73,6 +73,8 @@ pub struct Edge {
     pub flickers: Option<[f64; 2]>,
     /// The verdict just beyond: at the upper end of the last bracket. Where it was not judged there the edge is not known.
     pub outcome_beyond: Option<Outcome>,
+    /// Frequency of what oscillates just beyond, Hz; 0 where it runs away without oscillating; `None` where there is no edge.
+    pub frequency_hz: Option<f64>,
     /// The lowest gain at which a clamp acts or the travel is left: exact to the tolerance where this comes before any
     /// oscillation, else to the grid. `None` where there is none.
     pub limited_from: Option<f64>,
@@ -142,6 +144,7 @@ pub fn edge(
             at_least: search.highest,
             flickers: None,
             outcome_beyond: None,
+            frequency_hz: None,
             limited_from: None,
             returns_to_stable: None,
             evaluations: grid.len(),
@@ -221,6 +224,7 @@ pub fn edge(
         critical_gain,
         at_least: low,
         flickers,
+        frequency_hz: beyond.frequency_hz.filter(|_| critical_gain.is_some()),
         outcome_beyond: Some(beyond.outcome),
         limited_from,
         returns_to_stable,

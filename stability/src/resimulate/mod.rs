@@ -11,7 +11,7 @@ pub mod script;
 pub mod sweep;
 
 use crate::collect::{Collector, Signal};
-use crate::outcome::{Outcome, Trace, judge};
+use crate::outcome::{Outcome, Trace, frequency_hz, judge};
 use crate::session::Session;
 use crate::unjudged::Unjudged;
 use backdrive_control::core::Core;
@@ -158,6 +158,8 @@ pub struct Run {
     pub outcome: Outcome,
     /// The verdict as it would be if clamps and travel did not count: whether a limited run oscillates as well.
     pub beneath: Outcome,
+    /// The frequency at which it oscillated, Hz, where it is not stable; 0 where it ran away without oscillating.
+    pub frequency_hz: Option<f64>,
     /// Time in contact, s.
     pub contact_s: f64,
     /// Time in contact while the hand held still, s: the verdict is drawn from its longer pieces.
@@ -346,6 +348,8 @@ impl Scenario {
         }
         let traces = collector.traces();
         let outcome = Outcome::worst(traces.iter().map(judge)).unwrap_or(Outcome::NotJudged { why: Unjudged::Empty });
+        let rough = traces.iter().max_by_key(|t| judge(t).rank());
+        let frequency_hz = rough.filter(|_| !outcome.is_stable()).map(frequency_hz);
         let unclamped = |t: Trace| Trace { clamped: Vec::new(), travel: None, ..t };
         let (contact_s, judged_s) = contact(&traces);
         let beneath = match outcome {
@@ -353,7 +357,7 @@ impl Scenario {
             other => other,
         };
         let signals = options.keep_signals.then(|| collector.session());
-        Ok(Run { gain, outcome, beneath, contact_s, judged_s, steps: sequence.steps(), signals })
+        Ok(Run { gain, outcome, beneath, frequency_hz, contact_s, judged_s, steps: sequence.steps(), signals })
     }
 
     fn sequence(&self, graph: &Graph, grip_scale: f64) -> Result<Sequence, ResimulateError> {

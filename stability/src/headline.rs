@@ -1,0 +1,251 @@
+//! The headline: the least favourable of what is known, in one verdict with one edge and one frequency.
+//!
+//! [`crate::verdict`] says which method leads. What it says is then held against everything else that is known and counts (a [`Witness`]):
+//! - with the models leading: the loop run again with every grip of the range asked about, for nobody knows a grip exactly; and the measured
+//!   frequency response, where its edge lies below the others' by more than the uncertainty of both. Delays that the models lack are in the
+//!   measured loop, so they count by it;
+//! - with the frequency response leading: it alone, for then the models have been seen to do something else than was recorded.
+//!
+//! The lowest edge is the headline's, with the frequency of the same witness. The verdict is green only where every witness is, and where the gain
+//! asked about lies below that edge and outside of its 95 % interval: a gain beyond an edge at which one run happens to look stable is not stable,
+//! and one within the interval is too close to call. Where witnesses differ the reason names both, and the lower edge is the one to act on.
+
+use crate::frequency;
+use crate::outcome::Outcome;
+use crate::resimulate::edge::Edge;
+use crate::verdict::{Answer, Method, Word};
+use serde::Serialize;
+
+/// One way of asking, with what it says.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Witness {
+    /// Such as `the loop run again with a grip 1.15 times as firm`.
+    pub name: String,
+    /// By which method.
+    pub method: Method,
+    /// Factor on the grip; `None` for what was measured with the hand as it was.
+    pub grip: Option<f64>,
+    /// At the gain asked about.
+    pub verdict: Word,
+    /// What was seen there, in words.
+    pub seen: String,
+    /// The lowest mu*lambda at which it is not stable; `None` where none is known.
+    pub critical_gain: Option<f64>,
+    /// Highest mu*lambda up to which it is known to be stable.
+    pub at_least: Option<f64>,
+    /// Frequency on the edge, Hz; 0 where it runs away without oscillating; `None` where it is not known.
+    pub frequency_hz: Option<f64>,
+    /// What is seen beyond the edge.
+    #[serde(skip)]
+    pub beyond: Option<Outcome>,
+}
+
+impl Witness {
+    fn of_run(name: String, grip: f64, at_asked: &Outcome, edge: &Edge) -> Witness {
+        Witness {
+            name,
+            method: Method::Resimulation,
+            grip: Some(grip),
+            verdict: Word::of(at_asked),
+            seen: at_asked.to_string(),
+            critical_gain: edge.critical_gain,
+            at_least: Some(edge.at_least),
+            frequency_hz: edge.frequency_hz,
+            beyond: edge.outcome_beyond,
+        }
+    }
+
+    /// Where its stable range ends: at an edge, or where a clamp comes first.
+    fn end(&self) -> Option<f64> {
+        let limited = matches!(self.beyond, Some(Outcome::Limited { .. }));
+        self.critical_gain.or(self.at_least.filter(|_| limited))
+    }
+
+    /// What it says at the gain: a gain beyond its edge is not stable, even where one run there looks so.
+    fn word_at(&self, gain: f64) -> Word {
+        match (self.verdict, self.end()) {
+            (Word::Stable, Some(end)) if gain >= end => self.beyond.as_ref().map_or(Word::Unstable, Word::of),
+            (word, _) => word,
+        }
+    }
+}
+
+/// How bad a word is.
+fn rank(word: Word) -> u8 {
+    match word {
+        Word::Stable => 0,
+        Word::CannotTell => 1,
+        Word::Limited => 2,
+        Word::LimitCycle => 3,
+        Word::Unstable => 4,
+    }
+}
+
+/// A grip in words.
+pub fn grip_name(scale: f64) -> String {
+    if scale == 1.0 { "the grip as recorded".to_string() } else { format!("a grip {scale} times as firm") }
+}
+
+impl Answer {
+    /// Everything that counts, the one that leads first.
+    fn witnesses(&self) -> Vec<Witness> {
+        let measured = self.frequency_answer.as_ref().map(|answer| Witness {
+            name: "the measured frequency response".to_string(),
+            method: Method::Frequency,
+            grip: None,
+            verdict: match answer.verdict {
+                frequency::Verdict::Stable => Word::Stable,
+                frequency::Verdict::Unstable => Word::Unstable,
+                frequency::Verdict::CannotTell => Word::CannotTell,
+            },
+            seen: answer.reason.clone(),
+            critical_gain: answer.critical_gain,
+            at_least: answer.at_least,
+            frequency_hz: answer.frequency_hz,
+            beyond: None,
+        });
+        let again = self.resimulated.as_ref().filter(|_| self.from == Method::Resimulation);
+        let Some(again) = again else {
+            return measured.into_iter().filter(|_| self.from == Method::Frequency).collect();
+        };
+        let mut all = vec![Witness::of_run(format!("the loop run again with {}", grip_name(1.0)), 1.0, &again.outcome, &again.edge)];
+        for grip in &again.grips {
+            let Some(at_asked) = &grip.at_asked else { continue };
+            all.push(Witness::of_run(format!("the loop run again with {}", grip_name(grip.scale)), grip.scale, at_asked, &grip.edge));
+        }
+        // Within their uncertainty they say the same, and the runs know friction and contact besides.
+        let highest = self.frequency_answer.as_ref().and_then(|a| a.critical_gain_ci95).and_then(|ci| ci.1);
+        let below = |edge: &Edge| highest.is_some_and(|high| 1.05 * high < edge.critical_gain.unwrap_or(edge.at_least));
+        all.extend(measured.filter(|m| m.critical_gain.is_some() && below(&again.edge)));
+        all
+    }
+
+    /// Makes the verdict, the edge and its frequency those of the least favourable witness.
+    pub(crate) fn least_favourable(&mut self) {
+        let witnesses = self.witnesses();
+        let asked = self.gain.product();
+        let Some(leads) = witnesses.first() else { return };
+        // The edge: the lowest.
+        let lowest =
+            witnesses.iter().filter(|w| w.end().is_some()).min_by(|a, b| a.end().unwrap_or(0.0).total_cmp(&b.end().unwrap_or(0.0)));
+        if let Some(lowest) = lowest.filter(|_| leads.method == Method::Resimulation) {
+            (self.critical_gain, self.at_least) = (lowest.critical_gain, lowest.at_least.filter(|_| lowest.critical_gain.is_none()));
+            self.critical_frequency_hz = lowest.frequency_hz;
+            self.critical_gain_ci95 = match lowest.method {
+                Method::Frequency => self.frequency_answer.as_ref().and_then(|a| a.critical_gain_ci95),
+                _ => lowest.critical_gain.and_then(|critical| self.interval_about(critical)),
+            };
+        }
+        // The verdict: the worst; of several equally bad ones that with the lowest edge.
+        let end = |w: &Witness| w.end().unwrap_or(f64::INFINITY);
+        let worst = witnesses.iter().max_by(|a, b| {
+            let (a_word, b_word) = (a.word_at(asked), b.word_at(asked));
+            rank(a_word).min(2).cmp(&rank(b_word).min(2)).then(end(b).total_cmp(&end(a)))
+        });
+        // All that is not stable is equally negative: where the one that leads is, it is the one to tell.
+        let negative = |word: Word| rank(word).min(2);
+        let worse = worst.filter(|w| negative(w.word_at(asked)) > negative(leads.word_at(asked))).unwrap_or(leads);
+        let word = worse.word_at(asked);
+        if negative(word) > negative(self.verdict) {
+            self.reason = reason(worse, asked, (worse.name != leads.name).then_some(leads));
+            self.verdict = word;
+            self.from = worse.method;
+        }
+        self.too_close(asked);
+        self.decided_by = Some(lowest.filter(|_| leads.method == Method::Resimulation).unwrap_or(worse).name.clone());
+        self.witnesses = witnesses;
+    }
+
+    /// Within the interval of its edge a gain is neither.
+    fn too_close(&mut self, asked: f64) {
+        let Some((low, Some(high))) = self.critical_gain_ci95 else { return };
+        if self.verdict == Word::Stable && asked >= low && asked <= high {
+            self.verdict = Word::CannotTell;
+            self.reason =
+                format!("too close to call: the gain lies within the 95 % interval of the edge, {low:.3} to {high:.3}; {}", self.reason);
+        }
+    }
+
+    /// By how much the gain may rise to the headline's edge, dB; below 0 beyond it; `None` where no edge is known.
+    pub fn gain_margin_db(&self) -> Option<f64> {
+        self.critical_gain.map(|edge| 20.0 * (edge / self.gain.product()).log10())
+    }
+
+    /// Whether the margins of the measured response are those of the headline's edge: they are told beside it only then.
+    pub fn margins_are_of_the_edge(&self) -> bool {
+        match (self.critical_gain, self.frequency_answer.as_ref().and_then(|a| a.critical_gain_ci95)) {
+            (Some(edge), Some((low, high))) => 1.05 * edge >= low && high.is_none_or(|high| edge <= 1.05 * high),
+            (Some(_), None) => false,
+            (None, _) => true,
+        }
+    }
+
+    /// Tells in the reason whose edge the headline's is, and beside which other.
+    pub(crate) fn name_the_edge(&mut self) {
+        let (Some(edge), Some(by), Some(leads)) = (self.critical_gain, &self.decided_by, self.witnesses.first()) else { return };
+        if self.from == Method::Frequency || self.reason.contains("act on the lower") {
+            return;
+        }
+        self.reason += &match leads.critical_gain {
+            Some(other) if leads.name != *by => {
+                format!("; the edge to act on is the lowest known, mu*lambda = {edge:.3} by {by} ({other:.3} by {})", leads.name)
+            }
+            _ => format!("; the edge lies at mu*lambda = {edge:.3}"),
+        };
+    }
+}
+
+/// Why it is not stable, by the witness that says so beside the one that leads.
+fn reason(worst: &Witness, asked: f64, leads: Option<&Witness>) -> String {
+    let edge = |w: &Witness| match (w.critical_gain, w.end()) {
+        (Some(edge), _) => format!("edge at mu*lambda = {edge:.3}"),
+        (None, Some(end)) => format!("a clamp or the travel from {end:.3} on"),
+        (None, None) => "no edge known".to_string(),
+    };
+    let beyond = worst.verdict == Word::Stable && worst.end().is_some_and(|end| asked >= end);
+    let mut text = if beyond {
+        format!(
+            "the gain lies beyond the edge by {} ({}): that one run at this very gain looks stable is not to be relied on",
+            worst.name,
+            edge(worst)
+        )
+    } else {
+        format!("{} says: {} ({})", worst.name, worst.seen, edge(worst))
+    };
+    if let Some(leads) = leads {
+        text += &format!("; {} says: {} ({}); act on the lower edge", leads.name, leads.seen, edge(leads));
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn witness(verdict: Word, edge: f64) -> Witness {
+        Witness {
+            name: "a run".into(),
+            method: Method::Resimulation,
+            grip: Some(1.0),
+            verdict,
+            seen: verdict.text().into(),
+            critical_gain: Some(edge),
+            at_least: Some(0.99 * edge),
+            frequency_hz: Some(60.0),
+            beyond: Some(Outcome::LimitCycle { amplitude_m: 1e-3, frequency_hz: 60.0 }),
+        }
+    }
+
+    #[test]
+    fn a_stable_run_beyond_its_edge_is_not_stable() {
+        assert_eq!(witness(Word::Stable, 3.0).word_at(2.0), Word::Stable);
+        assert_eq!(witness(Word::Stable, 3.0).word_at(3.5), Word::LimitCycle);
+        assert_eq!(witness(Word::CannotTell, 3.0).word_at(2.0), Word::CannotTell);
+        let limited = Witness {
+            critical_gain: None,
+            beyond: Some(Outcome::Limited { clamped_share: 0.2, beyond_travel: false }),
+            ..witness(Word::Stable, 3.0)
+        };
+        assert_eq!((limited.end(), limited.word_at(3.5)), (Some(0.99 * 3.0), Word::Limited));
+    }
+}
