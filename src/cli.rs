@@ -389,6 +389,9 @@ pub struct Run {
     /// Folder for the recordings of a graph with experiments.
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
+    /// Write a page about the run as one HTML file: what happened, signals, contact, timing, losses, events.
+    #[arg(long, value_name = "FILE")]
+    pub html: Option<PathBuf>,
     /// Print the result as JSON.
     #[arg(long)]
     pub json: bool,
@@ -402,6 +405,9 @@ pub struct Run {
 pub struct Replay {
     /// The bag of a run.
     pub recording: PathBuf,
+    /// Write a page about the run as one HTML file: what happened, signals, contact, timing, losses, events.
+    #[arg(long, value_name = "FILE")]
+    pub html: Option<PathBuf>,
     /// Print the result as JSON.
     #[arg(long)]
     pub json: bool,

@@ -26,6 +26,7 @@ mod prove;
 pub mod recordings;
 mod replay;
 mod run;
+mod run_page;
 mod set_checks;
 mod shell;
 mod simulate;

@@ -4,6 +4,7 @@ use crate::cli;
 use crate::failure::Failure;
 use crate::output;
 use crate::run::run_here;
+use crate::run_page::{Heard, page};
 use crate::summary::graph_of;
 use backdrive_bags::Reader;
 use backdrive_control::cycle::Cycle;
@@ -66,12 +67,26 @@ pub fn replay(options: &cli::Replay) -> Result<u8, Failure> {
     graph.timing.steps = Some(options.changes.duration.map_or(steps, |d| ((d * graph.timing.rate_hz).round() as u64).max(1)));
     graph.nodes[operator].settings = settings;
 
-    let mut done = run_here(&graph, &mut |_, _| {})?;
+    if let Some(html) = &options.html {
+        output::writable(html)?;
+    }
+    let mut heard = Heard::of(&graph);
+    let drawn = options.html.is_some();
+    let mut done = run_here(&graph, &mut |topic, message| {
+        if drawn {
+            heard.take(topic, message);
+        }
+    })?;
     // The run above is whole, but the hand that moved it is not.
     if let Some(summary) = &mut done.summary {
         let rows = if options.changes.duration.is_some() { usize::MAX } else { steps as usize };
         let lost = reader.completeness().map_or(0, |c| c.lost());
         summary.hold_back(cut_short(&reader, planned as usize, rows).or((lost > 0).then_some(Unjudged::Lost { messages: lost })));
+    }
+    if let Some(html) = &options.html {
+        let what = format!("backdrive replay {}", path.display());
+        output::file(html, page(&done, &graph, &heard, &what).html())?;
+        output::note(format_args!("wrote {}", html.display()));
     }
     if options.json {
         output::line(done.json())?;

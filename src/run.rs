@@ -36,7 +36,23 @@ pub fn run(options: &cli::Run) -> Result<u8, Failure> {
     if options.out.is_some() {
         return Err(Failure::input(format!("{}: has no [[experiments]], so --out means nothing here; use --bag", options.graph.display())));
     }
-    let done = run_graph(&graph, &way)?;
+    if let Some(html) = &options.html {
+        output::writable(html)?;
+    }
+    let mut heard = crate::run_page::Heard::of(&graph);
+    let done = match &way {
+        // What goes by is all there is where no bag is recorded.
+        Way::Here if options.html.is_some() => run_here(&graph, &mut |topic, message| heard.take(topic, message))?,
+        _ => run_graph(&graph, &way)?,
+    };
+    if let Some(html) = &options.html {
+        if let (Way::Processes(_), Some(bag)) = (&way, &done.bag) {
+            heard = crate::run_page::Heard::from_bag(&graph, bag)?;
+        }
+        let what = format!("backdrive run {}", options.graph.display());
+        output::file(html, crate::run_page::page(&done, &graph, &heard, &what).html())?;
+        output::note(format_args!("wrote {}", html.display()));
+    }
     if options.json {
         output::line(done.json())?;
     } else {

@@ -34,6 +34,19 @@ impl Page {
         self.add(format_args!("<p class=\"aside warning\"><b>Warning:</b> {}</p>\n", escape(text)))
     }
 
+    /// A box of what to do now: a sentence each, with a command to copy where there is one. Nothing where there are no items.
+    pub fn todo(&mut self, heading: &str, items: &[(String, Option<String>)]) -> &mut Self {
+        if items.is_empty() {
+            return self;
+        }
+        self.add(format_args!("<div class=\"aside todo\">\n<b>{}</b>\n<ul>\n", escape(heading)));
+        for (sentence, command) in items {
+            let command = command.as_ref().map_or(String::new(), |c| format!("<pre><code>{}</code></pre>", escape(c)));
+            self.add(format_args!("<li>{}{command}</li>\n", escape(sentence)));
+        }
+        self.add(format_args!("</ul>\n</div>\n"))
+    }
+
     /// Begins a section.
     pub fn section(&mut self, heading: &str) -> &mut Self {
         self.add(format_args!("<h2>{}</h2>\n", escape(heading)))

@@ -425,19 +425,16 @@ mod tests {
 
     #[test]
     fn a_dither_whose_level_rises_is_no_growth_of_the_loop() {
-        let level = |t: f64| {
-            if t < 0.7 {
-                0.15
-            } else if t < 1.4 {
-                0.4
-            } else {
-                1.0
-            }
-        };
+        let level = |t: f64| [0.15, 0.4, 1.0][(t / 2.0) as usize % 3];
         // Friction takes more of a small force, so that no one response explains all levels.
         let moved = |t: f64| 0.005 + 1e-4 * (level(t) - 0.1) * (sine(t - 0.003 * level(t)) + sine(1.7 * t));
-        let mut shaken = trace(moved);
-        shaken.dither = (0..10_000).map(|i| f64::from(i) * 2e-4).map(|t| level(t) * (sine(t) + sine(1.7 * t))).collect();
+        let times = || (0..10_000).map(|i| f64::from(i) * 6e-4);
+        let shaken = Trace {
+            period_s: 6e-4,
+            position: times().map(moved).collect(),
+            dither: times().map(|t| level(t) * (sine(t) + sine(1.7 * t))).collect(),
+            ..trace(|_| 0.005)
+        };
         assert_eq!(judge(&shaken), Outcome::Stable);
     }
 
