@@ -215,7 +215,14 @@ fn a_bag_is_not_overwritten_unless_asked_for() {
     std::fs::write(&path, "precious").expect("it writes");
     assert!(matches!(Recorder::create(&path, &common::header(), &RecorderOptions::default()), Err(BagError::Exists { .. })));
     assert_eq!(std::fs::read(&path).expect("it reads"), b"precious");
-    assert!(Recorder::create(&path, &common::header(), &RecorderOptions { overwrite: true, ..Default::default() }).is_ok());
+    let overwrite = RecorderOptions { overwrite: true, ..Default::default() };
+    let refused = Recorder::create(&path, &common::header(), &overwrite);
+    assert!(matches!(refused, Err(BagError::Exists { is_bag: false, .. })), "what is no bag is never replaced");
+    common::record(&dir.path().join("bag.mcap"), 10);
+    let recorder = Recorder::create(&dir.path().join("bag.mcap"), &common::header(), &overwrite).expect("a bag is");
+    let second = Recorder::create(&dir.path().join("bag.mcap"), &common::header(), &overwrite);
+    assert!(matches!(second, Err(BagError::InUse { .. })), "but not while it is being written");
+    assert!(recorder.finish().is_ok());
 }
 
 #[test]
