@@ -96,7 +96,7 @@ fn a_clean_bag_is_copied_with_its_verdict() {
 }
 
 #[test]
-fn a_damaged_chunk_is_left_out_and_told_with_its_place() {
+fn a_damaged_chunk_is_saved_as_far_as_it_can_be_read_and_told_with_its_place() {
     let dir = tempfile::tempdir().expect("a directory");
     let (path, saved) = (dir.path().join("run.mcap"), dir.path().join("saved.mcap"));
     common::record(&path, 1_500);
@@ -117,7 +117,9 @@ fn a_damaged_chunk_is_left_out_and_told_with_its_place() {
     assert!(report.is_lossy());
     assert!(report.damaged[0].contains(&format!("byte {from}")), "{:?}", report.damaged);
     let verdict = report.completeness.expect("it has a verdict");
-    assert!(verdict.lost() > 0, "the hole is counted");
+    assert!(verdict.recovered && !verdict.is_complete());
+    assert!(report.unconfirmed > 0, "what was saved of the chunk has no checksum, and that is counted");
+    assert_eq!(verdict.lost(), report.missing.values().sum::<u64>(), "and so is the hole, if there is one");
 }
 
 #[test]
