@@ -4,7 +4,7 @@ use crate::bag::may_replace;
 use crate::cli;
 use crate::failure::Failure;
 use crate::output;
-use backdrive_bags::{Reader, recording};
+use backdrive_bags::{Reader, recording, topic_of};
 use backdrive_plant::excitation::{Excitation, load_experiments};
 use backdrive_plant::model::{Fragment, Hold, Model, OutputKind};
 use backdrive_plant::recording::{Columns, Piece, Recording, read_csv, signals_of, write_csv};
@@ -146,7 +146,7 @@ pub fn read_recording(path: &Path, model: &Model, columns: &Columns, piece: &Pie
 
 fn from_bag(path: &Path, model: &Model, columns: &Columns, piece: &Piece) -> Result<Recording, Failure> {
     let reader = Reader::open(path).map_err(Failure::input)?;
-    let there = |name: &str| columns.iter().any(|(signal, _)| signal == name) || reader.topic(&format!("/recording/{name}")).is_ok();
+    let there = |name: &str| columns.iter().any(|(signal, _)| signal == name) || reader.topic(&topic_of(name)).is_ok();
     let wanted: Vec<&str> = signals_of(model).into_iter().filter(|name| there(name)).collect();
     if wanted.is_empty() {
         let topics: Vec<&str> = reader.topics().iter().map(|t| t.name.as_str()).collect();

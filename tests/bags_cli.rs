@@ -3,7 +3,7 @@
 mod system;
 
 use nix::sys::signal::Signal;
-use system::{Place, file, kill, samples, until};
+use system::{PATIENCE, Place, file, kill, samples, until};
 
 #[test]
 fn what_is_in_a_bag() {
@@ -106,4 +106,50 @@ fn clean_removes_what_dead_runs_left_and_no_more() {
     kill(alive.pid(), Signal::SIGINT);
     assert_eq!(alive.end().code, Some(130));
     place.assert_clean(&living);
+}
+
+#[test]
+fn what_simulate_writes_goes_through_a_bag_and_back_exactly() {
+    let place = Place::new();
+    let (model, grip) = (file("plant/models/impulse-engine-linear.toml"), file("plant/grips/normal.toml"));
+    for (name, drive) in [("one", "sweep:amplitude=1,from=1,to=60,duration=0.4"), ("two", "multisine:rms=1,from=2,to=80,period=0.4,seed=3")]
+    {
+        let (csv, bag, back) = (format!("{name}.csv"), format!("{name}.mcap"), format!("{name}-back.csv"));
+        let made = place.backdrive(&["simulate", &model, drive, "--grip", &grip, "--rate", "2000", "--noise", "1", "--out", &csv]);
+        assert_eq!(made.code, Some(0), "{made:?}");
+        assert_eq!(place.backdrive(&["bag", "import", &csv, "--bag", &bag]).code, Some(0));
+        assert_eq!(place.backdrive(&["bag", "export", &bag, "--csv", &back]).code, Some(0));
+        let text = |name: &str| std::fs::read_to_string(place.path(name)).unwrap();
+        assert_eq!(text(&csv), text(&back));
+        assert!(text(&csv).starts_with("t,") && text(&csv).lines().next().unwrap().contains("normal.hand"));
+    }
+    // The model takes the same signals from the bag as from the table, those with a dot in their names too.
+    let of = |recording: &str, out: &str| {
+        let done = place.backdrive(&["simulate", &model, recording, "--grip", &grip, "--out", out]);
+        assert_eq!(done.code, Some(0), "{done:?}");
+        std::fs::read(place.path(out)).unwrap()
+    };
+    assert_eq!(of("one.csv", "p.csv"), of("one.mcap", "q.csv"));
+    let fitted = |set: [&str; 2]| {
+        let done = place.run_for(&["fit", &model, set[0], set[1], "--grip", &grip, "--patience", "20", "--json"], PATIENCE);
+        assert!([Some(0), Some(1)].contains(&done.code), "{done:?}");
+        done.json()["numbers"].clone()
+    };
+    assert_eq!(fitted(["one.csv", "two.csv"]), fitted(["one.mcap", "two.mcap"]));
+}
+
+#[test]
+fn what_is_no_number_is_refused_at_import() {
+    let place = Place::new();
+    for (text, says) in [
+        ("t,x\n0,1\n1,nan\n2,3\n", "a.csv, line 3: column \"x\": expected a number, found \"nan\""),
+        ("t,x\n0,1\n1,\n2,3\n", "a.csv, line 3: column \"x\": expected a number, found an empty cell"),
+        ("t,x\n0,1\n1,inf\n2,3\n", "a.csv, line 3: column \"x\": expected a number, found \"inf\""),
+    ] {
+        place.write("a.csv", text);
+        let done = place.backdrive(&["bag", "import", "a.csv", "--bag", "a.mcap"]);
+        assert_eq!(done.code, Some(3), "{done:?}");
+        assert!(done.stderr.contains(says), "{done:?}");
+        assert!(!place.path("a.mcap").exists());
+    }
 }

@@ -6,6 +6,7 @@ use crate::{BagError, Reader, Recorder, RecorderOptions, Signal, TopicInfo};
 use backdrive_msgs::topic::{Kind, Topic};
 use backdrive_msgs::{MAX_AXES, Message, Sample, source_id};
 use backdrive_plant::model::Hold;
+use backdrive_plant::recording::units;
 use serde::Serialize;
 use std::collections::{BTreeMap, HashMap};
 use std::path::Path;
@@ -29,13 +30,15 @@ pub fn export_csv(reader: &Reader, out: &Path, topics: Option<&[String]>) -> Res
     let mut csv = csv::Writer::from_writer(std::io::BufWriter::new(file));
     let failed = |error: csv::Error| BagError::Write { name: out.display().to_string(), what: error.to_string() };
     let mut row: Vec<String> = vec!["t".to_owned()];
-    row.extend(table.steps.is_some().then(|| "step".to_owned()));
+    // The steps of a table that was imported are its rows.
+    let steps = table.steps.filter(|_| !was_table(reader));
+    row.extend(steps.is_some().then(|| "step".to_owned()));
     row.extend(table.names);
     csv.write_record(&row).map_err(failed)?;
     for (index, t) in table.t.iter().enumerate() {
         row.clear();
         row.push(digits(*t));
-        row.extend(table.steps.as_ref().map(|steps| steps[index].to_string()));
+        row.extend(steps.as_ref().map(|steps| steps[index].to_string()));
         row.extend(table.columns.iter().map(|column| digits(column[index])));
         csv.write_record(&row).map_err(failed)?;
     }
@@ -82,7 +85,10 @@ pub(crate) fn columns_of(reader: &Reader, topics: Option<&[String]>) -> Result<V
             for axis in (0..MAX_AXES).filter(|axis| seen[*axis]) {
                 let name = topic.axes.get(axis).cloned().unwrap_or_else(|| format!("axis{axis}"));
                 let field = format!("{}[{axis}]", quantity.field());
-                wanted.push(Signal::new(&format!("{}.{}.{name}", topic.name, quantity.field()), &topic.name, &field));
+                // A column that was imported is called as it was in its table.
+                let own = was_table(reader) && axis == 0 && *quantity == Quantity::Position && topic.name == topic_of(&name);
+                let shown = if own { name } else { format!("{}.{}.{name}", topic.name, quantity.field()) };
+                wanted.push(Signal::new(&shown, &topic.name, &field));
             }
         }
         for field in ["mu", "lambda"].iter().filter(|_| gains[topic.index]) {
@@ -93,6 +99,11 @@ pub(crate) fn columns_of(reader: &Reader, topics: Option<&[String]>) -> Result<V
         }
     }
     Ok(wanted)
+}
+
+/// Whether a bag was made of a table.
+fn was_table(reader: &Reader) -> bool {
+    reader.header().is_some_and(|header| header.clock == Clock::Imported)
 }
 
 /// What a column is of an axis.
@@ -168,8 +179,8 @@ pub struct ImportReport {
 
 /// Turns a table, which is one experiment, into a bag that [`crate::signals()`] reads the same numbers from.
 ///
-/// A row is a step, its stamp the row's time to the ns; the exact time is in `position[0]` of `/recording/t`. An empty cell or
-/// `nan` is not measured. Errors: the file cannot be read, a column is missing, a time is no number or
+/// A row is a step, its stamp the row's time to the ns; the exact time is in `position[0]` of `/recording/t`. A heading may name its unit
+/// (`x [mm]`): the bag holds SI units. As where a table is read as it is, an empty cell or `nan` is an error. Errors: the file cannot be read, a column is missing, a time is no number or
 /// goes back, a mapped cell is no number, `bag` exists or cannot be written.
 pub fn import_csv(table: &Path, bag: &Path, options: &ImportOptions) -> Result<ImportReport, BagError> {
     let Table { headings, columns, skipped } = Table::read(table, options)?;
@@ -196,7 +207,7 @@ pub fn import_csv(table: &Path, bag: &Path, options: &ImportOptions) -> Result<I
         return Err(BagError::Table { path: table.to_owned(), line: 2, what: format!("{time:?} is no time in s") });
     }
     let maps = if options.columns.is_empty() { default_maps(&headings, &options.time) } else { options.columns.clone() };
-    let mut info = vec![topic_info(TIME_TOPIC)];
+    let mut info = vec![topic_info(TIME_TOPIC, "t")];
     let mut sources: Vec<(usize, &ColumnMap, &[f64])> = Vec::with_capacity(maps.len());
     let mut taken = HashMap::new();
     for map in &maps {
@@ -214,7 +225,7 @@ pub fn import_csv(table: &Path, bag: &Path, options: &ImportOptions) -> Result<I
         }
         let column = &columns[at(&map.column).ok_or_else(|| missing(&map.column))?];
         let place = info.iter().position(|info| info.topic.name == map.topic).unwrap_or_else(|| {
-            info.push(topic_info(&map.topic));
+            info.push(topic_info(&map.topic, if options.columns.is_empty() { &map.column } else { "axis0" }));
             info.len() - 1
         });
         for axis in info[place].axes.len()..=map.axis {
@@ -257,13 +268,14 @@ pub fn import_csv(table: &Path, bag: &Path, options: &ImportOptions) -> Result<I
     Ok(ImportReport { rows: times.len() as u64, topics, skipped })
 }
 
-fn topic_info(name: &str) -> TopicInfo {
+fn topic_info(name: &str, axis: &str) -> TopicInfo {
     let topic = Topic { name: name.to_owned(), kind: Kind::Sample };
-    TopicInfo { topic, axes: vec!["axis0".to_owned()], publisher: "import".to_owned() }
+    TopicInfo { topic, axes: vec![axis.to_owned()], publisher: "import".to_owned() }
 }
 
-/// The topic that a column of this name has to itself.
-pub(crate) fn topic_of(column: &str) -> String {
+/// The topic that a signal of this name has to itself in a bag made of a table: `/recording/NAME`, in which what ROS does not allow in a name
+/// is `_`.
+pub fn topic_of(column: &str) -> String {
     let name: String = column.chars().map(|c| if c.is_ascii_alphanumeric() || c == '_' { c } else { '_' }).collect();
     format!("/recording/{name}")
 }
@@ -291,20 +303,35 @@ impl Table {
             wrong(line, error.to_string())
         };
         let file = std::fs::File::open(path).map_err(BagError::io(path))?;
-        let mut csv = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(std::io::BufReader::new(file));
+        let mut csv = csv::ReaderBuilder::new().trim(csv::Trim::All).comment(Some(b'#')).from_reader(std::io::BufReader::new(file));
         let headings: Vec<String> =
             csv.headers().map_err(failed)?.iter().map(|heading| heading.trim_start_matches('\u{feff}').to_owned()).collect();
         let mut columns: Vec<Option<Vec<f64>>> = vec![Some(Vec::new()); headings.len()];
-        let needed = |heading: &String| *heading == options.time || options.columns.iter().any(|map| map.column == *heading);
+        let asked = |heading: &str| heading == options.time || options.columns.iter().any(|map| map.column == heading);
+        // A heading that is asked for whole is taken so, another one by its name, in SI units.
+        let known = |heading: &str| units::split(heading).1.and_then(|unit| units::parse(unit).ok()).filter(|_| !asked(heading));
+        let factors: Vec<f64> = headings.iter().map(|heading| known(heading).map_or(1.0, |unit| unit.factor)).collect();
+        let headings: Vec<String> =
+            headings.iter().map(|heading| known(heading).map_or(heading.as_str(), |_| units::split(heading).0).to_owned()).collect();
+        let needed = |heading: &String| asked(heading);
         let mut record = csv::StringRecord::new();
         while csv.read_record(&mut record).map_err(failed)? {
-            for ((cell, column), heading) in record.iter().zip(&mut columns).zip(&headings) {
+            for (values_of, ((cell, column), heading)) in record.iter().zip(&mut columns).zip(&headings).enumerate() {
                 let Some(values) = column else { continue };
-                match if cell.is_empty() { Ok(f64::NAN) } else { cell.parse() } {
-                    Ok(value) => values.push(value),
+                let line = || record.position().map_or(0, csv::Position::line);
+                match cell.parse::<f64>() {
+                    Ok(value) if value.is_finite() => values.push(value * factors[values_of]),
+                    Ok(_) => {
+                        return Err(wrong(line(), format!("column {heading:?}: expected a number, found {cell:?}; leave such rows out")));
+                    }
+                    Err(_) if cell.is_empty() && !values.is_empty() => {
+                        return Err(wrong(
+                            line(),
+                            format!("column {heading:?}: expected a number, found an empty cell; leave such rows out"),
+                        ));
+                    }
                     Err(_) if needed(heading) => {
-                        let line = record.position().map_or(0, csv::Position::line);
-                        return Err(wrong(line, format!("column {heading:?}: {cell:?} is not a number")));
+                        return Err(wrong(line(), format!("column {heading:?}: {cell:?} is not a number")));
                     }
                     Err(_) => *column = None,
                 }

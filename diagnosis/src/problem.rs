@@ -2,7 +2,7 @@
 
 use crate::floor;
 use crate::unknown::Unknown;
-use backdrive_bags::{BagError, Reader, recording as bag_recording};
+use backdrive_bags::{BagError, Reader, recording as bag_recording, topic_of};
 use backdrive_plant::model::{Hold, InputKind, Model, OutputKind};
 use backdrive_plant::recording::{Columns, Jitter, Recording, RecordingError, signals_of};
 use backdrive_plant::set::{Condition, Initial, RecordingSet};
@@ -202,7 +202,7 @@ fn from_csv(path: &Path, model: &Model, columns: &Columns, piece: &backdrive_pla
 
 fn from_bag(path: &Path, model: &Model, columns: &Columns, piece: &backdrive_plant::recording::Piece) -> Result<Recording, ProblemError> {
     let reader = Reader::open(path)?;
-    let there = |name: &str| columns.iter().any(|(signal, _)| signal == name) || reader.topic(&format!("/recording/{name}")).is_ok();
+    let there = |name: &str| columns.iter().any(|(signal, _)| signal == name) || reader.topic(&topic_of(name)).is_ok();
     let wanted: Vec<&str> = signals_of(model).into_iter().filter(|name| there(name)).collect();
     if wanted.is_empty() {
         let asked = names(signals_of(model).into_iter());
