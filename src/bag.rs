@@ -69,6 +69,9 @@ fn import(csv: &[std::path::PathBuf], bag: &Path, overwrite: bool, maps: &[Strin
 
 /// A table that is there already is replaced only where that was asked for.
 pub fn may_replace(table: &Path, overwrite: bool) -> Result<(), Failure> {
+    if table.is_dir() {
+        return Err(Failure::write(table, std::io::ErrorKind::IsADirectory.into()));
+    }
     match table.exists() && !output::is_stream(table) && !overwrite {
         true => Err(Failure::input(format!("{}: exists already; --overwrite replaces it, or name another", table.display()))),
         false => Ok(()),

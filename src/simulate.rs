@@ -11,7 +11,7 @@ use backdrive_plant::recording::{Columns, Piece, Recording, read_csv, signals_of
 use backdrive_plant::set::{Condition, RecordingSet};
 use backdrive_plant::stepper::{Options, simulate as simulate_model};
 use serde_json::json;
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 
 /// Simulates, writes the predictions, and says how far they are from what was recorded.
 pub fn simulate(options: &cli::Simulate) -> Result<u8, Failure> {
@@ -99,7 +99,11 @@ fn drives(options: &cli::Simulate, model: &Model) -> Result<Vec<Drive>, Failure>
             .map(|file| {
                 let rules = set.rules_of(file);
                 let recording = read_recording(&set.path_of(file), model, &set.columns, &rules.piece)?;
-                Ok(Drive { recording, out: options.out.join(Path::new(file).with_extension("csv")), condition: rules.condition })
+                // A recording that lies elsewhere is simulated into the folder all the same, and not onto itself.
+                let path = Path::new(file);
+                let inside = path.components().all(|part| matches!(part, Component::Normal(_) | Component::CurDir));
+                let name = if inside { path } else { Path::new(path.file_name().unwrap_or_default()) };
+                Ok(Drive { recording, out: options.out.join(name.with_extension("csv")), condition: rules.condition })
             })
             .collect();
     }

@@ -124,3 +124,16 @@ fn an_interrupt_ends_a_run_that_a_shell_has_put_into_the_background() {
     let done = command.stdin(Stdio::null()).output().unwrap();
     assert_eq!(String::from_utf8_lossy(&done.stdout).lines().last(), Some("code 130"), "{done:?}");
 }
+
+#[test]
+fn a_set_that_names_recordings_elsewhere_is_simulated_into_the_folder_and_not_onto_them() {
+    let place = Place::new();
+    let model = file("plant/models/rigid-mass.toml");
+    let done = place.backdrive(&["simulate", &model, "sweep:amplitude=1,from=1,to=20,duration=0.2", "--noise", "1", "--out", "mine.csv"]);
+    assert_eq!(done.code, Some(0), "{done:?}");
+    let before = std::fs::read(place.path("mine.csv")).unwrap();
+    place.write("set.toml", &format!("model = \"{model}\"\nfit = [\"{}\"]\n", place.path("mine.csv").display()));
+    let done = place.backdrive(&["simulate", &model, "set.toml", "--out", "out", "--overwrite"]);
+    assert_eq!(done.code, Some(0), "{done:?}");
+    assert!(place.path("out/mine.csv").exists() && std::fs::read(place.path("mine.csv")).unwrap() == before);
+}

@@ -170,7 +170,9 @@ fn operator() {
 fn lost_before(place: &Place, bag: &Path, at_ns: i64, name: &str) -> f64 {
     let saved = place.path(name);
     let done = place.backdrive(&["bag", "recover", &bag.display().to_string(), "--bag", name]);
-    assert_eq!(done.code, Some(4), "what the end held is lost: {done:?}");
+    // A recorder that was killed leaves an end that is lost; one that outlives its supervisor closes the bag.
+    let closed = Reader::open(bag).unwrap().ended_cleanly();
+    assert_eq!(done.code, Some(if closed { 0 } else { 4 }), "{done:?}");
     let reader = Reader::open(&saved).unwrap();
     assert!(reader.ended_cleanly() && reader.header().is_some() && reader.damage().is_empty());
     let rows = samples(&saved, "/master/measured_js");
@@ -237,7 +239,8 @@ fn a_slave_that_is_started_again_brings_the_force_back() {
     kill(first, Signal::SIGKILL);
     until("another slave", || place.process("slave").is_some_and(|pid| pid != first));
     let done = run.end();
-    assert_eq!(done.code, Some(0), "{done:?}");
+    // A run that a node was away from is not called stable.
+    assert_eq!(done.code, Some(7), "{done:?}");
     assert!(done.stderr.contains("`slave` is back"), "{done:?}");
     let report = done.json();
     assert_eq!((&report["run"]["deaths"][0]["recovered"], &report["lost"], &report["complete"]), (&true.into(), &0.into(), &true.into()));

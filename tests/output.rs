@@ -79,11 +79,11 @@ fn a_full_standard_error_changes_no_answer() {
     let place = made();
     for verb in verbs() {
         let open = program(&place, &verb).stderr(Stdio::null()).stdout(Stdio::null()).status().unwrap();
-        for made in ["a.mcap", "b.mcap", "i.mcap", "e.csv", "r.mcap"] {
+        for made in ["a.mcap", "b.mcap", "i.mcap", "e.csv", "r.mcap", "p.csv"] {
             let _ = std::fs::remove_file(place.path(made));
         }
         let closed = program(&place, &verb).stderr(full()).stdout(Stdio::null()).status().unwrap();
-        for made in ["a.mcap", "b.mcap", "i.mcap", "e.csv", "r.mcap"] {
+        for made in ["a.mcap", "b.mcap", "i.mcap", "e.csv", "r.mcap", "p.csv"] {
             let _ = std::fs::remove_file(place.path(made));
         }
         assert_eq!(closed.code(), open.code(), "{verb:?}");
