@@ -47,6 +47,15 @@ impl Page {
         self.add(format_args!("</ul>\n</div>\n"))
     }
 
+    /// A line that leads to a file beside the page, by its path from the page. What is no such path (an address with a scheme, one from
+    /// the root) stands as text.
+    pub fn link(&mut self, text: &str, path: &str) -> &mut Self {
+        if path.contains(':') || path.starts_with('/') {
+            return self.text(&format!("{text}: {path}"));
+        }
+        self.add(format_args!("<p><a href=\"{}\">{}</a></p>\n", escape(path), escape(text)))
+    }
+
     /// Begins a section.
     pub fn section(&mut self, heading: &str) -> &mut Self {
         self.add(format_args!("<h2>{}</h2>\n", escape(heading)))

@@ -133,6 +133,8 @@ pub(crate) struct Axis {
     pub log: bool,
     pub limits: Option<(f64, f64)>,
     pub include: Vec<f64>,
+    /// Names of the places 1, 2, ...; empty for numbers.
+    pub names: Vec<String>,
 }
 
 #[derive(Clone, Debug)]
@@ -212,6 +214,12 @@ impl Plot {
     pub fn x_axis(mut self, label: &str, unit: &str) -> Self {
         self.x.label = label.into();
         self.x.unit = unit.into();
+        self
+    }
+
+    /// Writes these names at x = 1, 2, ... in place of numbers, for bars that each stand for a thing. Without effect on a logarithmic axis.
+    pub fn x_names<S: Into<String>>(mut self, names: impl IntoIterator<Item = S>) -> Self {
+        self.x.names = names.into_iter().map(Into::into).collect();
         self
     }
 

@@ -79,7 +79,7 @@ pub const PAGE_STYLE: &str = "\
 'Helvetica Neue',Arial,'Liberation Sans',sans-serif}\n\
 main{max-width:1000px;margin:0 auto;padding:24px 16px 48px}h1{font-size:1.5rem;line-height:1.25;margin:0 0 12px}\
 h2{font-size:1.2rem;margin:36px 0 8px;padding-top:12px;border-top:1px solid var(--faint)}p{margin:8px 0;max-width:75ch}\
-h1,h2,p,td,th,summary,figcaption{overflow-wrap:break-word}\n\
+a{color:var(--c0)}h1,h2,p,td,th,summary,figcaption{overflow-wrap:break-word}\n\
 .lead{font-size:1.3rem;line-height:1.35;font-weight:600;max-width:none;margin:12px 0 16px;padding:12px 16px;border-left:6px solid var(--c);\
 background:var(--soft);color:var(--ct)}\n\
 .aside{max-width:none;padding:8px 14px;border-left:4px solid var(--c);background:var(--soft)}.aside b{color:var(--ct)}\n\

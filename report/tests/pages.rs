@@ -311,3 +311,26 @@ fn tick_labels_have_air_on_wide_and_narrow_drawings() {
         }
     }
 }
+
+#[test]
+fn bars_with_names_stand_over_their_names_and_not_over_numbers() {
+    let names = ["none", "nominal", "diagnosed"];
+    let mut plot = Plot::new("").x_names(names);
+    for (at, height) in [(1.0, 20.0), (2.0, 10.0), (3.0, 40.0)] {
+        plot = plot.series(Series::bars("", &[at], &[height]));
+    }
+    let svg = Figure::from(plot).svg();
+    let ticks: Vec<String> = labels(&svg, "k").into_iter().map(|t| t.2).collect();
+    assert!(names.iter().all(|n| ticks.contains(&n.to_string())), "{ticks:?}");
+    assert!(!ticks.iter().any(|t| t == "1.5" || t == "2.5"), "{ticks:?}");
+}
+
+#[test]
+fn a_link_leads_to_a_file_beside_the_page_only() {
+    let mut page = Page::new("t");
+    page.link("its page", "case-001/report.html").link("elsewhere", "javascript:alert(1)").link("root", "/etc/passwd");
+    let html = page.html();
+    assert!(html.contains("<a href=\"case-001/report.html\">its page</a>"));
+    assert_eq!(html.matches("href=").count(), 1);
+    parse(&html);
+}

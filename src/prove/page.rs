@@ -28,7 +28,7 @@ pub fn page(options: &cli::Prove, cases: &[Case]) -> Page {
             ),
         );
         if !options.no_gains {
-            page.figure(ratios(cases), "Stable mu*lambda with the diagnosed and with the chosen canceller, over that with the better of the two linear ones; above 1 is better. Cases in their order.");
+            page.figure(ratios(cases), "Stable μλ with the diagnosed and with the chosen canceller, over that with the better of the two linear ones; above 1 is better. Cases in their order.");
         }
         page.section("What was found");
         page.table(table(cases));
@@ -92,7 +92,7 @@ fn lead(page: &mut Page, case: &Case) {
 
 fn one(page: &mut Page, case: &Case) {
     if !case.gains.is_empty() {
-        page.figure(gains(case), "Highest stable mu*lambda against how firmly the hand grips, 1 being its grip in the session.");
+        page.figure(gains(case), "Highest stable μλ against how firmly the hand grips, 1 being its grip in the session.");
     }
     let mut table = Table::new(["canceller", "grip", "stable to", "because"]);
     for gain in &case.gains {
@@ -111,7 +111,7 @@ fn one(page: &mut Page, case: &Case) {
     }
     if !case.live.is_empty() {
         page.text("The running graph, with the hidden plant's process as its master, just below and just above those edges:");
-        let mut table = Table::new(["canceller", "mu*lambda", "should be", "was"]);
+        let mut table = Table::new(["canceller", "μλ", "should be", "was"]);
         for run in &case.live {
             let tone = if run.agrees() { Tone::Good } else { Tone::Warning };
             let should = if run.below_edge { "stable" } else { "not stable" };
@@ -119,7 +119,7 @@ fn one(page: &mut Page, case: &Case) {
         }
         page.table(table);
     }
-    page.text(&format!("The diagnosis itself: {}/diagnosis/report.html", case.name));
+    page.link("The diagnosis itself: its page", &format!("{}/diagnosis/report.html", case.name));
 }
 
 /// Stable gain over grip, a line for each canceller; bars where there is one grip only.
@@ -127,7 +127,7 @@ fn gains(case: &Case) -> Figure {
     let mut grips = case.grips();
     grips.sort_by(f64::total_cmp);
     let lowest = 0.05;
-    let mut plot = Plot::new("Stable gain").y_axis("mu*lambda", "").y_log();
+    let mut plot = Plot::new("Stable gain").y_axis("μλ", "").y_log();
     if grips.len() > 1 {
         plot = plot.x_axis("grip, over that of the session", "");
         for canceller in CANCELLERS {
@@ -136,7 +136,7 @@ fn gains(case: &Case) -> Figure {
             plot = if x.len() > 1 { plot.line(canceller, &x, &y) } else { plot.points(canceller, &x, &y) };
         }
     } else {
-        plot = plot.x_axis("canceller", "");
+        plot = plot.x_axis("canceller", "").x_names(CANCELLERS);
         for (index, canceller) in CANCELLERS.iter().enumerate() {
             let stable = case.gain(canceller, 1.0).unwrap_or(lowest).max(lowest);
             plot = plot.series(Series::bars(canceller, &[index as f64 + 1.0], &[stable]));

@@ -1,9 +1,10 @@
 //! The loop as it was measured: Nyquist and Bode plots, edges and their intervals.
 
 use super::words::interval;
-use backdrive_report::{Colour, Figure, Page, Plot, Series, Table, Tone, number, si};
+use backdrive_report::{Colour, Dash, Figure, Page, Plot, Series, Table, Tone, number, si};
 use backdrive_stability::frequency::{AxisEstimate, Frequency, LevelEstimate};
 use backdrive_stability::verdict::Answer;
+use std::f64::consts::TAU;
 
 /// Radius of the disc that holds 95 % of a two-dimensional normal spread, in standard deviations of one component: sqrt(-2 ln 0.05).
 const DISC_95: f64 = 2.447_746_830_680_816;
@@ -11,6 +12,8 @@ const DISC_95: f64 = 2.447_746_830_680_816;
 const INTERVAL_95: f64 = 1.96;
 /// A loop larger than this is cut in the Nyquist plot, so that what is near +1 can be seen.
 const NYQUIST_REACH: f64 = 3.0;
+/// Discs are drawn where they come nearer to +1 than this.
+const NEAR_CRITICAL: f64 = 0.5;
 /// Discs per curve, about: more only hide each other.
 const DISCS: usize = 60;
 
@@ -56,8 +59,8 @@ pub(super) fn measured(page: &mut Page, found: &Answer) {
         let title = if several { format!("{name}: ") } else { String::new() };
         page.figure(
             nyquist(&found, gain, &title),
-            "L, once round the loop, scaled to the gain asked; the closed loop is F_f = d + L F_f, so +1 is the critical point. The discs hold \
-             95 % each. Only lines at which L stands out of its uncertainty are drawn.",
+            "L, once round the loop, scaled to the gain asked; the closed loop is F_f = d + L F_f, so +1 is the critical point. The discs, \
+             drawn near +1 only, hold 95 % each. Only lines at which L stands out of its uncertainty are drawn.",
         );
         page.figure(
             bode(&found, gain, &title),
@@ -104,6 +107,9 @@ pub(super) fn measured(page: &mut Page, found: &Answer) {
 fn nyquist(found: &[(&LevelEstimate, &AxisEstimate)], gain: f64, title: &str) -> Plot {
     let mut plot = Plot::new(&format!("{title}Nyquist plot of the loop L")).x_axis("Re L", "").y_axis("Im L", "").equal_aspect();
     plot = plot.include(1.0, 0.0).include(0.0, 0.0);
+    let (circle_re, circle_im): (Vec<f64>, Vec<f64>) =
+        (0..=180).map(|k| (f64::from(k) * TAU / 180.0).sin_cos()).map(|(s, c)| (c, s)).unzip();
+    plot = plot.series(Series::line("|L| = 1", &circle_re, &circle_im).colour(Colour::Muted).dash(Dash::Dotted).width(1.0));
     let mut seen = Vec::new();
     // Frequencies are written at the curve whose edge comes first.
     let first = first_edge(found);
@@ -113,7 +119,10 @@ fn nyquist(found: &[(&LevelEstimate, &AxisEstimate)], gain: f64, title: &str) ->
         seen.extend(re.iter().copied().zip(im.iter().copied()));
         let every = axis.l.len().div_ceil(DISCS).max(1);
         let thin = |v: &[f64]| v.iter().step_by(every).copied().collect::<Vec<f64>>();
-        let radius: Vec<f64> = axis.sigma.iter().map(|s| DISC_95 * gain * s).collect();
+        // Uncertainty decides only where a disc comes near +1; elsewhere discs would smear the curve.
+        let near = |k: usize, r: f64| re.get(k).zip(im.get(k)).is_some_and(|(re, im)| (re - 1.0).hypot(*im) - r < NEAR_CRITICAL);
+        let all = axis.sigma.iter().map(|s| DISC_95 * gain * s).enumerate();
+        let radius: Vec<f64> = all.map(|(k, r)| if near(k, r) { r } else { f64::NAN }).collect();
         let name = level_name(level, found.len());
         let disc_name = if found.len() == 1 { "95 % discs" } else { "" };
         plot = plot.series(Series::discs(disc_name, &thin(&re), &thin(&im), &thin(&radius)).colour(Colour::Nth(i)));

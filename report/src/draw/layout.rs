@@ -1,10 +1,10 @@
 //! Where everything stands: limits, margins, frames, legends, looks.
 
 use super::label_width;
-use crate::plot::{Colour, Dash, Kind, Plot, Region, Series};
+use crate::plot::{Axis, Colour, Dash, Kind, Plot, Region, Series};
 use crate::style::{PALETTE, Tone};
 use crate::svg::{Rect, shorten, text_width, wrap};
-use crate::ticks::{self, Scale, Ticks, drawable};
+use crate::ticks::{self, Scale, Tick, Ticks, drawable};
 
 /// Font sizes, px; they agree with the style sheet.
 pub const FONT: f64 = 12.0;
@@ -161,7 +161,7 @@ pub fn layout(plots: &[Plot], width: f64) -> Layout {
         at += 18.0 * rows as f64;
         at += if plot.y.label.is_empty() && plot.y.unit.is_empty() { 8.0 } else { 22.0 };
         let frame = Rect { x: left, y: at, w, h: height };
-        let y_ticks = match step_of(&x_ticks(&x, &x_axis.unit, left, w, width)) {
+        let y_ticks = match step_of(&x_ticks(&x, &x_axis, left, w, width)) {
             // Equal aspect asks for equal steps.
             Some(step) if plot.equal_aspect && !x.log && !y.log => ticks::ticks(&y, &plot.y.unit, (y.hi - y.lo) / step),
             _ => y_ticks(&y, &plot.y.unit, height),
@@ -183,7 +183,7 @@ pub fn layout(plots: &[Plot], width: f64) -> Layout {
         });
         top = frame.bottom() + 14.0;
     }
-    let x_ticks = x_ticks(&x, &x_axis.unit, left, w, width);
+    let x_ticks = x_ticks(&x, &x_axis, left, w, width);
     let named = !(x_axis.label.is_empty() && x_ticks.unit.is_empty());
     let height = top + if named { 28.0 } else { 12.0 };
     Layout { height, panels, x_label: x_axis.label, x_ticks, remarks }
@@ -294,11 +294,21 @@ pub fn x_label_at(tick: f64, label: &str, width: f64) -> f64 {
     tick.min(width - text_width(label, FONT) / 2.0)
 }
 
+/// A tick at each named place, its name cut to the room between neighbours.
+fn named_ticks(x: &Scale, names: &[String], w: f64) -> Ticks {
+    let room = (w / (x.hi - x.lo) - 6.0).max(12.0);
+    let places = (1..).map(f64::from).zip(names).filter(|(at, _)| x.holds(*at));
+    Ticks { ticks: places.map(|(at, name)| Tick { at, label: Some(shorten(name, FONT, room)) }).collect(), unit: String::new() }
+}
+
 /// As many ticks as their labels leave air between.
-fn x_ticks(x: &Scale, unit: &str, left: f64, w: f64, width: f64) -> Ticks {
+fn x_ticks(x: &Scale, axis: &Axis, left: f64, w: f64, width: f64) -> Ticks {
+    if !axis.names.is_empty() && !x.log {
+        return named_ticks(x, &axis.names, w);
+    }
     let mut room = (w / 44.0).floor().clamp(1.0, 14.0);
     loop {
-        let found = ticks::ticks(x, unit, room);
+        let found = ticks::ticks(x, &axis.unit, room);
         let spans: Vec<(f64, f64)> = found
             .ticks
             .iter()
