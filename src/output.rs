@@ -83,7 +83,7 @@ pub fn file(path: &Path, contents: impl AsRef<[u8]>) -> Result<(), Failure> {
 }
 
 /// A file that `write` makes: at a path beside the one that is asked for, where nothing is yet and to which it may return as often as it
-/// likes. Once it is whole it is moved to its place; onto a device or a pipe it is copied.
+/// likes. Once it is whole it is moved to its place; onto a device or a pipe it is copied. Folders above it are made where they are not there.
 ///
 /// # Errors
 /// What `write` says, with the path that was asked for, and exit code 5 where that is about the file.
@@ -97,6 +97,7 @@ pub fn replace<T>(path: &Path, write: impl FnOnce(&Path) -> Result<T, Failure>) 
         return Err(failed(io::Error::from(ErrorKind::IsADirectory)));
     }
     let folder = if stream { std::env::temp_dir() } else { folder_of(&place) };
+    std::fs::create_dir_all(&folder).map_err(failed)?;
     let beside = tempfile::Builder::new().prefix(".backdrive-").tempdir_in(&folder).map_err(|e| {
         // The name of a folder that nobody knows of would not help.
         failed(e.raw_os_error().map_or_else(|| io::Error::from(e.kind()), io::Error::from_raw_os_error))
@@ -125,7 +126,13 @@ pub fn writable(path: &Path) -> Result<(), Failure> {
     }
     match path.is_dir() {
         true => Err(Failure::write(path, io::Error::from(ErrorKind::IsADirectory))),
-        false => tempfile::tempfile_in(folder_of(path)).map(drop).map_err(|e| Failure::write(path, e)),
+        false => {
+            // Of folders that are made later the nearest that is there has to take files.
+            let folder = folder_of(path);
+            let there = folder.ancestors().find(|f| f.exists() || f.as_os_str().is_empty()).unwrap_or(&folder);
+            let there = if there.as_os_str().is_empty() { Path::new(".") } else { there };
+            tempfile::tempfile_in(there).map(drop).map_err(|e| Failure::write(path, e))
+        }
     }
 }
 
@@ -203,13 +210,20 @@ mod tests {
     }
 
     #[test]
-    fn a_full_device_and_a_folder_that_is_not_there_are_told_with_the_path_that_was_asked_for() {
+    fn a_full_device_and_what_is_no_folder_are_told_with_the_path_that_was_asked_for() {
         let full = file(Path::new("/dev/full"), "x").unwrap_err();
         assert_eq!(full.code, code::MACHINE);
         assert!(full.message.starts_with("/dev/full: cannot be written: No space left"), "{}", full.message);
-        let absent = file(Path::new("/no/such/folder/x"), "x").unwrap_err();
+        let absent = file(Path::new("/dev/null/x"), "x").unwrap_err();
         assert_eq!(absent.code, code::MACHINE);
-        assert!(absent.message.starts_with("/no/such/folder/x: cannot be written: No such file"), "{}", absent.message);
+        assert!(absent.message.starts_with("/dev/null/x: cannot be written: "), "{}", absent.message);
+        assert_eq!(writable(Path::new("/dev/null/x")).unwrap_err().code, code::MACHINE);
+        let folder = tempfile::tempdir().unwrap();
+        let below = folder.path().join("new/folder/x");
+        writable(&below).unwrap();
+        assert!(names(folder.path()).is_empty(), "nothing is made before it is needed");
+        file(&below, "x").unwrap();
+        assert_eq!(std::fs::read_to_string(below).unwrap(), "x");
     }
 
     #[test]

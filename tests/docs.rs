@@ -40,11 +40,12 @@ fn the_tutorial_can_be_followed() {
         assert!([0, 1, 7].contains(code), "{block}\n{said}");
     }
     assert!(of("before.mcap").2.contains("limit cycle"));
-    let verdict: serde_json::Value = serde_json::from_str(&std::fs::read_to_string(place.path("diagnosis/verdict.json")).unwrap()).unwrap();
+    let verdict: serde_json::Value =
+        serde_json::from_str(&std::fs::read_to_string(place.path("out/diagnosis/verdict.json")).unwrap()).unwrap();
     assert!(["missing", "unexplained", "ambiguous"].contains(&verdict["verdict"].as_str().unwrap()), "{verdict}");
     let error = |key: &str| verdict["held_out"][key].as_f64().unwrap();
     assert!(error("nrmse_after") < 0.5 * error("nrmse_refit"), "{}", verdict["held_out"]);
-    assert!(place.path("diagnosis/report.html").is_file() && place.path("stability.html").is_file());
+    assert!(place.path("out/diagnosis/report.html").is_file() && place.path("out/stability.html").is_file());
     assert!(of("after.mcap").2.contains("loop     stable"), "{}", of("after.mcap").2);
 }
 
@@ -55,7 +56,7 @@ fn a_recording_of_ones_own_can_be_brought() {
         assert!([0, 1, 7].contains(&code), "{block}\n{said}");
     }
     let verdict: serde_json::Value =
-        serde_json::from_str(&std::fs::read_to_string(place.path("mine-diagnosis/verdict.json")).unwrap()).unwrap();
+        serde_json::from_str(&std::fs::read_to_string(place.path("out/mine-diagnosis/verdict.json")).unwrap()).unwrap();
     assert_eq!(verdict["unknown_inputs"][0]["input"], "normal.hand");
     assert_ne!(verdict["verdict"], "none");
 }
