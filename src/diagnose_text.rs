@@ -122,15 +122,15 @@ pub fn named(finding: &Value) -> String {
     format!("{} {}", words::physics(finding["physics"].as_str().unwrap_or("")), words::place(finding))
 }
 
-/// `likely (97 %)`, in words and percent.
+/// `well supported (97 %)`, in words and percent.
 pub fn confidence(finding: &Value) -> String {
     let share = finding["confidence"].as_f64().unwrap_or(0.0);
     let word = match share {
-        s if s > 0.95 => "nearly certain",
-        s if s > 0.8 => "likely",
-        s if s > 0.4 => "possible",
-        s if s > 0.05 => "doubtful",
-        _ => "unlikely",
+        s if s > 0.95 => "well supported",
+        s if s > 0.8 => "supported",
+        s if s > 0.4 => "weakly supported",
+        s if s > 0.05 => "hardly supported",
+        _ => "not supported by what remains",
     };
     format!("{word} ({})", words::share(share))
 }
@@ -214,7 +214,7 @@ mod tests {
             "physics": "coulomb", "between": ["drum", "ground"], "confidence": 0.97, "replaces": [],
             "parameters": { "force": { "value": 0.101, "ci95": [0.098, 0.104], "unit": "N" } },
         });
-        assert_eq!(described(&finding), "dry friction at the drum: force 101 mN (95 %: 98.0 mN to 104 mN); nearly certain (97 %)");
+        assert_eq!(described(&finding), "dry friction at the drum: force 101 mN (95 %: 98.0 mN to 104 mN); well supported (97 %)");
         let slip = json!({ "value": [1.0, 2.0], "ci95": [[0.5, 1.5], [1.0, 3.0]], "unit": "N" });
         assert_eq!(parameter(&slip), "1.00 N (95 %: 500 mN to 1.50 N); 2.00 N (95 %: 1.00 N to 3.00 N)");
     }

@@ -44,7 +44,7 @@ pub(super) fn section(page: &mut Page, found: &Found, best: &Candidate) {
 }
 
 /// A finding's physics and place in words, as a title.
-fn in_words(best: &Candidate, which: usize) -> String {
+pub(super) fn in_words(best: &Candidate, which: usize) -> String {
     let Some(own) = best.structure.added.get(which) else { return String::new() };
     let place = match &own.place {
         Place::Between(a, b) => serde_json::json!({ "between": [a, b] }),
@@ -155,7 +155,9 @@ fn cloud(traces: &[Trace]) -> (Vec<f64>, Vec<f64>) {
 fn fullest(curve: &Curve) -> std::ops::Range<usize> {
     let n = curve.force.len();
     let size = (n / LOOP).max(200).min(n);
-    let square: Vec<f64> = curve.force.iter().map(|f| f * f).collect();
+    // Changes, not sizes: a friction that holds its level shows nothing.
+    let mut square: Vec<f64> = curve.force.windows(2).map(|w| (w[1] - w[0]) * (w[1] - w[0])).collect();
+    square.resize(n, 0.0);
     let mut sum: f64 = square.iter().take(size).sum();
     let (mut best, mut at) = (sum, 0);
     for k in size..n {

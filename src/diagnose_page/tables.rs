@@ -15,6 +15,14 @@ const ALIKE: f64 = 10.0;
 /// Correlations from here on are named.
 const CORRELATED: f64 = 0.9;
 
+/// What a structure adds, in words.
+fn structure_in_words(candidate: &Candidate) -> String {
+    match candidate.structure.added.len() {
+        0 => "the nominal model, refitted".to_string(),
+        n => (0..n).map(|which| super::force::in_words(candidate, which)).collect::<Vec<_>>().join(" + "),
+    }
+}
+
 pub(super) fn hypotheses(page: &mut Page, found: &Found, best: &Candidate) {
     let search = &found.search;
     page.text(&format!(
@@ -39,7 +47,7 @@ pub(super) fn hypotheses(page: &mut Page, found: &Found, best: &Candidate) {
         };
         let behind = if c.structure.name() == best.structure.name() { "–".to_string() } else { number(behind) };
         fitted.push([
-            Cell::tone(c.structure.name(), tone),
+            Cell::tone(structure_in_words(c), tone),
             c.structure.numbers.len().to_string().into(),
             number(level(c)).into(),
             behind.into(),
@@ -68,7 +76,13 @@ pub(super) fn hypotheses(page: &mut Page, found: &Found, best: &Candidate) {
                 None => Cell::from("others like it promised more, or ended the search"),
             };
             let taken = tried.taken.map_or("not fitted".to_string(), percent);
-            table.push([Cell::from(physics.replace('_', " ")), place.into(), percent(tried.promised).into(), taken.into(), why]);
+            table.push([
+                Cell::from(backdrive_diagnosis::words::physics(physics)),
+                place.into(),
+                percent(tried.promised).into(),
+                taken.into(),
+                why,
+            ]);
         }
         table.caption("Shares of the residual of the refitted nominal model.")
     };
