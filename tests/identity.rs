@@ -39,7 +39,7 @@ fn one_answer(place: &Place, graph: &str, changes: &[&str]) {
     let contact = system::samples(&place.path("apart.mcap"), "/slave/measured_js");
     assert!(contact.iter().any(|s| s.effort[0] < -0.1), "nothing was touched: the comparison says little");
     for bag in ["here.mcap", "apart.mcap"] {
-        let replayed = place.backdrive(&["replay", bag, "--bag", "again.mcap"]);
+        let replayed = place.backdrive(&["replay", bag, "--bag", "again.mcap", "--overwrite"]);
         assert!(matches!(replayed.code, Some(0 | 1 | 7)), "{replayed:?}");
         assert_same(place, bag, "again.mcap", 9 * 6000);
     }

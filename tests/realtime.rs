@@ -46,7 +46,8 @@ fn a_second_at_1_khz() {
     until_recorded(&bag, "/master/measured_js", 1);
     let runs = place.runs();
     let done = run.end();
-    assert_eq!(done.code, Some(0), "{done:?}");
+    // It ends before the hand holds still: whether the loop is stable is not known.
+    assert_eq!(done.code, Some(7), "{done:?}");
     let report = done.json();
     assert_eq!((&report["steps"], &report["lost"], &report["complete"]), (&1000.into(), &0.into(), &true.into()));
     assert!(report["missed_deadlines"].is_u64() && report["loop_p50_us"].as_f64().unwrap() > 0.0, "{report}");
@@ -110,7 +111,7 @@ fn ctrl_c_ends_it_in_order() {
     assert!(samples(&bag, "/master/measured_js").len() >= 500);
     place.assert_clean(&runs);
     // Such a bag is as good as any.
-    assert_eq!(place.backdrive(&["replay", "run.mcap"]).code, Some(0));
+    assert_eq!(place.backdrive(&["replay", "run.mcap"]).code, Some(7), "too short to say more");
 }
 
 #[test]
@@ -164,7 +165,7 @@ fn the_dither_is_recorded_beside_the_force() {
     let place = Place::new();
     let graph = file("launch/contact.toml");
     let done = place.backdrive(&["run", &graph, "--dither", "--duration", "1.2", "--bag", "run.mcap"]);
-    assert_eq!(done.code, Some(0), "{done:?}");
+    assert_eq!(done.code, Some(7), "{done:?}");
     let bag = place.path("run.mcap");
     let (dither, force, contact) =
         (samples(&bag, "/scaling/dither_jf"), samples(&bag, "/master/servo_jf"), samples(&bag, "/slave/measured_js"));
@@ -176,7 +177,7 @@ fn the_dither_is_recorded_beside_the_force() {
         assert!((reflected - 0.3 * contact[k - 1].effort[0]).abs() < 1e-12, "step {k}");
     }
     let plain = place.backdrive(&["run", &graph, "--duration", "0.2", "--bag", "plain.mcap"]);
-    assert_eq!(plain.code, Some(0));
+    assert_eq!(plain.code, Some(7));
     let none = samples(&place.path("plain.mcap"), "/scaling/dither_jf");
     assert!(none.iter().all(|s| measured(s.effort[0]).is_none()), "what is not there is not 0");
 }
@@ -189,7 +190,7 @@ fn a_change_of_gains_ramps() {
     for (transport, bag) in [("iceoryx2", "apart.mcap"), ("inproc", "here.mcap")] {
         let options = ["--transport", transport, "--rate", "1000", "--duration", "1.5", "--bag", bag];
         let done = place.backdrive(&[&["run", &graph.display().to_string()], &options[..]].concat());
-        assert_eq!(done.code, Some(0), "{done:?}");
+        assert!(matches!(done.code, Some(0 | 7)), "{done:?}");
         let told = messages(&place.path(bag)).into_iter().filter_map(|(_, m)| if let Message::Gains(g) = m { Some(g) } else { None });
         let gains: Vec<(u64, f64, f64)> = told.map(|g| (g.step, g.mu, g.lambda)).collect();
         assert_eq!(gains[0], (0, 1.0, 0.3));

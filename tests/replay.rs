@@ -31,8 +31,8 @@ fn at_another_gain_it_is_the_run_at_that_gain() {
         &["--dither", "--sensors", "ideal", "--limits", "ignored"],
     ];
     for change in changes {
-        run("asked.mcap", change);
-        let again = place.backdrive(&[&["replay", "recorded.mcap", "--bag", "again.mcap"], change].concat());
+        run("asked.mcap", &[change, &["--overwrite"]].concat());
+        let again = place.backdrive(&[&["replay", "recorded.mcap", "--overwrite", "--bag", "again.mcap"], change].concat());
         assert!(matches!(again.code, Some(0 | 1 | 7)), "{change:?}: {again:?}");
         assert_eq!(same(&place, "asked.mcap", "again.mcap").code, Some(0), "{change:?}");
         assert_eq!(same(&place, "recorded.mcap", "again.mcap").code, Some(1), "{change:?} changed nothing");
@@ -75,7 +75,7 @@ fn of_a_run_in_real_time_that_was_stopped() {
     until_recorded(&place.path("run.mcap"), "/operator/setpoint_js", 1100);
     kill(run.pid(), Signal::SIGINT);
     assert_eq!(run.end().code, Some(130));
-    let done = place.backdrive(&["replay", "run.mcap", "--bag", "again.mcap", "--json"]);
+    let done = place.backdrive(&["replay", "run.mcap", "--overwrite", "--bag", "again.mcap", "--json"]);
     assert!(matches!(done.code, Some(0 | 1 | 7)), "{done:?}");
     let (meant, replayed) =
         (samples(&place.path("run.mcap"), "/operator/setpoint_js"), samples(&place.path("again.mcap"), "/operator/setpoint_js"));
@@ -96,7 +96,7 @@ fn a_longer_or_shorter_one() {
     let graph = file("launch/contact.toml");
     assert_eq!(place.backdrive(&["run", &graph, "--transport", "inproc", "--duration", "1.2", "--bag", "run.mcap"]).code, Some(7));
     for (duration, steps, code) in [("0.5", 2500, 7), ("2", 10_000, 0)] {
-        let done = place.backdrive(&["replay", "run.mcap", "--duration", duration, "--bag", "again.mcap", "--json"]);
+        let done = place.backdrive(&["replay", "run.mcap", "--duration", duration, "--overwrite", "--bag", "again.mcap", "--json"]);
         assert_eq!((done.code, &done.json()["steps"]), (Some(code), &steps.into()), "{done:?}");
         let rows = samples(&place.path("again.mcap"), "/operator/setpoint_js");
         // Beyond its end the hand rests where it was.

@@ -271,7 +271,7 @@ fn wrong_questions() {
         (vec!["stability", "run.mcap", "--sweep", "1:2"], 2, "FROM:TO:COUNT"),
         (vec!["stability", "run.mcap", "--sweep", "2:1:5"], 2, "FROM"),
         (vec!["stability", "run.mcap", "--roles", "empty.toml"], 3, "empty.toml"),
-        (vec!["stability", "run.mcap", "--html", "no/such/folder/r.html"], 5, "r.html"),
+        (vec!["stability", "run.mcap", "--html", "/dev/null/r.html"], 5, "r.html"),
         (vec!["stability", "run.mcap", "--script", "empty.toml"], 3, "empty.toml"),
     ] {
         let done = place.backdrive(&words);
