@@ -8,7 +8,7 @@ use system::{Place, file, samples};
 
 fn run(place: &Place, graph: &str, bag: &str, more: &[&str]) {
     let graph = file(graph);
-    let done = place.backdrive(&[&["run", graph.as_str(), "--bag", bag, "--json"], more].concat());
+    let done = place.backdrive(&[&["run", graph.as_str(), "--bag", bag, "--overwrite", "--json"], more].concat());
     assert!(matches!(done.code, Some(0 | 1 | 7)), "{done:?}");
     assert_eq!(done.json()["lost"], 0, "{done:?}");
 }

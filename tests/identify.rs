@@ -40,7 +40,7 @@ fn record(graph: &str, folder: &Path) -> PathBuf {
 
 /// nrmse of the one output for every recording, by the recording's file stem.
 fn nrmse(words: &[&str], folder: &Path) -> Vec<(String, f64)> {
-    let words = [&["simulate"], words, &["--out", "predicted", "--json"]].concat();
+    let words = [&["simulate"], words, &["--out", "predicted", "--overwrite", "--json"]].concat();
     let result: serde_json::Value = serde_json::from_str(&succeeds(&words, folder)).unwrap();
     let run = |run: &serde_json::Value| {
         let name = Path::new(run["recording"].as_str().unwrap()).file_stem().unwrap().to_str().unwrap().to_string();

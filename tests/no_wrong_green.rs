@@ -11,7 +11,7 @@ use system::{Ended, Place, alone, file, graph_text, kill, until_recorded};
 /// Records the contact task in one process.
 fn record(place: &Place, more: &[&str]) -> Ended {
     let graph = file("launch/contact.toml");
-    place.backdrive(&[&["run", graph.as_str(), "--transport", "inproc", "--bag", "run.mcap", "--json"], more].concat())
+    place.backdrive(&[&["run", graph.as_str(), "--transport", "inproc", "--bag", "run.mcap", "--overwrite", "--json"], more].concat())
 }
 
 fn cut(place: &Place, from: &str, to: &str, bytes: usize) {
@@ -103,7 +103,8 @@ fn a_run_in_which_a_node_died_does_not_call_itself_stable_nor_does_its_bag() {
         let done = run.end();
         assert_eq!((done.code, &done.json()["outcome"]), (Some(6), &"cannot_tell".into()), "{node}: {done:?}");
         let found = ask(&place, "died.mcap", &[]);
-        assert_eq!(found["verdict"], "cannot_tell", "{node}: {found}");
+        // A negative answer may stand: what was recorded until then, or the models, may show it.
+        assert_ne!(found["verdict"], "stable", "{node}: {found}");
         assert_eq!(found["methods"]["recording"]["outcome"]["why"], "gaps", "{node}: {found}");
         std::fs::remove_file(place.path("died.mcap")).unwrap();
     }

@@ -16,7 +16,8 @@ fn backdrive(words: &[&str], folder: &Path) -> Output {
 
 fn json(words: &[&str], folder: &Path) -> serde_json::Value {
     let output = backdrive(words, folder);
-    assert!(output.status.success(), "{words:?}: {}", String::from_utf8_lossy(&output.stderr));
+    // 7: a slave that is moved all the time never holds still, so nothing is said of its loop.
+    assert!(matches!(output.status.code(), Some(0 | 7)), "{words:?}: {}", String::from_utf8_lossy(&output.stderr));
     serde_json::from_slice(&output.stdout).unwrap()
 }
 
