@@ -24,8 +24,8 @@ fn rms(x: impl Iterator<Item = f64>) -> f64 {
 fn follow(place: &Place, seconds: &str, change: &dyn Fn(String) -> String) -> ([f64; 2], f64) {
     let text = change(graph_text("launch/ball-screw-slave.toml"));
     std::fs::write(place.path("slave.toml"), text).unwrap();
-    let ended = place.backdrive(&["run", "slave.toml", "--json", "--duration", seconds, "--bag", "slave.mcap"]);
-    assert_eq!(ended.code, Some(0), "{ended:?}");
+    let ended = place.backdrive(&["run", "slave.toml", "--json", "--duration", seconds, "--bag", "slave.mcap", "--overwrite"]);
+    assert!(matches!(ended.code, Some(0 | 7)), "{ended:?}"); // 7: nothing is held still
     let c = columns(
         &place.path("slave.mcap"),
         &[("/controller/servo_jp", "position[0]"), ("/slave/measured_js", "position[0]"), ("/master/measured_js", "effort[0]")],
@@ -64,7 +64,7 @@ fn the_axis_leads_as_a_master() {
     let place = Place::new();
     let graph = file("launch/ball-screw-master.toml");
     let ended = place.backdrive(&["run", &graph, "--json", "--bag", "master.mcap"]);
-    assert_eq!(ended.code, Some(0), "{ended:?}");
+    assert!(matches!(ended.code, Some(0 | 7)), "{ended:?}"); // 7: nothing is held still
     assert_eq!(ended.json()["outcome"], "stable", "{ended:?}");
     let c = columns(
         &place.path("master.mcap"),
