@@ -178,7 +178,8 @@ fn lockstep_across_hosts_is_lockstep_in_one_process() {
     let runs = [0, 1].map(|host| run_on(&hosts, host, folder.path(), &options));
     for (host, run) in runs.into_iter().enumerate() {
         let (report, code, told) = end(run, Duration::from_secs(300));
-        assert_eq!((code, report["complete"].as_bool()), (Some(0), Some(true)), "{}: {told}", HOSTS[host]);
+        // A second is over before the hand holds still.
+        assert_eq!((code, report["complete"].as_bool()), (Some(if is_long() { 0 } else { 7 }), Some(true)), "{}: {told}", HOSTS[host]);
         eprintln!("{}: {} steps/s", HOSTS[host], report["steps_per_s"]);
     }
     let here = folder.path().join("here.mcap");
@@ -190,7 +191,7 @@ fn lockstep_across_hosts_is_lockstep_in_one_process() {
         .args(options)
         .output()
         .unwrap();
-    assert!(alone.status.success(), "{}", String::from_utf8_lossy(&alone.stderr));
+    assert!(matches!(alone.status.code(), Some(0 | 7)), "{}", String::from_utf8_lossy(&alone.stderr));
     let here = Reader::open(&here).unwrap();
     for host in 0..2 {
         let report = diff(&bag(folder.path(), host), &here, &DiffOptions::default()).unwrap();
@@ -284,7 +285,7 @@ fn on_a_link_that_reorders_and_loses_what_is_late_is_dropped_and_all_is_counted(
         let runs = [0, 1].map(|host| run_on(&hosts, host, folder.path(), &options));
         for (host, run) in runs.into_iter().enumerate() {
             let (report, code, told) = end(run, Duration::from_secs(120));
-            assert!(matches!(code, Some(0 | 4)), "{}: {told}", HOSTS[host]);
+            assert!(matches!(code, Some(0 | 4 | 7)), "{}: {told}", HOSTS[host]);
             assert!(report["lost"].as_u64().unwrap() > 100, "{}: 2 % of 6000 steps of several topics: {report}", HOSTS[host]);
             let bag = bag(folder.path(), host);
             let late: f64 = events(&bag).iter().filter(|(kind, ..)| kind == "samples_late").map(|(_, _, count)| count).sum();
@@ -297,7 +298,8 @@ fn on_a_link_that_reorders_and_loses_what_is_late_is_dropped_and_all_is_counted(
             });
             let steps: Vec<u64> = commands.collect();
             assert!(steps.len() > 3000 && steps.windows(2).all(|w| w[0] < w[1]), "{}: {} commands", HOSTS[host], steps.len());
-            assert_eq!(report["outcome"].as_str(), Some("stable"), "{}", HOSTS[host]);
+            // Where more is missing than a verdict can bear it says so.
+            assert!(matches!(report["outcome"].as_str(), Some("stable" | "cannot_tell")), "{}: {report}", HOSTS[host]);
         }
     });
 }
