@@ -14,7 +14,7 @@
 #[path = "../tests/common/mod.rs"]
 mod common;
 
-use backdrive_bags::{Reader, Recorder};
+use backdrive_bags::{Reader, Recorder, RecorderOptions};
 use backdrive_launch::join::{recorder_options, recording};
 use backdrive_msgs::Message;
 use backdrive_nodes::build::plan;
@@ -145,7 +145,8 @@ fn live_edge(graph: &Graph) -> Option<f64> {
 /// Runs `real` and records it as a bag whose header is that of `told`.
 fn record(real: &Graph, told: &Graph, bag: &Path) {
     let (record, header) = recording(told, "recorder", None);
-    let mut recorder = Recorder::create(bag, &header, &recorder_options(told)).expect("a bag can be written");
+    let mut recorder =
+        Recorder::create(bag, &header, &RecorderOptions { overwrite: true, ..recorder_options(told) }).expect("a bag can be written");
     let plans = real.nodes.iter().filter(|n| n.kind != NodeKind::Recorder).map(|n| plan(real, &n.name).expect("it builds"));
     let mut sequence = Sequence::new(plans.collect(), &real.timing).expect("it runs");
     let names: Vec<String> = sequence.topics().iter().map(|t| t.name.clone()).collect();
