@@ -126,7 +126,9 @@ fn nyquist(found: &[(&LevelEstimate, &AxisEstimate)], gain: f64, title: &str) ->
         let name = level_name(level, found.len());
         let disc_name = if found.len() == 1 { "95 % discs" } else { "" };
         plot = plot.series(Series::discs(disc_name, &thin(&re), &thin(&im), &thin(&radius)).colour(Colour::Nth(i)));
-        plot = plot.series(Series::line(&name, &re, &im).colour(Colour::Nth(i)));
+        // The measured curve is whole: the unit circle before it would take its dash.
+        let dash = if i == 0 { Dash::Solid } else { Dash::Auto };
+        plot = plot.series(Series::line(&name, &re, &im).colour(Colour::Nth(i)).dash(dash));
         let lines: Vec<usize> = (0..axis.l.len()).filter(|k| told(axis, *k).is_some()).collect();
         let mut marks = vec![lines.first().copied(), lines.last().copied()];
         if let Some(hz) = axis.edge.frequency_hz {
