@@ -50,7 +50,7 @@ class Backdrive:
     def simulate_files(self, model, drive, substeps=None):
         """Every column of the prediction, for files that exist."""
         out = self.here / "out.csv"
-        command = [self.program, "simulate", str(model), str(drive), "--out", str(out)]
+        command = [self.program, "simulate", str(model), str(drive), "--out", str(out), "--overwrite"]
         command += [] if substeps is None else ["--substeps", str(substeps)]
         done = subprocess.run(command, capture_output=True, text=True, stdin=subprocess.DEVNULL)
         if done.returncode != 0:
