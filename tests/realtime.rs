@@ -222,7 +222,7 @@ fn a_minute_at_5_and_at_10_khz_is_recorded_whole() {
 
 fn minute_is_whole(place: &Place, rate: u64) -> bool {
     let (graph, rate_hz) = (file("launch/contact.toml"), rate.to_string());
-    let options = ["--clock", "realtime", "--rate", &rate_hz, "--duration", "60", "--bag", "run.mcap", "--json"];
+    let options = ["--clock", "realtime", "--rate", &rate_hz, "--duration", "60", "--bag", "run.mcap", "--overwrite", "--json"];
     let done = place.backdrive(&[&["run", graph.as_str()], &options[..]].concat());
     let report = done.json();
     let share = report["missed_deadlines"].as_f64().unwrap() / (5.0 * 60.0 * rate as f64);
