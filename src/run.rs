@@ -150,9 +150,6 @@ fn run_processes(graph: &Graph, place: &Place) -> Result<Done, Failure> {
 
 /// Whether a run's bag was ended and nothing is missing in it, and what keeps it from being read.
 fn whole(bag: &Path) -> (bool, Option<String>) {
-    if output::is_stream(bag) {
-        return (false, None); // nothing can be read back
-    }
     match Reader::open(bag) {
         Ok(reader) => {
             let complete = reader.ended_cleanly() && reader.completeness().is_some_and(Completeness::is_complete);
