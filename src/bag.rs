@@ -3,6 +3,7 @@
 use crate::cli;
 use crate::failure::{Failure, code};
 use crate::output;
+use crate::progress::busy;
 use backdrive_bags::{
     ColumnMap, DiffOptions, ImportOptions, Quantity, Reader, check_target, diff, export_csv, import_csv, info, merge, recover,
 };
@@ -22,7 +23,7 @@ pub fn bag(command: &cli::Bag) -> Result<u8, Failure> {
 }
 
 fn show(bag: &Path, json: bool) -> Result<u8, Failure> {
-    let info = info(bag).map_err(Failure::input)?;
+    let info = busy(&format!("reading {}", bag.display()), || info(bag)).map_err(Failure::input)?;
     if json {
         output::json(&info)?;
     } else {
@@ -49,7 +50,8 @@ fn import(csv: &[std::path::PathBuf], bag: &Path, overwrite: bool, maps: &[Strin
     }
     for table in csv {
         let options = ImportOptions { columns: columns.clone(), overwrite, ..ImportOptions::default() };
-        let report = import_csv(table, &into(table), &options).map_err(Failure::bag)?;
+        let importing = format!("importing {}", table.display());
+        let report = busy(&importing, || import_csv(table, &into(table), &options)).map_err(Failure::bag)?;
         for column in &report.skipped {
             output::note(format_args!(
                 "warning: {}: column \"{column}\" holds something that is no number and was left out",
@@ -101,13 +103,14 @@ fn export(bag: &Path, csv: &Path, overwrite: bool, topics: &[String]) -> Result<
     may_replace(csv, overwrite)?;
     let reader = Reader::open(bag).map_err(Failure::input)?;
     let topics = (!topics.is_empty()).then_some(topics);
-    let rows = output::replace(csv, |to| export_csv(&reader, to, topics).map_err(Failure::input))?;
+    let exporting = format!("exporting {}", bag.display());
+    let rows = busy(&exporting, || output::replace(csv, |to| export_csv(&reader, to, topics).map_err(Failure::input)))?;
     output::line(format_args!("{}: {rows} rows", csv.display()))?;
     Ok(0)
 }
 
 fn save(damaged: &Path, bag: &Path, overwrite: bool) -> Result<u8, Failure> {
-    let report = recover(damaged, bag, overwrite).map_err(Failure::bag)?;
+    let report = busy(&format!("recovering {}", damaged.display()), || recover(damaged, bag, overwrite)).map_err(Failure::bag)?;
     if !report.is_lossy() {
         output::line(format_args!("{}: had ended cleanly and is whole; copied", damaged.display()))?;
     }
@@ -134,7 +137,7 @@ fn save(damaged: &Path, bag: &Path, overwrite: bool) -> Result<u8, Failure> {
 
 fn join([a, b]: [&Path; 2], bag: &Path, overwrite: bool, offset_s: Option<f64>, json: bool) -> Result<u8, Failure> {
     check_target(bag, overwrite).map_err(Failure::bag)?;
-    let report = merge(a, b, bag, offset_s, overwrite).map_err(Failure::bag)?;
+    let report = busy(&format!("merging into {}", bag.display()), || merge(a, b, bag, offset_s, overwrite)).map_err(Failure::bag)?;
     if json {
         output::json(&report)?;
     } else {
@@ -167,7 +170,7 @@ fn compare(a: &Path, b: &Path, tolerances: &[String], ignore: &[String], json: b
         };
     }
     let (a, b) = (Reader::open(a).map_err(Failure::input)?, Reader::open(b).map_err(Failure::input)?);
-    let report = diff(&a, &b, &options).map_err(Failure::input)?;
+    let report = busy("comparing", || diff(&a, &b, &options)).map_err(Failure::input)?;
     if json {
         output::json(&report)?;
     } else {

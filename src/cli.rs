@@ -485,8 +485,11 @@ pub struct Diagnose {
     /// Print the verdict as JSON.
     #[arg(long)]
     pub json: bool,
-    /// Write no report.html.
-    #[arg(long)]
+    /// Where the report goes; without this report.html in the folder of --out.
+    #[arg(long, value_name = "FILE")]
+    pub html: Option<PathBuf>,
+    /// Write no report.
+    #[arg(long, conflicts_with = "html")]
     pub no_report: bool,
 }
 
@@ -613,7 +616,7 @@ pub struct Simulate {
     #[arg(long)]
     pub overwrite: bool,
     /// Where the prediction goes, as CSV; for a set a folder.
-    #[arg(long, alias = "csv", value_name = "FILE")]
+    #[arg(long, visible_alias = "csv", value_name = "FILE")]
     pub out: PathBuf,
     /// Grip or environment to attach at the model's user's body.
     #[arg(long, value_name = "FILE")]
@@ -692,7 +695,7 @@ pub enum Bag {
         #[arg(required = true)]
         csv: Vec<PathBuf>,
         /// The new bag; of several CSV files the folder in which each becomes one.
-        #[arg(long, alias = "out", value_name = "FILE")]
+        #[arg(long, visible_alias = "out", value_name = "FILE")]
         bag: PathBuf,
         /// Replace a bag that exists.
         #[arg(long)]
@@ -709,7 +712,7 @@ pub enum Bag {
         /// The bag.
         bag: PathBuf,
         /// The CSV file.
-        #[arg(long, alias = "out", value_name = "FILE")]
+        #[arg(long, visible_alias = "out", value_name = "FILE")]
         csv: PathBuf,
         /// Replace a file that exists.
         #[arg(long)]
@@ -726,7 +729,7 @@ pub enum Bag {
         /// The damaged bag; it is not changed.
         damaged: PathBuf,
         /// The new bag.
-        #[arg(long, alias = "out", value_name = "FILE")]
+        #[arg(long, visible_alias = "out", value_name = "FILE")]
         bag: PathBuf,
         /// Replace a bag that exists.
         #[arg(long)]
@@ -742,7 +745,7 @@ pub enum Bag {
         /// The other.
         b: PathBuf,
         /// The new bag.
-        #[arg(long, alias = "out", value_name = "FILE")]
+        #[arg(long, visible_alias = "out", value_name = "FILE")]
         bag: PathBuf,
         /// Replace a bag that exists.
         #[arg(long)]

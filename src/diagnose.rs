@@ -23,6 +23,8 @@ use std::time::{Duration, Instant};
 
 /// Name of the model file that is written.
 pub const MODEL: &str = "model.diagnosed.toml";
+/// Name of the report, where no other is asked for.
+pub const REPORT: &str = "report.html";
 /// How long each record is fitted by itself, at most.
 const PER_RECORD: Duration = Duration::from_secs(4);
 /// And at least, where the search has taken all of its time.
@@ -52,7 +54,8 @@ pub fn diagnose(options: &cli::Diagnose) -> Result<u8, Failure> {
     let began = Instant::now();
     let stop = interrupt::heard()?;
 
-    let opened = recordings::open(&options.set, options.model.as_deref(), options.grip.as_deref(), &options.ignore_signal)?;
+    let open = || recordings::open(&options.set, options.model.as_deref(), options.grip.as_deref(), &options.ignore_signal);
+    let opened = progress::busy("reading the recordings", open)?;
     for name in [MODEL, EXPERIMENT_FILE] {
         recordings::not_onto(&options.out.join(name), &opened.files, false)?;
     }
@@ -61,7 +64,9 @@ pub fn diagnose(options: &cli::Diagnose) -> Result<u8, Failure> {
     }
     let patience = Duration::from_secs_f64(options.patience);
     let settings = Settings { without: options.without.clone(), effects: usize::from(options.effects), patience };
-    let Diagnosed { found, written } = diagnose_into(opened, &settings, &options.out, !options.no_report, &stop)?;
+    let beside = options.out.join(REPORT);
+    let report = (!options.no_report).then_some(options.html.as_deref().unwrap_or(&beside));
+    let Diagnosed { found, written } = diagnose_into(opened, &settings, &options.out, report, &stop)?;
     let seconds = began.elapsed().as_secs_f64();
     let path = options.out.join("time.txt");
     output::file(&path, format!("{seconds:.2}\n"))?;
@@ -81,25 +86,32 @@ pub fn diagnose(options: &cli::Diagnose) -> Result<u8, Failure> {
 pub struct Diagnosed {
     /// Everything that was found.
     pub found: Found,
-    /// Names of the files, in the folder that was given.
-    pub written: Vec<&'static str>,
+    /// Names of the files in the folder that was given, and the path of a report that went elsewhere.
+    pub written: Vec<String>,
 }
 
-/// Diagnoses what was opened and writes verdict, model, next experiment and, where wanted, the report into a folder; makes the folder if it is
-/// not there.
+/// Diagnoses what was opened and writes verdict, model and next experiment into a folder, which is made if it is not there, and where wanted the
+/// report.
 ///
 /// # Errors
 /// When the folder cannot be written, or the nominal model cannot be simulated on the recordings.
-pub fn diagnose_into(opened: Opened, settings: &Settings, out: &Path, with_report: bool, stop: &AtomicBool) -> Result<Diagnosed, Failure> {
-    // A folder that cannot be written is told before the work, not after it.
+pub fn diagnose_into(
+    opened: Opened,
+    settings: &Settings,
+    out: &Path,
+    report: Option<&Path>,
+    stop: &AtomicBool,
+) -> Result<Diagnosed, Failure> {
+    // What cannot be written is told before the work, not after it.
     output::folder(out)?;
+    report.map_or(Ok(()), output::writable)?;
     let found = progress::at_most(longest(settings.patience + AFTERWARDS), |report| find(opened.problem, settings, stop, report))?;
 
     let write = |name: &str, text: &str| output::file(&out.join(name), text);
     let json = serde_json::to_string_pretty(&found.said.json).map_err(Failure::input)?;
     write("verdict.json", &format!("{json}\n"))?;
     write(MODEL, &found.said.model)?;
-    let mut written = vec!["verdict.json", MODEL];
+    let mut written = vec!["verdict.json".to_string(), MODEL.to_string()];
     // Rivals of an earlier diagnosis are none of this one.
     for number in 1..=9 {
         let _ = std::fs::remove_file(out.join(rival_file(number)));
@@ -109,12 +121,12 @@ pub fn diagnose_into(opened: Opened, settings: &Settings, out: &Path, with_repor
     }
     if let Some(experiment) = &found.said.experiment {
         write(EXPERIMENT_FILE, experiment)?;
-        written.push(EXPERIMENT_FILE);
+        written.push(EXPERIMENT_FILE.to_string());
     }
-    if with_report {
+    if let Some(report) = report {
         let shown = Shown { found: &found, name: &opened.name, notes: &opened.notes };
-        output::file(&out.join("report.html"), page(&shown).html())?;
-        written.push("report.html");
+        output::file(report, page(&shown).html())?;
+        written.push(if report == out.join(REPORT) { REPORT.to_string() } else { report.display().to_string() });
     }
     Ok(Diagnosed { found, written })
 }

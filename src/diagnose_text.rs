@@ -44,6 +44,9 @@ pub fn text(found: &Found) -> String {
     if word != "NOTHING MISSING" && word != "PARAMETERS" && place.is_object() {
         line("where", shows(place));
     }
+    if let Some(left) = remains(&json["remaining"]) {
+        line("remains", left);
+    }
     let held = &json["held_out"];
     let value = |key: &str| held[key].as_f64().map_or("?".to_string(), number);
     let on = if found.problem.held_out.is_empty() { "fitted" } else { "held out" };
@@ -184,6 +187,17 @@ pub fn shows(place: &Value) -> String {
     parts.join("; ")
 }
 
+/// What the explanation leaves over, beside what was found; `None` where that is the sensors' noise.
+pub fn remains(left: &Value) -> Option<String> {
+    let place = left["where"].is_object().then(|| shows(&left["where"]))?;
+    let share = left["share"].as_f64().map_or(String::new(), |s| {
+        let floor = left["floor_share"].as_f64().map_or(String::new(), |f| format!(" (the sensors' noise would be {})", words::share(f)));
+        format!("{} of the residual with the parameters refitted{floor}; ", words::share(s))
+    });
+    let like = left["looks_like"].as_str().map_or(String::new(), |like| format!("; looks most like {like}"));
+    Some(format!("{share}{place}{like}"))
+}
+
 /// What to record next, however the verdict says it.
 pub fn next_experiment(value: &Value) -> Option<String> {
     let text = match value {
@@ -217,6 +231,17 @@ mod tests {
         assert_eq!(described(&finding), "dry friction at the drum: force 101 mN (95 %: 98.0 mN to 104 mN); well supported (97 %)");
         let slip = json!({ "value": [1.0, 2.0], "ci95": [[0.5, 1.5], [1.0, 3.0]], "unit": "N" });
         assert_eq!(parameter(&slip), "1.00 N (95 %: 500 mN to 1.50 N); 2.00 N (95 %: 1.00 N to 3.00 N)");
+    }
+
+    #[test]
+    fn what_remains_is_told_only_where_it_is_more_than_noise() {
+        let noise = json!({ "share": 0.03, "floor_share": 0.03, "noise_sd": 1.01, "where": null, "looks_like": null });
+        assert_eq!((remains(&noise), remains(&Value::Null)), (None, None));
+        let left = json!({ "share": 0.31, "floor_share": 0.06, "noise_sd": 5.2, "where": { "time": [[1.0, 1.2]], "band_hz": [20.0, 90.0] },
+            "looks_like": "backlash between motor and drum" });
+        let said = "31 % of the residual with the parameters refitted (the sensors' noise would be 6 %); 20.0 Hz to 90.0 Hz; most at 1.00 to 1.20 s; \
+                    looks most like backlash between motor and drum";
+        assert_eq!(remains(&left).as_deref(), Some(said));
     }
 
     #[test]

@@ -28,6 +28,9 @@ const CORRELATED: f64 = 0.9;
 /// Computing time for a fit of what is determined, at least.
 const LEAST: Duration = Duration::from_secs(1);
 
+/// What comes beside the fits at most: the errors of the parameters, and how the models predict.
+const AFTERWARDS: Duration = Duration::from_secs(2);
+
 /// What a fit says.
 struct Fitted {
     rows: Vec<Row>,
@@ -43,7 +46,8 @@ struct Fitted {
 /// Fits, writes, and says how sure the numbers are.
 pub fn fit(options: &cli::Fit) -> Result<u8, Failure> {
     let stop = interrupt::heard()?;
-    let opened = recordings::open(&options.set, Some(&options.model), options.grip.as_deref(), &options.ignore_signal)?;
+    let open = || recordings::open(&options.set, Some(&options.model), options.grip.as_deref(), &options.ignore_signal);
+    let opened = progress::busy("reading the recordings", open)?;
     if let Some(out) = &options.out {
         recordings::not_onto(out, &opened.files, options.overwrite)?;
     }
@@ -52,7 +56,8 @@ pub fn fit(options: &cli::Fit) -> Result<u8, Failure> {
     }
     let problem = opened.problem;
     let patience = Duration::from_secs_f64(options.patience);
-    let fitted = progress::at_most(longest(patience), |report| fitted(&problem, patience, &stop, report))?;
+    let most = longest(patience + LEAST * ROUNDS as u32 + AFTERWARDS);
+    let fitted = progress::at_most(most, |report| fitted(&problem, patience, &stop, report))?;
     if let Some(out) = &options.out {
         output::file(out, &fitted.model)?;
     }

@@ -20,18 +20,13 @@ pub fn model(command: &cli::Model) -> Result<u8, Failure> {
 fn check(file: &cli::ModelFile) -> Result<u8, Failure> {
     let path = file.model.display();
     let loaded = ModelFile::load(&file.model)?;
-    small_enough(&loaded, file)?;
+    fit_to_show(&loaded, file)?;
     match loaded {
         ModelFile::Fragment(fragment) => {
             output::line(format_args!("{path}: fine: a fragment of {} elements", fragment.network.elements.len()))?;
         }
         ModelFile::Device(_) => {
             let model = held_model(&file.model, file.grip.as_deref())?;
-            if model.bodies.is_empty() {
-                return Err(Failure::input(format!(
-                    "{path}: is the model of nothing: it has no [bodies]; name what moves, such as `handle = 0.1`, kg (docs/own-recording.md, plant/models)"
-                )));
-            }
             // What cannot be stepped is told now, not at the start of a run.
             let plant = Plant::new(&model, 2e-4, &Options::default()).map_err(|e| Failure::input(format!("{path}: {e}")))?;
             for remark in remarks(&model, &Operating::small()) {
@@ -58,16 +53,20 @@ fn check(file: &cli::ModelFile) -> Result<u8, Failure> {
 /// Most bodies of a model that is looked at: its modes and its response are those of full matrices, whose cost grows with the cube of it.
 const MOST_BODIES: usize = 300;
 
-fn small_enough(loaded: &ModelFile, file: &cli::ModelFile) -> Result<(), Failure> {
+/// Whether there is something to look at, and not too much.
+fn fit_to_show(loaded: &ModelFile, file: &cli::ModelFile) -> Result<(), Failure> {
     let network = match loaded {
         ModelFile::Fragment(fragment) => &fragment.network,
         ModelFile::Device(model) => model,
     };
+    let path = file.model.display();
     match network.bodies.len() {
+        0 if matches!(loaded, ModelFile::Device(_)) => Err(Failure::input(format!(
+            "{path}: is the model of nothing: it has no [bodies]; name what moves, such as `handle = 0.1`, kg (docs/own-recording.md, plant/models)"
+        ))),
         bodies if bodies > MOST_BODIES => Err(Failure::input(format!(
-            "{}: has {bodies} bodies, and at most {MOST_BODIES} can be looked at; join those that move together (a chain needs few bodies per wave length \
-             of the highest frequency that matters)",
-            file.model.display()
+            "{path}: has {bodies} bodies, and at most {MOST_BODIES} can be looked at; join those that move together (a chain needs few bodies per wave length \
+             of the highest frequency that matters)"
         ))),
         _ => Ok(()),
     }
@@ -80,7 +79,7 @@ fn show(file: &cli::ModelFile) -> Result<u8, Failure> {
         None => Operating::small(),
     };
     let loaded = ModelFile::load(&file.model)?;
-    small_enough(&loaded, file)?;
+    fit_to_show(&loaded, file)?;
     let description = match loaded {
         ModelFile::Fragment(fragment) => describe(&fragment.network, &at),
         ModelFile::Device(_) => describe(&held_model(&file.model, file.grip.as_deref())?, &at),

@@ -2,6 +2,7 @@
 
 use crate::failure::{Failure, code};
 use crate::output;
+use crate::progress::busy;
 use backdrive_bags::{BagError, Entry, PlayOptions, Reader, Sink, play as play_bag};
 use backdrive_launch::RunHome;
 use backdrive_msgs::Message;
@@ -46,7 +47,8 @@ pub fn play(bag: &Path, speed: f64) -> Result<u8, Failure> {
         run.paths().root().display()
     ));
     let mut sink = Speaker { publishers };
-    let report = play_bag(&reader, &PlayOptions { rate: speed, ..PlayOptions::default() }, &mut sink).map_err(Failure::input);
+    let options = PlayOptions { rate: speed, ..PlayOptions::default() };
+    let report = busy(&format!("playing {}", bag.display()), || play_bag(&reader, &options, &mut sink)).map_err(Failure::input);
     drop((sink, transport));
     run.remove().map_err(Failure::from)?;
     let report = report?;

@@ -77,6 +77,7 @@ pub fn open(paths: &[PathBuf], model: Option<&Path>, grip: Option<&Path>, ignore
         }
     };
     let problem = problem.map_err(|e| told_failure(&e, model, &set))?;
+    set_checks::repeated_samples(&problem)?;
     notes.extend(set_checks::left_out(&set, &problem.model, ignored, grip.is_some())?);
     if !set.mixed_rates {
         audit::rates(&problem).map_err(Failure::input)?;

@@ -3,6 +3,7 @@
 use crate::cli;
 use crate::failure::Failure;
 use crate::output;
+use crate::progress::busy;
 use crate::run::run_here;
 use crate::run_page::{Heard, page};
 use crate::summary::graph_of;
@@ -50,7 +51,7 @@ pub fn replay(options: &cli::Replay) -> Result<u8, Failure> {
                 path.display()
             ));
         }
-        rows_of(&reader, &topic, graph.nodes[operator].axes, read)
+        busy(&format!("reading {}", path.display()), || rows_of(&reader, &topic, graph.nodes[operator].axes, read))
     };
     let (settings, steps) = match graph.nodes[operator].kind {
         NodeKind::Cycle => {

@@ -2,6 +2,7 @@
 
 use crate::failure::Failure;
 use backdrive_bags::Reader;
+use backdrive_diagnosis::problem::{Problem, Record};
 use backdrive_plant::model::Model;
 use backdrive_plant::recording::{Source, signals_of};
 use backdrive_plant::set::RecordingSet;
@@ -26,6 +27,23 @@ pub(crate) fn repeated(set: &RecordingSet) -> Result<Vec<String>, Failure> {
         notes.push(format!("{which}: its samples count twice, so that intervals are too narrow"));
     }
     Ok(notes)
+}
+
+/// Refuses a recording that is both fitted and held out in another form, such as a table and the bag that it was imported into: the samples
+/// that the model takes are the same, bit for bit.
+pub(crate) fn repeated_samples(problem: &Problem) -> Result<(), Failure> {
+    let moves = |record: &Record| record.inputs.iter().chain(record.outputs.iter().flatten()).any(|s| s.iter().any(|x| *x != s[0]));
+    let same = |a: &Record, b: &Record| a.inputs == b.inputs && a.outputs == b.outputs && moves(a);
+    for held in &problem.held_out {
+        if let Some(fitted) = problem.fit.iter().find(|fitted| same(fitted, held)) {
+            return Err(Failure::input(format!(
+                "{}: holds the same samples as {}, once to be fitted and once held out; what a fit has seen cannot check it: hold out another \
+                 recording, or give it once",
+                held.name, fitted.name
+            )));
+        }
+    }
+    Ok(())
 }
 
 /// Whether the rows that count in two files of a set have some in common, were the files the same.

@@ -4,6 +4,7 @@ use crate::bag::may_replace;
 use crate::cli;
 use crate::failure::Failure;
 use crate::output;
+use crate::progress::busy;
 use backdrive_bags::{Reader, recording, topic_of};
 use backdrive_plant::excitation::{Excitation, load_experiments};
 use backdrive_plant::model::{Fragment, Hold, Model, OutputKind};
@@ -17,11 +18,11 @@ use std::path::{Component, Path, PathBuf};
 pub fn simulate(options: &cli::Simulate) -> Result<u8, Failure> {
     let model = held_model(&options.model, options.grip.as_deref())?;
     let mut results = Vec::new();
-    let drives = drives(options, &model)?;
+    let drives = busy(&format!("reading {}", options.drive), || drives(options, &model))?;
     drives.iter().try_for_each(|drive| may_replace(&drive.out, options.overwrite))?;
     for Drive { recording: drive, out, condition } in drives {
         let model = under(&model, &condition, &drive.name)?;
-        let prediction = predict(&model, &drive, options)?;
+        let prediction = busy(&format!("simulating {}", drive.name), || predict(&model, &drive, options))?;
         if let Some(folder) = out.parent().filter(|f| !f.as_os_str().is_empty()) {
             output::folder(folder)?;
         }

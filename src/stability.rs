@@ -29,7 +29,7 @@ pub type Point = (f64, Run);
 pub fn stability(options: &cli::Stability) -> Result<u8, Failure> {
     let cancel = interrupt::heard()?;
 
-    let loaded = Loaded::read(options)?;
+    let loaded = progress::busy(&format!("reading {}", options.recording.display()), || Loaded::read(options))?;
     let question = loaded.question(options)?;
     if let Some(html) = &options.html {
         // A report that cannot be written is told before the work, not after it.
@@ -301,15 +301,23 @@ fn text(found: &Answer) -> String {
             let by = found.decided_by.as_deref().map_or(String::new(), |by| format!(", by {by}"));
             line("edge", format!("mu*lambda = {critical:.3}{ci}{hz}{by}{recorded}"));
         }
+        (None, Some(_)) if found.limited_from.is_some() => {
+            let by = found.decided_by.as_deref().map_or(String::new(), |by| format!(", by {by}"));
+            let from = found.limited_from.unwrap_or_default();
+            line("edge", format!("from mu*lambda = {from:.3} on a clamp acts or the travel is left, before any oscillation{by}{recorded}"));
+        }
         (None, Some(least)) => line("edge", format!("none up to mu*lambda = {least:.3}{recorded}")),
         _ => {}
     }
     let gain_db = found.gain_margin_db();
-    let at_least = found.at_least.filter(|_| found.critical_gain.is_none()).map(|least| 20.0 * (least / gain.product()).log10());
+    let to_clamp = found.limited_from.map(|from| 20.0 * (from / gain.product()).log10());
+    let at_least =
+        found.at_least.filter(|_| found.critical_gain.is_none() && to_clamp.is_none()).map(|least| 20.0 * (least / gain.product()).log10());
     let of = |value: Option<f64>, unit: &str| value.map_or("unlimited".to_string(), |v| format!("{v:.2} {unit}"));
     let to_edge = match (gain_db, at_least) {
         (Some(db), _) => Some(format!("gain {db:.2} dB to the edge")),
         (None, Some(db)) if db > 0.0 => Some(format!("gain at least {db:.2} dB")),
+        _ if to_clamp.is_some() => to_clamp.map(|db| format!("gain {db:.2} dB to where a clamp acts or the travel is left")),
         _ => None,
     };
     // Margins of another edge than the one told would contradict it.

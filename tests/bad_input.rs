@@ -1,8 +1,11 @@
 //! What is wrong is said once, with its place and what to do; the exit code says of which sort it is; nothing panics and
 //! nothing that was there is lost.
 
+#[path = "common/skipped.rs"]
+mod skipped;
 mod system;
 
+use skipped::skipped;
 use std::os::unix::process::CommandExt;
 use std::path::Path;
 use std::process::Command;
@@ -184,6 +187,7 @@ fn arguments() {
             case(&with("--dither", "multisine:peak=x,from=1,to=500,period=2"), 3, &["dither", "peak", "expected a number"]),
             case(&with("--dither", "sweep:amplitude=1"), 3, &["dither", "missing key \"from\""]),
             case(&with("--bag", "absent/x.mcap"), 5, &["absent/x.mcap", "cannot be written", "No such file"]),
+            case(&with("--bag", "/dev/null"), 5, &["/dev/null", "cannot be written", "name a file"]),
             case(&with("--bag", "tmp"), 5, &["tmp", "cannot be written", "directory"]),
             // A slip must not cost a file that is no bag.
             case(&with("--bag", "graph.toml"), 3, &["graph.toml", "exists and is not a bag"]),
@@ -338,12 +342,12 @@ fn privileged(place: &Place, script: &str) -> Option<Ended> {
     command.args(["sh", "-c", script, env!("CARGO_BIN_EXE_backdrive")]);
     let probe = Command::new("unshare").args(if root { &["--mount"][..] } else { &["--mount", "--map-root-user"] }).arg("true").output();
     if !probe.is_ok_and(|p| p.status.success()) {
-        println!("left out: unshare and mount are not allowed here");
+        skipped("unshare and mount are not allowed here");
         return None;
     }
     let done = Running::start(place, command).end();
     if done.code == Some(77) {
-        println!("left out: mount is not allowed here");
+        skipped("mount is not allowed here");
         return None;
     }
     Some(done)

@@ -88,6 +88,7 @@ fn what_cannot_be_meant_is_refused_with_what_to_do() {
         (&["run", &graph, "--transport", "inproc", "--mu", "1e300"], &["mu", "at most 1e6"]),
         (&["run", &graph, "--transport", "inproc", "--environment", &grip], &["is a grip", "--grip"]),
         (&["model", "check", "empty.toml"], &["empty.toml", "has no [bodies]"]),
+        (&["model", "show", "empty.toml"], &["empty.toml", "has no [bodies]"]),
         (&["model", "show", "huge.toml"], &["10000 bodies", "at most 300"]),
         (&["doctor", "--listen", "0", "--peer", "::1"], &["::1", "IPv4 only"]),
         (&["doctor", "--listen", "0", "--peer", "no-such-host.invalid"], &["no-such-host.invalid", "no host of that name"]),

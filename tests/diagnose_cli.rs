@@ -308,15 +308,22 @@ fn what_a_fit_has_seen_is_not_held_out_too() {
     let place = Place::new();
     record(&place, NOMINAL);
     std::fs::copy(place.path("sweep.csv"), place.path("copy.csv")).unwrap();
+    std::os::unix::fs::symlink("sweep.csv", place.path("link.csv")).unwrap();
+    // The same samples in other bytes: a table with other line ends, and the bag that it is imported into.
+    place.write("other-bytes.csv", &read(&place, "sweep.csv").replace('\n', "\r\n"));
+    assert_eq!(place.backdrive(&["bag", "import", "sweep.csv", "--bag", "bag.mcap"]).code, Some(0));
     std::fs::create_dir(place.path("set")).unwrap();
     for file in ["model.toml", "sweep.csv", "copy.csv"] {
         std::fs::copy(place.path(file), place.path(&format!("set/{file}"))).unwrap();
     }
     place.write("set/set.toml", "model = 'model.toml'\nfit = ['sweep.csv']\nheld_out = ['copy.csv']\n");
-    let cases: [&[&str]; 6] = [
+    let cases: [&[&str]; 9] = [
         &["diagnose", "sweep.csv", "sweep.csv", "--model", "model.toml", "--out", "out"],
         &["diagnose", "sweep.csv", "./sweep.csv", "--model", "model.toml", "--out", "out"],
         &["diagnose", "sweep.csv", "copy.csv", "--model", "model.toml", "--out", "out"],
+        &["diagnose", "sweep.csv", "link.csv", "--model", "model.toml", "--out", "out"],
+        &["diagnose", "sweep.csv", "other-bytes.csv", "--model", "model.toml", "--out", "out"],
+        &["diagnose", "bag.mcap", "sweep.csv", "--model", "model.toml", "--out", "out"],
         &["diagnose", "set", "--out", "out"],
         &["fit", "model.toml", "sweep.csv", "copy.csv"],
         &["fit", "model.toml", "set"],

@@ -1,11 +1,14 @@
 //! Runs with the wall clock: nothing lost, nothing mixed up, an end in order. And what a run does over its length: the
 //! guard, the dither, a change of gains. How late a step may be is not asserted: the machine decides that.
 
+#[path = "common/skipped.rs"]
+mod skipped;
 mod system;
 
 use backdrive_bags::{Reader, info};
 use backdrive_msgs::{Message, flag, measured};
 use nix::sys::signal::Signal;
+use skipped::skipped;
 use std::path::Path;
 use system::{Place, alone, events, file, graph_text, kill, messages, samples, until_recorded};
 
@@ -212,8 +215,7 @@ fn a_change_of_gains_ramps() {
 #[test]
 fn a_minute_at_5_and_at_10_khz_is_recorded_whole() {
     if std::env::var_os("BACKDRIVE_LONG").is_none() {
-        println!("left out: set BACKDRIVE_LONG=1");
-        return;
+        return skipped("a minute in real time; BACKDRIVE_LONG=1 runs it");
     }
     let (_alone, place) = (alone(), Place::new());
     assert!((0..3).any(|_| minute_is_whole(&place, 5000)), "no attempt of three was whole");

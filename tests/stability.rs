@@ -94,6 +94,26 @@ fn below_and_beyond_the_edge() {
 }
 
 #[test]
+fn the_edge_is_the_loop_s_and_not_the_question_s() {
+    let place = Place::new();
+    record(&place, "run.mcap", &["--lambda", "0.2"]);
+    let edges = ["1e-3", "0.3", "1", "5"].map(|gain| ask(&place, "run.mcap", &["--gain", gain]).1);
+    for found in &edges {
+        for path in ["/critical_gain", "/critical_frequency_hz", "/methods/frequency/critical_gain", "/methods/resimulation/critical_gain"]
+        {
+            assert_eq!(number(found, path), number(&edges[0], path), "{path} at {}", found["gain"]);
+        }
+    }
+    // What no loop can be asked about ends at once, and says so.
+    for gain in ["1e-300", "1e300"] {
+        let begun = std::time::Instant::now();
+        let done = place.backdrive(&["stability", "run.mcap", "--gain", gain]);
+        assert!(done.code == Some(3) && done.stderr.contains("beyond any sense"), "{done:?}");
+        assert!(begun.elapsed().as_secs() < 30, "{:?}", begun.elapsed());
+    }
+}
+
+#[test]
 fn a_swapped_part_and_a_named_script() {
     let place = Place::new();
     record(&place, "run.mcap", &["--lambda", "0.2"]);
@@ -266,6 +286,8 @@ fn wrong_questions() {
     record(&place, "run.mcap", &["--lambda", "0.2"]);
     for (words, code, told) in [
         (vec!["stability", "none.mcap"], 3, "none.mcap"),
+        (vec!["stability", "."], 3, "name the bag in it, ./run.mcap"),
+        (vec!["stability", "tmp"], 3, "is a folder without a bag"),
         (vec!["stability", "run.mcap", "--gain", "0"], 2, "above 0"),
         (vec!["stability", "run.mcap", "--gain", "1", "--mu", "2"], 2, "cannot be used with"),
         (vec!["stability", "run.mcap", "--sweep", "1:2"], 2, "FROM:TO:COUNT"),

@@ -2,19 +2,17 @@
 
 use crate::BagError;
 use std::fs::{File, OpenOptions, TryLockError};
-use std::io::{ErrorKind, Read, Seek, SeekFrom};
-use std::os::unix::fs::MetadataExt;
+use std::io::{ErrorKind, Read, Seek, SeekFrom, Write};
+use std::os::unix::fs::{FileTypeExt, MetadataExt};
 use std::path::Path;
 
 /// Opens a file for a bag, empty and locked for as long as it is open: a second writer is refused, whatever it was told.
 ///
 /// A file that holds something is replaced only with `overwrite`, and only if it is a bag. What is no regular file (a
-/// device, a pipe) is taken as it is. Errors: [`BagError::Exists`], [`BagError::InUse`], [`BagError::Create`].
+/// device, a pipe) is refused: a bag is written at several places and read again at the end. Errors: [`BagError::Exists`], [`BagError::InUse`], [`BagError::Create`].
 pub(crate) fn claim(path: &Path, overwrite: bool) -> Result<File, BagError> {
-    let (file, regular) = lock(path, overwrite)?;
-    if regular {
-        file.set_len(0).map_err(failed(path))?;
-    }
+    let file = lock(path, overwrite)?;
+    file.set_len(0).map_err(failed(path))?;
     Ok(file)
 }
 
@@ -23,15 +21,15 @@ pub(crate) fn claim(path: &Path, overwrite: bool) -> Result<File, BagError> {
 /// Whoever writes it later may still be refused, when another was faster.
 pub fn check_target(path: &Path, overwrite: bool) -> Result<(), BagError> {
     let existed = path.exists();
-    let (_file, regular) = lock(path, overwrite)?;
+    let _file = lock(path, overwrite)?;
     // Removed while the lock is held: one that has opened it meanwhile sees that it is gone, and begins again.
-    if !existed && regular {
+    if !existed {
         let _ = std::fs::remove_file(path);
     }
     Ok(())
 }
 
-fn lock(path: &Path, overwrite: bool) -> Result<(File, bool), BagError> {
+fn lock(path: &Path, overwrite: bool) -> Result<File, BagError> {
     loop {
         let mut file = OpenOptions::new().read(true).write(true).create(true).truncate(false).open(path);
         if file.as_ref().is_err_and(|e| e.kind() == ErrorKind::PermissionDenied) {
@@ -40,7 +38,7 @@ fn lock(path: &Path, overwrite: bool) -> Result<(File, bool), BagError> {
         let mut file = file.map_err(failed(path))?;
         let before = file.metadata().map_err(failed(path))?;
         if !before.is_file() {
-            return Ok((file, false));
+            return Err(no_file(path, file, before.file_type()));
         }
         match file.try_lock() {
             Ok(()) => {}
@@ -60,8 +58,15 @@ fn lock(path: &Path, overwrite: bool) -> Result<(File, bool), BagError> {
             }
             file.seek(SeekFrom::Start(0)).map_err(failed(path))?;
         }
-        return Ok((file, true));
+        return Ok(file);
     }
+}
+
+/// Why a device or a pipe takes no bag: what it says itself where it takes nothing at all, such as `/dev/full`.
+fn no_file(path: &Path, mut file: File, kind: std::fs::FileType) -> BagError {
+    let refused = if kind.is_char_device() { file.write_all(&[0]).err() } else { None };
+    let why = "it is a device or a pipe, and what is written there cannot be read again; name a file";
+    failed(path)(refused.unwrap_or_else(|| std::io::Error::new(ErrorKind::InvalidInput, why)))
 }
 
 fn failed(path: &Path) -> impl FnOnce(std::io::Error) -> BagError + use<> {

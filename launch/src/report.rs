@@ -14,6 +14,9 @@ pub struct RunReport {
     pub title: String,
     /// How time ran.
     pub clock: Clock,
+    /// Steps per second that the graph asks for; `None` in reports of earlier versions.
+    #[serde(default)]
+    pub rate_hz: Option<f64>,
     /// Steps done by the node that did most.
     pub steps: u64,
     /// Steps that the graph asks for; `None` where it runs until it is stopped.

@@ -173,6 +173,7 @@ impl Supervisor {
             id: self.directory.paths().id().to_string(),
             title: self.plan.title.clone(),
             clock: self.plan.timing.clock,
+            rate_hz: Some(self.plan.timing.rate_hz),
             steps,
             planned_steps: self.plan.timing.steps,
             startup_s: seconds_since(self.connected.unwrap_or(now), self.begun),

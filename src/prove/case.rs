@@ -10,6 +10,7 @@ use super::session::hand_over;
 use crate::cli;
 use crate::failure::Failure;
 use crate::output;
+use crate::progress::busy;
 use backdrive_sealed::seal::hash;
 use backdrive_sealed::truth::Truth;
 use serde::Serialize;
@@ -123,26 +124,29 @@ pub fn prove(options: &cli::Prove, folder: &Path, drawn: &Draw, stop: &AtomicBoo
     let masked = if drawn.refitted { "; the nominal numbers were refitted" } else { "" };
     output::line(format_args!("{}: sealed, SHA-256 {digest}{hand}{masked}", folder.display()))?;
 
+    let at = |doing: &str| format!("{}: {doing}", folder.display());
     // From here to the verdict only the hidden plant's process opens the truth.
     let record = |nominal: &Nominal, name: &str| {
         let graph = folder.join(format!("{name}.toml"));
         write(&graph, &graph_of(template.clone(), options, &hidden, nominal, &digest)?)?;
         let (recorded, session) = (folder.join("recorded"), folder.join(name));
-        ours(folder, &format!("run-{name}"), &[&"run", &graph, &"--out", &recorded, &"--overwrite"])?;
-        hand_over(&recorded, &session, drawn.shows_hand, options.hand_bandwidth)?;
+        busy(&at("recording the session"), || {
+            ours(folder, &format!("run-{name}"), &[&"run", &graph, &"--out", &recorded, &"--overwrite"])
+        })?;
+        busy(&at("handing the bags over"), || hand_over(&recorded, &session, drawn.shows_hand, options.hand_bandwidth))?;
         Ok::<PathBuf, Failure>(session)
     };
     let mut nominal = Nominal { model: hidden.model.clone(), grip: hidden.grip.clone() };
     if drawn.refitted {
         let before = record(&nominal, "before")?;
         let model = PathBuf::from(absolute(&folder.join("nominal.toml"))?);
-        refit(folder, "fit-before", &before, &model)?;
+        busy(&at("refitting the nominal parameters"), || refit(folder, "fit-before", &before, &model))?;
         nominal = Nominal { model, grip: None };
     }
     let session = record(&nominal, "session")?;
     let found = folder.join("diagnosis");
     let patience = (options.patience * if drawn.shows_hand { 1.0 } else { LONGER }).to_string();
-    ours(folder, "diagnose", &[&"diagnose", &session, &"--out", &found, &"--patience", &patience])?;
+    busy(&at("diagnosing"), || ours(folder, "diagnose", &[&"diagnose", &session, &"--out", &found, &"--patience", &patience]))?;
     let verdict: Value = serde_json::from_str(&read(&found.join("verdict.json"))?).map_err(Failure::input)?;
 
     let error = |key: &str| verdict["held_out"][key].as_f64();
@@ -150,14 +154,15 @@ pub fn prove(options: &cli::Prove, folder: &Path, drawn: &Draw, stop: &AtomicBoo
 
     let (mut cancellers, mut share) = (Vec::new(), None);
     if !options.no_gains {
-        cancellers = all_cancellers(options, folder, &nominal, &session, &found)?;
+        cancellers = busy(&at("fitting models to compare with"), || all_cancellers(options, folder, &nominal, &session, &found))?;
         let (diagnosed, scaled) = (found.join("model.diagnosed.toml"), folder.join("chosen.toml"));
         let rivals = verdict["rival_models"].as_array().into_iter().flatten().filter_map(Value::as_str).map(|name| found.join(name));
         let task = Task { graph: &options.contact, high_pass_hz: options.high_pass };
         // What is unexplained is in the device and in no model at hand: what it does to the loop nobody can say, so nothing is cancelled. So is what
         // an explanation leaves over that a proof would count as an effect.
         let is_explained = verdict["verdict"] != "unexplained" && floors_left("nrmse_after").is_some_and(|floors| floors < SHOWS);
-        let chosen = if is_explained { choose(&diagnosed, &rivals.collect::<Vec<_>>(), &scaled, &task, stop)? } else { Chosen::nothing() };
+        let choose = || choose(&diagnosed, &rivals.collect::<Vec<_>>(), &scaled, &task, stop);
+        let chosen = if is_explained { busy(&at("choosing how much to cancel"), choose)? } else { Chosen::nothing() };
         cancellers.push(Canceller { name: "chosen", model: (chosen.share > 0.0).then_some(scaled), grip: None });
         share = Some(chosen.share);
     }
@@ -178,9 +183,12 @@ pub fn prove(options: &cli::Prove, folder: &Path, drawn: &Draw, stop: &AtomicBoo
             if stop.load(Ordering::SeqCst) {
                 break;
             }
-            let edge = the_loop.edge(canceller, *grip, stop)?;
+            let raising = at(&format!("raising the gain with canceller \"{}\" and {grip} of the grip", canceller.name));
+            let edge = busy(&raising, || the_loop.edge(canceller, *grip, stop))?;
             if *grip == 1.0 && LIVE.contains(&canceller.name) {
-                live.extend(live::about(&folder.join("live"), &the_loop, canceller, &edge, &hidden, &device)?);
+                let live_folder = folder.join("live");
+                let about = || live::about(&live_folder, &the_loop, canceller, &edge, &hidden, &device);
+                live.extend(busy(&at("running the live graph"), about)?);
             }
             let whole_range = edge.critical_gain.is_none() && edge.limited_from.is_none() && edge.at_least > 0.0;
             gains.push(Gain { canceller: canceller.name, grip: *grip, stable_to: edge.at_least, because: edge.reason, whole_range });

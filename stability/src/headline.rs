@@ -86,6 +86,9 @@ pub fn grip_name(scale: f64) -> String {
     if scale == 1.0 { "the grip as recorded".to_string() } else { format!("a grip {scale} times as firm") }
 }
 
+/// Logarithm of the ratio up to which two edges may be one.
+const SAME_EDGE: f64 = 0.22;
+
 impl Answer {
     /// Everything that counts, the one that leads first.
     fn witnesses(&self) -> Vec<Witness> {
@@ -130,6 +133,7 @@ impl Answer {
             witnesses.iter().filter(|w| w.end().is_some()).min_by(|a, b| a.end().unwrap_or(0.0).total_cmp(&b.end().unwrap_or(0.0)));
         if let Some(lowest) = lowest.filter(|_| leads.method == Method::Resimulation) {
             (self.critical_gain, self.at_least) = (lowest.critical_gain, lowest.at_least.filter(|_| lowest.critical_gain.is_none()));
+            self.limited_from = lowest.end().filter(|_| lowest.critical_gain.is_none());
             self.critical_frequency_hz = lowest.frequency_hz;
             self.critical_gain_ci95 = match lowest.method {
                 Method::Frequency => self.frequency_answer.as_ref().and_then(|a| a.critical_gain_ci95),
@@ -171,21 +175,27 @@ impl Answer {
         self.critical_gain.map(|edge| 20.0 * (edge / self.gain.product()).log10())
     }
 
-    /// Whether the margins of the measured response are those of the headline's edge: they are told beside it only then.
+    /// Whether the margins of the measured response are those of the headline's edge: they are told beside it only then. An open interval
+    /// holds every edge and does not make the margins of one those of another.
     pub fn margins_are_of_the_edge(&self) -> bool {
-        match (self.critical_gain, self.frequency_answer.as_ref().and_then(|a| a.critical_gain_ci95)) {
-            (Some(edge), Some((low, high))) => 1.05 * edge >= low && high.is_none_or(|high| edge <= 1.05 * high),
-            (Some(_), None) => false,
-            (None, _) => true,
-        }
+        let Some(edge) = self.critical_gain else { return self.limited_from.is_none() };
+        let Some(answer) = &self.frequency_answer else { return false };
+        let (Some(measured), Some((low, high))) = (answer.critical_gain, answer.critical_gain_ci95) else { return false };
+        1.05 * edge >= low && high.is_none_or(|high| edge <= 1.05 * high) && (measured / edge).ln().abs() < SAME_EDGE
     }
 
     /// Tells in the reason whose edge the headline's is, and beside which other.
     pub(crate) fn name_the_edge(&mut self) {
-        let (Some(edge), Some(by), Some(leads)) = (self.critical_gain, &self.decided_by, self.witnesses.first()) else { return };
+        let (Some(by), Some(leads)) = (&self.decided_by, self.witnesses.first()) else { return };
         if self.from == Method::Frequency || self.reason.contains("act on the lower") {
             return;
         }
+        if let Some(end) = self.limited_from.filter(|_| leads.name != *by) {
+            let other = leads.end().map_or("none".to_string(), |end| format!("{end:.3}"));
+            self.reason += &format!("; the limit to act on is the lowest known, mu*lambda = {end:.3} by {by} ({other} by {})", leads.name);
+            return;
+        }
+        let Some(edge) = self.critical_gain else { return };
         self.reason += &match leads.critical_gain {
             Some(other) if leads.name != *by => {
                 format!("; the edge to act on is the lowest known, mu*lambda = {edge:.3} by {by} ({other:.3} by {})", leads.name)

@@ -186,6 +186,8 @@ pub struct Answer {
     pub critical_gain: Option<f64>,
     /// Where there is none: it is at least this.
     pub at_least: Option<f64>,
+    /// Where a clamp or the travel ends the stable range before any oscillation does: from this mu*lambda on.
+    pub limited_from: Option<f64>,
     /// 95 % interval; an open upper end is `None`.
     pub critical_gain_ci95: Option<(f64, Option<f64>)>,
     /// Frequency on the edge, Hz; 0 where it runs away without oscillating.
@@ -415,6 +417,21 @@ fn held(column: &[f64]) -> Vec<f64> {
     column.iter().map(value).collect()
 }
 
+/// Why the measured response and the loop that is run again may give different edges.
+fn why_apart(swapped: Swapped, amplitude_dependent: bool, model_is_off: bool) -> &'static str {
+    match () {
+        () if model_is_off => {
+            "The models do not do what was recorded, so that the re-simulation lacks something that the measured loop has"
+        }
+        () if amplitude_dependent => "The measured edge depends on the amplitude of the dither: such a loop has an edge for each motion",
+        () if swapped.any() => "The exchanged parts enter the frequency response linearised, and the re-simulation as they are",
+        () => {
+            "The frequency response is that of the dither's small motion in contact; the re-simulation goes through the hand's whole motion, in which \
+             friction, hysteresis and touching differ"
+        }
+    }
+}
+
 impl Answer {
     fn of(question: &Question, frequency: Frequency, checks: Vec<PartCheck>) -> Answer {
         let session = question.session;
@@ -447,6 +464,7 @@ impl Answer {
             from: Method::Nothing,
             critical_gain: None,
             at_least: None,
+            limited_from: None,
             critical_gain_ci95: None,
             critical_frequency_hz: None,
             margins: frequency_answer.margins,
@@ -646,14 +664,10 @@ impl Answer {
                     (None, None) => "nowhere".to_string(),
                 };
                 let text = format!(
-                    "the edge is {} by the frequency response and {} by the re-simulation: act on the lower{}",
+                    "the edge is {} by the frequency response and {} by the re-simulation: act on the lower. {}",
                     edge(answer.critical_gain, answer.at_least),
                     edge(again.edge.critical_gain, Some(again.edge.at_least)),
-                    if swapped.any() || answer.amplitude_dependent {
-                        "; a loop that is not linear has an edge for each motion"
-                    } else {
-                        ""
-                    }
+                    why_apart(swapped, answer.amplitude_dependent, found.iter().any(|d: &Disagreement| d.kind == "model"))
                 );
                 found.push(Disagreement { kind: "methods", text });
             }
@@ -732,6 +746,7 @@ impl Answer {
             "from": self.from,
             "critical_gain": self.critical_gain,
             "at_least": self.at_least,
+            "limited_from": self.limited_from,
             "critical_gain_ci95": self.critical_gain_ci95,
             "critical_frequency_hz": self.critical_frequency_hz,
             "margins": {

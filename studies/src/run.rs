@@ -1,7 +1,7 @@
 //! A diagnosis as `backdrive diagnose` makes it, from a set whose recordings lie elsewhere.
 
 use crate::{Context, StudyError};
-use backdrive::diagnose::{Diagnosed, Found, MODEL, diagnose_into};
+use backdrive::diagnose::{Diagnosed, Found, MODEL, REPORT, diagnose_into};
 use backdrive::recordings;
 use backdrive_diagnosis::hypothesis::PHYSICS;
 use backdrive_diagnosis::search::Settings;
@@ -52,7 +52,7 @@ pub fn diagnose(context: &Context, ask: &Ask) -> Result<Found, StudyError> {
         effects: ask.effects,
         patience: Duration::from_secs_f64(ask.patience * context.longer),
     };
-    let Diagnosed { found, .. } = diagnose_into(opened, &settings, &out, true, &AtomicBool::new(false))?;
+    let Diagnosed { found, .. } = diagnose_into(opened, &settings, &out, Some(&out.join(REPORT)), &AtomicBool::new(false))?;
     Ok(found)
 }
 

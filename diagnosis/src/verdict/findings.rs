@@ -95,7 +95,7 @@ fn rivals(search: &Search, best: &Candidate, which: usize) -> Vec<(Hypothesis, f
     each
 }
 
-fn place(place: &Place) -> Json {
+pub(super) fn place(place: &Place) -> Json {
     match place {
         Place::Between(a, b) => json!({ "between": [a, b] }),
         Place::Signal(name) => json!({ "signal": name }),

@@ -3,6 +3,7 @@
 mod choice;
 mod findings;
 mod models;
+mod remaining;
 mod signals;
 
 pub use choice::chosen;
@@ -20,6 +21,7 @@ use backdrive_plant::write::round_significant;
 use choice::{alike, nearest};
 use findings::{adequacy, detectable, findings, moved};
 use models::{held_out, model_text, rival_models};
+use remaining::remaining;
 use serde_json::{Value as Json, json};
 use signals::{bursts, place_in_signals, unknown_inputs};
 use std::time::Duration;
@@ -125,8 +127,9 @@ pub fn verdict(problem: &Problem, search: &Search, model_name: &str) -> Result<V
         "verdict": word,
         "sentence": sentence,
         "findings": findings,
-        "where": place_in_signals(problem, search, &bursts),
+        "where": place_in_signals(problem, &search.nominal.fit.residuals, &bursts),
         "parameters": parameters,
+        "remaining": remaining(problem, search, best, &held),
         "held_out": held,
         "unknown_inputs": unknown_inputs(problem, best),
         "model_after": model_name,
@@ -171,9 +174,17 @@ fn is_excited(problem: &Problem, search: &Search) -> bool {
 
 /// Whether a rival of the first finding is more likely than the finding itself: then the finding is not asserted.
 fn is_outdone(findings: &[Json]) -> bool {
+    findings.first().is_some_and(has_likelier_rival)
+}
+
+fn has_likelier_rival(finding: &Json) -> bool {
     let confidence = |f: &Json| f["confidence"].as_f64().unwrap_or(0.0);
-    let Some(first) = findings.first() else { return false };
-    first["alternatives"].as_array().into_iter().flatten().any(|rival| confidence(rival) >= confidence(first))
+    finding["alternatives"].as_array().into_iter().flatten().any(|rival| confidence(rival) >= confidence(finding))
+}
+
+/// A finding in words; where a rival is more likely, what is known of both.
+fn asserted(finding: &Json) -> String {
+    if has_likelier_rival(finding) { known(std::slice::from_ref(finding)) } else { words::finding(finding) }
 }
 
 /// What is known where the explanations cannot be told apart: the first finding and the rivals that are at least half as likely, at most three.
@@ -191,12 +202,12 @@ fn sentence(word: &str, best: &Candidate, findings: &[Json], planned: bool) -> S
     // Below this the residual is the sensor's noise up to chance and rounding.
     let end = if level < LEFT_OVER { "down to the sensor noise".to_string() } else { format!("to {times} times the sensor noise") };
     let still = if level < LEFT_OVER { String::new() } else { format!("; the residual is still {times} times the sensor noise") };
-    let all = findings.iter().map(words::finding).collect::<Vec<_>>().join(", and ");
+    let all = findings.iter().map(asserted).collect::<Vec<_>>().join(", and ");
     match word {
         "ambiguous" => {
             let others = match findings.get(1..) {
                 Some(others) if !others.is_empty() => {
-                    format!(", beside {}", others.iter().map(words::finding).collect::<Vec<_>>().join(", and "))
+                    format!(", beside {}", others.iter().map(asserted).collect::<Vec<_>>().join(", and "))
                 }
                 _ => String::new(),
             };
@@ -226,6 +237,8 @@ mod tests {
             |c: f64, r: f64| json!({ "physics": "coulomb", "between": ["motor", "ground"], "confidence": c, "alternatives": [rival(r)] });
         assert!(is_outdone(&[first(0.04, 0.10)]));
         assert!(!is_outdone(&[first(0.97, 0.03)]) && !is_outdone(&[]));
+        assert_eq!(asserted(&first(0.04, 0.10)), "dry friction, at the motor or at the drum");
+        assert_eq!(asserted(&first(0.97, 0.03)), "dry friction at the motor");
         assert_eq!(known(&[first(0.04, 0.10)]), "dry friction, at the motor or at the drum");
         assert_eq!(known(&[first(0.97, 0.03)]), "dry friction, at the motor");
     }

@@ -2,7 +2,7 @@
 
 use crate::fit::Evaluator;
 use crate::problem::Problem;
-use crate::search::{Candidate, Search};
+use crate::search::Candidate;
 use crate::unknown::{Estimated, Unknown, estimated};
 use backdrive_plant::write::round_significant;
 use serde_json::{Value as Json, json};
@@ -43,9 +43,8 @@ pub(super) fn bursts(problem: &Problem, best: &Candidate) -> Vec<[f64; 2]> {
     all
 }
 
-/// When and at which frequencies the refitted nominal model leaves most over.
-pub(super) fn place_in_signals(problem: &Problem, search: &Search, bursts: &[[f64; 2]]) -> Json {
-    let residuals = &search.nominal.fit.residuals;
+/// When and at which frequencies residuals, in the order of an evaluator, are largest.
+pub(super) fn place_in_signals(problem: &Problem, residuals: &[f64], bursts: &[[f64; 2]]) -> Json {
     let evaluator = Evaluator::new(problem);
     let mut strongest: Option<(f64, [f64; 2], [f64; 2])> = None;
     for (r, _, range) in evaluator.layout() {
