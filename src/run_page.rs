@@ -3,6 +3,7 @@
 //! It is made from what went by (from the bag, or from the run itself where it was in one process) and from the supervisor's report.
 
 use crate::failure::Failure;
+use crate::page_parts::{ending, shell_word};
 use crate::run::Done;
 use backdrive_bags::Reader;
 use backdrive_launch::{Cause, RunReport};
@@ -21,6 +22,20 @@ const MOST_EVENTS: usize = 200;
 const BRIDGE_S: f64 = 0.05;
 /// How much of the first contact is drawn by itself, s.
 const IMPACT_S: f64 = 0.3;
+
+/// The terms of the page.
+const TERMS: [(&str, &str); 7] = [
+    ("μλ", "the loop's gain: the position scale μ from master to slave times the force scale λ from slave to master"),
+    ("x_u, x_m, x_c, x_s", "position of: what the hand wants, the master, the command sent to the slave, the slave"),
+    ("F_f, F_s", "force reflected on the master; force of the environment on the slave"),
+    ("stable", "what oscillates while the hand holds still in contact dies out"),
+    ("limit cycle", "an oscillation that neither dies out nor grows while the hand holds still"),
+    (
+        "loop time",
+        "from the begin of a step of a node to its end, waiting for its inputs included; p50 half of the steps are faster, p99 all but one in a hundred",
+    ),
+    ("canceller", "takes the master's own motion under the reflected force out of the command (induced master motion)"),
+];
 
 /// What goes by in a run, for its page.
 pub struct Heard {
@@ -83,13 +98,13 @@ impl Heard {
     }
 }
 
-/// The page of a run; `what` is the verb that made it, with its file.
-pub fn page(done: &Done, graph: &Graph, heard: &Heard, what: &str) -> Page {
+/// The page of a run or a replay.
+pub fn page(done: &Done, graph: &Graph, heard: &Heard) -> Page {
     let mut page = Page::new(if graph.title.is_empty() { "A run" } else { &graph.title });
     let (tone, sentence) = headline(done);
     page.lead(tone, &sentence);
     page.todo("What to do now", &to_do(done));
-    page.table(facts(done, graph, what));
+    page.table(facts(done, graph));
 
     let session = heard.signals.session();
     page.section("Signals");
@@ -103,6 +118,7 @@ pub fn page(done: &Done, graph: &Graph, heard: &Heard, what: &str) -> Page {
     timing(&mut page, done, graph, heard);
     page.section("Events");
     events(&mut page, done, graph, heard);
+    ending(&mut page, &TERMS);
     page
 }
 
@@ -145,7 +161,7 @@ fn headline(done: &Done) -> (Tone, String) {
 /// Sentences with a command to copy.
 fn to_do(done: &Done) -> Vec<(String, Option<String>)> {
     let mut items = Vec::new();
-    let bag = done.bag.as_ref().map(|b| b.file_name().map_or(b.display().to_string(), |n| n.to_string_lossy().to_string()));
+    let bag = done.bag.as_ref().map(|b| shell_word(&b.file_name().map_or(b.display().to_string(), |n| n.to_string_lossy().to_string())));
     let ask = bag.as_ref().map(|bag| format!("backdrive stability {bag} --html stability.html"));
     let gain = done.summary.as_ref().map_or(1.0, |s| s.loop_gain);
     match done.summary.as_ref().and_then(|s| s.outcome) {
@@ -175,11 +191,9 @@ fn to_do(done: &Done) -> Vec<(String, Option<String>)> {
     items
 }
 
-fn facts(done: &Done, graph: &Graph, what: &str) -> Table {
+fn facts(done: &Done, graph: &Graph) -> Table {
     let mut table = Table::new(["", ""]);
     let mut row = |name: &str, text: String| table.push([name.to_string(), text]);
-    row("command", what.to_string());
-    row("program", format!("backdrive {}", env!("CARGO_PKG_VERSION")));
     let clock = if graph.timing.clock == Clock::Realtime { "real time" } else { "lockstep" };
     let planned = graph.timing.steps.map_or(String::new(), |n| format!(" of {n}"));
     row("steps", format!("{}{planned}, at {} ({clock})", done.steps, si(graph.timing.rate_hz, "Hz")));

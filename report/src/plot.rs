@@ -194,7 +194,7 @@ pub(crate) struct Annotation {
 /// let gain = [0.1, 1.0, 10.0];
 /// let amplitude = [1e-5, 2e-5, 3e-3];
 /// let plot = Plot::new("Sweep")
-///     .x_axis("gain µλ", "").x_log()
+///     .x_axis("gain μλ", "").x_log()
 ///     .y_axis("amplitude", "m").y_log()
 ///     .region(0.1, 4.0, Tone::Good, "stable")
 ///     .region(4.0, 10.0, Tone::Bad, "unstable")

@@ -4,6 +4,7 @@ use super::words::{text, tone, word};
 use crate::stability::Point;
 use backdrive_report::{Cell, Figure, Page, Plot, Table, Tone, number, si};
 use backdrive_stability::outcome::Outcome;
+use backdrive_stability::resimulate::edge::Edge;
 use backdrive_stability::verdict::{Answer, Resimulated, Word};
 
 /// The sweep, or the search for the edge where nothing was swept.
@@ -127,11 +128,14 @@ fn grips(page: &mut Page, again: &Resimulated, asked: f64) {
         let head = ["grip".to_string(), "critical μλ".to_string(), format!("at μλ = {}", number(asked))];
         let mut table =
             Table::new(head).caption("The edge for softer and firmer grips than the one recorded: nobody knows a grip exactly.");
-        for g in &again.grips {
+        let mut rows: Vec<(f64, &Edge, Option<Outcome>)> = again.grips.iter().map(|g| (g.scale, &g.edge, g.at_asked)).collect();
+        rows.push((1.0, &again.edge, Some(again.outcome)));
+        rows.sort_by(|a, b| a.0.total_cmp(&b.0));
+        for (scale, edge, at_asked) in rows {
             table.push([
-                Cell::from(format!("× {}", g.scale)),
-                g.edge.critical_gain.map_or_else(|| format!("≥ {}", number(g.edge.at_least)), number).into(),
-                g.at_asked.map_or(Cell::from("–"), |o| Cell::tone(o.to_string(), tone(word(&o)))),
+                Cell::from(if scale == 1.0 { "× 1 (as recorded)".to_string() } else { format!("× {scale}") }),
+                edge.critical_gain.map_or_else(|| format!("≥ {}", number(edge.at_least)), number).into(),
+                at_asked.map_or(Cell::from("–"), |o| Cell::tone(o.to_string(), tone(word(&o)))),
             ]);
         }
         page.table(table);
