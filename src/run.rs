@@ -49,7 +49,7 @@ pub fn run(options: &cli::Run) -> Result<u8, Failure> {
         if let (Way::Processes(_), Some(bag)) = (&way, &done.bag) {
             heard = crate::run_page::Heard::from_bag(&graph, bag)?;
         }
-        output::file(html, crate::run_page::page(&done, &graph, &heard).html())?;
+        output::file(html, crate::run_page::page(&done, &graph, &heard, None).html())?;
         output::note(format_args!("wrote {}", html.display()));
     }
     if options.json {

@@ -98,12 +98,12 @@ impl Heard {
     }
 }
 
-/// The page of a run or a replay.
-pub fn page(done: &Done, graph: &Graph, heard: &Heard) -> Page {
+/// The page of a run, or of a replay of the bag `source`.
+pub fn page(done: &Done, graph: &Graph, heard: &Heard, source: Option<&Path>) -> Page {
     let mut page = Page::new(if graph.title.is_empty() { "A run" } else { &graph.title });
     let (tone, sentence) = headline(done);
     page.lead(tone, &sentence);
-    page.todo("What to do now", &to_do(done));
+    page.todo("What to do now", &to_do(done, source));
     page.table(facts(done, graph));
 
     let session = heard.signals.session();
@@ -159,18 +159,21 @@ fn headline(done: &Done) -> (Tone, String) {
 }
 
 /// Sentences with a command to copy.
-fn to_do(done: &Done) -> Vec<(String, Option<String>)> {
+fn to_do(done: &Done, source: Option<&Path>) -> Vec<(String, Option<String>)> {
     let mut items = Vec::new();
     let bag = done.bag.as_ref().map(|b| shell_word(&b.file_name().map_or(b.display().to_string(), |n| n.to_string_lossy().to_string())));
-    let ask = bag.as_ref().map(|bag| format!("backdrive stability {bag} --html stability.html"));
+    // What a replay would be asked about is the bag that it replays, with the gain of the replay.
+    let source = source.map(|p| shell_word(&p.display().to_string()));
     let gain = done.summary.as_ref().map_or(1.0, |s| s.loop_gain);
+    let ask = bag.as_ref().map(|bag| format!("backdrive stability {bag} --html stability.html"));
+    let ask = ask.or(source.as_ref().map(|s| format!("backdrive stability {s} --gain {gain} --html stability.html")));
     match done.summary.as_ref().and_then(|s| s.outcome) {
         Some(Outcome::NotJudged { why }) => items.push((why.advice().to_string(), None)),
         Some(Outcome::Stable) => {
             items.push(("Ask how far away the edge is, and whether it holds for firmer and softer grips.".to_string(), ask.clone()))
         }
         Some(_) => {
-            let again = bag.as_ref().map(|bag| format!("backdrive replay {bag} --lambda LAMBDA --html again.html"));
+            let again = bag.as_ref().or(source.as_ref()).map(|bag| format!("backdrive replay {bag} --lambda LAMBDA --html again.html"));
             items.push((format!("Find the gain up to which this loop is stable (it is not at {}).", number(gain)), ask.clone()));
             items.push(("Run it again from the recorded hand with a lower force scale.".to_string(), again));
         }
@@ -231,8 +234,11 @@ fn signals(page: &mut Page, axis: &AxisSignals, session: &Session) {
         plots(axis, session.period_s, several, &touching, None),
         &match touching.len() {
             0 => "Position and force; the slave touched nothing.".to_string(),
-            1 => format!("Position and force; the slave touches for {}, shaded.", si(share, "s")),
-            n => format!("Position and force; the slave touches {n} times, {} in all, shaded.", si(share, "s")),
+            1 => format!("Position and force; the slave touches for {} (leaps of less than 50 ms included), shaded.", si(share, "s")),
+            n => format!(
+                "Position and force; the slave touches {n} times, {} in all (leaps of less than 50 ms included), shaded.",
+                si(share, "s")
+            ),
         },
     );
     if let Some((first, _)) = touching.first() {
@@ -265,7 +271,7 @@ fn plots(axis: &AxisSignals, period_s: f64, title: &str, touching: &[(f64, f64)]
     if let Some(intent) = axis.intent.as_ref().filter(|x| has(x)) {
         position = position.series(Series::line("hand x_u", &time, intent).colour(Colour::Ink).dash(Dash::Dashed));
     }
-    position = position.series(Series::line("master x_m", &time, &axis.master).colour(Colour::Nth(0)));
+    position = position.series(Series::line("master x_m", &time, &axis.master).colour(Colour::Nth(0)).dash(Dash::Solid));
     if has(&axis.command) {
         position = position.series(Series::line("command x_c", &time, &axis.command).colour(Colour::Nth(2)).dash(Dash::Dotted));
     }

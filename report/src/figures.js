@@ -155,7 +155,7 @@ const label = (words, x, y, tone, align) => ({type: 'text', silent: true, x, y, 
 const regions = (panel, base) => own(base, (api, frame) => group(panel.regions.flatMap(r => {
   const x0 = Math.max(frame.x, api.coord([r.from, panel.y.lo])[0]), x1 = Math.min(frame.x + frame.width, api.coord([r.to, panel.y.lo])[0]);
   if (x1 <= x0) return [];
-  const out = [{type: 'rect', shape: {x: x0, y: frame.y, width: Math.max(x1 - x0, 0.5), height: frame.height}, style: {fill: colour(r.tone), opacity: 0.15}}];
+  const out = [{type: 'rect', shape: {x: x0, y: frame.y, width: Math.max(x1 - x0, 0.5), height: frame.height}, style: {fill: colour(r.tone), opacity: r.tone === 'neutral' ? 0.07 : 0.15}}];
   if (r.label && widthOf(r.label) + 10 < x1 - x0) out.push(label(r.label, (x0 + x1) / 2, frame.y + frame.height - 11, r.tone, 'center'));
   return out;
 })), {z: 0});
@@ -326,11 +326,13 @@ function draw(stack) {
         const y = (zoom && (zoom.y || fitted(panel, x))) || [panel.y.lo, panel.y.hi];
         const name = p && panel.title ? panel.title + (titled(panel.y) ? ' · ' + titled(panel.y) : '') : titled(panel.y);
         const room = Math.max(2, layout.frames[p].height / 34) * (data.aspect ? 44 / 34 / 1.6 : 1);
-        return axis(panel.y, y[0], y[1], room, {option: {gridIndex: p, name, nameLocation: 'end', nameGap: 8,
+        return axis(panel.y, y[0], y[1], room, {option: {...bare(panel), gridIndex: p, name, nameLocation: 'end', nameGap: 8,
           nameTextStyle: {color: muted, fontSize: FONT, align: 'left', padding: [0, 0, 0, 0]}, axisPointer: {show: false}}});
       }),
     };
   }
+  // A panel of regions alone has nothing to read off y.
+  const bare = panel => panel.series.length ? {} : {axisLabel: {show: false}, axisTick: {show: false}, splitLine: {show: false}};
   // The limits of y for a part of x: what lies in it, with some air.
   function fitted(panel, [from, to]) {
     let lo = Infinity, hi = -Infinity;

@@ -7,6 +7,9 @@ use backdrive_stability::outcome::Outcome;
 use backdrive_stability::resimulate::edge::Edge;
 use backdrive_stability::verdict::{Answer, Resimulated, Word};
 
+/// Height of verdicts with no curve over them, px.
+const BARE: f64 = 90.0;
+
 /// The sweep, or the search for the edge where nothing was swept.
 pub(super) fn gains(page: &mut Page, found: &Answer, curve: &[&Point]) {
     let again = found.resimulated.as_ref();
@@ -48,8 +51,9 @@ pub(super) fn gains(page: &mut Page, found: &Answer, curve: &[&Point]) {
         plot = plot.y_limits(-1.0, 1.0).line("", &gains, &distance);
         plots.push(plot);
     }
-    if plots.is_empty() {
-        plots.push(Plot::new("").y_limits(0.0, 1.0).height(60.0));
+    let bare = plots.is_empty();
+    if bare {
+        plots.push(Plot::new("").y_limits(0.0, 1.0).height(BARE));
     }
     let edges = edge_marks(found);
     let count = plots.len();
@@ -64,7 +68,7 @@ pub(super) fn gains(page: &mut Page, found: &Answer, curve: &[&Point]) {
         for (at, label, tone) in &edges {
             drawn = drawn.vertical(*at, if i == 0 { label } else { "" }, *tone);
         }
-        *plot = if count == 1 { drawn.height(260.0) } else { drawn };
+        *plot = if count == 1 && !bare { drawn.height(260.0) } else { drawn };
     }
     let what = match (curve.is_empty(), again) {
         (false, _) => format!("{} gains, the loop run again at each; the colour is its verdict.", swept.len()),

@@ -71,8 +71,13 @@ fn to_do(found: &Answer) -> Vec<(String, Option<String>)> {
             let db = 20.0 * (edge / asked).log10();
             items.push((
                 format!(
-                    "The gain may rise by {} dB before the loop oscillates. With half of that edge in hand (6 dB) the highest gain to work at is μλ = {}.",
+                    "The edge is {} dB away. {} (6 dB below it, the usual reserve: μλ = {}.)",
                     number(db),
+                    if lower(edge) < asked {
+                        "That is little: a firmer hand or an older cable may use it up."
+                    } else {
+                        "The gain may rise."
+                    },
                     number(lower(edge))
                 ),
                 None,
@@ -85,11 +90,12 @@ fn to_do(found: &Answer) -> Vec<(String, Option<String>)> {
         (Word::Stable, None, Some(least)) => {
             items.push((format!("Nothing stands against a higher gain up to μλ = {}: that is how far was looked.", number(least)), None))
         }
-        (Word::LimitCycle | Word::Unstable | Word::Limited, Some(edge), _) => {
+        (Word::LimitCycle | Word::Unstable | Word::Limited, edge, least) if edge.or(least).is_some() => {
+            let edge = edge.or(least).unwrap_or(asked);
             let gain = lower(edge).min(asked);
             items.push((
                 format!(
-                    "Lower the force scale: at μλ = {} the loop keeps 6 dB to the edge, at the price of a reflected force of {} of what it would be now.",
+                    "Lower the force scale: at μλ = {} the loop keeps 6 dB to where it stops being stable, at the price of a reflected force of {} of what it would be now.",
                     number(gain),
                     percent(gain / asked)
                 ),
@@ -162,6 +168,11 @@ fn lead(found: &Answer) -> String {
             };
             let by = found.decided_by.as_deref().map_or(String::new(), |by| format!(", by {by}"));
             format!(" The edge is at μλ = {}{interval}{how}{by}.", number(edge))
+        }
+        // Beyond a clamp or an end of the travel no edge can be seen.
+        (None, Some(least)) if least < found.gain.product() => {
+            let by = found.decided_by.as_deref().map_or(String::new(), |by| format!(", by {by}"));
+            format!(" It is stable only up to μλ = {}{by}.", number(least))
         }
         (None, Some(least)) => format!(" No edge up to μλ = {}.", number(least)),
         (None, None) => String::new(),
