@@ -107,7 +107,8 @@ fn finding(page: &mut Page, evidence: &Evidence, name: &str) {
         Figure::beside(figures),
         &format!("At {place}: grey is what the recordings ask for when this law alone is left out, orange what the law does.{replaced}"),
     );
-    let part = fullest(&main.latent);
+    // Where the law does most; one that only bends is shown where the recordings ask for most.
+    let part = if main.law.force.windows(2).any(|w| w[0] != w[1]) { fullest(&main.law) } else { fullest(&main.latent) };
     let cut = |x: &[f64]| x.get(part.clone()).unwrap_or(&[]).to_vec();
     let (time, force, deviation) = (cut(&main.latent.time), cut(&main.latent.force), cut(&main.deviation));
     let edge = |sign: f64| force.iter().zip(&deviation).map(|(f, d)| f + sign * 2.0 * d).collect::<Vec<f64>>();
@@ -197,7 +198,8 @@ fn fullest(curve: &Curve) -> std::ops::Range<usize> {
     let n = curve.force.len();
     let size = (n / LOOP).max(200).min(n);
     // Changes, not sizes: a friction that holds its level shows nothing.
-    let mut square: Vec<f64> = curve.force.windows(2).map(|w| (w[1] - w[0]) * (w[1] - w[0])).collect();
+    let mut square: Vec<f64> =
+        curve.force.windows(2).map(|w| (w[1] - w[0]) * (w[1] - w[0])).map(|d| if d.is_finite() { d } else { 0.0 }).collect();
     square.resize(n, 0.0);
     let mut sum: f64 = square.iter().take(size).sum();
     let (mut best, mut at) = (sum, 0);

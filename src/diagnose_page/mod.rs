@@ -31,7 +31,7 @@ pub fn page(shown: &Shown) -> Page {
     let best = chosen(&found.search);
     let mut page = Page::new(&format!("Diagnosis of {} against {}", shown.name, found.problem.model.name));
     page.lead(tone(json), &capital(&found.said.sentence));
-    page.text(&summary(found));
+    page.text(&summary(found, adds(best)));
     page.todo("What to do now", &to_do(found));
     for note in shown.notes {
         page.note(&capital(note));
@@ -133,7 +133,7 @@ fn tone(json: &Value) -> Tone {
 }
 
 /// How far it is explained, and where it shows.
-fn summary(found: &Found) -> String {
+fn summary(found: &Found, added: bool) -> String {
     let json = &found.said.json;
     let held = &json["held_out"];
     let of = |key: &str| held[key].as_f64();
@@ -142,16 +142,17 @@ fn summary(found: &Found) -> String {
     if let (Some(before), Some(refit), Some(after), Some(floor)) =
         (of("nrmse_before"), of("nrmse_refit"), of("nrmse_after"), of("noise_floor"))
     {
+        // Where nothing was added, what is written as diagnosed is one of the two others.
+        let diagnosed = if added { format!(", {} with the diagnosed model", percent(after)) } else { String::new() };
         text = format!(
-            "On {on} the error is {} of what was measured with the model as given, {} with its parameters refitted, {} with the diagnosed model; \
-             the sensors' own noise is {}.",
+            "On {on} the error is {} of what was measured with the model as given, {} with its parameters refitted{diagnosed}; the sensors' own \
+             noise is {}.",
             percent(before),
             percent(refit),
-            percent(after),
             percent(floor)
         );
         let beyond = |x: f64| (x * x - floor * floor).max(0.0).sqrt();
-        if beyond(refit) > floor && after < refit {
+        if added && beyond(refit) > floor && after < refit {
             text.push_str(&format!(
                 " Of the error that refitting leaves beyond that noise, {} is removed.",
                 percent(1.0 - beyond(after) / beyond(refit))
