@@ -20,6 +20,7 @@ mod model;
 mod network;
 mod node;
 pub mod output;
+mod page_parts;
 mod play;
 mod progress;
 mod prove;

@@ -85,8 +85,7 @@ pub fn replay(options: &cli::Replay) -> Result<u8, Failure> {
         summary.hold_back(cut_short(&reader, planned as usize, rows).or((lost > 0).then_some(Unjudged::Lost { messages: lost })));
     }
     if let Some(html) = &options.html {
-        let what = format!("backdrive replay {}", path.display());
-        output::file(html, page(&done, &graph, &heard, &what).html())?;
+        output::file(html, page(&done, &graph, &heard, Some(path)).html())?;
         output::note(format_args!("wrote {}", html.display()));
     }
     if options.json {

@@ -50,8 +50,7 @@ pub fn run(options: &cli::Run) -> Result<u8, Failure> {
         if let (Way::Processes(_), Some(bag)) = (&way, &done.bag) {
             heard = crate::run_page::Heard::from_bag(&graph, bag)?;
         }
-        let what = format!("backdrive run {}", options.graph.display());
-        output::file(html, crate::run_page::page(&done, &graph, &heard, &what).html())?;
+        output::file(html, crate::run_page::page(&done, &graph, &heard, None).html())?;
         output::note(format_args!("wrote {}", html.display()));
     }
     if options.json {

@@ -3,6 +3,7 @@
 //! It is made from what went by (from the bag, or from the run itself where it was in one process) and from the supervisor's report.
 
 use crate::failure::Failure;
+use crate::page_parts::{ending, shell_word};
 use crate::run::Done;
 use backdrive_bags::Reader;
 use backdrive_launch::{Cause, RunReport};
@@ -21,6 +22,20 @@ const MOST_EVENTS: usize = 200;
 const BRIDGE_S: f64 = 0.05;
 /// How much of the first contact is drawn by itself, s.
 const IMPACT_S: f64 = 0.3;
+
+/// The terms of the page.
+const TERMS: [(&str, &str); 7] = [
+    ("μλ", "the loop's gain: the position scale μ from master to slave times the force scale λ from slave to master"),
+    ("x_u, x_m, x_c, x_s", "position of: what the hand wants, the master, the command sent to the slave, the slave"),
+    ("F_f, F_s", "force reflected on the master; force of the environment on the slave"),
+    ("stable", "what oscillates while the hand holds still in contact dies out"),
+    ("limit cycle", "an oscillation that neither dies out nor grows while the hand holds still"),
+    (
+        "loop time",
+        "from the begin of a step of a node to its end, waiting for its inputs included; p50 half of the steps are faster, p99 all but one in a hundred",
+    ),
+    ("canceller", "takes the master's own motion under the reflected force out of the command (induced master motion)"),
+];
 
 /// What goes by in a run, for its page.
 pub struct Heard {
@@ -83,13 +98,13 @@ impl Heard {
     }
 }
 
-/// The page of a run; `what` is the verb that made it, with its file.
-pub fn page(done: &Done, graph: &Graph, heard: &Heard, what: &str) -> Page {
+/// The page of a run, or of a replay of the bag `source`.
+pub fn page(done: &Done, graph: &Graph, heard: &Heard, source: Option<&Path>) -> Page {
     let mut page = Page::new(if graph.title.is_empty() { "A run" } else { &graph.title });
     let (tone, sentence) = headline(done);
     page.lead(tone, &sentence);
-    page.todo("What to do now", &to_do(done));
-    page.table(facts(done, graph, what));
+    page.todo("What to do now", &to_do(done, source));
+    page.table(facts(done, graph));
 
     let session = heard.signals.session();
     page.section("Signals");
@@ -103,6 +118,7 @@ pub fn page(done: &Done, graph: &Graph, heard: &Heard, what: &str) -> Page {
     timing(&mut page, done, graph, heard);
     page.section("Events");
     events(&mut page, done, graph, heard);
+    ending(&mut page, &TERMS);
     page
 }
 
@@ -143,18 +159,21 @@ fn headline(done: &Done) -> (Tone, String) {
 }
 
 /// Sentences with a command to copy.
-fn to_do(done: &Done) -> Vec<(String, Option<String>)> {
+fn to_do(done: &Done, source: Option<&Path>) -> Vec<(String, Option<String>)> {
     let mut items = Vec::new();
-    let bag = done.bag.as_ref().map(|b| b.file_name().map_or(b.display().to_string(), |n| n.to_string_lossy().to_string()));
-    let ask = bag.as_ref().map(|bag| format!("backdrive stability {bag} --html stability.html"));
+    let bag = done.bag.as_ref().map(|b| shell_word(&b.file_name().map_or(b.display().to_string(), |n| n.to_string_lossy().to_string())));
+    // What a replay would be asked about is the bag that it replays, with the gain of the replay.
+    let source = source.map(|p| shell_word(&p.display().to_string()));
     let gain = done.summary.as_ref().map_or(1.0, |s| s.loop_gain);
+    let ask = bag.as_ref().map(|bag| format!("backdrive stability {bag} --html stability.html"));
+    let ask = ask.or(source.as_ref().map(|s| format!("backdrive stability {s} --gain {gain} --html stability.html")));
     match done.summary.as_ref().and_then(|s| s.outcome) {
         Some(Outcome::NotJudged { why }) => items.push((why.advice().to_string(), None)),
         Some(Outcome::Stable) => {
             items.push(("Ask how far away the edge is, and whether it holds for firmer and softer grips.".to_string(), ask.clone()))
         }
         Some(_) => {
-            let again = bag.as_ref().map(|bag| format!("backdrive replay {bag} --lambda LAMBDA --html again.html"));
+            let again = bag.as_ref().or(source.as_ref()).map(|bag| format!("backdrive replay {bag} --lambda LAMBDA --html again.html"));
             items.push((format!("Find the gain up to which this loop is stable (it is not at {}).", number(gain)), ask.clone()));
             items.push(("Run it again from the recorded hand with a lower force scale.".to_string(), again));
         }
@@ -175,11 +194,9 @@ fn to_do(done: &Done) -> Vec<(String, Option<String>)> {
     items
 }
 
-fn facts(done: &Done, graph: &Graph, what: &str) -> Table {
+fn facts(done: &Done, graph: &Graph) -> Table {
     let mut table = Table::new(["", ""]);
     let mut row = |name: &str, text: String| table.push([name.to_string(), text]);
-    row("command", what.to_string());
-    row("program", format!("backdrive {}", env!("CARGO_PKG_VERSION")));
     let clock = if graph.timing.clock == Clock::Realtime { "real time" } else { "lockstep" };
     let planned = graph.timing.steps.map_or(String::new(), |n| format!(" of {n}"));
     row("steps", format!("{}{planned}, at {} ({clock})", done.steps, si(graph.timing.rate_hz, "Hz")));
@@ -217,8 +234,11 @@ fn signals(page: &mut Page, axis: &AxisSignals, session: &Session) {
         plots(axis, session.period_s, several, &touching, None),
         &match touching.len() {
             0 => "Position and force; the slave touched nothing.".to_string(),
-            1 => format!("Position and force; the slave touches for {}, shaded.", si(share, "s")),
-            n => format!("Position and force; the slave touches {n} times, {} in all, shaded.", si(share, "s")),
+            1 => format!("Position and force; the slave touches for {} (leaps of less than 50 ms included), shaded.", si(share, "s")),
+            n => format!(
+                "Position and force; the slave touches {n} times, {} in all (leaps of less than 50 ms included), shaded.",
+                si(share, "s")
+            ),
         },
     );
     if let Some((first, _)) = touching.first() {
@@ -251,7 +271,7 @@ fn plots(axis: &AxisSignals, period_s: f64, title: &str, touching: &[(f64, f64)]
     if let Some(intent) = axis.intent.as_ref().filter(|x| has(x)) {
         position = position.series(Series::line("hand x_u", &time, intent).colour(Colour::Ink).dash(Dash::Dashed));
     }
-    position = position.series(Series::line("master x_m", &time, &axis.master).colour(Colour::Nth(0)));
+    position = position.series(Series::line("master x_m", &time, &axis.master).colour(Colour::Nth(0)).dash(Dash::Solid));
     if has(&axis.command) {
         position = position.series(Series::line("command x_c", &time, &axis.command).colour(Colour::Nth(2)).dash(Dash::Dotted));
     }

@@ -47,10 +47,10 @@ fn main() -> std::io::Result<()> {
     let phase: Vec<f64> = column(|r| r.2.to_degrees());
     let sigma: Vec<f64> = response.iter().map(|r| 0.03 * r.1 + 0.02 + 0.1 * (r.0 / 120.0).min(1.0) * r.1).collect();
 
-    let mut page = Page::new("Stability of session-07.mcap at µλ = 6.2");
+    let mut page = Page::new("Stability of session-07.mcap at μλ = 6.2");
     page.lead(
         Tone::Bad,
-        "Unstable at µλ = 6.2: the loop goes into a limit cycle of 1.4 mm at 23 Hz. It is stable up to µλ = 4.1 (95 %: 3.8 to 4.4).",
+        "Unstable at μλ = 6.2: the loop goes into a limit cycle of 1.4 mm at 23 Hz. It is stable up to μλ = 4.1 (95 %: 3.8 to 4.4).",
     );
     page.warning("The two methods disagree by 18 %: a physical effect may be missing from the model <impulse-engine>.");
     page.note("Estimated from 31 segments of 2.0 s, Hann window, 50 % overlap; coherence above 0.8 from 1 Hz to 140 Hz.");
@@ -101,7 +101,7 @@ fn main() -> std::io::Result<()> {
         .map(|(k, g)| if *g < 4.1 { 4e-6 * (1.0 + 0.3 * noise(k)).abs() } else { 2.2e-3 * (1.0 - 4.05 / g).sqrt() })
         .collect();
     let mut sweep =
-        Plot::new("Oscillation in contact over the gain product").x_axis("gain product µλ", "").x_log().y_axis("amplitude", "m").y_log();
+        Plot::new("Oscillation in contact over the gain product").x_axis("gain product μλ", "").x_log().y_axis("amplitude", "m").y_log();
     for w in gains.windows(2) {
         let (tone, label) = match w[0] {
             g if g < 4.08 => (Tone::Good, "stable"),
@@ -132,7 +132,7 @@ fn main() -> std::io::Result<()> {
     let spiked: Vec<f64> = force.iter().enumerate().map(|(k, v)| if k == 9_001 { -9.0 } else { *v }).collect();
     page.figure(
         Figure::stacked([
-            Plot::new("Contact at µλ = 6.2")
+            Plot::new("Contact at μλ = 6.2")
                 .x_axis("time", "s")
                 .y_axis("position", "m")
                 .line("x_m", &t, &x)
@@ -188,7 +188,7 @@ fn main() -> std::io::Result<()> {
     let mut table = Table::new([
         "method",
         "verdict",
-        "critical µλ",
+        "critical μλ",
         "95 % interval",
         "frequency",
         "gain margin",

@@ -27,6 +27,6 @@ mod tests {
     fn markup_becomes_text() {
         assert_eq!(escape("<b a=\"1\" c='2'>&amp;"), "&lt;b a=&quot;1&quot; c=&#39;2&#39;&gt;&amp;amp;");
         assert_eq!(escape("a\u{0}b\u{1b}[0m\u{ffff}\n"), "a\u{fffd}b\u{fffd}[0m\u{fffd}\n");
-        assert_eq!(escape("µλ, 12 °, 力"), "µλ, 12 °, 力");
+        assert_eq!(escape("μλ, 12 °, 力"), "μλ, 12 °, 力");
     }
 }

@@ -1,7 +1,8 @@
-//! Self-contained reports: one HTML file with SVG plots that opens offline. Knows data only, nothing of robots.
+//! Self-contained reports: one HTML file with figures that opens offline. Knows data only, nothing of robots.
 //!
-//! A [`Page`] holds a lead sentence, sections, [`Table`]s and [`Figure`]s of [`Plot`]s, and becomes one file: no script is needed, no
-//! font or style is fetched, the same data give the same bytes. It reads in light and dark, on a narrow screen and in print.
+//! A [`Page`] holds a lead sentence, sections, [`Table`]s and [`Figure`]s of [`Plot`]s, and becomes one file: nothing is
+//! fetched, the same data give the same bytes. It reads in light and dark, on a narrow screen and in print. Figures tell their values
+//! where one points, show and hide curves by their legend, and zoom; a reader without scripts gets their numbers in a table.
 //!
 //! ```
 //! use backdrive_report::{Page, Plot, Tone};
@@ -15,23 +16,20 @@
 //! assert!(page.html().contains("The swing dies out."));
 //! ```
 //!
-//! The plots are written here and not by the plotters crate: that draws a point outside the limits at the edge (so a curve that leaves the
-//! window leaves it with a false slope), rounds to whole pixels, writes each dash as an element of its own, and puts colours where no style
-//! sheet reaches them (so no dark scheme). What is needed instead is small: [`plot`] is the data, `ticks` chooses the numbers at the axes,
-//! `thin` makes long series short without losing their extremes, `place` finds free room for labels, `draw` writes the SVG.
+//! Apache ECharts draws (`vendor/` says why it and which build of it); it stands in the page, once, if there is a figure. Ours is which
+//! figures a page has and what they say: [`plot`] is the data, `limits` chooses from where to where the axes go, `thin` makes long series
+//! short without losing their extremes, `data` writes them into the page, and `figures.js` there hands them to the library.
 
-mod draw;
+mod data;
 mod escape;
 mod figure;
+mod limits;
 mod number;
 mod page;
-mod place;
 pub mod plot;
 mod style;
-mod svg;
 mod table;
 mod thin;
-mod ticks;
 
 pub use figure::Figure;
 pub use number::{number, percent, si};

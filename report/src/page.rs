@@ -2,9 +2,15 @@
 
 use crate::escape::escape;
 use crate::figure::Figure;
-use crate::style::{COLOURS, PAGE_STYLE, PLOT_STYLE, SCRIPT, Tone};
+use crate::style::{COLOURS, FIGURE_STYLE, PAGE_STYLE, Tone};
 use crate::table::Table;
 use std::path::Path;
+
+/// The library that draws, and our script that gives it the data of the page; see vendor/README.md.
+const LIBRARY: &str = include_str!("../vendor/echarts/echarts.min.js");
+const FIGURES: &str = include_str!("figures.js");
+/// The buttons that copy commands.
+const COPY: &str = include_str!("copy.js");
 
 /// A report: blocks in the order in which they are added. All text is plain text; markup in it is shown, not obeyed.
 #[derive(Clone, Debug, Default)]
@@ -39,7 +45,7 @@ impl Page {
         if items.is_empty() {
             return self;
         }
-        self.add(format_args!("<div class=\"aside todo\">\n<b>{}</b>\n<ul>\n", escape(heading)));
+        self.add(format_args!("{TODO}\n<b>{}</b>\n<ul>\n", escape(heading)));
         for (sentence, command) in items {
             let command = command.as_ref().map_or(String::new(), |c| format!("<pre><code>{}</code></pre>", escape(c)));
             self.add(format_args!("<li>{}{command}</li>\n", escape(sentence)));
@@ -78,7 +84,7 @@ impl Page {
     pub fn figure(&mut self, figure: impl Into<Figure>, caption: &str) -> &mut Self {
         let caption = if caption.is_empty() { String::new() } else { format!("<figcaption>{}</figcaption>\n", escape(caption)) };
         let drawings = figure.into().html();
-        self.add(format_args!("<figure>\n{drawings}<output class=\"readout\"></output>\n{caption}</figure>\n"))
+        self.add(format_args!("<figure>\n{drawings}{caption}</figure>\n"))
     }
 
     /// A part that is folded away until asked for.
@@ -102,14 +108,18 @@ impl Page {
         self
     }
 
-    /// The whole file. It is HTML and XML at once, refers to nothing outside itself, and is the same for the same data.
+    /// The whole file. It is HTML and XML at once, refers to nothing outside itself, and is the same for the same data. The library that
+    /// draws is in it once, if there is a figure.
     pub fn html(&self) -> String {
         let title = escape(&self.title);
+        let drawn = self.body.contains(crate::figure::DATA);
+        let figures = if drawn { script(LIBRARY) + &script(FIGURES) } else { String::new() };
+        let copy = if self.body.contains(TODO) { script(COPY) } else { String::new() };
         format!(
             "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\"/>\n\
              <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\"/>\n<title>{title}</title>\n\
-             <style>\n{COLOURS}{PAGE_STYLE}{PLOT_STYLE}</style>\n</head>\n<body>\n<main>\n<h1>{title}</h1>\n{}</main>\n\
-             <script>\n{SCRIPT}</script>\n</body>\n</html>\n",
+             <style>\n{COLOURS}{PAGE_STYLE}{FIGURE_STYLE}</style>\n</head>\n<body>\n<main>\n<h1>{title}</h1>\n{}</main>\n\
+             {copy}{figures}</body>\n</html>\n",
             self.body
         )
     }
@@ -118,4 +128,12 @@ impl Page {
     pub fn write(&self, path: impl AsRef<Path>) -> std::io::Result<()> {
         std::fs::write(path, self.html())
     }
+}
+
+/// The box with commands to copy.
+const TODO: &str = "<div class=\"aside todo\">";
+
+/// A script that XML parsers take as text.
+fn script(source: &str) -> String {
+    format!("<script>//<![CDATA[\n{source}\n//]]></script>\n")
 }

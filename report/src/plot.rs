@@ -55,11 +55,30 @@ pub struct Series {
     pub(crate) dash: Dash,
     pub(crate) width: f64,
     pub(crate) in_limits: bool,
+    pub(crate) by: Option<By>,
+}
+
+/// What colours a line along its way.
+#[derive(Clone, Debug)]
+pub(crate) struct By {
+    pub label: String,
+    pub unit: String,
+    pub values: Vec<f64>,
 }
 
 impl Series {
     fn new(name: &str, x: &[f64], y: &[f64], kind: Kind) -> Self {
-        Self { name: name.into(), x: x.to_vec(), y: y.to_vec(), kind, colour: Colour::Auto, dash: Dash::Auto, width: 1.7, in_limits: true }
+        Self {
+            name: name.into(),
+            x: x.to_vec(),
+            y: y.to_vec(),
+            kind,
+            colour: Colour::Auto,
+            dash: Dash::Auto,
+            width: 1.7,
+            in_limits: true,
+            by: None,
+        }
     }
 
     /// A line through the points in their order. An empty name keeps it out of the legend.
@@ -105,6 +124,13 @@ impl Series {
         if px.is_finite() && px > 0.0 {
             self.width = px;
         }
+        self
+    }
+
+    /// Colours a line along its way by these values, one for each point (for instance the frequency along a Nyquist curve); the legend
+    /// shows the scale and hovering the value. Meant for curves of up to some thousand points: they are not thinned.
+    pub fn by(mut self, label: &str, unit: &str, values: &[f64]) -> Self {
+        self.by = Some(By { label: label.into(), unit: unit.into(), values: values.to_vec() });
         self
     }
 
@@ -168,7 +194,7 @@ pub(crate) struct Annotation {
 /// let gain = [0.1, 1.0, 10.0];
 /// let amplitude = [1e-5, 2e-5, 3e-3];
 /// let plot = Plot::new("Sweep")
-///     .x_axis("gain µλ", "").x_log()
+///     .x_axis("gain μλ", "").x_log()
 ///     .y_axis("amplitude", "m").y_log()
 ///     .region(0.1, 4.0, Tone::Good, "stable")
 ///     .region(4.0, 10.0, Tone::Bad, "unstable")

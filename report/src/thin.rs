@@ -1,7 +1,24 @@
 //! Long series made short for drawing, without losing what the eye would see.
 
-use crate::svg::Rect;
 use std::collections::HashSet;
+
+/// The part of the plane that is drawn, px; y grows upward or downward, it does not matter here.
+#[derive(Clone, Copy, Debug)]
+pub struct Rect {
+    pub x: f64,
+    pub y: f64,
+    pub w: f64,
+    pub h: f64,
+}
+
+impl Rect {
+    pub fn right(&self) -> f64 {
+        self.x + self.w
+    }
+    pub fn bottom(&self) -> f64 {
+        self.y + self.h
+    }
+}
 
 /// Points in pixels cut into strokes at what is not finite.
 fn strokes(points: impl Iterator<Item = (f64, f64)>) -> Vec<Vec<(f64, f64)>> {
@@ -38,11 +55,45 @@ pub fn line(points: impl Iterator<Item = (f64, f64)>, window: Rect) -> Thinned {
             if shorter.len() > 6000 { new_segments(&shorter) } else { vec![shorter] }
         };
         for part in shorter {
-            out.extend(cut(&part, window));
+            out.extend(cut(&part, window).iter().map(|part| straightened(part)));
         }
     }
     let length: f64 = out.iter().flat_map(|s| s.windows(2)).map(|w| if let [a, b] = w { (b.0 - a.0).hypot(b.1 - a.1) } else { 0.0 }).sum();
     Thinned { strokes: out, dense: length > 4.0 * (window.w + window.h) }
+}
+
+/// How far a point may lie off the straight line between its neighbours and still be left out, px.
+const STRAIGHT: f64 = 0.06;
+
+/// Without the points that the eye cannot tell from the straight line between those kept (Ramer, Douglas and Peucker).
+fn straightened(stroke: &[(f64, f64)]) -> Vec<(f64, f64)> {
+    let ends = [0, stroke.len().saturating_sub(1)];
+    let mut keep: Vec<bool> = (0..stroke.len()).map(|i| ends.contains(&i)).collect();
+    let mut open = vec![(0, stroke.len().saturating_sub(1))];
+    while let Some((from, to)) = open.pop() {
+        let (Some(a), Some(b)) = (stroke.get(from), stroke.get(to)) else { continue };
+        let (dx, dy) = (b.0 - a.0, b.1 - a.1);
+        let length = dx.hypot(dy);
+        let off = |p: &(f64, f64)| {
+            let (x, y) = (p.0 - a.0, p.1 - a.1);
+            // Beyond an end it is the distance from the end: a curve may turn back on its own line.
+            let along = if length > 0.0 { (x * dx + y * dy) / length } else { 0.0 };
+            if along < 0.0 || along > length || length == 0.0 {
+                x.hypot(y).min((p.0 - b.0).hypot(p.1 - b.1))
+            } else {
+                (x * dy - y * dx).abs() / length
+            }
+        };
+        let between = (from + 1..to).filter_map(|i| stroke.get(i).map(|p| (i, off(p))));
+        if let Some((i, _)) = between.max_by(|p, q| p.1.total_cmp(&q.1)).filter(|p| p.1 > STRAIGHT) {
+            if let Some(k) = keep.get_mut(i) {
+                *k = true;
+            }
+            open.push((from, i));
+            open.push((i, to));
+        }
+    }
+    stroke.iter().zip(keep).filter_map(|(p, keep)| keep.then_some(*p)).collect()
 }
 
 /// First, lowest, highest and last point of each pixel column, in their order.
@@ -156,16 +207,16 @@ fn cut(stroke: &[(f64, f64)], window: Rect) -> Vec<Vec<(f64, f64)>> {
     out
 }
 
-/// A band in pixels, x never turning back, as one polygon per stretch without a gap: per pixel column its outermost points.
-pub fn band(points: impl Iterator<Item = (f64, f64, f64)>) -> Vec<Vec<(f64, f64)>> {
+/// A band in pixels as (x, one edge, the other), x never turning back: per pixel column its outermost points, one stretch between gaps.
+pub fn band(points: impl Iterator<Item = (f64, f64, f64)>) -> Vec<Vec<(f64, f64, f64)>> {
     let mut stretches: Vec<Vec<(f64, f64, f64)>> = vec![Vec::new()];
     for (x, a, b) in points {
         if x.is_finite() && a.is_finite() && b.is_finite() {
             if let Some(last) = stretches.last_mut() {
                 let begun = last.len() > 1;
                 match last.last_mut() {
-                    Some(p) if begun && p.0.floor() == x.floor() => *p = (p.0, p.1.max(a.max(b)), p.2.min(a.min(b))),
-                    _ => last.push((x, a.max(b), a.min(b))),
+                    Some(p) if begun && p.0.floor() == x.floor() => *p = (p.0, p.1.min(a.min(b)), p.2.max(a.max(b))),
+                    _ => last.push((x, a.min(b), a.max(b))),
                 }
             }
         } else {
@@ -173,10 +224,10 @@ pub fn band(points: impl Iterator<Item = (f64, f64, f64)>) -> Vec<Vec<(f64, f64)
         }
     }
     stretches.retain(|s| !s.is_empty());
+    for p in stretches.iter_mut().flatten() {
+        *p = (p.0, p.1.clamp(-1e5, 1e5), p.2.clamp(-1e5, 1e5));
+    }
     stretches
-        .into_iter()
-        .map(|s| s.iter().map(|p| (p.0, p.1)).chain(s.iter().rev().map(|p| (p.0, p.2))).map(|p| (p.0, p.1.clamp(-1e5, 1e5))).collect())
-        .collect()
 }
 
 /// Marks in pixels within the window, one per half pixel.

@@ -107,7 +107,8 @@ fn finding(page: &mut Page, evidence: &Evidence, name: &str) {
         Figure::beside(figures),
         &format!("At {place}: grey is what the recordings ask for when this law alone is left out, orange what the law does.{replaced}"),
     );
-    let part = fullest(&main.latent);
+    // Where the law does most; one that only bends is shown where the recordings ask for most.
+    let part = if main.law.force.windows(2).any(|w| w[0] != w[1]) { fullest(&main.law) } else { fullest(&main.latent) };
     let cut = |x: &[f64]| x.get(part.clone()).unwrap_or(&[]).to_vec();
     let (time, force, deviation) = (cut(&main.latent.time), cut(&main.latent.force), cut(&main.deviation));
     let edge = |sign: f64| force.iter().zip(&deviation).map(|(f, d)| f + sign * 2.0 * d).collect::<Vec<f64>>();
@@ -116,6 +117,47 @@ fn finding(page: &mut Page, evidence: &Evidence, name: &str) {
     course = course.series(Series::line("the law found", &time, &cut(&main.law.force)).colour(Colour::Nth(1)).dash(Dash::Solid));
     course = course.series(Series::line("asked for by the recordings", &time, &force).colour(Colour::Ink).dash(Dash::Dotted));
     page.figure(course, &format!("The same in time, in {}.", file_name(&main.record)));
+    page.text(&within(main));
+}
+
+/// Whether the law lies within the interval of what the recordings ask for, and if not, where.
+fn within(main: &Trace) -> String {
+    let (latent, law, deviation) = (&main.latent.force, &main.law.force, &main.deviation);
+    let n = latent.len().min(law.len()).min(deviation.len());
+    let known: Vec<usize> = (0..n).filter(|k| latent[*k].is_finite() && law[*k].is_finite() && deviation[*k] > 0.0).collect();
+    if known.is_empty() {
+        return String::new();
+    }
+    let outside: Vec<usize> = known.iter().copied().filter(|k| (latent[*k] - law[*k]).abs() > 2.0 * deviation[*k]).collect();
+    let share = 1.0 - outside.len() as f64 / known.len() as f64;
+    let inside = format!("Over the whole record the law lies within the 95 % interval at {} of the samples", percent(share));
+    if share > 0.9 {
+        return format!("{inside}.");
+    }
+    // The estimate is smooth: where the law jumps (friction that turns, an end of a gap) it cannot follow.
+    let level = backdrive_diagnosis::compare::rms(law);
+    let reach = (n / 500).max(3);
+    let jumps = |k: usize| {
+        let part = law.get(k.saturating_sub(reach)..(k + reach).min(n)).unwrap_or(&[]);
+        let (low, high) = part.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), f| (low.min(*f), high.max(*f)));
+        high - low > level
+    };
+    let at_jumps = outside.iter().filter(|k| jumps(**k)).count() as f64 / outside.len() as f64;
+    let off: Vec<f64> = outside.iter().map(|k| latent[*k] - law[*k]).collect();
+    let size = backdrive_diagnosis::compare::rms(&off) / level;
+    let why = if at_jumps > 0.5 {
+        format!(
+            "{} of the rest lies where the law jumps, which an estimate from sensors of finite bandwidth follows only smoothly",
+            percent(at_jumps)
+        )
+    } else {
+        format!(
+            "elsewhere it is off by {} of the law's size (root mean square): the interval holds the sensors' noise alone, not what the other \
+             parts of the model leave, and the law may be only the nearest of those known",
+            percent(size)
+        )
+    };
+    format!("{inside}; {why}.")
 }
 
 /// The law's curve: without a memory a line over its variable, with one in the order of time.
@@ -156,7 +198,8 @@ fn fullest(curve: &Curve) -> std::ops::Range<usize> {
     let n = curve.force.len();
     let size = (n / LOOP).max(200).min(n);
     // Changes, not sizes: a friction that holds its level shows nothing.
-    let mut square: Vec<f64> = curve.force.windows(2).map(|w| (w[1] - w[0]) * (w[1] - w[0])).collect();
+    let mut square: Vec<f64> =
+        curve.force.windows(2).map(|w| (w[1] - w[0]) * (w[1] - w[0])).map(|d| if d.is_finite() { d } else { 0.0 }).collect();
     square.resize(n, 0.0);
     let mut sum: f64 = square.iter().take(size).sum();
     let (mut best, mut at) = (sum, 0);

@@ -65,7 +65,7 @@ pub(super) fn section(page: &mut Page, found: &Found, best: &Candidate) {
                 q.output.clone().into(),
                 of(&given).into(),
                 of(&refitted).into(),
-                percent(q.nrmse).into(),
+                (if adds(best) { percent(q.nrmse) } else { "–".to_string() }).into(),
                 Cell::tone(number(q.floors), tone),
                 (if fitted { "yes" } else { "held out" }).into(),
             ]);

@@ -6,6 +6,7 @@ mod tables;
 
 use crate::diagnose::{Found, MODEL};
 use crate::diagnose_text::{confidence, named, next_experiment, parameter, shows};
+use crate::page_parts::{command, ending};
 use backdrive_diagnosis::audit::Weight;
 use backdrive_diagnosis::search::Candidate;
 use backdrive_diagnosis::verdict::chosen;
@@ -30,8 +31,8 @@ pub fn page(shown: &Shown) -> Page {
     let best = chosen(&found.search);
     let mut page = Page::new(&format!("Diagnosis of {} against {}", shown.name, found.problem.model.name));
     page.lead(tone(json), &capital(&found.said.sentence));
-    page.text(&summary(found));
-    to_do(&mut page, found);
+    page.text(&summary(found, adds(best)));
+    page.todo("What to do now", &to_do(found));
     for note in shown.notes {
         page.note(&capital(note));
     }
@@ -54,69 +55,66 @@ pub fn page(shown: &Shown) -> Page {
     tables::per_record(&mut page, found);
     page.section("The recordings themselves");
     tables::audit(&mut page, found);
-    glossary(&mut page);
+    ending(&mut page, &TERMS);
     page
 }
 
-/// The terms of the page, and what made it.
-fn glossary(page: &mut Page) {
-    page.section("Terms");
-    let mut table = Table::new(["term", "meaning"]);
-    for (term, meaning) in [
-        ("residual", "what was measured less what a model predicts"),
-        (
-            "sensor noise",
-            "standard deviation of the measuring error of an output, estimated from the recordings: a residual of 1 cannot be improved on",
-        ),
-        ("nrmse", "root mean square of the residual over the standard deviation of the measured signal"),
-        ("held out", "a recording that no fit has seen"),
-        ("refitted", "the same structure, its parameters fitted to the recordings"),
-        ("diagnosed", "the structure with the physics that was found, all parameters fitted"),
-        ("sd", "standard deviations of a parameter's own error"),
-    ] {
-        table.push([term, meaning]);
-    }
-    page.table(table);
-    let command: Vec<String> = std::env::args().skip(1).collect();
-    page.text(&format!("Made by backdrive {}: backdrive {}", env!("CARGO_PKG_VERSION"), command.join(" ")));
-}
+/// The terms of the page.
+const TERMS: [(&str, &str); 8] = [
+    ("residual", "what was measured less what a model predicts"),
+    (
+        "sensor noise",
+        "standard deviation of the measuring error of an output, estimated from the recordings: a residual of 1 cannot be improved on",
+    ),
+    ("nrmse", "root mean square of the residual over the standard deviation of the measured signal"),
+    ("held out", "a recording that no fit has seen"),
+    ("refitted", "the same structure, its parameters fitted to the recordings"),
+    ("diagnosed", "the structure with the physics that was found, all parameters fitted"),
+    ("asked for by the recordings", "the force at a place that makes the model do what was recorded when the law found there is left out"),
+    ("sd", "standard deviations of a parameter's own error"),
+];
 
 /// What to do now, most useful first, with commands to copy.
-fn to_do(page: &mut Page, found: &Found) {
+fn to_do(found: &Found) -> Vec<(String, Option<String>)> {
     let json = &found.said.json;
     let held = &json["held_out"];
-    page.section("What to do now");
-    let use_it = format!("backdrive run launch/contact.toml --canceller {MODEL}");
+    let mut items = Vec::new();
+    let use_it = Some(format!("backdrive run launch/contact.toml --canceller {MODEL}"));
     let (before, after) = (held["nrmse_before"].as_f64().unwrap_or(f64::NAN), held["nrmse_after"].as_f64().unwrap_or(f64::NAN));
-    let worth = format!("it predicts to {} of the motion, the model as given to {}", percent(after), percent(before));
+    let worth = format!("its error is {} of what was measured, that of the model as given {}", percent(after), percent(before));
     match json["verdict"].as_str() {
         Some("missing" | "parameters") => {
-            page.text(&format!("Use the diagnosed model where the motion is predicted: {use_it}. What it is worth: {worth}."));
-        }
-        Some("ambiguous") => {
-            page.text(&format!(
-                "The diagnosed model may be used ({use_it}; {worth}), but hold what is built on it against the rival models beside it too."
+            items.push((
+                format!("Use {MODEL}, beside this page, where the motion is predicted, such as in the canceller: {worth}."),
+                use_it,
+            ));
+            items.push((
+                "See what it is worth in the loop: ask for the edge with it, in a bag of your contact task.".to_string(),
+                Some(format!("backdrive stability RUN.mcap --canceller {MODEL} --html stability.html")),
             ));
         }
-        Some("nothing_missing") => {
-            page.text("Keep the model: the recordings ask for nothing more.");
-        }
-        Some("unexplained") => {
-            page.text(
-                "Do not build on a law yet: look below at when and where the residual shows, and check the sensors named there first.",
-            );
-        }
+        Some("ambiguous") => items.push((
+            format!("{MODEL}, beside this page, may be used ({worth}), but hold what is built on it against the rivals below too."),
+            use_it,
+        )),
+        Some("nothing_missing") => items.push(("Keep the model: the recordings ask for nothing more.".to_string(), None)),
+        Some("unexplained") => items.push((
+            "Do not build on a law yet: look below at when and where the residual shows, and check the sensors named there first."
+                .to_string(),
+            None,
+        )),
         _ => {}
     }
     if let Some(next) = next_experiment(&json["next_experiment"]) {
-        page.text(&format!("Record next: {next}"));
+        items.push((format!("Record next: {next}"), None));
     }
     if let Some(remark) = found.remarks.iter().find(|r| r.weight > Weight::Note && !r.signal.is_empty()) {
-        page.text(&format!("Check this signal: {remark}"));
+        items.push((format!("Check this signal: {remark}"), None));
     }
     if found.search.stopped {
-        page.text("Give the search longer: the same command with a larger --patience.");
+        items.push(("Give the search longer: the same command with a larger --patience.".to_string(), Some(command())));
     }
+    items
 }
 
 /// The physics that a candidate adds, or nothing.
@@ -135,7 +133,7 @@ fn tone(json: &Value) -> Tone {
 }
 
 /// How far it is explained, and where it shows.
-fn summary(found: &Found) -> String {
+fn summary(found: &Found, added: bool) -> String {
     let json = &found.said.json;
     let held = &json["held_out"];
     let of = |key: &str| held[key].as_f64();
@@ -144,16 +142,17 @@ fn summary(found: &Found) -> String {
     if let (Some(before), Some(refit), Some(after), Some(floor)) =
         (of("nrmse_before"), of("nrmse_refit"), of("nrmse_after"), of("noise_floor"))
     {
+        // Where nothing was added, what is written as diagnosed is one of the two others.
+        let diagnosed = if added { format!(", {} with the diagnosed model", percent(after)) } else { String::new() };
         text = format!(
-            "On {on} the error is {} of what was measured with the model as given, {} with its parameters refitted, {} with the diagnosed model; \
-             the sensors' own noise is {}.",
+            "On {on} the error is {} of what was measured with the model as given, {} with its parameters refitted{diagnosed}; the sensors' own \
+             noise is {}.",
             percent(before),
             percent(refit),
-            percent(after),
             percent(floor)
         );
         let beyond = |x: f64| (x * x - floor * floor).max(0.0).sqrt();
-        if beyond(refit) > floor && after < refit {
+        if added && beyond(refit) > floor && after < refit {
             text.push_str(&format!(
                 " Of the error that refitting leaves beyond that noise, {} is removed.",
                 percent(1.0 - beyond(after) / beyond(refit))

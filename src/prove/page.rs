@@ -73,8 +73,18 @@ pub fn page(options: &cli::Prove, cases: &[Case]) -> Page {
          nothing is right. The second count, of effects that stay away from the refitted nominal model, has none of those.",
     );
     page.text("To check a seal: sha256sum case-NNN/sealed/truth.json gives the digest of the bags' title.");
+    crate::page_parts::ending(&mut page, &TERMS);
     page
 }
+
+/// The terms of the page.
+const TERMS: [(&str, &str); 5] = [
+    ("μλ", "the loop's gain: the position scale μ from master to slave times the force scale λ from slave to master"),
+    ("stable to", "the highest gain found at which what oscillates in contact dies out"),
+    ("canceller", "takes the master's own motion under the reflected force out of the command, by the model named"),
+    ("noise floor", "standard deviation of the sensor noise: an error of 1 cannot be improved on"),
+    ("linear", "the better of the two cancellers with a linear model"),
+];
 
 fn concealed(case: &Case) -> String {
     if case.concealed.is_empty() { "nothing".to_string() } else { case.concealed.join(", ") }

@@ -4,7 +4,11 @@ use super::words::{text, tone, word};
 use crate::stability::Point;
 use backdrive_report::{Cell, Figure, Page, Plot, Table, Tone, number, si};
 use backdrive_stability::outcome::Outcome;
+use backdrive_stability::resimulate::edge::Edge;
 use backdrive_stability::verdict::{Answer, Resimulated, Word};
+
+/// Height of verdicts with no curve over them, px.
+const BARE: f64 = 90.0;
 
 /// The sweep, or the search for the edge where nothing was swept.
 pub(super) fn gains(page: &mut Page, found: &Answer, curve: &[&Point]) {
@@ -47,8 +51,9 @@ pub(super) fn gains(page: &mut Page, found: &Answer, curve: &[&Point]) {
         plot = plot.y_limits(-1.0, 1.0).line("", &gains, &distance);
         plots.push(plot);
     }
-    if plots.is_empty() {
-        plots.push(Plot::new("").y_limits(0.0, 1.0).height(60.0));
+    let bare = plots.is_empty();
+    if bare {
+        plots.push(Plot::new("").y_limits(0.0, 1.0).height(BARE));
     }
     let edges = edge_marks(found);
     let count = plots.len();
@@ -63,7 +68,7 @@ pub(super) fn gains(page: &mut Page, found: &Answer, curve: &[&Point]) {
         for (at, label, tone) in &edges {
             drawn = drawn.vertical(*at, if i == 0 { label } else { "" }, *tone);
         }
-        *plot = if count == 1 { drawn.height(260.0) } else { drawn };
+        *plot = if count == 1 && !bare { drawn.height(260.0) } else { drawn };
     }
     let what = match (curve.is_empty(), again) {
         (false, _) => format!("{} gains, the loop run again at each; the colour is its verdict.", swept.len()),
@@ -127,11 +132,14 @@ fn grips(page: &mut Page, again: &Resimulated, asked: f64) {
         let head = ["grip".to_string(), "critical μλ".to_string(), format!("at μλ = {}", number(asked))];
         let mut table =
             Table::new(head).caption("The edge for softer and firmer grips than the one recorded: nobody knows a grip exactly.");
-        for g in &again.grips {
+        let mut rows: Vec<(f64, &Edge, Option<Outcome>)> = again.grips.iter().map(|g| (g.scale, &g.edge, g.at_asked)).collect();
+        rows.push((1.0, &again.edge, Some(again.outcome)));
+        rows.sort_by(|a, b| a.0.total_cmp(&b.0));
+        for (scale, edge, at_asked) in rows {
             table.push([
-                Cell::from(format!("× {}", g.scale)),
-                g.edge.critical_gain.map_or_else(|| format!("≥ {}", number(g.edge.at_least)), number).into(),
-                g.at_asked.map_or(Cell::from("–"), |o| Cell::tone(o.to_string(), tone(word(&o)))),
+                Cell::from(if scale == 1.0 { "× 1 (as recorded)".to_string() } else { format!("× {scale}") }),
+                edge.critical_gain.map_or_else(|| format!("≥ {}", number(edge.at_least)), number).into(),
+                at_asked.map_or(Cell::from("–"), |o| Cell::tone(o.to_string(), tone(word(&o)))),
             ]);
         }
         page.table(table);

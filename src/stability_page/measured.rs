@@ -35,11 +35,16 @@ pub(super) fn measured(page: &mut Page, found: &Answer) {
         }
     }
     if let Some(m) = &found.margins {
+        let whose = if found.margins_are_of_the_edge() {
+            "At the gain asked, by the measured response of the worst loop at the worst amplitude."
+        } else {
+            "At the gain asked, by the measured response alone: another edge, lower or known better, is the one to act on (above), and these margins are not to it."
+        };
         let of = |value: Option<f64>, unit: &str| value.map_or("unlimited".to_string(), |v| format!("{} {unit}", number(v)));
         page.table(
             Table::new(["gain margin", "phase margin", "delay margin", "modulus margin |1 − L|"])
                 .row([of(m.gain_db, "dB"), of(m.phase_deg, "°"), of(m.delay_ms, "ms"), number(m.modulus)])
-                .caption("At the gain asked, by the measured response of the worst loop at the worst amplitude."),
+                .caption(whose),
         );
     }
     let several = names.len() > 1;
@@ -59,8 +64,8 @@ pub(super) fn measured(page: &mut Page, found: &Answer) {
         let title = if several { format!("{name}: ") } else { String::new() };
         page.figure(
             nyquist(&found, gain, &title),
-            "L, once round the loop, scaled to the gain asked; the closed loop is F_f = d + L F_f, so +1 is the critical point. The discs, \
-             drawn near +1 only, hold 95 % each. Only lines at which L stands out of its uncertainty are drawn.",
+            "L, once round the loop, scaled to the gain asked, the colour of the curve with the lowest edge is its frequency; the closed loop is F_f = d + L F_f, so +1 is the critical \
+             point. The discs, drawn near +1 only, hold 95 % each. Only lines at which L stands out of its uncertainty are drawn.",
         );
         page.figure(
             bode(&found, gain, &title),
@@ -113,7 +118,9 @@ fn nyquist(found: &[(&LevelEstimate, &AxisEstimate)], gain: f64, title: &str) ->
     let mut seen = Vec::new();
     // Frequencies are written at the curve whose edge comes first.
     let first = first_edge(found);
-    for (i, (level, axis)) in found.iter().enumerate() {
+    let mut order: Vec<usize> = (0..found.len()).collect();
+    order.sort_by_key(|i| first == Some(*i)); // the curve that decides last, on top
+    for (i, (level, axis)) in order.into_iter().filter_map(|i| Some((i, found.get(i)?))) {
         let at = |k: usize| told(axis, k).map_or((f64::NAN, f64::NAN), |l| (gain * l[0], gain * l[1]));
         let (re, im): (Vec<f64>, Vec<f64>) = (0..axis.l.len()).map(at).unzip();
         seen.extend(re.iter().copied().zip(im.iter().copied()));
@@ -125,10 +132,12 @@ fn nyquist(found: &[(&LevelEstimate, &AxisEstimate)], gain: f64, title: &str) ->
         let radius: Vec<f64> = all.map(|(k, r)| if near(k, r) { r } else { f64::NAN }).collect();
         let name = level_name(level, found.len());
         let disc_name = if found.len() == 1 { "95 % discs" } else { "" };
-        plot = plot.series(Series::discs(disc_name, &thin(&re), &thin(&im), &thin(&radius)).colour(Colour::Nth(i)));
-        // The measured curve is whole: the unit circle before it would take its dash.
-        let dash = if i == 0 { Dash::Solid } else { Dash::Auto };
-        plot = plot.series(Series::line(&name, &re, &im).colour(Colour::Nth(i)).dash(dash));
+        // Of several amplitudes that with the lowest edge decides: its colour is the frequency, the others stay behind it.
+        let leads = first == Some(i);
+        let colour = if leads { Colour::Nth(0) } else { Colour::Muted };
+        plot = plot.series(Series::discs(disc_name, &thin(&re), &thin(&im), &thin(&radius)).colour(colour));
+        let curve = Series::line(&name, &re, &im).colour(colour).dash(Dash::Solid);
+        plot = plot.series(if leads { curve.by("frequency", "Hz", &level.hz).width(2.2) } else { curve.width(0.8) });
         let lines: Vec<usize> = (0..axis.l.len()).filter(|k| told(axis, *k).is_some()).collect();
         let mut marks = vec![lines.first().copied(), lines.last().copied()];
         if let Some(hz) = axis.edge.frequency_hz {

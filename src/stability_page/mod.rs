@@ -6,31 +6,29 @@ mod measured;
 mod response;
 mod words;
 
+use crate::page_parts::{ending, shell_word};
 use crate::stability::Point;
 use backdrive_report::{Cell, Page, Table, Tone, number, percent, si};
 use backdrive_stability::frequency;
-use backdrive_stability::outcome::Outcome;
 use backdrive_stability::session::Session;
 use backdrive_stability::verdict::{Answer, Method, Word};
 use energy::{energy, transparency};
 use gains::gains;
 use measured::measured;
 use response::response;
-use words::{capital, energy_verdict, file_name, interval, tone, verdict, word};
+use words::{capital, energy_verdict, file_name, interval, spelled, tone, verdict, word};
 
 /// The report of an answer; `session` is what was recorded, `curve` the sweep, which may be empty.
 pub fn page(found: &Answer, session: &Session, curve: &[&Point]) -> Page {
     let mut page = Page::new(&format!("Stability of {} at μλ = {}", file_name(&found.bag), number(found.gain.product())));
     page.lead(tone(found.verdict), &lead(found));
     page.text(&capital(&found.reason));
+    page.todo("What to do now", &to_do(found));
     for d in &found.disagreements {
         page.warning(&capital(&d.text));
     }
     for warning in &found.warnings {
         page.note(&capital(warning));
-    }
-    if let Some(advice) = &found.advice {
-        page.note(&format!("To record for a better answer: {advice}"));
     }
     page.table(methods(found));
 
@@ -54,8 +52,101 @@ pub fn page(found: &Answer, session: &Session, curve: &[&Point]) -> Page {
         page.section("Models against the recording");
         models(&mut page, found);
     }
+    ending(&mut page, &TERMS);
     page
 }
+
+/// What to do now, most useful first, with commands to copy.
+fn to_do(found: &Answer) -> Vec<(String, Option<String>)> {
+    let (bag, asked) = (shell_word(&found.bag), found.gain.product());
+    // Digits as a command takes them.
+    let plain = |v: f64| format!("{v:.3}").trim_end_matches('0').trim_end_matches('.').to_string();
+    let lower = |edge: f64| {
+        let low = found.critical_gain_ci95.map_or(edge, |ci| ci.0.min(edge));
+        low / SAFE
+    };
+    let mut items = Vec::new();
+    match (found.verdict, found.critical_gain, found.at_least) {
+        (Word::Stable, Some(edge), _) => {
+            let db = 20.0 * (edge / asked).log10();
+            items.push((
+                format!(
+                    "The edge is {} dB away. {} (6 dB below it, the usual reserve: μλ = {}.)",
+                    number(db),
+                    if lower(edge) < asked {
+                        "That is little: a firmer hand or an older cable may use it up."
+                    } else {
+                        "The gain may rise."
+                    },
+                    number(lower(edge))
+                ),
+                None,
+            ));
+            items.push((
+                "See what happens up to the edge and beyond it, before a hand feels it.".to_string(),
+                Some(format!("backdrive replay {bag} --lambda {} --html at-the-edge.html", plain(edge / found.gain.mu))),
+            ));
+        }
+        (Word::Stable, None, Some(least)) => {
+            items.push((format!("Nothing stands against a higher gain up to μλ = {}: that is how far was looked.", number(least)), None))
+        }
+        (Word::LimitCycle | Word::Unstable | Word::Limited, edge, least) if edge.or(least).is_some() => {
+            let edge = edge.or(least).unwrap_or(asked);
+            let gain = lower(edge).min(asked);
+            items.push((
+                format!(
+                    "Lower the force scale: at μλ = {} the loop keeps 6 dB to where it stops being stable, at the price of a reflected force of {} of what it would be now.",
+                    number(gain),
+                    percent(gain / asked)
+                ),
+                Some(format!("backdrive replay {bag} --lambda {} --html lower.html", plain(gain / found.gain.mu))),
+            ));
+            let has_canceller = found.transparency.iter().any(|t| t.cancellation.is_some());
+            items.push(if has_canceller {
+                (
+                    "Or cancel with a better model of the master: a diagnosis finds what the present one lacks.".to_string(),
+                    Some("backdrive diagnose --help".to_string()),
+                )
+            } else {
+                (
+                    "Or take the induced master motion out by a canceller, with a model of the master.".to_string(),
+                    Some(format!("backdrive stability {bag} --gain {} --canceller MODEL.toml --html cancelled.html", plain(asked))),
+                )
+            });
+        }
+        _ => {}
+    }
+    if let Some(advice) = &found.advice {
+        items.push((format!("To record for a better answer: {}", spelled(advice)), None));
+    }
+    if found.checks.iter().any(|c| !c.agrees) {
+        items.push((
+            "A model does something else than its device: find out what it lacks, and ask again.".to_string(),
+            Some("backdrive diagnose --help".to_string()),
+        ));
+    }
+    items
+}
+
+/// A gain is worked at this factor (6 dB) below its edge.
+const SAFE: f64 = 2.0;
+
+/// The terms of the page.
+const TERMS: [(&str, &str); 10] = [
+    ("μλ", "the loop's gain: the position scale μ from master to slave times the force scale λ from slave to master"),
+    ("critical μλ, edge", "the lowest gain at which the loop is not stable; at it the loop oscillates without growing"),
+    (
+        "L",
+        "the loop's frequency response, once round: reflected force to master to slave to environment and back; the closed loop is 1/(1 − L)",
+    ),
+    ("margins", "by how much the gain may rise, the phase or the delay grow, and how near L comes to +1, before the loop is on its edge"),
+    ("coherence", "share of a signal's power that the excitation explains, 0 to 1, at each frequency"),
+    ("re-simulation", "the loop of the bag run again from its models with the recorded hand"),
+    ("limit cycle", "an oscillation that neither dies out nor grows while the hand holds still"),
+    ("limited", "a clamp or the end of the travel decides what happens; never called stable"),
+    ("passive port", "one that never gives more energy than it has taken"),
+    ("95 %", "interval that holds the value in 95 of 100 such recordings"),
+];
 
 /// The verdict in a sentence.
 fn lead(found: &Answer) -> String {
@@ -75,7 +166,13 @@ fn lead(found: &Answer) -> String {
                 Some(_) => ", where it runs away without oscillating".to_string(),
                 None => String::new(),
             };
-            format!(" The edge is at μλ = {}{interval}{how}.", number(edge))
+            let by = found.decided_by.as_deref().map_or(String::new(), |by| format!(", by {by}"));
+            format!(" The edge is at μλ = {}{interval}{how}{by}.", number(edge))
+        }
+        // Beyond a clamp or an end of the travel no edge can be seen.
+        (None, Some(least)) if least < found.gain.product() => {
+            let by = found.decided_by.as_deref().map_or(String::new(), |by| format!(", by {by}"));
+            format!(" It is stable only up to μλ = {}{by}.", number(least))
         }
         (None, Some(least)) => format!(" No edge up to μλ = {}.", number(least)),
         (None, None) => String::new(),
@@ -104,7 +201,7 @@ fn methods(found: &Answer) -> Table {
             edge(f.critical_gain, f.at_least).into(),
             f.critical_gain_ci95.map_or("–".to_string(), interval).into(),
             f.frequency_hz.map_or("–".to_string(), |hz| si(hz, "Hz")).into(),
-            f.reason.clone().into(),
+            spelled(&f.reason).into(),
         ]);
     }
     match &found.resimulated {
@@ -113,12 +210,8 @@ fn methods(found: &Answer) -> Table {
             verdict(word(&again.outcome)),
             edge(again.edge.critical_gain, Some(again.edge.at_least)).into(),
             "–".into(),
-            match again.edge.outcome_beyond {
-                Some(Outcome::LimitCycle { frequency_hz, .. }) => si(frequency_hz, "Hz"),
-                _ => "–".to_string(),
-            }
-            .into(),
-            format!("{}; {}", again.outcome, again.edge.reason).into(),
+            again.edge.frequency_hz.filter(|hz| *hz > 0.0).map_or("–".to_string(), |hz| si(hz, "Hz")).into(),
+            spelled(&format!("{}; {}", again.outcome, again.edge.reason)).into(),
         ]),
         None => table.push([
             Cell::from("re-simulation"),
@@ -126,7 +219,7 @@ fn methods(found: &Answer) -> Table {
             "–".into(),
             "–".into(),
             "–".into(),
-            found.no_resimulation.clone().unwrap_or_default().into(),
+            spelled(found.no_resimulation.as_deref().unwrap_or_default()).into(),
         ]),
     }
     let energy = found.resimulated.as_ref().map_or(&found.recorded_energy, |r| &r.energy);

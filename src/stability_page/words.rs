@@ -53,12 +53,18 @@ pub(super) fn file_name(path: &str) -> &str {
     path.rsplit('/').find(|part| !part.is_empty()).unwrap_or(path)
 }
 
-/// A sentence from a clause: its first letter large, a full stop at its end.
+/// A sentence from a clause: its first letter large, a full stop at its end, the gain as the page spells it.
 pub(super) fn capital(clause: &str) -> String {
+    let clause = &spelled(clause);
     let mut chars = clause.chars();
     let first: String = chars.next().map(|c| c.to_uppercase().collect()).unwrap_or_default();
     let stop = if clause.is_empty() || clause.ends_with(['.', '!', '?', ':']) { "" } else { "." };
     format!("{first}{}{stop}", chars.as_str())
+}
+
+/// The gain as the page spells it; in a terminal and in files it is `mu*lambda`.
+pub(super) fn spelled(text: &str) -> String {
+    text.replace("mu*lambda", "μλ")
 }
 
 #[cfg(test)]
@@ -70,6 +76,7 @@ mod tests {
         assert_eq!(capital("äh, no"), "Äh, no.");
         assert_eq!(capital("Done."), "Done.");
         assert_eq!(capital(""), "");
+        assert_eq!(capital("the edge lies at mu*lambda = 3"), "The edge lies at μλ = 3.");
         assert_eq!(file_name("a/b/session/"), "session");
     }
 }
