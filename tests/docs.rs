@@ -109,5 +109,5 @@ fn a_recording_of_ones_own_ends_in_what_the_page_promises() {
     // What the simulated devices hide.
     let near = |found: f64, hidden: f64| (found / hidden - 1.0).abs() < 0.03;
     assert!(near(size("out/mine", "force"), 4e-3), "{}", size("out/mine", "force"));
-    assert!(near(size("out/rig", "static"), 11.0) && near(size("out/rig", "coulomb"), 6.0), "{}", size("out/rig", "static"));
+    assert!(near(size("out/rig", "positive"), 80.0) && near(size("out/rig", "negative"), 40.0), "{}", size("out/rig", "positive"));
 }
