@@ -57,7 +57,7 @@ pub fn init(options: &cli::Init) -> Result<u8, Failure> {
         output::json(&json!({
             "model": model, "set": set, "fit": seen.fit, "held_out": seen.held_out,
             "start": { "inertia": seen.numbers.inertia, "damping": seen.numbers.damping, "stiffness": seen.numbers.stiffness, "from": seen.from },
-            "notes": opened.notes, "audit": audit::json(&remarks), "next": next,
+            "doubt": seen.doubt, "notes": opened.notes, "audit": audit::json(&remarks), "next": next,
         }))?;
         return Ok(0);
     }
@@ -65,7 +65,7 @@ pub fn init(options: &cli::Init) -> Result<u8, Failure> {
     output::line(format_args!("start     {}", told_numbers(&plan, &seen)))?;
     let cautions: Vec<String> = remarks.iter().filter(|r| r.weight > Weight::Note).map(|r| r.to_string()).collect();
     let partial = found.partial.iter().map(|name| format!("{name}: is not in all of the recordings, so that it was not offered"));
-    let told: Vec<String> = cautions.into_iter().chain(opened.notes).chain(partial).collect();
+    let told: Vec<String> = seen.doubt.clone().into_iter().chain(cautions).chain(opened.notes).chain(partial).collect();
     if told.is_empty() {
         output::line("check     fine: diagnose takes them, and nothing in the recordings speaks against it")?;
     }
@@ -160,14 +160,23 @@ fn seen<R: BufRead, W: Write>(
             (Numbers { inertia, damping: inertia, stiffness }, "the inertia as given, the rest guessed")
         }
     };
+    let doubt = inertia.zip(estimated).map(|(given, shown)| given / shown.inertia).filter(|f| !(1.0 / DOUBTED..=DOUBTED).contains(f)).map(|factor| {
+        format!(
+            "the inertia as given is {} times what the recordings show by themselves: is it, a unit, the motor's constant or the size of a count wrong?",
+            number(factor)
+        )
+    });
     let encoder = plan.position.as_ref().map(|position| {
         let shows = records.iter().find_map(|r| r.signal(&position.name).and_then(step_of));
         options.resolution.or(position.scale.filter(|_| shows.is_some())).or(shows).unwrap_or(0.0)
     });
     let held_out = held_out(asker, options, plan, found, records)?;
     let (held_out, fit) = found.names.iter().cloned().partition(|name| Some(name) == held_out.as_ref());
-    Ok(Seen { numbers, from, resolution: encoder.unwrap_or(0.0), start, fit, held_out })
+    Ok(Seen { numbers, from, resolution: encoder.unwrap_or(0.0), start, fit, held_out, doubt })
 }
+
+/// Factor between an inertia as given and as estimated from which on one of them is doubted: friction alone does not make that much.
+const DOUBTED: f64 = 3.0;
 
 /// Beginnings that count as moving: a share of the usual speed, or of the whole travel away from 0.
 const MOVING: f64 = 0.2;

@@ -22,6 +22,8 @@ pub struct Seen {
     pub fit: Vec<String>,
     /// And of the one that is not, where there are several.
     pub held_out: Vec<String>,
+    /// What makes an answer doubtful, in a sentence.
+    pub doubt: Option<String>,
 }
 
 /// Damping ratio that a joint is given to start with.
