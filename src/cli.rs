@@ -1,5 +1,9 @@
 //! The command line: its doc comments are the help.
 
+mod init;
+
+pub use init::{Answer, Attached, Driven, Init, Motion, Start};
+
 use backdrive_nodes::graph::{MAX_RATE_HZ, Overrides};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
@@ -74,6 +78,9 @@ pub enum Command {
     /// Ask a bag whether its loop would be stable at another gain, and how far away the edge is.
     #[command(after_help = STABILITY_HELP)]
     Stability(Stability),
+    /// Write a model and a set for recordings of your own: asks what is driven and what is measured, and checks what it wrote.
+    #[command(after_help = init::HELP)]
+    Init(Init),
     /// Find where a model and recordings part, and which physics the model leaves out.
     #[command(after_help = DIAGNOSE_HELP)]
     Diagnose(Diagnose),

@@ -15,10 +15,12 @@ pub struct Failure {
     pub message: String,
 }
 
-/// Exit codes. 2 is usage and comes from the argument parser.
+/// Exit codes.
 pub mod code {
     /// The finding is negative: not stable, bags differ.
     pub const NEGATIVE: u8 = 1;
+    /// Usage; most of it comes from the argument parser.
+    pub const USAGE: u8 = 2;
     /// A file is missing, broken, or does not hold what is needed.
     pub const BAD_INPUT: u8 = 3;
     /// Data was lost.

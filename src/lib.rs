@@ -15,6 +15,7 @@ mod experiments;
 pub mod failure;
 mod fit;
 mod graph;
+mod init;
 mod interrupt;
 mod model;
 mod network;
@@ -55,6 +56,7 @@ pub fn main() -> ExitCode {
         Command::Run(options) => run::run(&options),
         Command::Replay(options) => replay::replay(&options),
         Command::Stability(options) => stability::stability(&options),
+        Command::Init(options) => init::init(&options),
         Command::Diagnose(options) => diagnose::diagnose(&options),
         Command::Fit(options) => fit::fit(&options),
         Command::TestBench(options) => test_bench::test_bench(&options),

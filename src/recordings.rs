@@ -67,7 +67,7 @@ pub fn open(paths: &[PathBuf], model: Option<&Path>, grip: Option<&Path>, ignore
         }
     }
     notes.extend(set_checks::repeated(&set)?);
-    notes.extend(set.fit.iter().chain(&set.held_out).filter_map(|file| unfinished(&set.folder.join(file))));
+    notes.extend(set.fit.iter().chain(&set.held_out).filter_map(|file| unfinished(&set.path_of(file))));
     let problem = match grip {
         None => Problem::of_set(&set, model),
         Some(grip) => {

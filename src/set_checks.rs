@@ -4,7 +4,7 @@ use crate::failure::Failure;
 use backdrive_bags::Reader;
 use backdrive_diagnosis::problem::{Problem, Record};
 use backdrive_plant::model::Model;
-use backdrive_plant::recording::{Source, signals_of};
+use backdrive_plant::recording::{Source, read_headings, signals_of, units};
 use backdrive_plant::set::RecordingSet;
 use std::io::Read;
 use std::path::Path;
@@ -120,14 +120,13 @@ fn unused_in(set: &RecordingSet, file: &str, model: &Model) -> Vec<String> {
         let names = reader.topics().iter().filter(|t| !topic_by_rule(&t.name)).filter_map(|t| t.name.strip_prefix("/recording/"));
         return names.filter(|n| !own.contains(n) && !flat.iter().any(|f| f == n)).map(str::to_string).collect();
     }
-    let Ok(mut reader) = csv::ReaderBuilder::new().trim(csv::Trim::All).flexible(true).comment(Some(b'#')).from_path(&path) else {
-        return Vec::new();
-    };
-    let Ok(headings) = reader.headers() else { return Vec::new() };
+    let Ok(headings) = read_headings(&path) else { return Vec::new() };
     let rows_by = set.rules_of(file).piece.keep;
     let is_own = |h: &str| {
-        let bare = h.split_once(" [").map_or(h, |(name, _)| name);
-        h == "t" || bare == "t" || own.contains(&h) || own.contains(&bare) || by_rule(h) || rows_by.iter().any(|(c, _)| c == h)
+        // A heading is meant by its whole text or by its name without the unit.
+        [h, units::split(h).0]
+            .iter()
+            .any(|name| *name == "t" || own.contains(name) || by_rule(name) || rows_by.iter().any(|(c, _)| c == name))
     };
-    headings.iter().map(|h| h.trim_start_matches('\u{feff}')).filter(|h| !h.is_empty() && !is_own(h)).map(str::to_string).collect()
+    headings.into_iter().filter(|h| !h.is_empty() && !is_own(h)).collect()
 }

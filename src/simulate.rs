@@ -8,7 +8,7 @@ use crate::progress::busy;
 use backdrive_bags::{Reader, recording, topic_of};
 use backdrive_plant::excitation::{Excitation, load_experiments};
 use backdrive_plant::model::{Fragment, Hold, Model, OutputKind};
-use backdrive_plant::recording::{Columns, Piece, Recording, read_csv, signals_of, write_csv};
+use backdrive_plant::recording::{Columns, Piece, Recording, read_signals_of, signals_of, write_csv};
 use backdrive_plant::set::{Condition, RecordingSet};
 use backdrive_plant::stepper::{Options, simulate as simulate_model};
 use serde_json::json;
@@ -133,9 +133,13 @@ fn drives(options: &cli::Simulate, model: &Model) -> Result<Vec<Drive>, Failure>
 /// The signals of a model from a recording: all of its inputs, and those of its outputs that were recorded.
 pub fn read_recording(path: &Path, model: &Model, columns: &Columns, piece: &Piece) -> Result<Recording, Failure> {
     let is_bag = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("mcap"));
-    let recording = if is_bag { from_bag(path, model, columns, piece)? } else { read_csv(path, None, columns, piece)? };
+    let is_hand = |name: &str| name.ends_with(".hand");
+    let recording = match is_bag {
+        true => from_bag(path, model, columns, piece)?,
+        false => read_signals_of(path, model, columns, piece, &is_hand)?,
+    };
     for input in &model.inputs {
-        if recording.signal(&input.name).is_none() && !input.name.ends_with(".hand") {
+        if recording.signal(&input.name).is_none() && !is_hand(&input.name) {
             let there: Vec<&str> = recording.signals.iter().map(|(name, _)| name.as_str()).collect();
             let there = if there.is_empty() { "nothing else".to_string() } else { there.join(", ") };
             return Err(Failure::input(format!(

@@ -10,6 +10,7 @@ const VERBS: &[&[&str]] = &[
     &["run"],
     &["replay"],
     &["stability"],
+    &["init"],
     &["diagnose"],
     &["fit"],
     &["test-bench"],

@@ -45,5 +45,5 @@ pub use reader::{Entry, Messages, Reader, TopicRef};
 pub use recorder::{Health, Recorder, RecorderOptions, WhenFull};
 pub use recover::{RecoverReport, recover};
 pub use signals::{Alignment, Signal, Signals, recording, signals};
-pub use table::{ColumnMap, ImportOptions, ImportReport, Quantity, export_csv, import_csv, topic_of};
+pub use table::{ColumnMap, ImportOptions, ImportReport, Quantity, columns_of, export_csv, import_csv, topic_of};
 pub use without::without;

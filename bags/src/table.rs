@@ -51,7 +51,10 @@ fn digits(value: f64) -> String {
 }
 
 /// The signals of all topics that have numbers: those of ours that were measured at least once, of others every number.
-pub(crate) fn columns_of(reader: &Reader, topics: Option<&[String]>) -> Result<Vec<Signal>, BagError> {
+///
+/// # Errors
+/// When the bag cannot be read.
+pub fn columns_of(reader: &Reader, topics: Option<&[String]>) -> Result<Vec<Signal>, BagError> {
     let listed = |name: &str| topics.is_none_or(|topics| topics.iter().any(|topic| topic == name));
     let count = reader.topics().len();
     let mut measured = vec![[[false; MAX_AXES]; 3]; count];

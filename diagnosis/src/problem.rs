@@ -188,16 +188,17 @@ fn record(set: &RecordingSet, file: &str, model: &Model, unknown: &[Unknown]) ->
     let path = set.path_of(file);
     let rules = set.rules_of(file);
     let is_bag = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("mcap"));
-    let recording =
-        if is_bag { from_bag(&path, model, &set.columns, &rules.piece)? } else { from_csv(&path, model, &set.columns, &rules.piece)? };
+    let recording = if is_bag { from_bag(&path, model, &set.columns, &rules.piece)? } else { from_csv(&path, model, set, &rules.piece)? };
     recording.check_units(model)?;
+    // Pieces of one file have names of their own.
+    let name = set.folder.join(file).display().to_string();
+    let recording = Recording { name, ..recording };
     Record::knowing(&recording, model, rules.condition, unknown)
 }
 
-fn from_csv(path: &Path, model: &Model, columns: &Columns, piece: &backdrive_plant::recording::Piece) -> Result<Recording, ProblemError> {
-    // Outputs may be missing in some files, inputs may not: so all columns are read.
-    let _ = model;
-    Ok(backdrive_plant::recording::read_csv(path, None, columns, piece)?)
+fn from_csv(path: &Path, model: &Model, set: &RecordingSet, piece: &backdrive_plant::recording::Piece) -> Result<Recording, ProblemError> {
+    let nobody_measured = |name: &str| set.unknown.iter().any(|(input, _)| input == name);
+    Ok(backdrive_plant::recording::read_signals_of(path, model, &set.columns, piece, &nobody_measured)?)
 }
 
 fn from_bag(path: &Path, model: &Model, columns: &Columns, piece: &backdrive_plant::recording::Piece) -> Result<Recording, ProblemError> {

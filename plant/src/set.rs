@@ -29,6 +29,8 @@ pub enum Condition {
 /// What is particular to one file of a set.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct FileRules {
+    /// The file that it is a piece of, relative to the folder; `None` where it is a file of its own.
+    pub of: Option<String>,
     /// Which rows count.
     pub piece: Piece,
     /// Parameters that differ in this file, by path: `elements.band.force`.
@@ -94,9 +96,9 @@ impl RecordingSet {
         }
     }
 
-    /// Path of one of its files.
+    /// Path of one of its files; of a piece that of the file that holds it.
     pub fn path_of(&self, file: &str) -> PathBuf {
-        self.folder.join(file)
+        self.folder.join(source_of(&self.files, file))
     }
 
     /// What is particular to a file; the defaults where the set says nothing.
@@ -127,12 +129,21 @@ impl RecordingSet {
     }
 }
 
+/// The file that holds what a set calls so.
+fn source_of<'a>(files: &'a [(String, FileRules)], name: &'a str) -> &'a str {
+    files.iter().find(|(file, _)| file == name).and_then(|(_, rules)| rules.of.as_deref()).unwrap_or(name)
+}
+
 fn is_recording(name: &str) -> bool {
     let lower = name.to_lowercase();
     lower.ends_with(".csv") || lower.ends_with(".mcap")
 }
 
-fn recordings_in(folder: &Path) -> Result<Vec<String>, FileError> {
+/// Names of the recordings in a folder, in order.
+///
+/// # Errors
+/// When the folder cannot be read.
+pub fn recordings_in(folder: &Path) -> Result<Vec<String>, FileError> {
     let failed = |e: std::io::Error| FileError::whole(folder.display().to_string(), format!("cannot be read: {e}"));
     let mut names = Vec::new();
     for entry in std::fs::read_dir(folder).map_err(failed)? {
@@ -159,12 +170,21 @@ fn read(mut top: Table, folder: PathBuf) -> Result<RecordingSet, FileError> {
         Some(fit) => fit,
         None => recordings_in(&folder)?.into_iter().filter(|name| !held_out.contains(name)).collect(),
     };
+    let mut files_table = top.table("files")?;
+    let mut files = Vec::new();
+    if let Some(table) = &mut files_table {
+        for name in table.keys() {
+            let below = table.table(&name)?.ok_or_else(|| table.missing(&name))?;
+            files.push((name, read_rules(below)?));
+        }
+    }
     for (key, names) in [("fit", &fit), ("held_out", &held_out)] {
         for (i, name) in names.iter().enumerate() {
-            if !is_recording(name) {
-                return Err(top.error_at(key, format!("\"{name}\" is no recording; expected .csv or .mcap")));
+            let source = source_of(&files, name);
+            if !is_recording(source) {
+                return Err(top.error_at(key, format!("\"{source}\" is no recording; expected .csv or .mcap")));
             }
-            exists(&top, key, name)?;
+            exists(&top, key, source)?;
             if names[..i].contains(name) {
                 return Err(top.error_at(key, format!("names \"{name}\" twice")));
             }
@@ -186,15 +206,12 @@ fn read(mut top: Table, folder: PathBuf) -> Result<RecordingSet, FileError> {
         }
     }
     let columns = top.table("columns")?.map(read_columns).transpose()?.unwrap_or_default();
-    let mut files = Vec::new();
-    if let Some(mut table) = top.table("files")? {
-        for name in table.keys() {
+    if let Some(table) = &files_table {
+        for (name, _) in &files {
             let all = fit.iter().chain(&held_out).map(String::as_str);
-            if !fit.contains(&name) && !held_out.contains(&name) {
-                return Err(table.error_at(&name, unknown("file", &name, all)));
+            if !fit.contains(name) && !held_out.contains(name) {
+                return Err(table.error_at(name, unknown("file", name, all)));
             }
-            let below = table.table(&name)?.ok_or_else(|| table.missing(&name))?;
-            files.push((name, read_rules(below)?));
         }
     }
     let mut sessions = Vec::new();
@@ -239,7 +256,7 @@ fn shown(folder: &Path) -> String {
 }
 
 fn read_rules(mut table: Table) -> Result<FileRules, FileError> {
-    let mut rules = FileRules::default();
+    let mut rules = FileRules { of: table.string("of")?, ..FileRules::default() };
     if let Some(rows) = table.numbers("rows", Range::NonNegative)? {
         let whole = rows.iter().all(|x| x.fract() == 0.0);
         match rows.as_slice() {

@@ -4,7 +4,9 @@
 mod skipped;
 
 use backdrive_plant::model::{Hold, Model};
-use backdrive_plant::recording::{Cell, ColumnRule, Columns, Piece, Recording, Source, read_csv, signals_of, write_csv};
+use backdrive_plant::recording::{
+    Cell, ColumnRule, Columns, Piece, Recording, Source, read_csv, read_headings, read_signals_of, signals_of, write_csv,
+};
 use backdrive_plant::set::{Condition, Initial, RecordingSet};
 use backdrive_plant::tomlfile::FileError;
 use skipped::skipped;
@@ -231,6 +233,44 @@ condition = { "inputs.position.offset" = "free" }
     let s = RecordingSet::open(bare.path()).unwrap();
     assert_eq!((s.fit.as_slice(), s.model.clone()), (["a.csv".to_string(), "b.csv".to_string()].as_slice(), None));
     assert_eq!(s.read_csv("a.csv", &["y"]).unwrap().len(), 3);
+}
+
+#[test]
+fn pieces_of_one_file_are_recordings_of_their_own() {
+    let set = r#"
+fit = ["slow"]
+held_out = ["fast"]
+files.slow = { of = "log.csv", where = { run = 1 } }
+files.fast = { of = "log.csv", where = { run = 2 } }
+"#;
+    let log = "t,run,y\n0,1,10\n1,1,11\n0,2,12\n1,2,13\n";
+    let dir = folder(&[("set.toml", set), ("log.csv", log)]);
+    let s = RecordingSet::open(dir.path()).unwrap();
+    assert_eq!((s.path_of("slow"), s.path_of("fast")), (dir.path().join("log.csv"), dir.path().join("log.csv")));
+    let y = |piece: &str| s.read_csv(piece, &["y"]).unwrap().signals[0].1.clone();
+    assert_eq!((y("slow"), y("fast")), (vec![10.0, 11.0], vec![12.0, 13.0]));
+    let refused = |set: &str| {
+        let dir = folder(&[("set.toml", set), ("log.csv", log), ("notes.txt", "")]);
+        message(RecordingSet::open(dir.path()))
+    };
+    assert!(refused("fit = [\"slow\"]\nfiles.slow = { of = \"lag.csv\" }").contains("there is no file \"lag.csv\""));
+    assert!(refused("fit = [\"slow\"]\nfiles.slow = { of = \"notes.txt\" }").contains("\"notes.txt\" is no recording"));
+}
+
+#[test]
+fn columns_that_a_model_does_not_use_may_hold_anything() {
+    let model = "[bodies]\nm = 1.0\n[[inputs]]\nname = \"f\"\nkind = \"force\"\non = \"m\"\n\
+                 [[outputs]]\nname = \"x\"\nkind = \"position\"\nof = \"m\"\n[[outputs]]\nname = \"v\"\nkind = \"velocity\"\nof = \"m\"\n";
+    let model = Model::from_toml(model, "m.toml").unwrap();
+    let dir = folder(&[("a.csv", "t [ms],state,f,x [mm],note\n0,RUN,1,2,\n1,RUN,2,3,nan\n"), ("b.csv", "t,state,x\n0,RUN,1\n1,RUN,2\n")]);
+    let read = |name: &str, absent: bool| read_signals_of(&dir.path().join(name), &model, &Columns::new(), &Piece::default(), &|_| absent);
+    let a = read("a.csv", false).unwrap();
+    assert_eq!(a.signals, [("f".to_string(), vec![1.0, 2.0]), ("x".to_string(), vec![2e-3, 3e-3])]);
+    let told = message(read("b.csv", false));
+    assert!(told.starts_with("b.csv:1: unknown column \"f\"; there is t, state, x"), "{told}");
+    assert_eq!(read("b.csv", true).unwrap().signals.len(), 1);
+    assert_eq!(read_headings(&dir.path().join("a.csv")).unwrap(), ["t [ms]", "state", "f", "x [mm]", "note"]);
+    assert_eq!(message(read_headings(&dir.path().join("c.csv"))), "c.csv: there is no such file");
 }
 
 #[test]

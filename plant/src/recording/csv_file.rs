@@ -1,9 +1,11 @@
 //! CSV recordings.
 
 use super::units::{self, Kind, Unit};
-use super::{Columns, Piece, Recording, RecordingError, Source};
+use super::{Columns, Piece, Recording, RecordingError, Source, signals_of};
+use crate::model::Model;
 use crate::tomlfile::{self, FileError};
 use csv::{ReaderBuilder, StringRecord, Trim};
+use std::fs::File;
 use std::path::Path;
 
 /// A column to be read.
@@ -17,6 +19,54 @@ struct Wanted {
     unit: Option<Unit>,
 }
 
+/// The headings of a CSV file, as they stand there: `name` or `name [unit]`.
+///
+/// # Errors
+/// When the file cannot be read or has no heading.
+pub fn read_headings(path: &Path) -> Result<Vec<String>, FileError> {
+    let name = path.display().to_string();
+    let file = File::open(path).map_err(|e| tomlfile::unreadable(path, &e))?;
+    let mut reader = ReaderBuilder::new().trim(Trim::All).flexible(true).comment(Some(b'#')).from_reader(file);
+    let headings = heading_of(&mut reader, &name)?;
+    Ok(headings.iter().map(|heading| heading.trim_start_matches('\u{feff}').to_string()).collect())
+}
+
+fn heading_of<R: std::io::Read>(reader: &mut csv::Reader<R>, name: &str) -> Result<StringRecord, FileError> {
+    let headings = reader.headers().map_err(|e| FileError::at(name, 1, "", e.to_string()))?.clone();
+    match headings.iter().all(str::is_empty) {
+        true => Err(FileError::at(name, 1, "", "is empty, expected a heading such as t,force,position")),
+        false => Ok(headings),
+    }
+}
+
+/// Reads the signals of a model from a CSV file: its inputs, and those of its outputs that were recorded. Other columns may hold anything.
+///
+/// Where an input is missing that `may_be_absent` does not excuse, all columns are read, so that who asks for it can tell what there is.
+///
+/// # Errors
+/// As [`read_csv`].
+pub fn read_signals_of(
+    path: &Path,
+    model: &Model,
+    columns: &Columns,
+    piece: &Piece,
+    may_be_absent: &dyn Fn(&str) -> bool,
+) -> Result<Recording, FileError> {
+    // What is wrong with the whole file is told by who reads the whole file.
+    let Ok(headings) = read_headings(path) else { return read_csv(path, None, columns, piece) };
+    let there = |signal: &str| {
+        columns.iter().any(|(ruled, _)| ruled == signal) || headings.iter().any(|h| h == signal || units::split(h).0 == signal)
+    };
+    let needed = |name: &str| model.inputs.iter().any(|input| input.name == name) && !may_be_absent(name);
+    let wanted: Vec<&str> = signals_of(model).into_iter().filter(|signal| there(signal)).collect();
+    if signals_of(model).into_iter().all(|signal| there(signal) || !needed(signal)) {
+        return read_csv(path, Some(&wanted), columns, piece);
+    }
+    // Where a column of words is in the way of reading all, the missing one is told.
+    let with_missing: Vec<&str> = signals_of(model).into_iter().filter(|signal| there(signal) || needed(signal)).collect();
+    read_csv(path, None, columns, piece).or_else(|_| read_csv(path, Some(&with_missing), columns, piece))
+}
+
 /// Reads the named signals of a CSV file, or all of its columns where `signals` is `None`.
 ///
 /// The first line is the heading, `name` or `name [unit]`; time is the column `t` unless `columns` says otherwise. A unit that `columns` names
@@ -27,10 +77,7 @@ pub fn read_csv(path: &Path, signals: Option<&[&str]>, columns: &Columns, piece:
     let text = tomlfile::read_text(path)?;
     let text = text.strip_prefix('\u{feff}').unwrap_or(&text);
     let mut reader = ReaderBuilder::new().trim(Trim::All).flexible(true).comment(Some(b'#')).from_reader(text.as_bytes());
-    let headings = reader.headers().map_err(|e| FileError::at(&name, 1, "", e.to_string()))?.clone();
-    if headings.iter().all(str::is_empty) {
-        return Err(FileError::at(&name, 1, "", "is empty, expected a heading such as t,force,position"));
-    }
+    let headings = heading_of(&mut reader, &name)?;
     let file = Headings { name: &name, headings: &headings };
     let time = file.find("t", columns)?;
     if let Some(unit) = time.unit.filter(|unit| unit.kind != Kind::Time) {

@@ -6,7 +6,7 @@ mod hold;
 pub mod units;
 
 pub use columns::{Cell, ColumnRule, Columns, Piece, Source, read_columns};
-pub use csv_file::{read_csv, write_csv};
+pub use csv_file::{read_csv, read_headings, read_signals_of, write_csv};
 pub use hold::{resample, segments};
 
 use crate::model::{Hold, Model};

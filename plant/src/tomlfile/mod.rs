@@ -33,18 +33,21 @@ pub struct Table {
     taken: Vec<(String, usize)>,
 }
 
+/// Why a file cannot be read, in words.
+pub(crate) fn unreadable(path: &Path, error: &std::io::Error) -> FileError {
+    let message = match error.kind() {
+        std::io::ErrorKind::NotFound => "there is no such file".to_string(),
+        std::io::ErrorKind::PermissionDenied => "may not be read: permission denied".to_string(),
+        _ if path.is_dir() => "is a folder, expected a file".to_string(),
+        _ => format!("cannot be read: {error}"),
+    };
+    FileError::whole(path.display().to_string(), message)
+}
+
 /// Text of a file, or a clear error where it is missing, is not a file or is not UTF-8.
 pub fn read_text(path: &Path) -> Result<String, FileError> {
     let name = path.display().to_string();
-    let bytes = std::fs::read(path).map_err(|e| {
-        let message = match e.kind() {
-            std::io::ErrorKind::NotFound => "there is no such file".to_string(),
-            std::io::ErrorKind::PermissionDenied => "may not be read: permission denied".to_string(),
-            _ if path.is_dir() => "is a folder, expected a file".to_string(),
-            _ => format!("cannot be read: {e}"),
-        };
-        FileError::whole(&name, message)
-    })?;
+    let bytes = std::fs::read(path).map_err(|e| unreadable(path, &e))?;
     String::from_utf8(bytes).map_err(|e| {
         let good = e.utf8_error().valid_up_to();
         let line = e.as_bytes()[..good].iter().filter(|b| **b == b'\n').count() + 1;

@@ -27,15 +27,17 @@ impl Fragment {
 }
 
 /// A number as TOML that reads back as the same number: `39500.0`, `2e-6`.
-pub(crate) fn number(value: f64) -> String {
+pub fn number(value: f64) -> String {
     format!("{value:?}")
 }
 
-fn string(text: &str) -> String {
+/// A text as TOML, in quotes.
+pub fn string(text: &str) -> String {
     toml_edit::Value::from(text).to_string()
 }
 
-fn key(name: &str) -> String {
+/// A name as a key of TOML, in quotes where it needs them.
+pub fn key(name: &str) -> String {
     let bare = !name.is_empty() && name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_' || c == '-');
     if bare { name.to_string() } else { string(name) }
 }

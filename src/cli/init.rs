@@ -1,0 +1,161 @@
+//! Options of `backdrive init`: every question that it asks has one.
+
+use super::positive;
+use clap::{Args, ValueEnum};
+use std::path::PathBuf;
+
+/// Examples and exit codes.
+pub const HELP: &str = "Examples:
+  backdrive init mine
+  backdrive init mine --motion rotation --driven current --drive current --constant 0.035 --position encoder --per-count 1.5708e-3 --yes
+  backdrive init rig --motion translation --driven motion --drive x --force load --attached spring --yes
+  backdrive diagnose mine --out mine/diagnosis
+
+Writes model.toml and set.toml into the folder of the recordings and checks them as diagnose would before it searches. On a terminal it asks for what
+no option says; elsewhere what is missing is an error that names its option, or with --yes the default, where there is one. Columns are named by
+their headings, with or without their unit; of bags they are TOPIC.FIELD, such as /joint_states.position[0].
+
+Exit codes: 0 written and fine; 2 usage; 3 a recording is wrong, a file exists, or diagnose would refuse what was written; 5 a file cannot be written.";
+
+/// `backdrive init`
+#[derive(Debug, Clone, Default, Args)]
+pub struct Init {
+    /// Folder of the recordings, and of the files that are written.
+    #[arg(value_name = "FOLDER", default_value = ".")]
+    pub folder: PathBuf,
+    /// A recording (CSV or MCAP); may be given several times. Without this all in the folder.
+    #[arg(long, value_name = "FILE")]
+    pub recording: Vec<PathBuf>,
+    /// The recording that no fit sees. Without this the one that is driven neither most nor least.
+    #[arg(long, value_name = "FILE")]
+    pub held_out: Option<PathBuf>,
+    /// Whether it moves along a line or turns.
+    #[arg(long, value_enum)]
+    pub motion: Option<Motion>,
+    /// What is prescribed and recorded: a force (a torque), a motor's current, or a motion whose reaction force is measured.
+    #[arg(long, value_enum)]
+    pub driven: Option<Driven>,
+    /// The column of it.
+    #[arg(long, value_name = "COLUMN")]
+    pub drive: Option<String>,
+    /// Its unit, where the heading names none.
+    #[arg(long, value_name = "UNIT")]
+    pub drive_unit: Option<String>,
+    /// The motor's constant, N/A or N m/A; a gear's ratio is part of it.
+    #[arg(long, value_name = "NUMBER", value_parser = positive, allow_negative_numbers = true)]
+    pub constant: Option<f64>,
+    /// The column of the time; without this t or time.
+    #[arg(long, value_name = "COLUMN")]
+    pub time: Option<String>,
+    /// Its unit, where the heading names none: s, ms, us, ns, min.
+    #[arg(long, value_name = "UNIT")]
+    pub time_unit: Option<String>,
+    /// The column of a measured position or angle; `none` where there is none.
+    #[arg(long, value_name = "COLUMN|none")]
+    pub position: Option<String>,
+    /// Its unit, where the heading names none.
+    #[arg(long, value_name = "UNIT")]
+    pub position_unit: Option<String>,
+    /// Size of one count, m or rad, where the position (or, without --position, the prescribed motion) is in counts.
+    #[arg(long, value_name = "NUMBER", value_parser = positive, allow_negative_numbers = true)]
+    pub per_count: Option<f64>,
+    /// Step of the position's encoder, m or rad; without this what the samples show.
+    #[arg(long, value_name = "NUMBER", value_parser = positive, allow_negative_numbers = true)]
+    pub resolution: Option<f64>,
+    /// The column of a measured velocity; `none` where there is none.
+    #[arg(long, value_name = "COLUMN|none")]
+    pub velocity: Option<String>,
+    /// Its unit, where the heading names none.
+    #[arg(long, value_name = "UNIT")]
+    pub velocity_unit: Option<String>,
+    /// The column of a measured force (or torque): of a prescribed motion its reaction, else that in the joint to a load; `none` where there is none.
+    #[arg(long, value_name = "COLUMN|none")]
+    pub force: Option<String>,
+    /// Its unit, where the heading names none.
+    #[arg(long, value_name = "UNIT")]
+    pub force_unit: Option<String>,
+    /// What the driven body holds on to: nothing, a spring to the frame (a specimen, a return spring), or a load behind a joint that yields.
+    #[arg(long, value_enum)]
+    pub attached: Option<Attached>,
+    /// Roughly where a load rings against the motor, Hz.
+    #[arg(long, value_name = "HZ", value_parser = positive, allow_negative_numbers = true)]
+    pub resonance: Option<f64>,
+    /// A hand that nobody measured holds the device: it becomes a slow curve that is found with the rest.
+    #[arg(long, value_enum, num_args = 0..=1, default_missing_value = "yes")]
+    pub hand: Option<Answer>,
+    /// The moving mass, kg, or inertia, kg m^2; without this an estimate from the recordings.
+    #[arg(long, value_name = "NUMBER", value_parser = positive, allow_negative_numbers = true)]
+    pub inertia: Option<f64>,
+    /// How each recording begins. Without this what the samples show.
+    #[arg(long, value_enum)]
+    pub start: Option<Start>,
+    /// Take the default of every question that no option answers.
+    #[arg(long)]
+    pub yes: bool,
+    /// Replace model.toml and set.toml if they exist.
+    #[arg(long)]
+    pub overwrite: bool,
+    /// Print what was written and found as JSON.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// See [`Init::motion`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Motion {
+    /// Along a line: m, kg, N.
+    Translation,
+    /// It turns: rad, kg m², N m.
+    Rotation,
+}
+
+impl Motion {
+    /// One word or another.
+    pub fn pick<T>(self, translation: T, rotation: T) -> T {
+        match self {
+            Motion::Translation => translation,
+            Motion::Rotation => rotation,
+        }
+    }
+}
+
+/// See [`Init::driven`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Driven {
+    /// A force or a torque.
+    #[value(alias = "torque")]
+    Force,
+    /// A motor's current.
+    Current,
+    /// A prescribed motion.
+    Motion,
+}
+
+/// See [`Init::attached`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Attached {
+    /// Nothing but its own mass and bearing.
+    Nothing,
+    /// A spring to the frame.
+    Spring,
+    /// A second body behind a joint that yields.
+    Load,
+}
+
+/// See [`Init::start`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Start {
+    /// At rest at the first sample.
+    Rest,
+    /// In any state.
+    Free,
+}
+
+/// Yes or no.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Answer {
+    /// Yes.
+    Yes,
+    /// No.
+    No,
+}
