@@ -12,6 +12,8 @@ const LEAST_SHARE: f64 = 0.02;
 const TIE: f64 = 8.0;
 /// Explanations of an advantage below this over each other cannot be told apart.
 const ALIKE: f64 = 6.0;
+/// Times the cost of a fit up to which another one leaves less than twice as much over.
+const TWICE: f64 = 4.0;
 
 /// Which of the structures is claimed.
 pub fn chosen(search: &Search) -> &Candidate {
@@ -44,8 +46,18 @@ fn order(h: &Hypothesis) -> usize {
 
 /// What the fits and the recordings that no fit has seen say for a candidate against another one, as a difference of information
 /// criteria with effective samples.
+///
+/// A structure with more numbers may follow what it is fitted to, without being what is there. So where the fits say the one and the
+/// recordings that no fit has seen surely say the other, for a structure with fewer numbers that leaves less than twice as much over, the
+/// unseen ones decide alone.
 pub(super) fn evidence(search: &Search, base: &Candidate, better: &Candidate) -> f64 {
-    advantage_over(base, better, search.samples) + unseen_evidence(search, base, better)
+    let (fits, unseen) = (advantage_over(base, better, search.samples), unseen_evidence(search, base, better));
+    let (simple, rich) = if unseen > 0.0 { (better, base) } else { (base, better) };
+    let is_overfit = simple.structure.numbers.len() < rich.structure.numbers.len()
+        && simple.fit.cost < TWICE * rich.fit.cost
+        && unseen.abs() > TIE
+        && fits * unseen < 0.0;
+    if is_overfit { unseen } else { fits + unseen }
 }
 
 /// What the recordings that no fit has seen say alone; 0 where there are none.
