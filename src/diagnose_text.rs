@@ -44,7 +44,8 @@ pub fn text(found: &Found) -> String {
     if word != "NOTHING MISSING" && word != "PARAMETERS" && place.is_object() {
         line("where", shows(place));
     }
-    if let Some(left) = remains(&json["remaining"]) {
+    // Where nothing was found all of it remains, and it is told above where it shows.
+    if let Some(left) = remains(&json["remaining"]).filter(|_| !list(&json["findings"]).is_empty()) {
         line("remains", left);
     }
     let held = &json["held_out"];

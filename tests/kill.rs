@@ -215,7 +215,9 @@ fn supervisor() {
         let at_ns = unix_ns();
         run.child.kill().unwrap();
         run.child.wait().unwrap();
+        let begun = std::time::Instant::now();
         until("the nodes to be gone", || place.processes().is_empty());
+        let gone_s = begun.elapsed().as_secs_f64();
         let lost = lost_before(&place, &bag, at_ns, "saved.mcap");
         // The next start removes what the dead one left.
         let next = place.backdrive(&["run", "graph.toml", "--duration", "0.1", "--bag", "next.mcap"]);
@@ -223,10 +225,12 @@ fn supervisor() {
         assert!(next.stderr.contains(&format!("removed what the dead run {} had left", runs[0])), "{next:?}");
         assert!(shared_memory_of(&runs[0]).is_empty());
         place.assert_clean(&runs);
-        lost
+        (lost, gone_s)
     });
-    println!("supervisor: the bag ends {lost:.3?} s before the kill");
+    let (lost, gone) = (lost.map(|l| l.0), lost.map(|l| l.1));
+    println!("supervisor: the bag ends {lost:.3?} s before the kill, and the nodes are gone {gone:.3?} s after it");
     assert!(median(lost) < 0.25, "{lost:?}");
+    assert!(median(gone) < 1.0, "{gone:?}");
 }
 
 #[test]

@@ -44,6 +44,7 @@ fn verbs() -> Vec<Vec<String>> {
         "bag diff short.mcap short.mcap".to_string(),
         "doctor --listen 0".to_string(),
         "clean".to_string(),
+        "completions bash".to_string(),
         "--help".to_string(),
         "--version".to_string(),
     ]

@@ -234,6 +234,12 @@ fn a_force_that_is_clipped() {
     assert_eq!(code, Some(1), "{found}");
     assert_eq!(found["verdict"], "limited", "{found}");
     assert!(!found["methods"]["resimulation"]["limited_from"].is_null(), "{found}");
+    // The headline says where the clamp ends the stable range, and no margin of another limit stands beside it.
+    let (headline, again) = (number(&found, "/limited_from"), number(&found, "/methods/resimulation/limited_from"));
+    assert!((headline / again - 1.0).abs() < 0.01, "{found}");
+    assert!(found["critical_gain"].is_null() && found["margins"]["phase_deg"].is_null(), "{found}");
+    let text = place.backdrive(&["stability", "run.mcap", "--gain", "0.3", "--grips", "1"]).stdout;
+    assert!(text.contains("on a clamp acts or the travel is left") && text.contains("dB to where a clamp acts"), "{text}");
 }
 
 #[test]
@@ -272,12 +278,15 @@ fn an_interrupted_sweep_prints_what_it_has() {
         .stderr(Stdio::piped())
         .spawn()
         .unwrap();
-    std::thread::sleep(std::time::Duration::from_secs(3));
+    // Longer than the 5 s after which what has no terminal tells how far it is.
+    std::thread::sleep(std::time::Duration::from_secs(8));
     nix::sys::signal::kill(nix::unistd::Pid::from_raw(child.id() as i32), Signal::SIGINT).unwrap();
     let done = child.wait_with_output().unwrap();
     let text = String::from_utf8_lossy(&done.stdout);
     assert_eq!(done.status.code(), Some(130), "{text}");
     assert!(text.contains("sweep") && text.contains("stopped after") && text.contains("of 5000 gains"), "{text}");
+    let told = String::from_utf8_lossy(&done.stderr);
+    assert!(told.lines().any(|l| l.starts_with("sweep: ") && l.contains(" of 5000, after 5 s")), "{told}");
 }
 
 #[test]
