@@ -88,7 +88,7 @@ fn finding(page: &mut Page, evidence: &Evidence, name: &str) {
     map = map.series(Series::points("asked for by the recordings", &x, &y).colour(Colour::Muted).width(1.3));
     map = map.series(law(evidence, main));
     let mut figures: Vec<Figure> = vec![map.into()];
-    let loose = loose(main);
+    let loose = loose(main, &evidence.force_unit);
     // A law of velocity over displacement is a fence of jumps that says nothing: loops are drawn of what depends on the path.
     if loose.is_none()
         && !main.latent.displacement.is_empty()
@@ -120,7 +120,8 @@ fn finding(page: &mut Page, evidence: &Evidence, name: &str) {
     let (time, force, deviation) = (cut(&main.latent.time), cut(&main.latent.force), cut(&main.deviation));
     let edge = |sign: f64| force.iter().zip(&deviation).map(|(f, d)| f + sign * 2.0 * d).collect::<Vec<f64>>();
     let mut course = Plot::new("").x_axis("time", "s").y_axis(what, &evidence.force_unit).height(220.0);
-    course = course.series(Series::band("its 95 % interval", &time, &edge(-1.0), &edge(1.0)).colour(Colour::Muted));
+    let band = Series::band("its 95 % interval", &time, &edge(-1.0), &edge(1.0)).colour(Colour::Muted);
+    course = course.series(if loose.is_some() { band.outside_limits() } else { band });
     course = course.series(Series::line("the law found", &time, &cut(&main.law.force)).colour(Colour::Nth(1)).dash(Dash::Solid));
     course = course.series(Series::line("asked for by the recordings", &time, &force).colour(Colour::Ink).dash(Dash::Dotted));
     page.figure(course, &format!("The same in time, in {}.", file_name(&main.record)));
@@ -130,7 +131,7 @@ fn finding(page: &mut Page, evidence: &Evidence, name: &str) {
 }
 
 /// Says so where the sensors leave the force so open that its cloud cannot speak for or against a law.
-fn loose(main: &Trace) -> Option<String> {
+fn loose(main: &Trace, unit: &str) -> Option<String> {
     let mut wide: Vec<f64> = main.deviation.iter().copied().filter(|d| d.is_finite()).collect();
     wide.sort_by(f64::total_cmp);
     let half = 2.0 * wide.get(wide.len() / 2)?;
@@ -139,8 +140,8 @@ fn loose(main: &Trace) -> Option<String> {
         format!(
             " Taken out of the model, this force can be told to ± {} only, more than the law itself has ({} root mean square): these sensors leave \
              open how it is shared with the rest. That the law holds is seen in the residual above, not here.",
-            number(half),
-            number(level)
+            si(half, unit),
+            si(level, unit)
         )
     })
 }
