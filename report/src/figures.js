@@ -477,7 +477,7 @@ function draw(stack) {
       if (place.clientWidth && Math.abs(place.clientWidth - layout.width) >= 2) fit();
     }).observe(place);
     // On paper (some 680 px wide) letters keep their size and the drawing has fewer of them.
-    addEventListener('beforeprint', () => fit(Math.min(layout.width, stack.parentNode.className === 'cells' ? 330 : 680)));
+    addEventListener('beforeprint', () => fit(stack.parentNode.className === 'cells' ? 330 : stack.classList.contains('square') ? 560 : 680));
     addEventListener('afterprint', () => fit());
   }
   function fit(width) {

@@ -144,7 +144,12 @@ fn grips(page: &mut Page, again: &Resimulated, asked: f64) {
         for (scale, edge, at_asked) in rows {
             table.push([
                 Cell::from(if scale == 1.0 { "× 1 (as recorded)".to_string() } else { format!("× {scale}") }),
-                edge.critical_gain.map_or_else(|| format!("≥ {}", number(edge.at_least)), number).into(),
+                match edge.critical_gain {
+                    Some(gain) => number(gain),
+                    None if edge.at_least > 0.0 => format!("≥ {}", number(edge.at_least)),
+                    None => "–".to_string(),
+                }
+                .into(),
                 at_asked.map_or(Cell::from("–"), |o| Cell::tone(o.to_string(), tone(word(&o)))),
             ]);
         }
