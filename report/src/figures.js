@@ -275,8 +275,8 @@ function draw(stack) {
   data.panels.forEach(p => { p.x = data.x; });
   const all = data.panels.flatMap((panel, p) => panel.series.map((s, i) => ({s, panel, key: p + '.' + i})));
   // Where x never turns back, hovering reads all curves at one x; elsewhere (loops, Nyquist curves) the nearest point.
-  const along = !data.aspect && !data.x.names && all.every(({s}) => s.forward);
-  let chart = null, zoom = null, layout = null;
+  const along = !data.aspect && !data.x.names && all.every(({s}) => s.forward && s.kind !== 'bars');
+  let chart = null, zoom = null, layout = null, pointer = LEFT;
   legend(stack, data, key => {
     const shown = hidden.has(key);
     shown ? hidden.delete(key) : hidden.add(key);
@@ -389,8 +389,9 @@ function draw(stack) {
     }
     return null;
   }
-  function readAlong(params) {
-    const at = (Array.isArray(params) ? params[0] : params).axisValue, seen = new Set();
+  // At the pointer itself: the library's own value is that of the nearest sample of one curve.
+  function readAlong() {
+    const at = chart.convertFromPixel({xAxisIndex: 0}, pointer), seen = new Set();
     const rows = data.panels.map((panel, p) => {
       const spans = panel.regions.filter(r => r.label && at >= r.from && at <= r.to).map(r => r.label);
       const own = visible().filter(e => e.panel === panel && e.s.kind !== 'discs').map(({s}) => ({s, v: valueAt(s, at)})).filter(e => e.v);
@@ -464,6 +465,7 @@ function draw(stack) {
     layout = arrange();
     place.style.height = layout.height + 'px';
     chart = echarts.init(place, null, {renderer: 'svg', width: layout.width, height: layout.height});
+    chart.getZr().on('mousemove', e => { pointer = Math.min(LEFT + layout.inner, Math.max(LEFT, e.offsetX)); });
     chart.setOption(option());
     scale();
     place.append(back);
@@ -477,7 +479,7 @@ function draw(stack) {
       if (place.clientWidth && Math.abs(place.clientWidth - layout.width) >= 2) fit();
     }).observe(place);
     // On paper (some 680 px wide) letters keep their size and the drawing has fewer of them.
-    addEventListener('beforeprint', () => fit(Math.min(layout.width, stack.parentNode.className === 'cells' ? 330 : 680)));
+    addEventListener('beforeprint', () => fit(stack.parentNode.className === 'cells' ? 330 : stack.classList.contains('square') ? 560 : 680));
     addEventListener('afterprint', () => fit());
   }
   function fit(width) {

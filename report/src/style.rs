@@ -83,13 +83,13 @@ background:var(--soft);color:var(--ct)}\n\
 .scroll{overflow-x:auto;margin:12px 0}table{border-collapse:collapse;font-size:.92rem;font-variant-numeric:tabular-nums}\
 .caption{color:var(--muted);font-size:.92rem;margin-top:-4px}\
 th,td{padding:4px 14px 4px 0;text-align:left;vertical-align:top;border-bottom:1px solid var(--fainter)}\
-thead th{white-space:normal;min-width:4.5rem;border-bottom:1px solid var(--muted);vertical-align:bottom;font-weight:600}tbody th{font-weight:400}\
-.some{min-width:8rem}.long{min-width:17rem}.num{text-align:right;white-space:nowrap}.mid{text-align:center}td.tone{color:var(--ct);font-weight:600;white-space:nowrap}\n\
+thead th,thead th.num{white-space:normal}thead th{min-width:4.5rem;border-bottom:1px solid var(--muted);vertical-align:bottom;font-weight:600}tbody th{font-weight:400}\
+.some{min-width:8rem}.long{min-width:12rem}.num{text-align:right;white-space:nowrap}.mid{text-align:center}td.tone{color:var(--ct);font-weight:600}\n\
 figure{margin:20px 0;position:relative}figcaption{color:var(--muted);font-size:.92rem;max-width:85ch;margin-top:4px}\
 .todo li{margin:6px 0}.todo pre{position:relative;margin:4px 0;padding:8px 60px 8px 12px;background:var(--paper);border:1px solid var(--faint);border-radius:4px;\
 font-size:.88rem;white-space:pre-wrap;overflow-wrap:anywhere}.copy{position:absolute;top:4px;right:4px;font:inherit;font-size:.78rem;color:var(--ink);background:var(--soft);\
 border:1px solid var(--faint);border-radius:4px;cursor:pointer}\n\
 details{margin:12px 0;border:1px solid var(--faint);border-radius:6px;padding:0 14px}summary{cursor:pointer;padding:8px 0;font-weight:600}\n\
-@media (max-width:720px){body{font-size:15px}.lead{font-size:1.12rem}}\n\
+@media (max-width:720px){.long{min-width:15rem}body{font-size:15px}.lead{font-size:1.12rem}}\n\
 @media print{body{font-size:10.5pt}main{max-width:none;padding:0}figure,.lead,.aside,tr{break-inside:avoid}h2{break-after:avoid}\
 .scroll{overflow:visible}table{font-size:8.5pt}th,td{padding-right:8px}.num{white-space:normal}}\n";

@@ -88,8 +88,12 @@ fn finding(page: &mut Page, evidence: &Evidence, name: &str) {
     map = map.series(Series::points("asked for by the recordings", &x, &y).colour(Colour::Muted).width(1.3));
     map = map.series(law(evidence, main));
     let mut figures: Vec<Figure> = vec![map.into()];
+    let loose = loose(main, &evidence.force_unit);
     // A law of velocity over displacement is a fence of jumps that says nothing: loops are drawn of what depends on the path.
-    if !main.latent.displacement.is_empty() && !matches!(evidence.against, Against::Velocity | Against::Acceleration | Against::Time) {
+    if loose.is_none()
+        && !main.latent.displacement.is_empty()
+        && !matches!(evidence.against, Against::Velocity | Against::Acceleration | Against::Time)
+    {
         let part = fullest(&main.latent);
         let mut turn = Plot::new(&format!("{name}: {what} against displacement, loops"));
         turn = turn.x_axis("displacement", &evidence.displacement_unit).y_axis(what, &evidence.force_unit);
@@ -105,7 +109,10 @@ fn finding(page: &mut Page, evidence: &Evidence, name: &str) {
     };
     page.figure(
         Figure::beside(figures),
-        &format!("At {place}: grey is what the recordings ask for when this law alone is left out, orange what the law does.{replaced}"),
+        &format!(
+            "At {place}: grey is what the recordings ask for when this law alone is left out, orange what the law does.{replaced}{}",
+            loose.as_deref().unwrap_or_default()
+        ),
     );
     // Where the law does most; one that only bends is shown where the recordings ask for most.
     let part = if main.law.force.windows(2).any(|w| w[0] != w[1]) { fullest(&main.law) } else { fullest(&main.latent) };
@@ -113,11 +120,30 @@ fn finding(page: &mut Page, evidence: &Evidence, name: &str) {
     let (time, force, deviation) = (cut(&main.latent.time), cut(&main.latent.force), cut(&main.deviation));
     let edge = |sign: f64| force.iter().zip(&deviation).map(|(f, d)| f + sign * 2.0 * d).collect::<Vec<f64>>();
     let mut course = Plot::new("").x_axis("time", "s").y_axis(what, &evidence.force_unit).height(220.0);
-    course = course.series(Series::band("its 95 % interval", &time, &edge(-1.0), &edge(1.0)).colour(Colour::Muted));
+    let band = Series::band("its 95 % interval", &time, &edge(-1.0), &edge(1.0)).colour(Colour::Muted);
+    course = course.series(if loose.is_some() { band.outside_limits() } else { band });
     course = course.series(Series::line("the law found", &time, &cut(&main.law.force)).colour(Colour::Nth(1)).dash(Dash::Solid));
     course = course.series(Series::line("asked for by the recordings", &time, &force).colour(Colour::Ink).dash(Dash::Dotted));
     page.figure(course, &format!("The same in time, in {}.", file_name(&main.record)));
-    page.text(&within(main));
+    if loose.is_none() {
+        page.text(&within(main));
+    }
+}
+
+/// Says so where the sensors leave the force so open that its cloud cannot speak for or against a law.
+fn loose(main: &Trace, unit: &str) -> Option<String> {
+    let mut wide: Vec<f64> = main.deviation.iter().copied().filter(|d| d.is_finite()).collect();
+    wide.sort_by(f64::total_cmp);
+    let half = 2.0 * wide.get(wide.len() / 2)?;
+    let level = backdrive_diagnosis::compare::rms(&main.law.force);
+    (half > level).then(|| {
+        format!(
+            " Taken out of the model, this force can be told to ± {} only, more than the law itself has ({} root mean square): these sensors leave \
+             open how it is shared with the rest. That the law holds is seen in the residual above, not here.",
+            si(half, unit),
+            si(level, unit)
+        )
+    })
 }
 
 /// Whether the law lies within the interval of what the recordings ask for, and if not, where.

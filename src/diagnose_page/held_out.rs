@@ -92,7 +92,7 @@ fn figures(page: &mut Page, found: &Found, three: &Three, output: usize) {
     let name = file_name(&three.record.name);
 
     let mut whole = Plot::new(&format!("{name}: {label}")).x_axis("time", "s").y_axis(label, &unit);
-    whole = whole.region(span.0, span.1, Tone::Limited, "below");
+    whole = whole.region(span.0, span.1, Tone::Limited, "shown below");
     if let Some(refitted) = &refitted {
         whole =
             whole.series(Series::line("parameters refitted", &time, refitted).colour(Colour::Nth(0)).dash(Dash::Solid).outside_limits());

@@ -173,8 +173,11 @@ fn findings(page: &mut Page, json: &Value) {
         return;
     }
     let claimed = matches!(json["verdict"].as_str(), Some("missing" | "ambiguous"));
-    let mut table =
-        Table::new([if claimed { "missing" } else { "nearest" }, "where", "parameters", "in place of", "confidence", "or instead"]);
+    let replacing = all.iter().any(|f| f["replaces"].as_array().is_some_and(|r| !r.is_empty()));
+    let mut headers = vec![if claimed { "missing" } else { "nearest" }, "where", "parameters"];
+    headers.extend(replacing.then_some("in place of"));
+    headers.extend(["confidence", "or instead"]);
+    let mut table = Table::new(headers);
     for finding in all {
         let numbers: Vec<String> = finding["parameters"]
             .as_object()
@@ -189,14 +192,14 @@ fn findings(page: &mut Page, json: &Value) {
             .map(|a| format!("{} ({})", named(a), words::share(a["confidence"].as_f64().unwrap_or(0.0))))
             .collect();
         let sure = if finding["confidence"].as_f64().unwrap_or(0.0) > 0.8 { Tone::Good } else { Tone::Unsure };
-        table.push([
+        let mut row = vec![
             Cell::from(words::physics(finding["physics"].as_str().unwrap_or(""))),
             words::place(finding).into(),
             numbers.join("; ").into(),
-            replaced.join(", ").into(),
-            Cell::tone(confidence(finding), sure),
-            others.join("; ").into(),
-        ]);
+        ];
+        row.extend(replacing.then(|| Cell::from(replaced.join(", "))));
+        row.extend([Cell::tone(confidence(finding), sure), others.join("; ").into()]);
+        table.push(row);
     }
     page.table(table);
 }

@@ -3,6 +3,7 @@
 use super::case::{Case, SHOWS};
 use super::summary::{Summary, Worth};
 use crate::cli;
+use backdrive_diagnosis::words;
 use backdrive_report::{Cell, Figure, Page, Plot, Series, Table, Tone, number, percent};
 
 /// The cancellers in tables, in this order.
@@ -87,12 +88,24 @@ const TERMS: [(&str, &str); 5] = [
 ];
 
 fn concealed(case: &Case) -> String {
-    if case.concealed.is_empty() { "nothing".to_string() } else { case.concealed.join(", ") }
+    let all: Vec<String> = case.concealed.iter().map(|name| in_words(name)).collect();
+    if all.is_empty() { "nothing".to_string() } else { all.join(", ") }
+}
+
+/// `stribeck drum-ground` as `dry friction that is lower once it moves at the drum`.
+fn in_words(name: &str) -> String {
+    let Some((physics, place)) = name.split_once(' ') else { return words::physics(name) };
+    let place = match place.split_once('-') {
+        Some((a, b)) => serde_json::json!({ "between": [a, b] }),
+        None => serde_json::json!({ "signal": place }),
+    };
+    format!("{} {}", words::physics(physics), words::place(&place)).trim_end().to_string()
 }
 
 fn found(case: &Case) -> String {
-    let names: Vec<String> = case.findings.iter().map(|f| format!("{} {}", f.physics, f.place.join("-"))).collect();
-    if names.is_empty() { format!("nothing ({})", case.word) } else { format!("{} ({})", names.join(", "), case.word) }
+    let names: Vec<String> = case.findings.iter().map(|f| in_words(&format!("{} {}", f.physics, f.place.join("-")))).collect();
+    let word = case.word.replace('_', " ");
+    if names.is_empty() { format!("nothing ({word})") } else { format!("{} ({word})", names.join(", ")) }
 }
 
 fn lead(page: &mut Page, case: &Case) {
@@ -104,20 +117,28 @@ fn one(page: &mut Page, case: &Case) {
     if !case.gains.is_empty() {
         page.figure(gains(case), "Highest stable μλ against how firmly the hand grips, 1 being its grip in the session.");
     }
-    let mut table = Table::new(["canceller", "grip", "stable to", "because"]);
+    let mut because = Table::new(["canceller", "grip", "stable to", "because"]);
     for gain in &case.gains {
         let stable = if gain.whole_range { format!("above {}", number(gain.stable_to)) } else { number(gain.stable_to) };
-        table.push([gain.canceller.to_string(), number(gain.grip), stable, gain.because.clone()]);
+        because.push([gain.canceller.to_string(), number(gain.grip), stable, gain.because.clone()]);
     }
     let [given, refitted, diagnosed] = case.held_out.map(|x| x.map_or("-".to_string(), percent));
-    page.text(&format!("Concealed: {}. Found: {}. {}", concealed(case), found(case), case.sentence));
+    page.text(&format!(
+        "Concealed: {}. Found: {}. In its own words: {}.",
+        concealed(case),
+        found(case),
+        case.sentence.trim_end_matches('.')
+    ));
     page.text(&format!("Error on recordings that no fit has seen: {given} as given, {refitted} refitted, {diagnosed} diagnosed."));
     let hand = if case.shows_hand { "The bags hold what the hand wants." } else { "Nobody measured the hand: it was found with the rest." };
     let share = case.share.map_or_else(String::new, |share| format!(" Share of the estimate that was chosen: {}.", number(share)));
     let nominal = if case.refitted { " The nominal model's numbers were refitted to a session before." } else { "" };
     page.text(&format!("{hand}{nominal}{share} Seal: {}.", case.sealed));
     if !case.gains.is_empty() {
-        page.table(table);
+        page.table(by_grip(case));
+        page.details("What ends each stable range", |inside| {
+            inside.table(because);
+        });
     }
     if !case.live.is_empty() {
         page.text("The running graph, with the hidden plant's process as its master, just below and just above those edges:");
@@ -130,6 +151,18 @@ fn one(page: &mut Page, case: &Case) {
         page.table(table);
     }
     page.link("The diagnosis itself: its page", &format!("{}/diagnosis/report.html", case.name));
+}
+
+/// A row for each canceller, a column for each grip.
+fn by_grip(case: &Case) -> Table {
+    let mut grips = case.grips();
+    grips.sort_by(f64::total_cmp);
+    let mut table = Table::new(["canceller".to_string()].into_iter().chain(grips.iter().map(|g| format!("grip × {}", number(*g)))));
+    for canceller in CANCELLERS {
+        let cells = grips.iter().map(|g| case.gain(canceller, *g).map_or("–".to_string(), number));
+        table.push([canceller.to_string()].into_iter().chain(cells));
+    }
+    table.caption("Stable up to this μλ.")
 }
 
 /// Stable gain over grip, a line for each canceller; bars where there is one grip only.

@@ -71,9 +71,9 @@ pub(super) fn gains(page: &mut Page, found: &Answer, curve: &[&Point]) {
         *plot = if count == 1 && !bare { drawn.height(260.0) } else { drawn };
     }
     let what = match (curve.is_empty(), again) {
-        (false, _) => format!("{} gains, the loop run again at each; the colour is its verdict.", swept.len()),
+        (false, _) => format!("{} gains, the loop run again at each with the grip as recorded; the colour is its verdict.", swept.len()),
         (true, Some(again)) => format!(
-            "The colour is the verdict of the loop run again, at the {} gains at which the edge was looked for (--sweep draws more); it was \
+            "The colour is the verdict of the loop run again with the grip as recorded, at the {} gains at which the edge was looked for (--sweep draws more); it was \
              narrowed down with {} runs.",
             swept.len(),
             again.edge.evaluations
@@ -97,6 +97,12 @@ fn edge_marks(found: &Answer) -> Vec<(f64, String, Tone)> {
     }
     if let Some(edge) = found.resimulated.as_ref().and_then(|a| a.edge.critical_gain) {
         marks.push((edge, format!("edge, re-simulated {}", number(edge)), Tone::Bad));
+    }
+    // Below those of the recorded grip there may be one of a firmer or softer one.
+    let marked = |edge: f64, marks: &[(f64, String, Tone)]| marks.iter().any(|m| m.2 == Tone::Bad && (m.0 / edge - 1.0).abs() < 0.005);
+    let limit = found.critical_gain.or(found.at_least.filter(|least| *least < found.gain.product()));
+    if let Some(edge) = limit.filter(|edge| !marked(*edge, &marks)) {
+        marks.push((edge, format!("to act on {}", number(edge)), Tone::Bad));
     }
     if let Some(edge) = found.frequency_answer.as_ref().and_then(|a| a.critical_gain) {
         marks.push((edge, format!("edge, measured {}", number(edge)), Tone::Bad));
@@ -138,7 +144,12 @@ fn grips(page: &mut Page, again: &Resimulated, asked: f64) {
         for (scale, edge, at_asked) in rows {
             table.push([
                 Cell::from(if scale == 1.0 { "× 1 (as recorded)".to_string() } else { format!("× {scale}") }),
-                edge.critical_gain.map_or_else(|| format!("≥ {}", number(edge.at_least)), number).into(),
+                match edge.critical_gain {
+                    Some(gain) => number(gain),
+                    None if edge.at_least > 0.0 => format!("≥ {}", number(edge.at_least)),
+                    None => "–".to_string(),
+                }
+                .into(),
                 at_asked.map_or(Cell::from("–"), |o| Cell::tone(o.to_string(), tone(word(&o)))),
             ]);
         }

@@ -185,8 +185,8 @@ fn methods(found: &Answer) -> Table {
     let mut table = Table::new(["method", "verdict", "critical μλ", "95 % interval", "frequency", "why"]);
     let edge = |gain: Option<f64>, least: Option<f64>| match (gain, least) {
         (Some(gain), _) => number(gain),
-        (None, Some(least)) => format!("≥ {}", number(least)),
-        (None, None) => "–".to_string(),
+        (None, Some(least)) if least > 0.0 => format!("≥ {}", number(least)),
+        _ => "–".to_string(),
     };
     let mark = |name: &str, leads: bool| if leads { format!("{name} (leads)") } else { name.to_string() };
     if let Some(f) = &found.frequency_answer {
