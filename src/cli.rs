@@ -27,17 +27,17 @@ pub struct Cli {
 const STABILITY_HELP: &str = "Examples:
   backdrive run launch/push-and-hold.toml
   backdrive stability push-and-hold.mcap --gain 1
-  backdrive stability push-and-hold.mcap --sweep 0.1:50:200 --html stability.html
+  backdrive stability push-and-hold.mcap --sweep 0.1:50:200 --html out/stability.html
   backdrive stability push-and-hold.mcap --gain 1 --canceller plant/models/impulse-engine.toml --canceller-grip plant/grips/normal.toml
   backdrive stability session/ --roles roles.toml --gain 1
 
 Exit codes: 0 stable, 1 not, 2 usage, 3 the bag or a file is wrong, 5 the report cannot be written, 7 it cannot be told, 130 interrupted.";
 
 const DIAGNOSE_HELP: &str = "Examples:
-  backdrive run launch/identify.toml --out identify
-  backdrive diagnose identify --model plant/models/impulse-engine-linear.toml --grip plant/grips/normal.toml --out diagnosis
-  backdrive diagnose session.csv held-out.csv --model model.toml --out diagnosis --patience 60
-  backdrive diagnose set/ --without coulomb --out diagnosis
+  backdrive run launch/identify.toml --out out/identify
+  backdrive diagnose out/identify --model plant/models/impulse-engine-linear.toml --grip plant/grips/normal.toml --out out/diagnosis
+  backdrive diagnose session.csv held-out.csv --model model.toml --out out/diagnosis --patience 60
+  backdrive diagnose set/ --without coulomb --out out/diagnosis
 
 Writes verdict.json, model.diagnosed.toml, report.html and time.txt. Ctrl-C ends the search and writes what was found until then.
 
@@ -52,9 +52,9 @@ Exit codes: 0 fitted, 1 the records disagree: the structure is not the device's;
 5 the model cannot be written; 130 interrupted.";
 
 const TEST_BENCH_HELP: &str = "Example:
-  backdrive run launch/engine-test-bench-identify.toml --out bench --transport inproc
-  backdrive test-bench bench/unfired.mcap bench/map.mcap bench/lag.mcap --dragged bench/unfired-other.mcap --cycle bench/validation.mcap \\
-    --engine-inertia 0.9 --stiffness 2e4 --power 240e3 --out identified
+  backdrive run launch/engine-test-bench-identify.toml --out out/bench --transport inproc
+  backdrive test-bench out/bench/unfired.mcap out/bench/map.mcap out/bench/lag.mcap --dragged out/bench/unfired-other.mcap --cycle out/bench/validation.mcap \\
+    --engine-inertia 0.9 --stiffness 2e4 --power 240e3 --out out/identified
 
 Exit codes: 0 identified, 2 usage, 3 a bag does not hold what is needed, 5 the folder cannot be written.";
 

@@ -28,6 +28,8 @@ use write::Seen;
 
 const MODEL: &str = "model.toml";
 const SET: &str = "set.toml";
+/// The answer of who does not know the inertia.
+const ESTIMATE: &str = "estimate";
 
 /// Asks, writes, checks, and says what to do next.
 pub fn init(options: &cli::Init) -> Result<u8, Failure> {
@@ -75,7 +77,9 @@ pub fn init(options: &cli::Init) -> Result<u8, Failure> {
     output::line(format_args!("wrote     {wrote}: look at them"))?;
     output::line(format_args!("next      {next}"))?;
     if is_terminal {
-        let said: Vec<String> = asker.said().iter().map(|(option, answer)| format!("--{option} {}", quoted(answer))).collect();
+        // What an option cannot say is what happens without it.
+        let sayable = asker.said().iter().filter(|(_, answer)| answer != ESTIMATE);
+        let said: Vec<String> = sayable.map(|(option, answer)| format!("--{option} {}", quoted(answer))).collect();
         output::line(format_args!("again     backdrive init {shown} {}", said.join(" ")))?;
     }
     Ok(0)
@@ -143,11 +147,11 @@ fn seen<R: BufRead, W: Write>(
             .motion
             .pick("The moving mass, kg? (estimate: from the recordings)", "The moving inertia, kg m^2? (estimate: from the recordings)"),
         choices: Vec::new(),
-        default: estimated.is_some().then(|| "estimate".to_string()),
+        default: estimated.is_some().then(|| ESTIMATE.to_string()),
     };
     let inertia = asker.ask(&question, options.inertia.map(|x| x.to_string()), |text| match text.parse::<f64>() {
         Ok(x) if x > 0.0 && x.is_finite() => Ok(Some(x)),
-        Err(_) if text == "estimate" && estimated.is_some() => Ok(None),
+        Err(_) if text == ESTIMATE && estimated.is_some() => Ok(None),
         _ => Err("expected a number above 0; the recordings do not tell it".to_string()),
     })?;
     let (numbers, from) = match (inertia, estimated) {
