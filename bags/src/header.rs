@@ -63,7 +63,7 @@ pub struct BagHeader {
     pub clock: Clock,
     /// Steps per second.
     pub rate_hz: f64,
-    /// Name of the machine.
+    /// Name of the host in a graph that runs on several, or of the machine where that was asked for; else empty.
     pub host: String,
     /// Topics, in the order of their indices.
     pub topics: Vec<TopicInfo>,
