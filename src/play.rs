@@ -2,10 +2,11 @@
 
 use crate::failure::{Failure, code};
 use crate::output;
-use backdrive_bags::{BagError, Entry, PlayOptions, Reader, Sink, play as play_bag};
+use backdrive_bags::{BagError, BagHeader, Entry, PlayOptions, Reader, Sink, play as play_bag};
 use backdrive_launch::RunHome;
 use backdrive_msgs::Message;
 use backdrive_msgs::topic::Topic;
+use backdrive_nodes::graph::with_files_renamed;
 use backdrive_nodes::transport::iceoryx2::Iceoryx2;
 use backdrive_nodes::transport::{Publisher, Transport};
 use std::collections::HashMap;
@@ -25,7 +26,9 @@ pub fn play(bag: &Path, speed: f64) -> Result<u8, Failure> {
     }
     let reader = Reader::open(bag).map_err(Failure::input)?;
     let home = RunHome::system();
-    let run = home.create(reader.header().map_or("", |h| h.graph_toml.as_str()), 1).map_err(Failure::from)?;
+    let files = tempfile::tempdir().map_err(Failure::machine)?;
+    let graph = reader.header().map_or(Ok(String::new()), |header| laid_out(header, files.path()))?;
+    let run = home.create(&graph, 1).map_err(Failure::from)?;
     // SAFETY: the handler does nothing but store to an atomic.
     unsafe {
         let handler = nix::sys::signal::SigHandler::Handler(on_interrupt);
@@ -52,6 +55,17 @@ pub fn play(bag: &Path, speed: f64) -> Result<u8, Failure> {
     let report = report?;
     output::line(format_args!("{}: {} messages sent, the latest {:.3} ms late", bag.display(), report.sent, report.latest_s * 1e3))?;
     Ok(if report.finished { 0 } else { code::INTERRUPTED })
+}
+
+/// The graph of a bag with the bag's files laid out in a folder, so that whoever joins can read it.
+fn laid_out(header: &BagHeader, folder: &Path) -> Result<String, Failure> {
+    for (at, (_, text)) in header.files.iter().enumerate() {
+        let path = folder.join(at.to_string());
+        std::fs::write(&path, text).map_err(|e| Failure::write(&path, e))?;
+    }
+    let place = |name: &str| header.files.iter().position(|(file, _)| file == name);
+    let there = |name: &str| place(name).map_or_else(|| name.to_string(), |at| folder.join(at.to_string()).display().to_string());
+    Ok(with_files_renamed(&header.graph_toml, &there))
 }
 
 struct Speaker {
