@@ -26,9 +26,9 @@ pub fn play(bag: &Path, speed: f64) -> Result<u8, Failure> {
     }
     let reader = Reader::open(bag).map_err(Failure::input)?;
     let home = RunHome::system();
-    let files = tempfile::tempdir().map_err(Failure::machine)?;
-    let graph = reader.header().map_or(Ok(String::new()), |header| laid_out(header, files.path()))?;
+    let graph = reader.header().map_or(String::new(), graph_of);
     let run = home.create(&graph, 1).map_err(Failure::from)?;
+    lay_out(reader.header().map_or(&[], |header| &header.files), &run.paths().root().join(FILES))?;
     // SAFETY: the handler does nothing but store to an atomic.
     unsafe {
         let handler = nix::sys::signal::SigHandler::Handler(on_interrupt);
@@ -57,15 +57,23 @@ pub fn play(bag: &Path, speed: f64) -> Result<u8, Failure> {
     Ok(if report.finished { 0 } else { code::INTERRUPTED })
 }
 
-/// The graph of a bag with the bag's files laid out in a folder, so that whoever joins can read it.
-fn laid_out(header: &BagHeader, folder: &Path) -> Result<String, Failure> {
-    for (at, (_, text)) in header.files.iter().enumerate() {
+/// Folder of the bag's files beside the graph in the directory of the run.
+const FILES: &str = "files";
+
+/// The graph of a bag, in which the bag's files are called as [`lay_out`] calls them: whoever joins the run can read it.
+fn graph_of(header: &BagHeader) -> String {
+    let place = |name: &str| header.files.iter().position(|(file, _)| file == name);
+    with_files_renamed(&header.graph_toml, &|name| place(name).map_or_else(|| name.to_string(), |at| format!("{FILES}/{at}")))
+}
+
+/// Writes the bag's files, each under its number, for its name may be anything.
+fn lay_out(files: &[(String, String)], folder: &Path) -> Result<(), Failure> {
+    std::fs::create_dir_all(folder).map_err(|e| Failure::write(folder, e))?;
+    for (at, (_, text)) in files.iter().enumerate() {
         let path = folder.join(at.to_string());
         std::fs::write(&path, text).map_err(|e| Failure::write(&path, e))?;
     }
-    let place = |name: &str| header.files.iter().position(|(file, _)| file == name);
-    let there = |name: &str| place(name).map_or_else(|| name.to_string(), |at| folder.join(at.to_string()).display().to_string());
-    Ok(with_files_renamed(&header.graph_toml, &there))
+    Ok(())
 }
 
 struct Speaker {
