@@ -241,6 +241,10 @@ pub struct Changes {
     /// another run is writing is never replaced.
     #[arg(long)]
     pub overwrite: bool,
+    /// Let the bag say on which machine and from which folders it was made. Without this it holds neither; in a graph file:
+    /// record_origin = true.
+    #[arg(long)]
+    pub record_origin: bool,
 }
 
 fn number(text: &str) -> Result<f64, String> {
@@ -290,6 +294,7 @@ impl Changes {
             guard: self.guard.then_some(true),
             bag: self.bag.clone(),
             overwrite: self.overwrite,
+            record_origin: self.record_origin,
             clock: clock.map(|c| if matches!(c, Clock::Lockstep) { "lockstep" } else { "realtime" }.to_string()),
             rate_hz: self.rate,
             duration_s: self.duration,

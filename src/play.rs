@@ -3,10 +3,11 @@
 use crate::failure::{Failure, code};
 use crate::output;
 use crate::progress::busy;
-use backdrive_bags::{BagError, Entry, PlayOptions, Reader, Sink, play as play_bag};
+use backdrive_bags::{BagError, BagHeader, Entry, PlayOptions, Reader, Sink, play as play_bag};
 use backdrive_launch::RunHome;
 use backdrive_msgs::Message;
 use backdrive_msgs::topic::Topic;
+use backdrive_nodes::graph::with_files_renamed;
 use backdrive_nodes::transport::iceoryx2::Iceoryx2;
 use backdrive_nodes::transport::{Publisher, Transport};
 use std::collections::HashMap;
@@ -26,7 +27,9 @@ pub fn play(bag: &Path, speed: f64) -> Result<u8, Failure> {
     }
     let reader = Reader::open(bag).map_err(Failure::input)?;
     let home = RunHome::system();
-    let run = home.create(reader.header().map_or("", |h| h.graph_toml.as_str()), 1).map_err(Failure::from)?;
+    let graph = reader.header().map_or(String::new(), graph_of);
+    let run = home.create(&graph, 1).map_err(Failure::from)?;
+    lay_out(reader.header().map_or(&[], |header| &header.files), &run.paths().root().join(FILES))?;
     // SAFETY: the handler does nothing but store to an atomic.
     unsafe {
         let handler = nix::sys::signal::SigHandler::Handler(on_interrupt);
@@ -54,6 +57,25 @@ pub fn play(bag: &Path, speed: f64) -> Result<u8, Failure> {
     let report = report?;
     output::line(format_args!("{}: {} messages sent, the latest {:.3} ms late", bag.display(), report.sent, report.latest_s * 1e3))?;
     Ok(if report.finished { 0 } else { code::INTERRUPTED })
+}
+
+/// Folder of the bag's files beside the graph in the directory of the run.
+const FILES: &str = "files";
+
+/// The graph of a bag, in which the bag's files are called as [`lay_out`] calls them: whoever joins the run can read it.
+fn graph_of(header: &BagHeader) -> String {
+    let place = |name: &str| header.files.iter().position(|(file, _)| file == name);
+    with_files_renamed(&header.graph_toml, &|name| place(name).map_or_else(|| name.to_string(), |at| format!("{FILES}/{at}")))
+}
+
+/// Writes the bag's files, each under its number, for its name may be anything.
+fn lay_out(files: &[(String, String)], folder: &Path) -> Result<(), Failure> {
+    std::fs::create_dir_all(folder).map_err(|e| Failure::write(folder, e))?;
+    for (at, (_, text)) in files.iter().enumerate() {
+        let path = folder.join(at.to_string());
+        std::fs::write(&path, text).map_err(|e| Failure::write(&path, e))?;
+    }
+    Ok(())
 }
 
 struct Speaker {

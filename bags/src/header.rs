@@ -16,7 +16,7 @@ pub enum Clock {
     /// Simulated time: stamps are ns since the start and log times are stamps, so that nothing in the bag depends on the machine.
     #[default]
     Lockstep,
-    /// Wall-clock time: stamps are ns since the Unix epoch and log times are the times of arrival.
+    /// Wall-clock time: stamps are ns since the Unix epoch, and log times are when each message came to the recorder.
     Realtime,
     /// A table was turned into a bag: stamps are its times.
     Imported,
@@ -63,7 +63,7 @@ pub struct BagHeader {
     pub clock: Clock,
     /// Steps per second.
     pub rate_hz: f64,
-    /// Name of the machine.
+    /// Name of the host in a graph that runs on several, or of the machine where that was asked for; else empty.
     pub host: String,
     /// Topics, in the order of their indices.
     pub topics: Vec<TopicInfo>,

@@ -24,7 +24,7 @@ pub struct BagInfo {
     pub clock: Option<&'static str>,
     /// Steps per second.
     pub rate_hz: Option<f64>,
-    /// Machine.
+    /// Host or machine, where the bag names it.
     pub host: Option<String>,
     /// Program and version.
     pub versions: BTreeMap<String, String>,
@@ -145,7 +145,7 @@ pub fn info(path: &Path) -> Result<BagInfo, BagError> {
         title: told.map(|header| header.title.clone()),
         clock: told.map(|header| header.clock.as_str()),
         rate_hz: told.map(|header| header.rate_hz),
-        host: told.map(|header| header.host.clone()),
+        host: told.map(|header| header.host.clone()).filter(|host| !host.is_empty()),
         files: told.map(|header| header.files.iter().map(|file| file.0.clone()).collect()).unwrap_or_default(),
         start_s: first.map(|time| time as f64 * 1e-9),
         duration_s: first.zip(last).map_or(0.0, |(first, last)| (last - first) as f64 * 1e-9),

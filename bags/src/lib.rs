@@ -27,6 +27,7 @@ mod reader;
 mod recorder;
 mod recover;
 mod signals;
+mod steps;
 mod table;
 mod without;
 mod writer;

@@ -5,8 +5,9 @@ use crate::cdr::Schema;
 use crate::completeness::{COMPLETENESS, Completeness};
 use crate::framing::{Frame, Frames};
 use crate::header::{BagHeader, RUN};
+use crate::steps::Said;
 use backdrive_msgs::Message;
-use backdrive_msgs::ros;
+use backdrive_msgs::ros::{self, Facts};
 use backdrive_msgs::topic::Kind;
 use mcap::records::{MessageHeader, Metadata, Record, op};
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
@@ -72,6 +73,8 @@ pub struct Entry {
     pub offset: u64,
     /// Its bytes.
     pub payload: Vec<u8>,
+    /// What the bag says of it beside its bytes, if it is a sample of ours.
+    pub facts: Option<Facts>,
 }
 
 impl Entry {
@@ -80,11 +83,19 @@ impl Entry {
     /// Errors: the payload does not hold what its topic says.
     pub fn message(&self, path: &Path) -> Result<Option<Message>, BagError> {
         let Some(kind) = self.topic.kind else { return Ok(None) };
-        match ros::decode(kind, &self.payload) {
+        match decode(kind, self.facts.as_ref(), &self.payload) {
             Ok(message) => Ok(Some(message)),
             Err(ros::RosError::Foreign { .. }) => Ok(None),
             Err(source) => Err(BagError::Message { path: path.to_owned(), offset: self.offset, topic: self.topic.name.clone(), source }),
         }
+    }
+}
+
+/// Reads a payload, with what the bag says of it beside.
+pub(crate) fn decode(kind: Kind, facts: Option<&Facts>, payload: &[u8]) -> Result<Message, ros::RosError> {
+    match facts {
+        Some(facts) if kind == Kind::Sample => ros::decode_sample(payload, facts).map(Message::Sample),
+        _ => ros::decode(kind, payload),
     }
 }
 
@@ -95,6 +106,8 @@ pub struct Reader {
     profile: String,
     library: String,
     topics: Vec<Arc<TopicRef>>,
+    /// Channels on which it is said which step samples are of.
+    steps: Vec<u16>,
     counts: Vec<u64>,
     header: Option<BagHeader>,
     completeness: Option<Completeness>,
@@ -171,6 +184,7 @@ impl Reader {
                 }
             }
         }
+        let steps = found.steps();
         let topics = found.topics(header.as_ref());
         Ok(Reader {
             path: path.to_owned(),
@@ -178,6 +192,7 @@ impl Reader {
             library,
             counts: topics.iter().map(|topic| counts.get(&topic.channel).copied().unwrap_or(0)).collect(),
             topics,
+            steps,
             header,
             completeness,
             damage,
@@ -191,7 +206,8 @@ impl Reader {
         &self.path
     }
 
-    /// Every topic, in the order of the run's header if there is one, then by channel.
+    /// Every topic, in the order of the run's header if there is one, then by channel; without that on which a bag of ours says
+    /// which step samples are of, for which see [`Entry::facts`].
     pub fn topics(&self) -> &[Arc<TopicRef>] {
         &self.topics
     }
@@ -257,6 +273,8 @@ impl Reader {
             path: self.path.clone(),
             frames: Frames::open(&self.path)?,
             topics,
+            steps: self.steps.clone(),
+            said: Said::default(),
             pending: VecDeque::new(),
             offset: 0,
             done: false,
@@ -269,6 +287,8 @@ pub struct Messages {
     path: PathBuf,
     frames: Frames,
     topics: HashMap<u16, Arc<TopicRef>>,
+    steps: Vec<u16>,
+    said: Said,
     pending: VecDeque<(MessageHeader, Vec<u8>)>,
     offset: u64,
     done: bool,
@@ -278,6 +298,10 @@ impl Messages {
     fn advance(&mut self) -> Result<Option<Entry>, BagError> {
         loop {
             if let Some((header, payload)) = self.pending.pop_front() {
+                if self.steps.contains(&header.channel_id) {
+                    self.said.hear(&self.path, self.offset, &payload)?;
+                    continue;
+                }
                 let Some(topic) = self.topics.get(&header.channel_id) else {
                     let what = format!("a message of channel {}, which was never described", header.channel_id);
                     return Err(BagError::Damaged { path: self.path.clone(), offset: self.offset, what });
@@ -289,6 +313,7 @@ impl Messages {
                     publish_time_ns: header.publish_time,
                     offset: self.offset,
                     payload,
+                    facts: if topic.kind == Some(Kind::Sample) { self.said.of(&topic.name, header.sequence) } else { None },
                 }));
             }
             let Some(frame) = self.frames.next()? else { return Ok(None) };
@@ -343,7 +368,20 @@ impl Channels {
         }
     }
 
-    fn topics(self, run: Option<&BagHeader>) -> Vec<Arc<TopicRef>> {
+    /// Whether a channel says which step samples are of.
+    pub(crate) fn says_steps(&self, channel: &mcap::records::Channel) -> bool {
+        channel.message_encoding == "cdr" && self.schemas.get(&channel.schema_id).is_some_and(|schema| schema.0 == ros::STEPS.0)
+    }
+
+    /// The channels that say which step samples are of.
+    pub(crate) fn steps(&self) -> Vec<u16> {
+        self.channels.values().filter(|channel| self.says_steps(channel)).map(|channel| channel.id).collect()
+    }
+
+    fn topics(mut self, run: Option<&BagHeader>) -> Vec<Arc<TopicRef>> {
+        for steps in self.steps() {
+            self.channels.remove(&steps);
+        }
         let place = |name: &str| run.and_then(|run| run.topic(name));
         let mut channels: Vec<_> = self.channels.into_values().collect();
         channels.sort_by_key(|channel| (place(&channel.topic).unwrap_or(usize::MAX), channel.id));

@@ -4,14 +4,16 @@ use crate::claim::{claim, not_itself};
 use crate::completeness::{COMPLETENESS, Completeness, Tracker};
 use crate::framing::{Frame, Frames};
 use crate::header::{BagHeader, RUN};
-use crate::reader::{Channels, parse, records, salvage};
+use crate::reader::{Channels, decode, parse, records, salvage};
+use crate::steps::Said;
 use crate::writer::{completeness_record, options, reason};
 use crate::{BagError, Reader};
+use backdrive_msgs::Message;
 use backdrive_msgs::ros;
 use backdrive_msgs::topic::Kind;
-use mcap::records::{Record, op};
+use mcap::records::{MessageHeader, Record, Statistics, op};
 use serde::Serialize;
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, HashMap, VecDeque};
 use std::fs::File;
 use std::io::BufWriter;
 use std::path::Path;
@@ -73,8 +75,9 @@ fn copy(from: &Path, frames: &mut Frames, to: &Path, file: File) -> Result<Recov
         from,
         begun: Begun::Not(file),
         found: Channels::default(),
-        kinds: HashMap::new(),
+        carried: HashMap::new(),
         trackers: BTreeMap::new(),
+        said: Said::default(),
         run: false,
         report: RecoverReport::default(),
     };
@@ -92,7 +95,7 @@ fn copy(from: &Path, frames: &mut Frames, to: &Path, file: File) -> Result<Recov
         if !wanted || frame.cut && frame.opcode != op::CHUNK {
             continue;
         }
-        let body = frames.body(&frame)?;
+        let (body, damaged) = (frames.body(&frame)?, copy.report.damaged.len());
         let (mut whole, error) = records(from, &frame, &body);
         if let Some(error) = error {
             copy.report.damaged.push(error.to_string());
@@ -108,6 +111,13 @@ fn copy(from: &Path, frames: &mut Frames, to: &Path, file: File) -> Result<Recov
             }
             copy.take(record, frame.offset).map_err(failed)?;
         }
+        if frame.opcode == op::CHUNK {
+            // Chunks of ours can be read each by itself, and those of the copy are the same.
+            copy.begun.end_chunk().map_err(failed)?;
+            if copy.report.damaged.len() > damaged {
+                copy.said.forget();
+            }
+        }
     }
     // Only a walk to the very end tells whether the file was closed.
     while frames.next()?.is_some() {}
@@ -115,12 +125,17 @@ fn copy(from: &Path, frames: &mut Frames, to: &Path, file: File) -> Result<Recov
     for id in copy.found.channels.keys().copied().collect::<Vec<_>>() {
         copy.channel(id).map_err(failed)?;
     }
-    let Copy { mut begun, trackers, run, mut report, .. } = copy;
+    let Copy { mut begun, trackers, run, mut report, found, .. } = copy;
+    let steps = found.steps();
+    let counted = |statistics: Statistics| {
+        let of_steps = |channel: &u16| statistics.channel_message_counts.get(channel).copied().unwrap_or(0);
+        statistics.message_count.saturating_sub(steps.iter().map(of_steps).sum())
+    };
     report.was_clean = frames.closed;
     report.last_log_time_s = last.map(|time| time as f64 * 1e-9);
     report.last_step = trackers.values().filter_map(|tracker| tracker.found.last_step).max();
     let known = report.missing.values().sum::<u64>();
-    report.expected = statistics.filter(|_| report.was_clean).or((known > 0).then_some(report.messages + known));
+    report.expected = statistics.filter(|_| report.was_clean).map(counted).or((known > 0).then_some(report.messages + known));
     let out = begun.writer("", "").map_err(failed)?;
     if run {
         // A verdict of the recorder knows more than the sequence numbers tell, if the bag got as far.
@@ -148,6 +163,36 @@ fn copy(from: &Path, frames: &mut Frames, to: &Path, file: File) -> Result<Recov
 /// Of a chunk: the log time of a message by channel and place in the chunk.
 type Index = BTreeMap<u16, Vec<u64>>;
 
+/// What the index of a chunk promises of a channel.
+#[derive(Default)]
+struct Due {
+    /// Log times of what is still to come.
+    times: VecDeque<u64>,
+    /// Entries that lie behind.
+    passed: u64,
+    /// Of these, those whose message was not there.
+    lost: u64,
+}
+
+impl Due {
+    /// Of the next message with this log time: how many are due before it, and its place in the index.
+    fn find(&self, log_time: u64) -> Option<(usize, u64)> {
+        let ahead = self.times.iter().position(|time| *time == log_time)?;
+        Some((ahead, self.passed + ahead as u64))
+    }
+
+    /// That message is there; those that were due before it are not.
+    fn take(&mut self, ahead: usize) {
+        self.times.drain(..=ahead);
+        self.passed += ahead as u64 + 1;
+        self.lost += ahead as u64;
+    }
+
+    fn missing(&self) -> u64 {
+        self.lost + self.times.len() as u64
+    }
+}
+
 /// The indices that stand behind a chunk, and the record after them.
 fn index_behind(from: &Path, frames: &mut Frames) -> Result<(Index, Option<Frame>), BagError> {
     let mut index = Index::new();
@@ -173,7 +218,7 @@ enum Begun {
 impl Begun {
     fn writer(&mut self, profile: &str, library: &str) -> mcap::McapResult<&mut mcap::Writer<BufWriter<File>>> {
         *self = match std::mem::replace(self, Begun::Failed) {
-            Begun::Not(file) => Begun::Yes(Box::new(options(1 << 20).profile(profile).library(library).create(BufWriter::new(file))?)),
+            Begun::Not(file) => Begun::Yes(Box::new(options().profile(profile).library(library).create(BufWriter::new(file))?)),
             begun => begun,
         };
         match self {
@@ -181,6 +226,21 @@ impl Begun {
             Begun::Not(_) | Begun::Failed => Err(mcap::McapError::AttemptedWriteAfterFailure),
         }
     }
+
+    fn end_chunk(&mut self) -> mcap::McapResult<()> {
+        if let Begun::Yes(out) = self { out.flush() } else { Ok(()) }
+    }
+}
+
+/// What a channel carries.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Carries {
+    /// Messages of ours.
+    Ours(Kind),
+    /// Which step samples are of.
+    Steps,
+    /// Something else.
+    Foreign,
 }
 
 /// A copy in the making.
@@ -188,17 +248,19 @@ struct Copy<'a> {
     from: &'a Path,
     begun: Begun,
     found: Channels,
-    /// Channels in the copy, and the kind of those that are ours.
-    kinds: HashMap<u16, Option<Kind>>,
+    /// Channels in the copy.
+    carried: HashMap<u16, Carries>,
     trackers: BTreeMap<u16, Tracker>,
+    /// Which step samples are of, as far as the copy has come.
+    said: Said,
     run: bool,
     report: RecoverReport,
 }
 
 impl Copy<'_> {
     /// Reads the channels of the summary, which outlive a damaged chunk that described them, and how many messages there were.
-    fn look_ahead(&mut self, from: &Path) -> Result<Option<u64>, BagError> {
-        let (mut frames, mut in_summary, mut messages) = (Frames::open(from)?, false, None);
+    fn look_ahead(&mut self, from: &Path) -> Result<Option<Statistics>, BagError> {
+        let (mut frames, mut in_summary, mut statistics) = (Frames::open(from)?, false, None);
         while let Some(frame) = frames.next()? {
             in_summary |= frame.opcode == op::DATA_END;
             if !in_summary || frame.cut || !matches!(frame.opcode, op::SCHEMA | op::CHANNEL | op::STATISTICS) {
@@ -206,49 +268,82 @@ impl Copy<'_> {
             }
             let body = frames.body(&frame)?;
             match parse(from, &frame, &body) {
-                Ok(Record::Statistics(found)) => messages = Some(found.message_count),
+                Ok(Record::Statistics(found)) => statistics = Some(found),
                 Ok(record) => self.found.see(record.into_owned()),
                 Err(_) => {}
             }
         }
-        Ok(messages)
+        Ok(statistics)
     }
 
-    /// Of what can be read in a damaged chunk: the messages of which the chunk's index knows, in the index' order, and that
-    /// hold what their type says. The others are counted as missing.
+    /// What a channel carries, as it was described.
+    fn carries(&self, id: u16) -> Carries {
+        let Some(channel) = self.found.channels.get(&id) else { return Carries::Foreign };
+        if self.found.says_steps(channel) {
+            return Carries::Steps;
+        }
+        let schema = self.found.schemas.get(&channel.schema_id).filter(|_| channel.schema_id != 0); // 0 means none
+        schema.and_then(|schema| ros::kind_of(&schema.0)).map_or(Carries::Foreign, Carries::Ours)
+    }
+
+    /// The message of a topic of ours, with what was said of it.
+    fn decode(&self, said: &Said, kind: Kind, header: &MessageHeader, data: &[u8]) -> Result<Message, ros::RosError> {
+        let topic = self.found.channels.get(&header.channel_id).map_or("", |channel| &channel.topic);
+        decode(kind, said.of(topic, header.sequence).as_ref(), data)
+    }
+
+    /// Of what can be read in a damaged chunk: the messages of which the chunk's index knows, in the index' order, that hold what
+    /// their type says, and a sample only if the chunk says which step it is of. The others are counted as missing.
     fn believable(&mut self, read: Vec<Record<'static>>, index: Index) -> Vec<Record<'static>> {
-        let mut left: BTreeMap<u16, std::collections::VecDeque<u64>> =
-            index.into_iter().map(|(channel, times)| (channel, times.into())).collect();
-        let mut kept = Vec::new();
+        let mut due: BTreeMap<u16, Due> =
+            index.into_iter().map(|(channel, times)| (channel, Due { times: times.into(), ..Due::default() })).collect();
+        let (mut kept, mut said) = (Vec::new(), Said::default());
+        // Of a topic's channel: the place in the index of the sample of which it was said last what it is, and its sequence number.
+        let mut first: HashMap<u16, (u64, u64)> = HashMap::new();
         for record in read {
             let Record::Message { header, data } = &record else {
                 self.found.see(record);
                 continue;
             };
-            let Some(times) = left.get_mut(&header.channel_id) else { continue };
-            let Some(place) = times.iter().position(|time| *time == header.log_time) else { continue };
-            let kind = self
-                .found
-                .channels
-                .get(&header.channel_id)
-                .and_then(|c| self.found.schemas.get(&c.schema_id))
-                .and_then(|s| ros::kind_of(&s.0));
-            let fits = match kind.map(|kind| ros::decode(kind, data)) {
-                Some(Ok(message)) => {
-                    message.sequence() as u32 == header.sequence && u64::try_from(message.stamp_ns()).unwrap_or(0) == header.publish_time
-                }
-                Some(Err(ros::RosError::Foreign { .. })) | None => true,
-                Some(Err(_)) => false,
+            let id = header.channel_id;
+            let Some((ahead, place)) = due.get(&id).and_then(|due| due.find(header.log_time)) else { continue };
+            let stamped = |stamp_ns: i64| u64::try_from(stamp_ns).unwrap_or(0) == header.publish_time;
+            let fits = match self.carries(id) {
+                // Without one of them the samples behind it are not what they seem.
+                Carries::Steps if ahead > 0 => false,
+                Carries::Steps => match ros::decode_steps(data) {
+                    Ok((topic, facts)) if facts.stamp_ns.is_some_and(stamped) => {
+                        for channel in self.found.channels.values().filter(|channel| channel.topic == topic) {
+                            first.insert(channel.id, (due.get(&channel.id).map_or(0, |due| due.passed), facts.sequence));
+                        }
+                        said.hear(self.from, 0, data).is_ok()
+                    }
+                    _ => false,
+                },
+                Carries::Ours(kind) => match self.decode(&said, kind, header, data) {
+                    Ok(message) => {
+                        let counted = first
+                            .get(&id)
+                            .is_none_or(|(from, sequence)| sequence.checked_add(place.saturating_sub(*from)) == Some(message.sequence()));
+                        counted && message.sequence() as u32 == header.sequence && stamped(message.stamp_ns())
+                    }
+                    Err(ros::RosError::Foreign { .. }) => self.found.steps().is_empty(),
+                    Err(_) => false,
+                },
+                Carries::Foreign => true,
             };
             if fits {
-                times.remove(place);
-                self.report.unconfirmed += 1;
+                due.entry(id).and_modify(|due| due.take(ahead));
+                self.report.unconfirmed += u64::from(self.carries(id) != Carries::Steps);
                 kept.push(record);
             }
         }
-        for (channel, times) in left.iter().filter(|(_, times)| !times.is_empty()) {
+        for (channel, due) in due.iter().filter(|(_, due)| due.missing() > 0) {
+            if self.carries(*channel) == Carries::Steps {
+                continue;
+            }
             let name = self.found.channels.get(channel).map_or_else(|| format!("channel {channel}"), |channel| channel.topic.clone());
-            *self.report.missing.entry(name).or_default() += times.len() as u64;
+            *self.report.missing.entry(name).or_default() += due.missing();
         }
         kept
     }
@@ -259,16 +354,22 @@ impl Copy<'_> {
                 self.begun.writer(&header.profile, &header.library)?;
             }
             Record::Message { header, data } => {
-                let Some(kind) = self.channel(header.channel_id)? else {
+                let Some(carries) = self.channel(header.channel_id)? else {
                     let what = format!("byte {offset}: a message of channel {}, which was never described", header.channel_id);
                     self.report.damaged.push(what);
                     return Ok(());
                 };
+                if carries == Carries::Steps
+                    && let Err(error) = self.said.hear(self.from, offset, &data)
+                {
+                    self.report.damaged.push(error.to_string());
+                    return Ok(());
+                }
                 self.begun.writer("", "")?.write_to_known_channel(&header, &data)?;
-                self.report.messages += 1;
-                if let Some(kind) = kind
+                self.report.messages += u64::from(carries != Carries::Steps);
+                if let Carries::Ours(kind) = carries
+                    && let Ok(message) = self.decode(&self.said, kind, &header, &data)
                     && let Some(tracker) = self.trackers.get_mut(&header.channel_id)
-                    && let Ok(message) = ros::decode(kind, &data)
                 {
                     tracker.see(&message);
                 }
@@ -297,9 +398,9 @@ impl Copy<'_> {
     }
 
     /// Sees to it that the copy has a channel, under the number it has in the original; `None` if that never described it.
-    fn channel(&mut self, id: u16) -> mcap::McapResult<Option<Option<Kind>>> {
-        if let Some(kind) = self.kinds.get(&id) {
-            return Ok(Some(*kind));
+    fn channel(&mut self, id: u16) -> mcap::McapResult<Option<Carries>> {
+        if let Some(carries) = self.carried.get(&id) {
+            return Ok(Some(*carries));
         }
         let Some(channel) = self.found.channels.get(&id) else { return Ok(None) };
         let schema = self.found.schemas.get(&channel.schema_id).filter(|_| channel.schema_id != 0); // 0 means none
@@ -309,11 +410,11 @@ impl Copy<'_> {
             schema_id = out.add_schema_with_id(channel.schema_id, name, encoding, text)?;
         }
         out.add_channel_with_id(id, schema_id, &channel.topic, &channel.message_encoding, &channel.metadata)?;
-        let kind = schema.and_then(|(name, ..)| ros::kind_of(name));
-        self.kinds.insert(id, kind);
-        if kind.is_some() {
+        let carries = self.carries(id);
+        self.carried.insert(id, carries);
+        if let Carries::Ours(_) = carries {
             self.trackers.insert(id, Tracker::new(&channel.topic));
         }
-        Ok(Some(kind))
+        Ok(Some(carries))
     }
 }

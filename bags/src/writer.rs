@@ -2,6 +2,7 @@
 
 use crate::completeness::{COMPLETENESS, Completeness};
 use crate::header::{BagHeader, Clock, RUN};
+use crate::steps::{Expected, STEPS_TOPIC};
 use backdrive_msgs::Message;
 use backdrive_msgs::ros::{self, RosError};
 use mcap::records::{MessageHeader, Metadata};
@@ -38,14 +39,15 @@ pub(crate) fn reason(error: &mcap::McapError) -> String {
     }
 }
 
-/// The format options that all bags of ours share: lz4, because its worst stall is 0.3 ms where that of zstd is 60 ms.
-pub(crate) fn options(chunk_bytes: u64) -> mcap::WriteOptions {
+/// The format options that all bags of ours share: lz4, because its worst stall is 0.3 ms where that of zstd is 60 ms. Chunks end where
+/// the caller says: no limit of size may part a sample from what is said of it.
+pub(crate) fn options() -> mcap::WriteOptions {
     mcap::WriteOptions::new()
         .profile("ros2")
         .library(concat!("backdrive ", env!("CARGO_PKG_VERSION")))
         .compression(Some(mcap::Compression::Lz4))
         .compression_threads(0)
-        .chunk_size(Some(chunk_bytes))
+        .chunk_size(None)
 }
 
 /// Counts the bytes of a file while it grows.
@@ -75,33 +77,50 @@ impl Seek for Counted {
     }
 }
 
+/// Metadata of a channel.
+fn qos() -> BTreeMap<String, String> {
+    BTreeMap::from([("offered_qos_profiles".to_owned(), OFFERED_QOS.to_owned())])
+}
+
 /// A bag being written.
 pub(crate) struct BagWriter {
     mcap: mcap::Writer<BufWriter<Counted>>,
     clock: Clock,
     channels: Vec<ChannelState>,
+    /// Channel of what samples have no field for, and messages on it.
+    steps: (u16, u32),
     payload: Vec<u8>,
+    /// Size at which a chunk ends, and of the one at hand, bytes before compression.
+    chunk_bytes: u64,
+    in_chunk: u64,
 }
 
 struct ChannelState {
     id: u16,
+    topic: String,
     axes: Vec<String>,
     written: u64,
+    expected: Expected,
 }
+
+/// Bytes of a message record in its chunk, beside its payload.
+const RECORD_BYTES: u64 = 31;
 
 impl BagWriter {
     /// Writes everything that comes before the first message, so that a bag that is cut off later has it.
     pub(crate) fn new(store: Box<dyn Store>, header: &BagHeader, chunk_bytes: u64, size: Arc<AtomicU64>) -> Result<BagWriter, WriteError> {
         let sink = BufWriter::with_capacity(1 << 17, Counted { store, position: 0, size });
-        let mut mcap = options(chunk_bytes).create(sink)?;
+        let mut mcap = options().create(sink)?;
         let mut channels = Vec::with_capacity(header.topics.len());
         for info in &header.topics {
             let (name, text) = ros::schema(info.topic.kind);
             let schema = mcap.add_schema(name, "ros2msg", text.as_bytes())?;
-            let metadata = BTreeMap::from([("offered_qos_profiles".to_owned(), OFFERED_QOS.to_owned())]);
-            let id = mcap.add_channel(schema, &info.topic.name, "cdr", &metadata)?;
-            channels.push(ChannelState { id, axes: info.axes.clone(), written: 0 });
+            let id = mcap.add_channel(schema, &info.topic.name, "cdr", &qos())?;
+            let (topic, axes) = (info.topic.name.clone(), info.axes.clone());
+            channels.push(ChannelState { id, topic, axes, written: 0, expected: Expected::default() });
         }
+        let schema = mcap.add_schema(ros::STEPS.0, "ros2msg", ros::STEPS.1.as_bytes())?;
+        let steps = (mcap.add_channel(schema, STEPS_TOPIC, "cdr", &qos())?, 0);
         mcap.write_metadata(&Metadata { name: RUN.to_owned(), metadata: header.to_metadata()? })?;
         for (name, text) in &header.files {
             mcap.attach(&mcap::Attachment {
@@ -113,27 +132,43 @@ impl BagWriter {
             })?;
         }
         mcap.flush()?;
-        Ok(BagWriter { mcap, clock: header.clock, channels, payload: Vec::with_capacity(1024) })
+        Ok(BagWriter { mcap, clock: header.clock, channels, steps, payload: Vec::with_capacity(1024), chunk_bytes, in_chunk: 0 })
     }
 
     /// Writes one message. An index beyond the header's topics is ignored: the recorder has refused it before.
     pub(crate) fn write(&mut self, topic: usize, message: &Message, receive_ns: i64) -> Result<(), WriteError> {
         let Some(channel) = self.channels.get_mut(topic) else { return Ok(()) };
-        ros::encode(message, &channel.axes, &mut self.payload)?;
         let stamp = u64::try_from(message.stamp_ns()).unwrap_or(0);
         let log_time = match self.clock {
             Clock::Realtime => u64::try_from(receive_ns).unwrap_or(0),
             Clock::Lockstep | Clock::Imported => stamp,
         };
+        if let Message::Sample(sample) = message
+            && channel.expected.must_say(sample)
+        {
+            ros::encode_steps(&channel.topic, sample, &mut self.payload)?;
+            let (channel_id, sequence) = self.steps;
+            self.mcap.write_to_known_channel(&MessageHeader { channel_id, sequence, log_time, publish_time: stamp }, &self.payload)?;
+            self.steps.1 = sequence.wrapping_add(1);
+            self.in_chunk += RECORD_BYTES + self.payload.len() as u64;
+        }
+        ros::encode(message, &channel.axes, &mut self.payload)?;
         let header = MessageHeader { channel_id: channel.id, sequence: message.sequence() as u32, log_time, publish_time: stamp };
         self.mcap.write_to_known_channel(&header, &self.payload)?;
         channel.written += 1;
+        self.in_chunk += RECORD_BYTES + self.payload.len() as u64;
+        if self.in_chunk > self.chunk_bytes {
+            self.flush()?;
+        }
         Ok(())
     }
 
     /// Ends the chunk at hand and hands everything to the operating system: what is flushed survives the death of the process.
     pub(crate) fn flush(&mut self) -> Result<(), WriteError> {
-        Ok(self.mcap.flush()?)
+        self.mcap.flush()?;
+        self.in_chunk = 0;
+        self.channels.iter_mut().for_each(|channel| channel.expected.forget());
+        Ok(())
     }
 
     /// Messages written per topic.

@@ -36,7 +36,8 @@ fn compare(python: &Path, bag: &Path) {
     let ours = Reader::open(bag).expect("it opens");
     for reader in ["mcap", "rosbags"] {
         let topics = seen[reader].as_object().expect("topics");
-        assert_eq!(topics.len(), ours.topics().len(), "{reader}");
+        assert_eq!(topics.len(), ours.topics().len() + 1, "{reader}: and which step samples are of");
+        assert_eq!(topics["/backdrive/steps"]["type"], "backdrive_msgs/msg/Steps", "{reader}");
         for (topic, count) in ours.topics().iter().zip(ours.counts()) {
             assert_eq!(topics[&topic.name]["count"], *count, "{reader}, {}", topic.name);
             assert_eq!(topics[&topic.name]["type"], topic.type_name, "{reader}, {}", topic.name);
@@ -57,6 +58,7 @@ fn other_peoples_readers_decode_every_message() {
     assert_eq!(force["names"], json!(["forward", "side"]));
     assert_eq!(force["last_effort"], json!([-(1_500.0_f64).sqrt(), null]), "not measured is NaN");
     assert_eq!(force["last_stamp"], json!([1, 500_000_000]));
+    assert_eq!((&force["frame_id"], &force["last_step"]), (&json!(""), &json!(1_500)));
     assert_eq!(seen["mcap"]["/master/events"]["last_text"], "the handle touched the wall");
     assert_eq!(seen["mcap"]["/scaling/gains"]["last_mu"], 1.15);
     let bytes = std::fs::read(&path).expect("it reads");

@@ -121,11 +121,13 @@ pub fn read_graph(paths: &RunPaths) -> Result<Graph, String> {
 pub fn recording(graph: &Graph, name: &str, host: Option<&str>) -> (RecorderPlan, BagHeader) {
     let topics = topics(graph);
     let credit = (graph.timing.clock == Clock::Lockstep).then(|| (build::credit_topic(host), credit_listeners(graph)));
-    let plan = RecorderPlan { name: name.to_string(), topics: topics.iter().map(|t| t.topic.clone()).collect(), credit };
+    let heard = topics.iter().map(|t| t.topic.clone()).collect();
+    let plan = RecorderPlan { name: name.to_string(), topics: heard, credit, by_wall_clock: host.is_some() };
+    let (graph_toml, files) = graph.portable();
     let header = BagHeader {
         title: graph.title.clone(),
-        graph_toml: graph.text.clone(),
-        files: graph.files.clone(),
+        graph_toml,
+        files,
         versions: BTreeMap::from([("backdrive".to_string(), env!("CARGO_PKG_VERSION").to_string())]),
         seeds: BTreeMap::from([("graph".to_string(), graph.seed)]),
         clock: match graph.timing.clock {
@@ -133,7 +135,8 @@ pub fn recording(graph: &Graph, name: &str, host: Option<&str>) -> (RecorderPlan
             Clock::Realtime => backdrive_bags::Clock::Realtime,
         },
         rate_hz: graph.timing.rate_hz,
-        host: host.map_or_else(self::host, str::to_string),
+        // Hosts of a graph are called as its author likes, and merging needs to know them.
+        host: host.map_or_else(|| if graph.record_origin { self::host() } else { String::new() }, str::to_string),
         topics: topics.into_iter().map(|t| TopicInfo { topic: t.topic, axes: t.axes, publisher: t.publisher }).collect(),
     };
     (plan, header)
@@ -148,7 +151,7 @@ pub fn recorder_options(graph: &Graph) -> RecorderOptions {
     RecorderOptions { overwrite: graph.overwrite, ..options }
 }
 
-/// Name of this machine. A lockstep bag is the same wherever it was made, so it is left out there by the caller's choice of clock.
+/// Name of this machine.
 fn host() -> String {
     std::fs::read_to_string("/proc/sys/kernel/hostname").map(|s| s.trim().to_string()).unwrap_or_default()
 }

@@ -1,9 +1,11 @@
 //! The ROS 2 form of every message: schema text, CDR both ways.
 //!
 //! A [`Sample`] is a plain `sensor_msgs/msg/JointState`, so that any tool shows it with nothing of
-//! ours installed. What JointState has no place for stands in `header.frame_id`:
-//! `step=123 seq=123 src=89abcdef axes=2 flags=0 layout=1`. A quantity that no axis has is an empty
-//! array; a single axis without it is a NaN. The other kinds have types of their own in `msg/`.
+//! ours installed: its stamp is the sample's, its arrays are as long as there are axes, what was not measured is a NaN.
+//! What JointState has no field for ([`Facts`]: step, sequence, source, flags) is said in messages of a type of their own,
+//! [`STEPS`], wherever counting on does not tell it. Older bags have it in `header.frame_id`
+//! (`step=123 seq=123 src=89abcdef axes=2 flags=0 layout=1`), with an empty array for a quantity that no axis has;
+//! both are read. The other kinds have types of their own in `msg/`.
 //!
 //! Every payload is a 4-byte encapsulation header, `00 01 00 00`, and little-endian CDR.
 
@@ -13,7 +15,7 @@ mod twins;
 use crate::topic::Kind;
 use crate::{Message, Sample};
 use byteorder::{BigEndian, LittleEndian};
-use twins::{EventTwin, GainsTwin, JointState, JointStateIn, MarginTwin, StatusTwin};
+use twins::{EventTwin, Form, GainsTwin, JointState, JointStateIn, MarginTwin, StatusTwin, StepsTwin};
 
 /// The encapsulation header of little-endian CDR.
 pub const ENCAPSULATION: [u8; 4] = [0, 1, 0, 0];
@@ -35,7 +37,7 @@ pub enum RosError {
         /// What the CDR reader says.
         source: cdr_encoding::Error,
     },
-    /// A JointState of somebody else.
+    /// A JointState of somebody else, or one of ours of which nobody says the step.
     #[error("JointState with header.frame_id {frame_id:?} was not sent by backdrive: read its fields by name instead")]
     Foreign {
         /// The frame id, cut to 64 bytes.
@@ -49,20 +51,41 @@ pub enum RosError {
     },
 }
 
+/// What a sample says that a `JointState` has no field for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Facts {
+    /// As [`Sample::layout`].
+    pub layout: u32,
+    /// As [`Sample::source`].
+    pub source: u32,
+    /// As [`Sample::step`].
+    pub step: u64,
+    /// As [`Sample::sequence`].
+    pub sequence: u64,
+    /// As [`Sample::flags`].
+    pub flags: u32,
+    /// As [`Sample::stamp_ns`], where it is known apart from the header, which holds no time before 1901 or after 2038.
+    pub stamp_ns: Option<i64>,
+}
+
+// The text of one type, then each dependency behind a line of 80 `=` and its name.
+macro_rules! with_header {
+    ($text:expr) => {
+        concat!(
+            $text,
+            "================================================================================\nMSG: std_msgs/Header\n",
+            "builtin_interfaces/Time stamp\nstring frame_id\n",
+            "================================================================================\nMSG: builtin_interfaces/Time\n",
+            "int32 sec\nuint32 nanosec\n"
+        )
+    };
+}
+
+/// Name and full text of the schema of the messages that say [`Facts`] of samples.
+pub const STEPS: (&str, &str) = ("backdrive_msgs/msg/Steps", with_header!(include_str!("../msg/Steps.msg")));
+
 /// Name and full text (dependencies included) of the ros2msg schema of a kind of message.
 pub fn schema(kind: Kind) -> (&'static str, &'static str) {
-    // The text of one type, then each dependency behind a line of 80 `=` and its name.
-    macro_rules! with_header {
-        ($text:expr) => {
-            concat!(
-                $text,
-                "================================================================================\nMSG: std_msgs/Header\n",
-                "builtin_interfaces/Time stamp\nstring frame_id\n",
-                "================================================================================\nMSG: builtin_interfaces/Time\n",
-                "int32 sec\nuint32 nanosec\n"
-            )
-        };
-    }
     match kind {
         Kind::Sample => (
             "sensor_msgs/msg/JointState",
@@ -83,14 +106,16 @@ pub fn kind_of(type_name: &str) -> Option<Kind> {
 /// Writes the payload of `message` into `payload`, replacing what was there (its memory is reused).
 ///
 /// `axis_names` become `JointState.name`; missing ones are called `axis0`, `axis1`, … and names beyond
-/// the message's axes are left out. Errors: none for any value of `message` as it is built today; the
+/// the message's axes are left out. Of a sample its [`Facts`] are not in it: see [`encode_steps`]. Errors: none for any value of `message` as it is built today; the
 /// encoder's own are passed on.
 pub fn encode(message: &Message, axis_names: &[String], payload: &mut Vec<u8>) -> Result<(), RosError> {
     payload.clear();
     payload.extend_from_slice(&ENCAPSULATION);
     // The encoder counts alignment from where it starts, which is behind the header, as CDR wants.
     match message {
-        Message::Sample(sample) => cdr_encoding::to_writer::<_, LittleEndian, _>(payload, &JointState { sample, axis_names }),
+        Message::Sample(sample) => {
+            cdr_encoding::to_writer::<_, LittleEndian, _>(payload, &JointState { sample, axis_names, form: Form::Bag })
+        }
         Message::Gains(gains) => cdr_encoding::to_writer::<_, LittleEndian, _>(payload, &GainsTwin::from(gains)),
         Message::Event(event) => cdr_encoding::to_writer::<_, LittleEndian, _>(payload, &EventTwin::from(event)),
         Message::Status(status) => cdr_encoding::to_writer::<_, LittleEndian, _>(payload, &StatusTwin::from(status)),
@@ -99,7 +124,38 @@ pub fn encode(message: &Message, axis_names: &[String], payload: &mut Vec<u8>) -
     .map_err(|source| RosError::Cdr { type_name: schema(message.kind()).0, source })
 }
 
-/// Reads a payload that [`encode`] wrote (in either byte order).
+/// Writes into `payload` what is to be said of `sample`, and of those that follow it on `topic`, replacing what was there.
+///
+/// Errors: as of [`encode`].
+pub fn encode_steps(topic: &str, sample: &Sample, payload: &mut Vec<u8>) -> Result<(), RosError> {
+    payload.clear();
+    payload.extend_from_slice(&ENCAPSULATION);
+    cdr_encoding::to_writer::<_, LittleEndian, _>(payload, &StepsTwin::new(topic, sample))
+        .map_err(|source| RosError::Cdr { type_name: STEPS.0, source })
+}
+
+/// Reads a payload that [`encode_steps`] wrote: a topic, and what is so of its next sample.
+///
+/// Errors: a wrong encapsulation header, CDR that ends early.
+pub fn decode_steps(payload: &[u8]) -> Result<(String, Facts), RosError> {
+    Ok(read::<StepsTwin>(STEPS.0, payload)?.into_facts())
+}
+
+/// Whether the header of a JointState holds this stamp to the ns; where it does not, [`Facts::stamp_ns`] does.
+pub fn header_holds(stamp_ns: i64) -> bool {
+    twins::Time::from_ns(stamp_ns).to_ns() == stamp_ns
+}
+
+/// Reads a sample that [`encode`] wrote, of which `facts` are known from elsewhere. One that carries its own, as in older bags, is read
+/// by those.
+///
+/// Errors: as of [`decode`].
+pub fn decode_sample(payload: &[u8], facts: &Facts) -> Result<Sample, RosError> {
+    read::<JointStateIn>(schema(Kind::Sample).0, payload)?.sample(facts)
+}
+
+/// Reads a payload that [`encode`] wrote (in either byte order); a sample only where it carries its [`Facts`] itself, as in older bags: see
+/// [`decode_sample`] for others.
 ///
 /// What was not measured comes back as the canonical [`crate::NOT_MEASURED`], on axes beyond the
 /// message's too; everything else comes back bit for bit. The layout version is not judged here: see

@@ -17,6 +17,12 @@ impl Start {
         let unix = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).map_or(0, |d| d.as_nanos() as i64);
         Start { t0_ns: now_ns() + delay_ns, unix_ns: unix + delay_ns }
     }
+
+    /// Unix time at a moment of CLOCK_MONOTONIC, ns. All of a run go by it, so that setting the machine's clock neither turns stamps back nor
+    /// puts arrivals before them.
+    pub fn unix_at(&self, monotonic_ns: i64) -> i64 {
+        self.unix_ns.saturating_add(monotonic_ns.saturating_sub(self.t0_ns))
+    }
 }
 
 /// CLOCK_MONOTONIC now, ns.

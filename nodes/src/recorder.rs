@@ -1,10 +1,11 @@
 //! The recorder: hears every topic, takes everything over in time, and slows nobody down.
 //!
-//! It polls rather than wakes, so a publisher never pays for it. In lockstep it says on its credit topic
+//! It polls rather than wakes, so a publisher never pays for it. When a message arrived does not depend on when the recorder looked:
+//! the transport knows it ([`Subscriber::arrived_ns`]), and messages go to the sink in that order. In lockstep it says on its credit topic
 //! up to which step it has everything; sources wait for that, so the graph cannot outrun it and nothing
 //! is ever lost. In real time the buffers cover the time between two polls many times over, and a hole is counted.
 
-use crate::clock::now_ns;
+use crate::clock::{Start, now_ns};
 use crate::process::{GRACE, Line};
 use crate::protocol::NodeStatus;
 use crate::runner::{Report, RunError, Told};
@@ -16,7 +17,7 @@ use backdrive_msgs::text::Text;
 use backdrive_msgs::topic::{Kind, Topic};
 use backdrive_msgs::{Event, LAYOUT, Message, Sample, source_id};
 use std::process::ExitCode;
-use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+use std::time::{Duration, Instant};
 
 /// How often it looks: at 10 kHz a topic then has 50 messages for it, and room for 4096.
 const POLL: Duration = Duration::from_millis(5);
@@ -33,7 +34,7 @@ const CREDIT_EVERY: u64 = 256;
 /// Where a recorder puts what it hears.
 pub trait Sink {
     /// Takes a message of topic number `topic`; `receive_ns` is its time of arrival, ns since the Unix
-    /// epoch, or in lockstep its own stamp. May wait in lockstep, never in real time.
+    /// epoch by the clock that its stamp is of, or in lockstep its own stamp. May wait in lockstep, never in real time.
     fn push(&mut self, topic: usize, message: Message, receive_ns: i64) -> Result<(), RunError>;
 
     /// Every topic has been asked for all it had.
@@ -74,6 +75,9 @@ pub struct RecorderPlan {
     pub topics: Vec<Topic>,
     /// Lockstep: where it says how far it has come, and how many sources listen to that.
     pub credit: Option<(Topic, usize)>,
+    /// Real time: whether times of arrival are told by the wall clock of this host, as they must be where it is one of several whose clocks
+    /// are compared. Otherwise they count from the start of the run, as stamps do, and no setting of the clock puts one before its stamp.
+    pub by_wall_clock: bool,
 }
 
 struct Heard {
@@ -81,6 +85,14 @@ struct Heard {
     subscriber: Box<dyn Subscriber>,
     /// One more than the newest step of a sample topic.
     upto: u64,
+}
+
+/// A message on its way to the sink.
+struct Arrived {
+    /// CLOCK_MONOTONIC, ns.
+    at_ns: i64,
+    topic: usize,
+    message: Message,
 }
 
 /// A recorder whose subscribers exist.
@@ -91,7 +103,10 @@ pub struct Recording {
     credits: u64,
     source: u32,
     clock: Clock,
+    by_wall_clock: bool,
     sink: Box<dyn Sink>,
+    /// Real time: what has arrived and is not yet handed on.
+    arrived: Vec<Arrived>,
     /// Real time: a topic that could not be read; the others go on.
     broken: Option<TransportError>,
     /// Last, so that it outlives the ports that came from it.
@@ -118,8 +133,20 @@ impl Recording {
             Some((topic, listeners)) => Some((transport.publisher(topic, *listeners)?, *listeners)),
             None => None,
         };
-        let (source, clock) = (source_id(&plan.name), timing.clock);
-        Ok(Recording { heard, credit, credited: 0, credits: 0, source, clock, sink, broken: None, _transport: transport })
+        let (source, clock, by_wall_clock) = (source_id(&plan.name), timing.clock, plan.by_wall_clock);
+        Ok(Recording {
+            heard,
+            credit,
+            credited: 0,
+            credits: 0,
+            source,
+            clock,
+            by_wall_clock,
+            sink,
+            arrived: Vec::new(),
+            broken: None,
+            _transport: transport,
+        })
     }
 
     /// What it still lacks before a run can start, one line each.
@@ -139,9 +166,11 @@ impl Recording {
     ///
     /// # Errors
     /// A subscriber or the sink fails.
-    fn take(&mut self) -> Result<usize, RunError> {
+    fn take(&mut self, start: Start) -> Result<usize, RunError> {
         let (mut taken, mut more) = (0, false);
-        let arrival = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |d| d.as_nanos() as i64);
+        // What comes while the topics are asked is held back: one that has been asked may get something that came before it. So
+        // is what came after the last that was taken of a topic that has more.
+        let mut settled_ns = now_ns();
         for (index, heard) in self.heard.iter_mut().enumerate() {
             let mut here = 0;
             while here < AT_ONCE {
@@ -157,14 +186,20 @@ impl Recording {
                 if heard.topic.kind == Kind::Sample {
                     heard.upto = heard.upto.max(message.step() + 1);
                 }
-                // A lockstep bag holds nothing that the machine decides.
-                let receive_ns = if self.clock == Clock::Lockstep { message.stamp_ns() } else { arrival };
-                self.sink.push(index, message, receive_ns)?;
                 here += 1;
+                // A lockstep bag holds nothing that the machine decides.
+                match self.clock {
+                    Clock::Lockstep => self.sink.push(index, message, message.stamp_ns())?,
+                    Clock::Realtime => self.arrived.push(Arrived { at_ns: heard.subscriber.arrived_ns(), topic: index, message }),
+                }
             }
-            more |= here == AT_ONCE;
+            if here == AT_ONCE {
+                more = true;
+                settled_ns = settled_ns.min(heard.subscriber.arrived_ns());
+            }
             taken += here;
         }
+        self.hand_on(start, settled_ns)?;
         if more {
             self.give_credit(CREDIT_EVERY)?;
         } else {
@@ -172,6 +207,17 @@ impl Recording {
             self.sink.checkpoint();
         }
         Ok(taken)
+    }
+
+    /// Gives the sink what arrived before `until_ns`, in the order of arrival.
+    fn hand_on(&mut self, start: Start, until_ns: i64) -> Result<(), RunError> {
+        let epoch = if self.by_wall_clock { Start::after(0) } else { start };
+        self.arrived.sort_by_key(|arrived| arrived.at_ns); // stable: what came at once keeps the order of the topics
+        let count = self.arrived.partition_point(|arrived| arrived.at_ns < until_ns);
+        for Arrived { at_ns, topic, message } in self.arrived.drain(..count) {
+            self.sink.push(topic, message, epoch.unix_at(at_ns))?;
+        }
+        Ok(())
     }
 
     /// Steps of which every sample has been taken over.
@@ -201,15 +247,22 @@ impl Recording {
     }
 
     /// Takes over until every topic has reached the last of `steps`, or `stopped` says so; then what is still
-    /// on its way. `tell` hears of losses and, about ten times a second, of progress.
+    /// on its way. `start` is that of the nodes: times of arrival count from it as their stamps do. `tell` hears of losses and, about
+    /// ten times a second, of progress.
     ///
     /// # Errors
     /// A subscriber or the sink fails.
-    pub fn run(&mut self, steps: Option<u64>, stopped: impl Fn() -> bool, tell: &mut dyn FnMut(Told)) -> Result<(), RunError> {
+    pub fn run(
+        &mut self,
+        start: Start,
+        steps: Option<u64>,
+        stopped: impl Fn() -> bool,
+        tell: &mut dyn FnMut(Told),
+    ) -> Result<(), RunError> {
         let (mut reported, mut lost_before) = (Instant::now(), 0);
         let mut ends_at: Option<Instant> = None;
         loop {
-            let taken = self.take()?;
+            let taken = self.take(start)?;
             let lost = self.sink.health().2;
             if lost > lost_before {
                 tell(Told::Event(self.loss(lost - lost_before)));
@@ -227,7 +280,7 @@ impl Recording {
                 // Events and status may still be on their way; they are few, and their publishers end now.
                 let end = *ends_at.get_or_insert_with(|| Instant::now() + LINGER);
                 if (self.is_deserted() || Instant::now() >= end) && taken == 0 {
-                    return Ok(());
+                    return self.hand_on(start, i64::MAX);
                 }
             }
             if taken < AT_ONCE {
@@ -265,10 +318,10 @@ impl Recording {
 pub fn run_recorder(plan: &RecorderPlan, timing: &Timing, transport: Box<dyn Transport>, sink: Box<dyn Sink>) -> ExitCode {
     Line::open(GRACE).supervised(|line| {
         let mut recording = Recording::new(plan, timing, transport, sink)?;
-        let Some(_start) = line.meet(|| recording.missing()) else {
+        let Some(start) = line.meet(|| recording.missing()) else {
             return recording.finish();
         };
-        recording.run(timing.steps, || line.control.is_stopped(), &mut |told| line.tell(told))?;
+        recording.run(start, timing.steps, || line.control.is_stopped(), &mut |told| line.tell(told))?;
         recording.finish()
     })
 }

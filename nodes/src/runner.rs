@@ -367,7 +367,7 @@ impl Runner {
         let due_ns = |step: u64| start.t0_ns + (step as f64 * period_ns) as i64;
         let steps = self.timing.steps.unwrap_or(u64::MAX);
         let horizon_ns = (self.options.horizon_s * 1e9) as i64;
-        let unix = |now: i64| start.unix_ns + (now - start.t0_ns);
+        let unix = |now: i64| start.unix_at(now);
         let due_step = |now: i64| (((now - start.t0_ns).max(0) as f64) / period_ns).ceil() as u64;
 
         let begun = now_ns();

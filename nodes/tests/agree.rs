@@ -55,7 +55,7 @@ fn in_threads(impairment: Option<Impairment>) -> Heard {
                 assert_eq!((status.steps, status.lost), (STEPS, 0));
             });
         }
-        recording.run(Some(STEPS), || false, &mut |_| {}).unwrap();
+        recording.run(Start::after(0), Some(STEPS), || false, &mut |_| {}).unwrap();
     });
     recording.finish().unwrap();
     Arc::try_unwrap(heard).unwrap().into_inner().unwrap()
@@ -133,9 +133,10 @@ fn in_processes(impairment: Option<Impairment>) -> Heard {
     while !recording.missing().is_empty() {
         std::thread::sleep(Duration::from_millis(1));
     }
-    let Start { t0_ns, unix_ns } = Start::after(0);
+    let start = Start::after(0);
+    let Start { t0_ns, unix_ns } = start;
     processes.iter_mut().for_each(|p| p.say(&ToNode::Start { t0_ns, unix_ns }));
-    recording.run(Some(STEPS), || false, &mut |_| {}).unwrap();
+    recording.run(start, Some(STEPS), || false, &mut |_| {}).unwrap();
     recording.finish().unwrap();
     for process in &mut processes {
         let mut events = 0;

@@ -3,6 +3,7 @@
 use backdrive_msgs::text::Text;
 use backdrive_msgs::topic::{Kind, Topic};
 use backdrive_msgs::{Event, Gains, LAYOUT, Message, NOT_MEASURED, Sample, Status};
+use backdrive_nodes::clock::now_ns;
 use backdrive_nodes::transport::iceoryx2::Iceoryx2;
 use backdrive_nodes::transport::inproc::Hub;
 use backdrive_nodes::transport::ros2::{Delivery, Network, Ros2};
@@ -13,6 +14,11 @@ use std::time::{Duration, Instant};
 /// A run in which nodes can meet.
 trait World: Sync {
     fn join(&self, name: &str) -> Box<dyn Transport>;
+
+    /// Whether what is sent is with the receiver when it has been sent.
+    fn arrives_at_once(&self) -> bool {
+        true
+    }
 
     /// How long a message or the news of a connection may take.
     fn patience(&self) -> Duration {
@@ -72,6 +78,10 @@ impl World for Domain {
 
     fn patience(&self) -> Duration {
         Duration::from_secs(20)
+    }
+
+    fn arrives_at_once(&self) -> bool {
+        false
     }
 
     /// A NaN means "not measured", whatever its bits.
@@ -138,6 +148,7 @@ conform!(
     carries_every_kind_and_no_other,
     refuses_another_layout,
     two_listeners_get_everything,
+    tells_when_each_message_came,
 );
 
 fn topic(name: &str, kind: Kind) -> Topic {
@@ -399,6 +410,32 @@ fn refuses_another_layout(world: &dyn World, _: &dyn World) {
     assert!(eventually(world, || receiver.receive().inspect_err(|e| refused = e.to_string()).is_err()));
     assert!(refused.contains("/arm/measured_js") && refused.contains("layout 2"), "{refused}");
     assert_eq!(sequences(world, &mut receiver, 1), [1]);
+}
+
+/// However late the receiver looks.
+fn tells_when_each_message_came(world: &dyn World, _: &dyn World) {
+    let (mut a, mut b) = (world.join("a"), world.join("b"));
+    let mut receiver = b.subscriber(&samples(), 16, false).unwrap();
+    let mut sender = a.publisher(&samples(), 1).unwrap();
+    assert!(eventually(world, || receiver.has_publisher() && sender.listeners() == 1));
+    let mut send = |sequence: u64| {
+        let before = now_ns();
+        sender.send(&sample(sequence)).unwrap();
+        let after = now_ns();
+        std::thread::sleep(Duration::from_millis(5));
+        (before, after)
+    };
+    let sent: Vec<(i64, i64)> = (0..5).map(&mut send).collect();
+    settle(world);
+    let mut last = i64::MIN;
+    for (before, after) in sent {
+        assert!(next(world, &mut *receiver).is_some());
+        let (arrived, latest) = (receiver.arrived_ns(), if world.arrives_at_once() { after } else { now_ns() });
+        // What the middleware says by the wall clock is true to the microsecond.
+        assert!((before - 1_000..=latest).contains(&arrived), "sent from {before} to {after}, came at {arrived}");
+        assert!(arrived >= last);
+        last = arrived;
+    }
 }
 
 fn two_listeners_get_everything(world: &dyn World, _: &dyn World) {

@@ -3,7 +3,7 @@
     python read_bag.py RUN.mcap        (pip install mcap mcap-ros2-support rosbags numpy)
 
 Every message is decoded. Prints {"mcap": {TOPIC: {...}}, "rosbags": {TOPIC: {...}}} with, per topic, the number of
-messages, the ROS type, and of a JointState the last effort, so that values can be compared too. Exits with 1 and
+messages, the ROS type, and of a JointState the last effort and the last step, so that values can be compared too. Exits with 1 and
 the reader's own error when a reader cannot open the bag or decode a message.
 """
 
@@ -11,6 +11,9 @@ import json
 import math
 import sys
 from pathlib import Path
+
+
+JOINT_STATE = "sensor_msgs/msg/JointState"
 
 
 def plain(values):
@@ -21,12 +24,19 @@ def plain(values):
 def note(topics, topic, type_name, message):
     seen = topics.setdefault(topic, {"count": 0, "type": type_name})
     seen["count"] += 1
-    if type_name == "sensor_msgs/msg/JointState":
+    if type_name == JOINT_STATE:
+        seen["frame_id"] = message.header.frame_id
+        if "next_step" in seen:
+            seen["last_step"] = seen["next_step"]
+            seen["next_step"] += 1
         seen["names"] = list(message.name)
         seen["last_effort"] = plain(message.effort)
         seen["last_stamp"] = [message.header.stamp.sec, message.header.stamp.nanosec]
     elif type_name == "backdrive_msgs/msg/Event":
         seen["last_text"] = message.text
+    elif type_name == "backdrive_msgs/msg/Steps":
+        # Which step the next message of a topic is of; those after it count on.
+        topics.setdefault(message.topic, {"count": 0, "type": JOINT_STATE})["next_step"] = message.step
     elif type_name == "backdrive_msgs/msg/Gains":
         seen["last_mu"] = message.mu
 

@@ -1,12 +1,15 @@
 //! Every message as a standard ROS 2 message, for the wire: what `ros2 topic echo`, PlotJuggler, rviz and a
 //! Foxglove bridge on another machine show with nothing of ours installed.
 //!
-//! A sample is the `JointState` that bags hold. Gains, status and margin are a `JointState` too, whose `name` has the
+//! A sample is a `JointState` whose `header.frame_id` says what JointState has no field for: `step=123 seq=123 src=89abcdef axes=2 flags=0
+//! layout=1`. A bag says it in messages of its own ([`super`]), which the wire cannot: samples may be lost here, a node of another host
+//! takes each by its step the moment it comes, and what stands in a second message would have to be waited for, and be lost alone.
+//! A quantity that was not measured is NaN, so that arrays are as long as there are axes. Gains, status and margin are a `JointState` too, whose `name` has the
 //! names of their fields and whose `position` has the values. An event is an `rcl_interfaces/msg/Log`: `name` is who
 //! tells it, `msg` its sentence, `function` its kind, and `file` carries what `Log` has no field for. Counts travel as
 //! floating point, so they are exact up to 2^53.
 
-use super::twins::{JointState, JointStateIn, Time};
+use super::twins::{Form, JointState, JointStateIn, Time};
 use super::{RosError, read_cdr};
 use crate::text::Text;
 use crate::topic::Kind;
@@ -74,22 +77,22 @@ pub fn encode(message: &Message, speaker: &str, names: &[String], cdr: &mut Vec<
             };
             cdr_encoding::to_writer::<_, LittleEndian, _>(cdr, &log)
         }
-        Message::Sample(sample) => joint_state(cdr, sample, names),
-        Message::Gains(g) => joint_state(cdr, &numbers(&[g.mu, g.lambda, g.ramp_s]), names),
+        Message::Sample(sample) => joint_state(cdr, sample, names, Form::Wire),
+        Message::Gains(g) => joint_state(cdr, &numbers(&[g.mu, g.lambda, g.ramp_s]), names, Form::WireList),
         Message::Status(s) => {
             let values = [s.steps as f64, s.missed_deadlines as f64, s.lost as f64, s.loop_p50_s, s.loop_p99_s];
-            joint_state(cdr, &numbers(&values), names)
+            joint_state(cdr, &numbers(&values), names, Form::WireList)
         }
         Message::Margin(m) => {
             let values = [f64::from(m.axis), f64::from(m.known), m.gain, m.factor, m.deviation, m.frequency_hz, m.decay_per_s];
-            joint_state(cdr, &numbers(&values), names)
+            joint_state(cdr, &numbers(&values), names, Form::WireList)
         }
     };
     written.map_err(|source| RosError::Cdr { type_name: type_of(message.kind()).1, source })
 }
 
-fn joint_state(cdr: &mut Vec<u8>, sample: &Sample, axis_names: &[String]) -> Result<(), cdr_encoding::Error> {
-    cdr_encoding::to_writer::<_, LittleEndian, _>(cdr, &JointState { sample, axis_names })
+fn joint_state(cdr: &mut Vec<u8>, sample: &Sample, axis_names: &[String], form: Form) -> Result<(), cdr_encoding::Error> {
+    cdr_encoding::to_writer::<_, LittleEndian, _>(cdr, &JointState { sample, axis_names, form })
 }
 
 /// A message as a sample whose positions are its values.

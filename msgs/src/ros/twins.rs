@@ -1,6 +1,6 @@
 //! What the CDR encoder and decoder see: the fields of each message in the order of its schema.
 
-use super::RosError;
+use super::{Facts, RosError};
 use crate::text::Text;
 use crate::{Event, Gains, MAX_AXES, Margin, NOT_MEASURED, Sample, Status};
 use serde::de::{SeqAccess, Visitor};
@@ -40,7 +40,7 @@ pub(super) fn canonical(value: f64) -> f64 {
     if value.is_nan() { NOT_MEASURED } else { value }
 }
 
-/// Text on the stack: a frame id is written 60 000 times a second.
+/// What the wire's JointState has no other room for, as text on the stack.
 struct FrameId {
     bytes: [u8; 192],
     len: usize,
@@ -78,19 +78,32 @@ impl FrameId {
 pub(super) struct JointState<'a> {
     pub(super) sample: &'a Sample,
     pub(super) axis_names: &'a [String],
+    pub(super) form: Form,
+}
+
+/// What a JointState is written for.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Form {
+    /// A bag: no frame, and what else is to be said stands beside it.
+    Bag,
+    /// The wire: everything in one message, in the frame id.
+    Wire,
+    /// The wire, for a list of named numbers, which are positions and nothing else.
+    WireList,
 }
 
 impl Serialize for JointState<'_> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let axes = self.sample.len();
-        let frame_id = FrameId::of(self.sample);
+        let frame_id = (self.form != Form::Bag).then(|| FrameId::of(self.sample));
         let mut out = serializer.serialize_struct("JointState", 7)?;
         out.serialize_field("stamp", &Time::from_ns(self.sample.stamp_ns))?;
-        out.serialize_field("frame_id", frame_id.as_str())?;
+        out.serialize_field("frame_id", frame_id.as_ref().map_or("", FrameId::as_str))?;
         out.serialize_field("name", &AxisNames { given: self.axis_names, axes })?;
         out.serialize_field("position", &Quantity(&self.sample.position[..axes]))?;
-        out.serialize_field("velocity", &Quantity(&self.sample.velocity[..axes]))?;
-        out.serialize_field("effort", &Quantity(&self.sample.effort[..axes]))?;
+        let further = if self.form == Form::WireList { 0 } else { axes };
+        out.serialize_field("velocity", &Quantity(&self.sample.velocity[..further]))?;
+        out.serialize_field("effort", &Quantity(&self.sample.effort[..further]))?;
         out.end()
     }
 }
@@ -112,21 +125,21 @@ impl Serialize for AxisNames<'_> {
     }
 }
 
-/// Position, velocity or effort of all axes, or an empty array when no axis has it.
+/// Position, velocity or effort of all axes, NaN where it was not measured.
 struct Quantity<'a>(&'a [f64]);
 
 impl Serialize for Quantity<'_> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let values = if self.0.iter().all(|value| value.is_nan()) { &[] } else { self.0 };
-        let mut out = serializer.serialize_seq(Some(values.len()))?;
-        for value in values {
+        let mut out = serializer.serialize_seq(Some(self.0.len()))?;
+        for value in self.0 {
             out.serialize_element(&canonical(*value))?;
         }
         out.end()
     }
 }
 
-/// `sensor_msgs/JointState` as it is read, without allocating.
+/// `sensor_msgs/JointState` as it is read, without allocating. A quantity that no axis has may be an empty array: older bags and
+/// other people write it so.
 #[derive(Deserialize)]
 pub(super) struct JointStateIn {
     stamp: Time,
@@ -141,39 +154,50 @@ impl TryFrom<JointStateIn> for Sample {
     type Error = RosError;
 
     fn try_from(read: JointStateIn) -> Result<Sample, RosError> {
-        let frame = match read.frame {
-            FrameIn::Ours(frame) => frame,
-            FrameIn::Foreign(frame_id) => return Err(RosError::Foreign { frame_id }),
-        };
-        for (name, values) in [("position", &read.position), ("velocity", &read.velocity), ("effort", &read.effort)] {
-            if values.len != 0 && values.len != frame.axes as usize {
-                return Err(RosError::Inconsistent { what: format!("{} axes, but {name} has {} entries", frame.axes, values.len) });
+        match &read.frame {
+            FrameIn::Ours(Frame { facts, axes }) => read.with(facts, *axes),
+            FrameIn::Foreign(frame_id) => Err(RosError::Foreign { frame_id: frame_id.clone() }),
+        }
+    }
+}
+
+impl JointStateIn {
+    /// The sample that it is part of, in either form: what its frame id says holds before `facts`.
+    pub(super) fn sample(self, facts: &Facts) -> Result<Sample, RosError> {
+        match self.frame {
+            FrameIn::Ours(_) => Sample::try_from(self),
+            FrameIn::Foreign(_) => match u32::try_from(self.position.len) {
+                Ok(axes) if axes as usize <= MAX_AXES => self.with(facts, axes),
+                _ => Err(RosError::Inconsistent { what: format!("{} axes, but {MAX_AXES} are the most", self.position.len) }),
+            },
+        }
+    }
+
+    fn with(&self, facts: &Facts, axes: u32) -> Result<Sample, RosError> {
+        for (name, values) in [("position", &self.position), ("velocity", &self.velocity), ("effort", &self.effort)] {
+            if values.len != 0 && values.len != axes as usize {
+                return Err(RosError::Inconsistent { what: format!("{axes} axes, but {name} has {} entries", values.len) });
             }
         }
         Ok(Sample {
-            layout: frame.layout,
-            source: frame.source,
-            step: frame.step,
-            sequence: frame.sequence,
-            stamp_ns: frame.stamp_ns.unwrap_or_else(|| read.stamp.to_ns()),
-            axes: frame.axes,
-            flags: frame.flags,
-            position: read.position.values,
-            velocity: read.velocity.values,
-            effort: read.effort.values,
+            layout: facts.layout,
+            source: facts.source,
+            step: facts.step,
+            sequence: facts.sequence,
+            stamp_ns: facts.stamp_ns.unwrap_or_else(|| self.stamp.to_ns()),
+            axes,
+            flags: facts.flags,
+            position: self.position.values,
+            velocity: self.velocity.values,
+            effort: self.effort.values,
         })
     }
 }
 
 /// What a frame id of ours says.
 struct Frame {
-    step: u64,
-    sequence: u64,
-    source: u32,
+    facts: Facts,
     axes: u32,
-    flags: u32,
-    layout: u32,
-    stamp_ns: Option<i64>,
 }
 
 impl Frame {
@@ -194,7 +218,8 @@ impl Frame {
                 _ => {}
             }
         }
-        Some(Frame { step: step?, sequence: sequence?, source: source?, axes: axes?, flags: flags?, layout: layout?, stamp_ns })
+        let facts = Facts { step: step?, sequence: sequence?, source: source?, flags: flags?, layout: layout?, stamp_ns };
+        Some(Frame { facts, axes: axes? })
     }
 }
 
@@ -307,6 +332,33 @@ struct Common {
 impl Common {
     fn new(layout: u32, source: u32, step: u64, sequence: u64, stamp_ns: i64) -> Common {
         Common { stamp: Time::from_ns(stamp_ns), frame_id: Cow::Borrowed(""), layout, source, step, sequence, stamp_ns }
+    }
+}
+
+/// `backdrive_msgs/Steps`.
+#[derive(Serialize, Deserialize)]
+pub(super) struct StepsTwin<'a> {
+    stamp: Time,
+    frame_id: Cow<'static, str>,
+    topic: Cow<'a, str>,
+    layout: u32,
+    source: u32,
+    flags: u32,
+    step: u64,
+    sequence: u64,
+    stamp_ns: i64,
+}
+
+impl<'a> StepsTwin<'a> {
+    pub(super) fn new(topic: &'a str, sample: &Sample) -> StepsTwin<'a> {
+        let Sample { layout, source, step, sequence, stamp_ns, flags, .. } = *sample;
+        let (stamp, frame_id, topic) = (Time::from_ns(stamp_ns), Cow::Borrowed(""), Cow::Borrowed(topic));
+        StepsTwin { stamp, frame_id, topic, layout, source, flags, step, sequence, stamp_ns }
+    }
+
+    pub(super) fn into_facts(self) -> (String, Facts) {
+        let StepsTwin { topic, layout, source, flags, step, sequence, stamp_ns, .. } = self;
+        (topic.into_owned(), Facts { layout, source, step, sequence, flags, stamp_ns: Some(stamp_ns) })
     }
 }
 

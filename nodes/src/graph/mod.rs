@@ -16,7 +16,7 @@ mod recorded;
 pub use draw::draw;
 pub use hosts::Host;
 pub use kinds::{Direction, NodeKind, PortKind, StageKind};
-pub use overrides::Overrides;
+pub use overrides::{Overrides, with_files_renamed};
 pub use parse::{Files, MAX_RATE_HZ};
 
 use crate::stage::{Impairment, Timing};
@@ -31,13 +31,13 @@ use backdrive_msgs::topic::Topic;
 use backdrive_plant::model::{Fragment, Model};
 use std::path::PathBuf;
 
-/// A graph, read and checked. Paths in it are absolute.
+/// A graph, read and checked. Paths in it are absolute, but for files that a bag holds.
 #[derive(Debug, Clone)]
 pub struct Graph {
     /// One line for a person.
     pub title: String,
     /// The file's text with the command line's changes and absolute paths written into it: what each
-    /// process reads, and what the bag holds.
+    /// process reads. What the bag holds is [`Graph::portable`].
     pub text: String,
     /// Where it was read.
     pub path: PathBuf,
@@ -53,6 +53,8 @@ pub struct Graph {
     pub bag: Option<PathBuf>,
     /// Whether a bag that exists may be replaced.
     pub overwrite: bool,
+    /// Whether the bag says on which machine and from which folders it was made.
+    pub record_origin: bool,
     /// Where nodes run, in the order of the file; empty for a graph that runs on one host.
     pub hosts: Vec<Host>,
     /// In the order of the file.

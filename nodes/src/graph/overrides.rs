@@ -1,7 +1,8 @@
 //! What the command line changes in a graph file, without touching the file.
 
-use super::NodeKind;
+use super::parse::Files;
 use super::recorded::Recorded;
+use super::{Graph, NodeKind};
 use backdrive_plant::tomlfile::FileError;
 use std::path::{Path, PathBuf};
 use toml_edit::{DocumentMut, Item, Value, value};
@@ -41,6 +42,8 @@ pub struct Overrides {
     pub rate_hz: Option<f64>,
     /// Length of the run, s.
     pub duration_s: Option<f64>,
+    /// Whether the bag says on which machine and from which folders it was made.
+    pub record_origin: bool,
     /// Seed of everything random.
     pub seed: Option<u64>,
     /// Whether sensors round and are noisy as the model files say (`as_modelled`) or not (`ideal`).
@@ -53,8 +56,9 @@ pub struct Overrides {
 const FILE_KEYS: &[&str] = &["model", "grip", "environment", "recording", "map", "cycle", "specimen"];
 
 impl Overrides {
-    /// Text of the graph file with the changes, and with every file it names as an absolute path.
-    pub(super) fn apply(&self, text: &str, path: &Path) -> Result<String, FileError> {
+    /// Text of the graph file with the changes, and with every file it names as an absolute path, but for those that a bag holds by the
+    /// name that stands there.
+    pub(super) fn apply(&self, text: &str, path: &Path, files: &Files) -> Result<String, FileError> {
         let name = path.display().to_string();
         let mut doc: DocumentMut = match text.parse() {
             Ok(doc) => doc,
@@ -63,7 +67,10 @@ impl Overrides {
         };
         let here = std::env::current_dir().unwrap_or_default();
         let beside = absolute(&here, path).parent().map(Path::to_path_buf).unwrap_or_default();
-        make_absolute(&mut doc, &beside);
+        let full = |name: &str| if files.holds(name) { name.to_string() } else { absolute(&beside, Path::new(name)).display().to_string() };
+        rename_files(&mut doc, &full);
+        // A program that is named with its folder lies beside the graph; a bare name is looked for as a shell would.
+        rename_programs(&mut doc, &|name| if name.contains('/') { full(name) } else { name.to_string() });
         self.write_top(&mut doc);
         self.write_nodes(&mut doc, &here, &name)?;
         Ok(doc.to_string())
@@ -85,6 +92,9 @@ impl Overrides {
         }
         if let Some(clock) = &self.clock {
             doc["clock"] = value(clock.as_str());
+        }
+        if self.record_origin {
+            doc["record_origin"] = value(true);
         }
         if let Some(seed) = self.seed {
             doc["seed"] = value(seed.min(i64::MAX as u64) as i64);
@@ -143,31 +153,75 @@ fn set(table: &mut Item, key: &str, item: Item) {
 /// Keys of node tables that hold excitations, which may name a file.
 const EXCITATION_KEYS: &[&str] = &["force", "dither", "demand"];
 
-fn make_absolute(doc: &mut DocumentMut, beside: &Path) {
-    let full = |path: &str| absolute(beside, Path::new(path)).display().to_string();
+/// Changes the names of the files that nodes are made of.
+fn rename_files(doc: &mut DocumentMut, change: &dyn Fn(&str) -> String) {
     for node in node_tables(doc) {
         for key in FILE_KEYS {
             if let Some(Item::Value(value)) = node.get_mut(key)
                 && value.as_str() != Some("none")
             {
-                rewrite(value, &full);
+                rewrite(value, change);
             }
         }
         for key in EXCITATION_KEYS {
             if let Some(Item::Value(value)) = node.get_mut(key) {
-                rewrite(value, &|spec| Recorded::with_absolute_file(spec, beside));
+                rewrite(value, &|spec| Recorded::with_file(spec, change));
             }
         }
-        // A program that is named with its folder lies beside the graph; a bare name is looked for as a shell would.
+    }
+}
+
+/// Changes the names of the programs that nodes run.
+fn rename_programs(doc: &mut DocumentMut, change: &dyn Fn(&str) -> String) {
+    for node in node_tables(doc) {
         let program = match node.get_mut("command") {
             Some(Item::Value(Value::Array(words))) => words.get_mut(0),
             Some(Item::Value(value)) => Some(value),
             _ => None,
         };
-        if let Some(program) = program.filter(|p| p.as_str().is_some_and(|p| p.contains('/'))) {
-            rewrite(program, &full);
+        if let Some(program) = program.filter(|program| program.is_str()) {
+            rewrite(program, change);
         }
     }
+}
+
+/// A graph's text with other names for the files that it is made of, and everything else as it was. Text that is no TOML stays as it is.
+pub fn with_files_renamed(text: &str, change: &dyn Fn(&str) -> String) -> String {
+    let Ok(mut doc) = text.parse::<DocumentMut>() else { return text.to_string() };
+    rename_files(&mut doc, change);
+    doc.to_string()
+}
+
+impl Graph {
+    /// Its text and its files as a bag holds them: files, programs and the bag have no folders, so that nothing tells on which
+    /// machine it was made, unless the graph asks for that. Of files that are called the same the second is `2-NAME`.
+    pub fn portable(&self) -> (String, Vec<(String, String)>) {
+        let (Ok(mut doc), false) = (self.text.parse::<DocumentMut>(), self.record_origin) else {
+            return (self.text.clone(), self.files.clone());
+        };
+        let mut names: Vec<String> = Vec::new();
+        for (path, _) in &self.files {
+            let own = bare(path);
+            let with = |count: usize| if count == 1 { own.clone() } else { format!("{count}-{own}") };
+            let name = (1..).map(with).find(|name| !names.contains(name)).unwrap_or(own.clone());
+            names.push(name);
+        }
+        let given = |path: &str| self.files.iter().position(|(file, _)| file == path).and_then(|at| names.get(at).cloned());
+        rename_files(&mut doc, &|path| given(path).unwrap_or_else(|| bare(path)));
+        rename_programs(&mut doc, &bare);
+        for node in node_tables(&mut doc) {
+            if let Some(Item::Value(value)) = node.get_mut("bag") {
+                rewrite(value, &bare);
+            }
+        }
+        let files = names.iter().zip(&self.files).map(|(name, (_, text))| (name.clone(), text.clone())).collect();
+        (doc.to_string(), files)
+    }
+}
+
+/// A path without its folders.
+fn bare(path: &str) -> String {
+    Path::new(path).file_name().map_or_else(|| path.to_string(), |name| name.to_string_lossy().into_owned())
 }
 
 /// Changes a string, or each string of a list, and leaves comments and spaces where they are.

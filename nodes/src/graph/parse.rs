@@ -32,6 +32,11 @@ pub enum Files<'a> {
 }
 
 impl Files<'_> {
+    /// Whether the bag holds a file of this name.
+    pub(super) fn holds(&self, name: &str) -> bool {
+        matches!(self, Files::Bag(files) if files.iter().any(|(file, _)| file == name))
+    }
+
     fn read(&self, path: &Path, seen: &mut Vec<(String, String)>) -> Result<String, FileError> {
         let name = path.display().to_string();
         let held = match self {
@@ -65,7 +70,7 @@ impl Graph {
 
     /// The same from text, such as a bag holds; `path` is where its relative paths start and what errors name.
     pub fn from_text(text: &str, path: &Path, changes: &Overrides, files: &Files) -> Result<Graph, FileError> {
-        let text = changes.apply(text, path)?;
+        let text = changes.apply(text, path, files)?;
         let mut top = Table::parse(text.as_str(), path.display().to_string())?;
         let title = top.string("title")?.unwrap_or_default();
         let rate_hz = top.need_number("rate_hz", Range::Positive)?;
@@ -95,6 +100,7 @@ impl Graph {
             stale_after_s,
             bag: None,
             overwrite: changes.overwrite,
+            record_origin: top.boolean("record_origin")?.unwrap_or(false),
             hosts: read_hosts(&mut top)?,
             nodes: Vec::new(),
             connections: Vec::new(),

@@ -1,8 +1,5 @@
 //! Forces as they were recorded: `recorded:file=impacts.csv,column=effort` in the place of an excitation.
 
-use super::overrides::absolute;
-use std::path::Path;
-
 const PREFIX: &str = "recorded:";
 
 /// Most samples that a recording may become.
@@ -58,11 +55,11 @@ impl Recorded {
         Some(Ok(recorded))
     }
 
-    /// A specification whose file is named absolutely; what is no recording stays as it is.
-    pub fn with_absolute_file(spec: &str, beside: &Path) -> String {
+    /// A specification whose file is named differently; what is no recording stays as it is.
+    pub fn with_file(spec: &str, change: &dyn Fn(&str) -> String) -> String {
         let Some(keys) = spec.strip_prefix(PREFIX) else { return spec.to_string() };
         let pairs = keys.split(',').map(|pair| match pair.split_once('=') {
-            Some((key, file)) if key.trim() == "file" => format!("file={}", absolute(beside, Path::new(file.trim())).display()),
+            Some((key, file)) if key.trim() == "file" => format!("file={}", change(file.trim())),
             _ => pair.trim().to_string(),
         });
         format!("{PREFIX}{}", pairs.collect::<Vec<_>>().join(","))
@@ -143,9 +140,9 @@ mod tests {
     }
 
     #[test]
-    fn the_file_lies_beside_the_graph() {
-        let spec = Recorded::with_absolute_file("recorded:file=../b.csv, column=f", Path::new("/x/y"));
-        assert_eq!(spec, "recorded:file=/x/b.csv,column=f");
-        assert_eq!(Recorded::with_absolute_file("steps:amplitude=1", Path::new("/x")), "steps:amplitude=1");
+    fn only_the_file_gets_another_name() {
+        let there = |name: &str| format!("/x/{name}");
+        assert_eq!(Recorded::with_file("recorded:file=b.csv, column=f", &there), "recorded:file=/x/b.csv,column=f");
+        assert_eq!(Recorded::with_file("steps:amplitude=1", &there), "steps:amplitude=1");
     }
 }

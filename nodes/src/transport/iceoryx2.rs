@@ -4,6 +4,7 @@
 use super::bell::{Spin, Tones};
 use super::board::Board;
 use super::{Location, MAX_LISTENERS, Publisher, Subscriber, Transport, TransportError, capacity, check_layout, wrong_kind};
+use crate::clock::now_ns;
 use backdrive_msgs::topic::{Kind, Topic};
 use backdrive_msgs::{Event, Gains, Margin, Message, Sample, Status};
 use iceoryx2::port::publisher::Publisher as IoxPublisher;
@@ -67,12 +68,13 @@ impl Iceoryx2 {
     }
 
     /// The service of a topic; made by whoever comes first, so all must ask for the same.
-    fn service<T: Payload>(&self, topic: &Topic, action: &'static str) -> Result<PubSub<ipc::Service, T, ()>, TransportError> {
+    fn service<T: Payload>(&self, topic: &Topic, action: &'static str) -> Result<PubSub<ipc::Service, T, SentNs>, TransportError> {
         let (depth, history) = capacity(topic.kind);
         let name = ServiceName::new(&topic.name).map_err(|e| open_error(topic, action, e))?;
         self.node
             .service_builder(&name)
             .publish_subscribe::<T>()
+            .user_header::<SentNs>()
             .enable_safe_overflow(true)
             .subscriber_max_buffer_size(depth)
             .history_size(history)
@@ -107,7 +109,8 @@ impl Iceoryx2 {
             self.board.listen(entry, self.bell, of_topic);
             tone = Some(of_topic);
         }
-        Ok(Box::new(Receiving { topic: topic.clone(), port, service, tones: Rc::clone(&self.tones), tone, awaited: wakes }))
+        let (topic, tones) = (topic.clone(), Rc::clone(&self.tones));
+        Ok(Box::new(Receiving { topic, port, service, tones, tone, awaited: wakes, arrived_ns: 0 }))
     }
 }
 
@@ -145,6 +148,9 @@ impl Transport for Iceoryx2 {
     }
 }
 
+/// Beside every message: when it was sent, CLOCK_MONOTONIC, ns. The receiver has it in its queue from then on, however late it looks.
+type SentNs = i64;
+
 /// What iceoryx2 carries as it is.
 trait Payload: ZeroCopySend + Debug + Copy + 'static {
     fn of(message: &Message) -> Option<&Self>;
@@ -170,8 +176,8 @@ payload!(Sample, Gains, Event, Status, Margin);
 
 struct Sending<T: Payload> {
     topic: Topic,
-    port: IoxPublisher<ipc::Service, T, ()>,
-    service: PubSub<ipc::Service, T, ()>,
+    port: IoxPublisher<ipc::Service, T, SentNs>,
+    service: PubSub<ipc::Service, T, SentNs>,
     board: Rc<Board>,
     entry: usize,
 }
@@ -179,7 +185,9 @@ struct Sending<T: Payload> {
 impl<T: Payload> Publisher for Sending<T> {
     fn send(&mut self, message: &Message) -> Result<(), TransportError> {
         let payload = T::of(message).ok_or_else(|| wrong_kind(&self.topic, message))?;
-        self.port.send_copy(*payload).map_err(|e| broken(&self.topic, e))?;
+        let mut sample = self.port.loan_uninit().map_err(|e| broken(&self.topic, e))?;
+        *sample.user_header_mut() = now_ns();
+        sample.write_payload(*payload).send().map_err(|e| broken(&self.topic, e))?;
         self.board.ring(self.entry);
         Ok(())
     }
@@ -193,12 +201,13 @@ impl<T: Payload> Publisher for Sending<T> {
 
 struct Receiving<T: Payload> {
     topic: Topic,
-    port: IoxSubscriber<ipc::Service, T, ()>,
-    service: PubSub<ipc::Service, T, ()>,
+    port: IoxSubscriber<ipc::Service, T, SentNs>,
+    service: PubSub<ipc::Service, T, SentNs>,
     tones: Rc<Tones>,
     /// If it wakes.
     tone: Option<u8>,
     awaited: bool,
+    arrived_ns: i64,
 }
 
 impl<T: Payload> Subscriber for Receiving<T> {
@@ -206,9 +215,14 @@ impl<T: Payload> Subscriber for Receiving<T> {
         let Some(sample) = self.port.receive().map_err(|e| broken(&self.topic, e))? else {
             return Ok(None);
         };
+        self.arrived_ns = *sample.user_header();
         let message = sample.payload().message();
         check_layout(&self.topic.name, &message)?;
         Ok(Some(message))
+    }
+
+    fn arrived_ns(&self) -> i64 {
+        self.arrived_ns
     }
 
     fn has_publisher(&self) -> bool {

@@ -2,6 +2,7 @@
 
 use super::bell::{Bell, Spin};
 use super::{Publisher, Subscriber, Transport, TransportError, capacity, check_layout, wrong_kind};
+use crate::clock::now_ns;
 use backdrive_msgs::Message;
 use backdrive_msgs::topic::Topic;
 use std::collections::{HashMap, VecDeque};
@@ -18,22 +19,29 @@ pub struct Hub {
 struct Channel {
     publishers: usize,
     queues: Vec<Arc<Queue>>,
-    history: VecDeque<Message>,
+    history: VecDeque<Sent>,
+}
+
+/// A message, and when it was sent: CLOCK_MONOTONIC, ns.
+#[derive(Clone, Copy)]
+struct Sent {
+    message: Message,
+    at_ns: i64,
 }
 
 struct Queue {
-    messages: Mutex<VecDeque<Message>>,
+    messages: Mutex<VecDeque<Sent>>,
     depth: usize,
     bell: Option<Arc<Bell>>,
 }
 
 impl Queue {
-    fn push(&self, message: Message) {
+    fn push(&self, sent: Sent) {
         let mut messages = lock(&self.messages);
         if messages.len() == self.depth {
             messages.pop_front();
         }
-        messages.push_back(message);
+        messages.push_back(sent);
     }
 }
 
@@ -76,7 +84,7 @@ impl Transport for Inproc {
         open.history.iter().for_each(|m| queue.push(*m));
         open.queues.push(Arc::clone(&queue));
         drop(open);
-        Ok(Box::new(Receiving { topic: topic.clone(), channel, queue }))
+        Ok(Box::new(Receiving { topic: topic.clone(), channel, queue, arrived_ns: 0 }))
     }
 
     fn wait(&mut self, timeout: Duration) -> Result<(), TransportError> {
@@ -96,15 +104,16 @@ impl Publisher for Sending {
             return Err(wrong_kind(&self.topic, message));
         }
         let mut channel = lock(&self.channel);
+        let sent = Sent { message: *message, at_ns: now_ns() };
         let history = capacity(self.topic.kind).1;
         if history > 0 {
             if channel.history.len() == history {
                 channel.history.pop_front();
             }
-            channel.history.push_back(*message);
+            channel.history.push_back(sent);
         }
         for queue in &channel.queues {
-            queue.push(*message);
+            queue.push(sent);
             if let Some(bell) = &queue.bell {
                 bell.ring(0);
             }
@@ -132,15 +141,21 @@ struct Receiving {
     topic: Topic,
     channel: Arc<Mutex<Channel>>,
     queue: Arc<Queue>,
+    arrived_ns: i64,
 }
 
 impl Subscriber for Receiving {
     fn receive(&mut self) -> Result<Option<Message>, TransportError> {
-        let Some(message) = lock(&self.queue.messages).pop_front() else {
+        let Some(Sent { message, at_ns }) = lock(&self.queue.messages).pop_front() else {
             return Ok(None);
         };
+        self.arrived_ns = at_ns;
         check_layout(&self.topic.name, &message)?;
         Ok(Some(message))
+    }
+
+    fn arrived_ns(&self) -> i64 {
+        self.arrived_ns
     }
 
     fn has_publisher(&self) -> bool {

@@ -121,6 +121,12 @@ pub trait Subscriber {
     /// The oldest message not yet received, if there is one. A message of another layout is an error.
     fn receive(&mut self) -> Result<Option<Message>, TransportError>;
 
+    /// When the message that [`Subscriber::receive`] gave last came here, CLOCK_MONOTONIC, ns; 0 before the first.
+    ///
+    /// Between processes and threads of one machine that is when its publisher put it into the receiver's queue: nothing is on its
+    /// way in between, and it does not depend on when the receiver looks. From another host it is when the middleware took it in.
+    fn arrived_ns(&self) -> i64;
+
     /// Whether the topic has its publisher now.
     fn has_publisher(&self) -> bool;
 

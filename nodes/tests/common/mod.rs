@@ -125,7 +125,7 @@ pub fn recorder_plan() -> RecorderPlan {
         topics.extend([plan.events, plan.status]);
         topics.extend(plan.gains_out);
     }
-    RecorderPlan { name: "recorder".into(), topics, credit: Some((topic(CREDIT), 1)) }
+    RecorderPlan { name: "recorder".into(), topics, credit: Some((topic(CREDIT), 1)), by_wall_clock: false }
 }
 
 /// How many listeners each topic has, the recorder included where there is one.

@@ -3,11 +3,12 @@
 use super::Shared;
 use super::participant::Reader;
 use super::raw::Reads;
+use crate::clock::now_ns;
 use crate::transport::{Subscriber, TransportError, capacity, check_layout};
 use backdrive_msgs::Message;
 use backdrive_msgs::topic::{Kind, Topic};
 use rustdds::dds::ReadError;
-use rustdds::{DataReaderStatus, GUID, StatusEvented};
+use rustdds::{DataReaderStatus, GUID, StatusEvented, Timestamp};
 use std::collections::VecDeque;
 use std::rc::Rc;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
@@ -57,7 +58,8 @@ pub(super) struct Inbox {
     life: u32,
     matched: usize,
     speaker: Option<Speaker>,
-    queue: VecDeque<Result<Message, TransportError>>,
+    /// With when each was taken in: CLOCK_MONOTONIC, ns.
+    queue: VecDeque<(Result<Message, TransportError>, i64)>,
     late: u64,
     strangers: u64,
     complained: Option<Instant>,
@@ -67,6 +69,7 @@ pub(super) struct Receiving {
     shared: Rc<Shared>,
     wakes: bool,
     inbox: Arc<Mutex<Inbox>>,
+    arrived_ns: i64,
 }
 
 /// The inboxes of a node.
@@ -74,6 +77,9 @@ pub(super) type Inboxes = Mutex<Vec<Weak<Mutex<Inbox>>>>;
 
 /// How often what has arrived is taken over where nobody asks: what is unread when its reliable writer ends is gone with it.
 const TAKE_OVER_EVERY: Duration = Duration::from_millis(2);
+
+/// Nothing lies in the middleware for so long; an age beyond it says that the wall clock was set, ns.
+const LONGEST_AGE_NS: i64 = 10_000_000_000;
 
 fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
@@ -121,7 +127,7 @@ impl Receiving {
         let mut all = locked(&shared.inboxes);
         all.retain(|other| other.strong_count() > 0);
         all.push(Arc::downgrade(&inbox));
-        Ok(Receiving { shared: Rc::clone(shared), wakes, inbox })
+        Ok(Receiving { shared: Rc::clone(shared), wakes, inbox, arrived_ns: 0 })
     }
 
     /// Has a reader of the participant that the node has now.
@@ -141,6 +147,13 @@ pub(super) fn drain(inboxes: &Inboxes) {
     now.iter().for_each(|inbox| locked(inbox).drain());
 }
 
+/// When the middleware took something in, in CLOCK_MONOTONIC, ns. It says so by the wall clock, which may have been set since: then now is
+/// the best that is known.
+fn taken_in_ns(at: Timestamp) -> i64 {
+    let age_ns = Timestamp::now().duration_since(at).to_nanoseconds();
+    now_ns() - if (0..LONGEST_AGE_NS).contains(&age_ns) { age_ns } else { 0 }
+}
+
 impl Inbox {
     /// Takes over what has arrived, and asks to be woken for what comes next.
     fn drain(&mut self) {
@@ -149,9 +162,11 @@ impl Inbox {
             self.reader.set_waker(Some(self.waker.clone()));
         }
         loop {
+            let mut arrived_ns = now_ns();
             let entry = match self.reader.try_take_one_with(Reads(self.topic.kind)) {
                 Ok(None) => return,
                 Ok(Some(change)) => {
+                    arrived_ns = taken_in_ns(change.receive_instant);
                     let guid = change.writer_guid();
                     let message = change.into_value();
                     if !self.admits(guid, &message) {
@@ -165,7 +180,7 @@ impl Inbox {
             if self.queue.len() == self.depth {
                 self.queue.pop_front();
             }
-            self.queue.push_back(entry);
+            self.queue.push_back((entry, arrived_ns));
         }
     }
 
@@ -237,7 +252,14 @@ impl Subscriber for Receiving {
                 return Err(complaint);
             }
         }
-        inbox.queue.pop_front().transpose()
+        let Some((entry, arrived_ns)) = inbox.queue.pop_front() else { return Ok(None) };
+        drop(inbox);
+        self.arrived_ns = arrived_ns;
+        entry.map(Some)
+    }
+
+    fn arrived_ns(&self) -> i64 {
+        self.arrived_ns
     }
 
     fn has_publisher(&self) -> bool {
