@@ -334,3 +334,15 @@ fn every_concealed_set_reads() {
         }
     }
 }
+
+#[test]
+fn times_that_are_even_but_for_their_rounding_stay_as_they_are_written() {
+    let model = Model::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("models/impulse-engine.toml")).unwrap();
+    let recording = |t: &[f64]| Recording::new("r", t.to_vec(), vec![("feedback_force".to_string(), vec![0.0; t.len()])]).unwrap();
+    let written: Vec<f64> = (0..1000).map(|i| i as f64 / 1000.0).collect();
+    assert_eq!(recording(&written).regular_for(&model).unwrap().t, written);
+    // A logger's wandering clock is put onto an even grid.
+    let wandering: Vec<f64> = written.iter().enumerate().map(|(i, t)| t + 1e-4 * (i as f64).sin()).collect();
+    let even = recording(&wandering).regular_for(&model).unwrap().t;
+    assert!(even != wandering && even.windows(2).all(|w| (w[1] - w[0] - even[1] + even[0]).abs() < 1e-12));
+}

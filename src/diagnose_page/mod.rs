@@ -79,19 +79,24 @@ fn to_do(found: &Found) -> Vec<(String, Option<String>)> {
     let json = &found.said.json;
     let held = &json["held_out"];
     let mut items = Vec::new();
-    let use_it = Some(format!("backdrive run launch/contact.toml --canceller {MODEL}"));
+    // A canceller takes the model of a master: one that says where it is held, pushed and read.
+    let is_master = !found.problem.model.axes.is_empty();
+    let use_it = Some(match is_master {
+        true => format!("backdrive run launch/contact.toml --canceller {MODEL}"),
+        false => format!("backdrive simulate {MODEL} RECORDING.csv --out predicted.csv"),
+    });
+    let place = if is_master { ", such as in the canceller" } else { ", such as in a feed-forward or a simulation" };
     let (before, after) = (held["nrmse_before"].as_f64().unwrap_or(f64::NAN), held["nrmse_after"].as_f64().unwrap_or(f64::NAN));
     let worth = format!("its error is {} of what was measured, that of the model as given {}", percent(after), percent(before));
     match json["verdict"].as_str() {
         Some("missing" | "parameters") => {
-            items.push((
-                format!("Use {MODEL}, beside this page, where the motion is predicted, such as in the canceller: {worth}."),
-                use_it,
-            ));
-            items.push((
-                "See what it is worth in the loop: ask for the edge with it, in a bag of your contact task.".to_string(),
-                Some(format!("backdrive stability RUN.mcap --canceller {MODEL} --html stability.html")),
-            ));
+            items.push((format!("Use {MODEL}, beside this page, where the motion is predicted{place}: {worth}."), use_it));
+            if is_master {
+                items.push((
+                    "See what it is worth in the loop: ask for the edge with it, in a bag of your contact task.".to_string(),
+                    Some(format!("backdrive stability RUN.mcap --canceller {MODEL} --html stability.html")),
+                ));
+            }
         }
         Some("ambiguous") => items.push((
             format!("{MODEL}, beside this page, may be used ({worth}), but hold what is built on it against the rivals below too."),

@@ -364,23 +364,41 @@ fn judge(axis: &mut AxisEnergy, beyond_j: Option<f64>, touched: bool) {
         (_, Some(hold), _) if gives(&hold) => {
             let all: f64 = axis.elements.iter().filter_map(|e| e.hold_w).sum();
             let taken = if all > 0.0 {
-                format!(" (by the model its elements take {all:.3e} W there, dry friction and hysteresis {friction:.3e} W of it)")
+                format!(
+                    " (by the model its elements take {} there, dry friction and hysteresis {} of it)",
+                    in_unit(all, "W"),
+                    in_unit(friction, "W")
+                )
             } else {
                 String::new()
             };
             let power = -hold.mean_w;
-            (EnergyVerdict::Active, format!("the displayed environment gives {power:.3e} W while the hand holds still{taken}; {MAY_REST}"))
+            (
+                EnergyVerdict::Active,
+                format!("the displayed environment gives {} while the hand holds still{taken}; {MAY_REST}", in_unit(power, "W")),
+            )
         }
         (_, Some(_), None) => {
             let reason = "the displayed environment never gave more than it took, and gives nothing while the hand holds still";
             (EnergyVerdict::Passive, reason.to_owned())
         }
         (_, hold, beyond) => {
-            let gave = beyond.map_or("never gave more than it took".to_owned(), |j| format!("at times gave {j:.3e} J more than it took"));
+            let gave = beyond
+                .map_or("never gave more than it took".to_owned(), |j| format!("at times gave {} more than it took", in_unit(j, "J")));
             let held = if hold.is_some() { "gives none while the hand holds still" } else { "the hand never held still in contact" };
             (EnergyVerdict::CannotTell, format!("the displayed environment {gave}, but {held}; {MAY_REST}"))
         }
     };
+}
+
+/// A power or an energy with three digits and the prefix that suits it.
+fn in_unit(value: f64, unit: &str) -> String {
+    let (factor, prefix) = match value.abs() {
+        x if x >= 1.0 => (1.0, ""),
+        x if x >= 1e-3 => (1e3, "m"),
+        _ => (1e6, "µ"),
+    };
+    format!("{:.3} {prefix}{unit}", factor * value)
 }
 
 fn misfit(model: &[f64], measured: &[f64]) -> Option<f64> {

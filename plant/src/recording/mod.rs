@@ -218,10 +218,13 @@ impl Recording {
 
     /// The recording on a regular grid of its own.
     ///
-    /// Where no sample is missing and none is half a period from its place, samples keep their values and only
-    /// the times are made even. Otherwise the grid has the median step, inputs of the model run between their
+    /// Times that are even but for their rounding stay as they are written. Where no sample is missing and none is half a period from its place, samples keep
+    /// their values and only the times are made even. Otherwise the grid has the median step, inputs of the model run between their
     /// samples as their hold says, and all else runs linearly.
     pub fn regular_for(&self, model: &Model) -> Result<Recording, RecordingError> {
+        if self.is_regular(ROUNDED) {
+            return Ok(self.clone());
+        }
         if self.is_regular(0.5) {
             let t = (0..self.len()).map(|i| self.t[0] + i as f64 * self.period).collect();
             return Recording::new(self.name.clone(), t, self.signals.clone());
@@ -231,6 +234,9 @@ impl Recording {
         })
     }
 }
+
+/// Periods by which the rounding of written times may put a sample off its place.
+const ROUNDED: f64 = 1e-6;
 
 fn median_step(t: &[f64], otherwise: f64) -> f64 {
     let mut steps: Vec<f64> = t.windows(2).map(|w| w[1] - w[0]).collect();
