@@ -1,7 +1,9 @@
 //! The end of a search: the best made simpler and brought to their ends, and held against recordings that no fit has seen.
 
 use super::nominal::{Nominal, to_its_end};
+use super::trials::BLUR;
 use super::{Candidate, MIDDLE, Time, candidate, done, key_of, sort};
+use crate::clock::Moment;
 use crate::compare::unseen;
 use crate::fit::{Effort, Evaluator, Fit};
 use crate::race::Course;
@@ -12,6 +14,8 @@ use rayon::prelude::*;
 const SIMPLER: usize = 3;
 /// The last steps of those that could still win.
 const POLISH: Effort = Effort { steps: 15, tolerance: 0.3 };
+/// Share of the time in which fits that too few substeps have blurred go on.
+const REFITTED: f64 = 0.1;
 /// Structures of so many effects that are held against recordings that no fit has seen.
 const FINALISTS: usize = 8;
 
@@ -34,15 +38,27 @@ pub(super) fn make_simpler(course: &Course, found: &mut Vec<Candidate>, time: &T
     }
 }
 
-/// Brings those that could still win, or tie with the best, to their ends.
+/// Brings those that could still win, or tie with the best, to their ends. Far from the noise a fit may have ended at parameters that make up for
+/// what few substeps err by: it is judged, and goes on, with as many as the model asks for, even where the time is up.
 pub(super) fn bring_to_their_ends(evaluator: &Evaluator, found: &mut [Candidate], samples: usize, time: &Time) {
     let last = Evaluator { until: Some(time.at(0.95)), ..evaluator.clone() };
+    let exact = Evaluator { until: Some(time.at(0.95).max(Moment::now() + time.share(REFITTED))), ..evaluator.clone() };
     let best = found.first().map_or(f64::INFINITY, |c| c.fit.cost);
     let unit = best / samples as f64;
     let open = |c: &Candidate| c.fit.foreseen > 0.5 * unit && c.fit.cost - 2.0 * c.fit.foreseen < best + 20.0 * unit * c.correlation_time;
-    let ends: Vec<usize> = (0..found.len().min(6)).filter(|i| found[*i].fit.cost < 1.5 * best && open(&found[*i])).collect();
-    let polished: Vec<(usize, Fit)> =
-        ends.par_iter().filter_map(|i| Some((*i, last.fit(&found[*i].structure, &found[*i].fit.values, POLISH)?))).collect();
+    let near: Vec<usize> = (0..found.len().min(6)).filter(|i| found[*i].fit.cost < 1.5 * best).collect();
+    let polish = |i: usize| -> Option<(usize, Fit)> {
+        let c = &found[i];
+        let cost = evaluator.residuals(&c.structure, &c.fit.values).map_or(f64::INFINITY, |r| evaluator.cost(&r));
+        let is_blurred = (cost - c.fit.cost).abs() > BLUR * c.fit.cost;
+        let by = match (is_blurred, open(c)) {
+            (true, _) => &exact,
+            (false, true) => &last,
+            (false, false) => return None,
+        };
+        Some((i, by.fit(&c.structure, &c.fit.values, POLISH)?))
+    };
+    let polished: Vec<(usize, Fit)> = near.par_iter().filter_map(|i| polish(*i)).collect();
     for (i, fit) in polished {
         found[i] = candidate(evaluator, found[i].structure.clone(), fit);
     }

@@ -14,7 +14,7 @@ const CHANCE: f64 = 25.0;
 /// Substeps per sample, at most, whatever the model asks for.
 const FINEST: usize = 64;
 /// Share of what is left over, in squares, that too few substeps may make up.
-const BLUR: f64 = 0.02;
+pub(super) const BLUR: f64 = 0.02;
 /// Share of the time for screening beside a structure that was found.
 const ANEW: f64 = 0.06;
 /// Times the cost of the best up to which a law leaves less than twice as much over.
