@@ -9,13 +9,13 @@ use crate::output;
 use crate::progress;
 use crate::recordings::{self, Opened};
 use backdrive_diagnosis::audit::{self, Remark};
-use backdrive_diagnosis::clock::{Moment, longest};
 use backdrive_diagnosis::evidence;
 use backdrive_diagnosis::locate::{self, Location, locate};
 use backdrive_diagnosis::per_record::{PerRecord, fit_each};
 use backdrive_diagnosis::problem::Problem;
 use backdrive_diagnosis::search::{Search, Settings, search};
 use backdrive_diagnosis::verdict::{EXPERIMENT_FILE, Verdict, rival_file, verdict};
+use backdrive_diagnosis::work::{Budget, Steps};
 use serde_json::{Value, json};
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -25,13 +25,8 @@ use std::time::{Duration, Instant};
 pub const MODEL: &str = "model.diagnosed.toml";
 /// Name of the report, where no other is asked for.
 pub const REPORT: &str = "report.html";
-/// How long each record is fitted by itself, at most.
-const PER_RECORD: Duration = Duration::from_secs(4);
-/// And at least, where the search has taken all of its time.
-const LEAST: Duration = Duration::from_millis(500);
-
-/// What comes after a search at most: its last fit, the next experiment, each record by itself, the force located.
-const AFTERWARDS: Duration = Duration::from_secs(6);
+/// Work in which each record is fitted by itself, at most.
+const PER_RECORD: Steps = 200_000_000;
 
 /// Everything that was found.
 pub struct Found {
@@ -62,8 +57,12 @@ pub fn diagnose(options: &cli::Diagnose) -> Result<u8, Failure> {
     for note in &opened.notes {
         output::note(format_args!("note: {note}"));
     }
-    let patience = Duration::from_secs_f64(options.patience);
-    let settings = Settings { without: options.without.clone(), effects: usize::from(options.effects), patience };
+    let settings = Settings {
+        without: options.without.clone(),
+        effects: usize::from(options.effects),
+        effort: options.effort,
+        patience: Duration::from_secs_f64(options.patience),
+    };
     let beside = options.out.join(REPORT);
     let report = (!options.no_report).then_some(options.html.as_deref().unwrap_or(&beside));
     let Diagnosed { found, written } = diagnose_into(opened, &settings, &options.out, report, &stop)?;
@@ -105,7 +104,7 @@ pub fn diagnose_into(
     // What cannot be written is told before the work, not after it.
     output::folder(out)?;
     report.map_or(Ok(()), output::writable)?;
-    let found = progress::at_most(longest(settings.patience + AFTERWARDS), |report| find(opened.problem, settings, stop, report))?;
+    let found = progress::about(settings.expected(), |report| find(opened.problem, settings, stop, report))?;
 
     let write = |name: &str, text: &str| output::file(&out.join(name), text);
     let json = serde_json::to_string_pretty(&found.said.json).map_err(Failure::input)?;
@@ -147,20 +146,17 @@ pub fn exit_code(verdict: &Value) -> u8 {
 
 /// Audit, search, verdict, and what shows it.
 fn find(problem: Problem, settings: &Settings, stop: &AtomicBool, report: &(dyn Fn(&str) + Sync)) -> Result<Found, Failure> {
-    let began = Moment::now();
+    let limit = settings.limit(Some(stop));
     report("looking at the recordings");
     let remarks = audit::audit(&problem);
-    let search = search(&problem, settings, Some(stop), report).map_err(Failure::input)?;
+    let search = search(&problem, settings, limit, report).map_err(Failure::input)?;
     report("deciding");
     let mut said = verdict(&problem, &search, MODEL).map_err(Failure::input)?;
     if said.json.get("audit").is_none_or(Value::is_null) {
         said.json["audit"] = audit::json(&remarks);
     }
     report("fitting each record by itself");
-    // A search that took all of its time leaves little for what only shows it.
-    let left = settings.patience.saturating_sub(began.elapsed()).clamp(LEAST, PER_RECORD);
-    let until = Moment::now() + left;
-    let per_record = fit_each(&problem, &search.nominal, &search.floor, Some(stop), Some(until));
+    let per_record = fit_each(&problem, &search.nominal, &search.floor, &Budget::new(PER_RECORD, limit));
     report("locating the missing force");
     let location = located(&problem, &search);
     if said.json["where"].is_object() && said.json["where"]["state"].is_null() {

@@ -64,8 +64,14 @@ pub fn text(found: &Found) -> String {
     if let Some(next) = next_experiment(&json["next_experiment"]) {
         line("next", next);
     }
-    if found.search.stopped {
-        line("note", "the search ended before everything was tried; --patience gives it longer".to_string());
+    if found.search.cut {
+        line(
+            "note",
+            "the search was cut off by the clock (--patience) or interrupted: on another machine it may come to another verdict"
+                .to_string(),
+        );
+    } else if found.search.exhausted {
+        line("note", "the search ended before everything was tried; --effort gives it more".to_string());
     }
     out.trim_end().to_string()
 }

@@ -7,7 +7,6 @@ use crate::interrupt;
 use crate::output;
 use crate::progress;
 use crate::recordings::{self, file_name};
-use backdrive_diagnosis::clock::{Moment, longest};
 use backdrive_diagnosis::compare::{Quality, predictions, qualities};
 use backdrive_diagnosis::hypothesis::PHYSICS;
 use backdrive_diagnosis::intervals::Spread;
@@ -16,20 +15,15 @@ use backdrive_diagnosis::per_record::{PerRecord, fit_each};
 use backdrive_diagnosis::problem::Problem;
 use backdrive_diagnosis::search::{Search, Settings, search};
 use backdrive_diagnosis::structure::{Number, Role, Structure};
+use backdrive_diagnosis::work::{Budget, Limit};
 use backdrive_report::{number, percent};
 use serde_json::json;
 use std::fmt::Write as _;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 /// Correlations from here on are named.
 const CORRELATED: f64 = 0.9;
-
-/// Computing time for a fit of what is determined, at least.
-const LEAST: Duration = Duration::from_secs(1);
-
-/// What comes beside the fits at most: the errors of the parameters, and how the models predict.
-const AFTERWARDS: Duration = Duration::from_secs(2);
 
 /// What a fit says.
 struct Fitted {
@@ -56,8 +50,11 @@ pub fn fit(options: &cli::Fit) -> Result<u8, Failure> {
     }
     let problem = opened.problem;
     let patience = Duration::from_secs_f64(options.patience);
-    let most = longest(patience + LEAST * ROUNDS as u32 + AFTERWARDS);
-    let fitted = progress::at_most(most, |report| fitted(&problem, patience, &stop, report))?;
+    let without: Vec<String> = PHYSICS.iter().map(|p| p.name.to_string()).collect();
+    // With every physics withheld a search is the refit of the nominal model alone.
+    let settings = Settings { without, effort: options.effort, patience, ..Settings::default() };
+    let limit = settings.limit(Some(&stop));
+    let fitted = progress::about(settings.expected(), |report| fitted(&problem, &settings, limit, report))?;
     if let Some(out) = &options.out {
         output::file(out, &fitted.model)?;
     }
@@ -95,17 +92,11 @@ pub fn fit(options: &cli::Fit) -> Result<u8, Failure> {
 /// How often parameters that the recordings do not determine are taken out and the rest is fitted again, at most.
 const ROUNDS: usize = 3;
 
-fn fitted(problem: &Problem, patience: Duration, stop: &AtomicBool, report: &(dyn Fn(&str) + Sync)) -> Result<Fitted, Failure> {
-    let until = Moment::now() + patience;
-    // With every physics withheld a search is the refit of the nominal model alone.
-    let without: Vec<String> = PHYSICS.iter().map(|p| p.name.to_string()).collect();
-    let refit = |problem: &Problem, patience: Duration| {
-        let settings = Settings { without: without.clone(), patience, ..Settings::default() };
-        search(problem, &settings, Some(stop), report).map_err(Failure::input)
-    };
-    let Search { mut nominal, floor, .. } = refit(problem, patience)?;
+fn fitted(problem: &Problem, settings: &Settings, limit: Limit, report: &(dyn Fn(&str) + Sync)) -> Result<Fitted, Failure> {
+    let refit = |problem: &Problem| search(problem, settings, limit, report).map_err(Failure::input);
+    let Search { mut nominal, floor, .. } = refit(problem)?;
     report("fitting each record by itself");
-    let per_record = fit_each(problem, &nominal, &floor, Some(stop), Some(until));
+    let per_record = fit_each(problem, &nominal, &floor, &Budget::new(settings.work(), limit));
     let stated: Vec<f64> = problem.stated.iter().map(|s| s.given).collect();
     let given = quality(problem, &nominal.structure, &nominal.structure.values(problem, &stated, &[], &[]), &floor);
     // What the recordings do not determine keeps its nominal value, and the rest is fitted around it: written as fitted, such parameters
@@ -130,7 +121,7 @@ fn fitted(problem: &Problem, patience: Duration, stop: &AtomicBool, report: &(dy
         });
         kept.extend(loose.into_iter().map(|l| l.1));
         report("fitting what is determined");
-        nominal = refit(&free, until.since(Moment::now()).max(LEAST))?.nominal;
+        nominal = refit(&free)?.nominal;
         spread = Spread::of(&nominal);
     }
     let mut all: Vec<Row> = rows(&free, &nominal, &spread).into_iter().filter(|r| !kept.iter().any(|k| k.name == r.name)).collect();

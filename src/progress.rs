@@ -66,18 +66,17 @@ pub fn work() -> ProgressBar {
     bar
 }
 
-/// How long something has taken beside the limit that was told for it. A limit that was passed is not told beside a longer time: then one step
-/// of it, which is not ended halfway, is what takes so long.
+/// How long something has taken beside what it takes at most as a rule. That is not told beside a longer time.
 fn within(elapsed: Duration, limit: Duration) -> String {
     let s = elapsed.as_secs_f64();
     match elapsed <= limit {
-        true => format!("{s:.0} s, at most {:.0} s", limit.as_secs_f64()),
-        false => format!("{s:.0} s, ending with the step that it is in"),
+        true => format!("{s:.0} s, usually at most {:.0} s", limit.as_secs_f64()),
+        false => format!("{s:.0} s, longer than usual: a slow or busy machine"),
     }
 }
 
-/// A bar over the time that something may take at most, which moves by itself while `work` runs; `work` names its stages.
-pub fn at_most<T>(limit: std::time::Duration, work: impl FnOnce(&(dyn Fn(&str) + Sync)) -> T) -> T {
+/// A bar over the time that something takes at most as a rule, which moves by itself while `work` runs; `work` names its stages.
+pub fn about<T>(limit: std::time::Duration, work: impl FnOnce(&(dyn Fn(&str) + Sync)) -> T) -> T {
     let bar = ProgressBar::new(limit.as_millis().max(1) as u64);
     let style = ProgressStyle::with_template("{msg:32!} {wide_bar} {elapsed_of}");
     if let Ok(style) = style {
@@ -110,7 +109,7 @@ mod tests {
     #[test]
     fn a_limit_is_never_told_beside_a_longer_time() {
         let at = |s: f64| within(Duration::from_secs_f64(s), Duration::from_secs(24));
-        assert_eq!(at(3.2), "3 s, at most 24 s");
-        assert_eq!(at(31.7), "32 s, ending with the step that it is in");
+        assert_eq!(at(3.2), "3 s, usually at most 24 s");
+        assert_eq!(at(31.7), "32 s, longer than usual: a slow or busy machine");
     }
 }

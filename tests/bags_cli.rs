@@ -131,7 +131,7 @@ fn what_simulate_writes_goes_through_a_bag_and_back_exactly() {
     };
     assert_eq!(of("one.csv", "p.csv"), of("one.mcap", "q.csv"));
     let fitted = |set: [&str; 2]| {
-        let done = place.run_for(&["fit", &model, set[0], set[1], "--grip", &grip, "--patience", "20", "--json"], PATIENCE);
+        let done = place.run_for(&["fit", &model, set[0], set[1], "--grip", &grip, "--effort", "0.5", "--json"], PATIENCE);
         assert!([Some(0), Some(1)].contains(&done.code), "{done:?}");
         done.json()["numbers"].clone()
     };

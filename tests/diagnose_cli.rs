@@ -89,7 +89,7 @@ fn read(place: &Place, name: &str) -> String {
 fn friction_that_was_left_out_is_named_and_written() {
     let place = Place::new();
     record(&place, &format!("{NOMINAL}{FRICTION}"));
-    let done = place.backdrive(&["diagnose", ".", "--out", "out", "--patience", "60"]);
+    let done = place.backdrive(&["diagnose", ".", "--out", "out", "--effort", "2"]);
     assert_eq!(done.code, Some(1), "{done:?}");
     let verdict: serde_json::Value = serde_json::from_str(&read(&place, "out/verdict.json")).unwrap();
     assert_eq!(verdict["verdict"], "missing", "{verdict:#}");
@@ -130,7 +130,7 @@ fn friction_that_was_left_out_is_named_and_written() {
     assert!(seconds > 0.0);
 
     // Withheld, it is not named.
-    let done = place.backdrive(&["diagnose", ".", "--out", "less", "--without", "coulomb", "--patience", "10", "--no-report", "--json"]);
+    let done = place.backdrive(&["diagnose", ".", "--out", "less", "--without", "coulomb", "--effort", "0.4", "--no-report", "--json"]);
     let verdict = done.json();
     let named: Vec<&str> = verdict["findings"].as_array().unwrap().iter().filter_map(|f| f["physics"].as_str()).collect();
     assert!(!named.contains(&"coulomb") && !named.contains(&"stribeck"), "{verdict:#}");
@@ -199,7 +199,7 @@ rows = [310, 1900]
 rows = [155, 1900]
 ",
     );
-    let done = place.backdrive(&["diagnose", ".", "--out", "out", "--patience", "60", "--json"]);
+    let done = place.backdrive(&["diagnose", ".", "--out", "out", "--effort", "2", "--json"]);
     let verdict = done.json();
     assert_eq!(verdict["verdict"], "missing", "{verdict:#}");
     // Dry friction, by whichever law has Coulomb's as a limit: where the device already moves, presliding may have been anything.
@@ -225,7 +225,7 @@ rows = [155, 1900]
 fn interrupted_it_writes_what_it_has() {
     let place = Place::new();
     record(&place, &format!("{NOMINAL}{FRICTION}"));
-    let run = place.start(&["diagnose", ".", "--out", "out", "--patience", "600"]);
+    let run = place.start(&["diagnose", ".", "--out", "out", "--effort", "1000", "--patience", "600"]);
     std::thread::sleep(std::time::Duration::from_millis(300));
     system::kill(run.pid(), nix::sys::signal::Signal::SIGINT);
     let done = run.end();

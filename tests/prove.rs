@@ -47,7 +47,7 @@ fn a_sealed_effect_is_diagnosed_without_its_truth() {
         return;
     }
     let place = Place::new();
-    let ended = prove(&place, &["--seed", "13", "--operator", "hidden", "--nominal", "refitted", "--patience", "10", "--out", "proof"]);
+    let ended = prove(&place, &["--seed", "13", "--operator", "hidden", "--nominal", "refitted", "--effort", "0.4", "--out", "proof"]);
     assert!([Some(0), Some(1)].contains(&ended.code), "{ended:?}");
     let case = place.path("proof/case-001");
 
@@ -109,7 +109,7 @@ fn a_sealed_effect_is_diagnosed_without_its_truth() {
     let (session, out) = (case.join("session"), place.path("again"));
     let (session, out) = (session.display().to_string(), out.display().to_string());
     let again =
-        place.run_for(&["diagnose", &session, "--out", &out, "--patience", "10", "--no-report"], std::time::Duration::from_secs(300));
+        place.run_for(&["diagnose", &session, "--out", &out, "--effort", "0.4", "--no-report"], std::time::Duration::from_secs(300));
     assert!([Some(0), Some(1), Some(7)].contains(&again.code), "{again:?}");
     let read = |path: PathBuf| serde_json::from_str::<serde_json::Value>(&std::fs::read_to_string(path).unwrap()).unwrap();
     let verdict = read(place.path("again/verdict.json"));

@@ -13,11 +13,11 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let began = Instant::now();
     let problem = Problem::open(Path::new(set), after("--model").as_deref().map(Path::new))?;
     let settings = search::Settings { without: after("--without").into_iter().collect(), ..Default::default() };
-    let settings = match after("--patience").and_then(|p| p.parse().ok()) {
-        Some(seconds) => search::Settings { patience: std::time::Duration::from_secs_f64(seconds), ..settings },
+    let settings = match after("--effort").and_then(|p| p.parse().ok()) {
+        Some(effort) => search::Settings { effort, ..settings },
         None => settings,
     };
-    let found = search::search(&problem, &settings, None, &|what| {
+    let found = search::search(&problem, &settings, settings.limit(None), &|what| {
         if talk {
             eprintln!("{:.2} s {what}", began.elapsed().as_secs_f64());
         }
@@ -32,8 +32,13 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     if talk {
         let n = found.samples as f64;
         eprintln!(
-            "{} hypotheses, {} simulations; floor {:.3?}, as given {:.3?}",
-            found.hypotheses, found.simulations, found.floor, found.levels_given
+            "{} hypotheses, {} simulations, {:.0} million steps{}; floor {:.3?}, as given {:.3?}",
+            found.hypotheses,
+            found.simulations,
+            found.work as f64 / 1e6,
+            if found.exhausted { ", exhausted" } else { "" },
+            found.floor,
+            found.levels_given
         );
         let nominal = &found.nominal;
         eprintln!(

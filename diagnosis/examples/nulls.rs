@@ -5,6 +5,7 @@
 use backdrive_diagnosis::problem::{Problem, Record};
 use backdrive_diagnosis::search::{Settings, search};
 use backdrive_diagnosis::verdict::verdict;
+use backdrive_diagnosis::work::Limit;
 use backdrive_plant::model::{InputKind, Model};
 use backdrive_plant::recording::Recording;
 use backdrive_plant::set::Initial;
@@ -160,7 +161,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     for seed in first..first + count {
         let (name, problem) = draw(seed)?;
         let began = std::time::Instant::now();
-        let found = search(&problem, &Settings::default(), None, &|_| {})?;
+        let found = search(&problem, &Settings::default(), Limit::default(), &|_| {})?;
         let said = verdict(&problem, &found, "after.toml")?;
         let alarm = !matches!(said.json["verdict"].as_str(), Some("nothing_missing" | "parameters"));
         alarms += u32::from(alarm);

@@ -2,8 +2,10 @@
 
 use crate::fit::{Effort, Evaluator, measured};
 use crate::problem::{Problem, Record};
+use crate::simulate::FINEST;
 use crate::statistics::correlation_time;
-use crate::structure::Structure;
+use crate::structure::{Along, Structure};
+use crate::work::Budget;
 use serde::Serialize;
 
 /// Predictions of each output of the model in one record, in the output's unit, before rounding; `None` where it was not recorded.
@@ -36,8 +38,10 @@ impl Ready {
 /// fitted first, and nothing else. `None` where the structure cannot be simulated.
 pub fn predictions(problem: &Problem, records: &[Record], structure: &Structure, values: &[f64]) -> Option<Vec<Predicted>> {
     let Ready { fixed, own, values } = Ready::of(problem, records, structure, values)?;
+    let budget = Budget::default();
+    let along = Along { substeps: FINEST, guide: None, budget: &budget };
     let one = |(r, record): (usize, &Record)| {
-        let columns = own.predict(&fixed, &fixed.model, &values, record, r, 64)?;
+        let columns = own.predict(&fixed, &fixed.model, &values, (record, r), along)?;
         let mut of_outputs: Predicted = vec![None; record.outputs.len()];
         for (column, output) in columns.chunks_exact(record.len.max(1)).zip(measured(record)) {
             *of_outputs.get_mut(output)? = Some(column.to_vec());

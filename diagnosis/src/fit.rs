@@ -3,12 +3,12 @@
 use crate::guide::Guide;
 use crate::normal_equations::normal_equations;
 use crate::problem::{Problem, Record};
-use crate::structure::{Number, Role, Structure};
+use crate::simulate::FINEST;
+use crate::structure::{Along, Number, Role, Structure};
+use crate::work::{Budget, Steps};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 /// What a fit is held against: recordings, the size of each output's measuring error, and how large errors count.
 #[derive(Clone)]
@@ -21,12 +21,8 @@ pub struct Evaluator<'a> {
     pub floor: Vec<f64>,
     /// Residuals beyond this many floors count by their size, not their square; infinite for none.
     pub robust: f64,
-    /// Set from outside to end every fit after its present step.
-    pub stop: Option<&'a AtomicBool>,
-    /// When every fit ends after its present step.
-    pub until: Option<crate::clock::Moment>,
-    /// Simulations of a record so far.
-    pub simulations: Arc<AtomicUsize>,
+    /// Counts what is computed; every fit ends after its present step once it is used up.
+    pub budget: Budget<'a>,
     /// Substeps per sample, at most: fewer are faster, and blur what is very stiff.
     pub substeps: usize,
     /// What leads the simulations along the recordings; `None` for simulation errors.
@@ -83,10 +79,8 @@ impl<'a> Evaluator<'a> {
             records,
             floor: problem.floor.clone(),
             robust: f64::INFINITY,
-            stop: None,
-            until: None,
-            simulations: Arc::default(),
-            substeps: 64,
+            budget: Budget::default(),
+            substeps: FINEST,
             guide: None,
             stretch: 1.0,
             own_only: false,
@@ -120,9 +114,10 @@ impl<'a> Evaluator<'a> {
     /// Residuals of a structure, `None` where it cannot be simulated.
     pub fn residuals(&self, structure: &Structure, values: &[f64]) -> Option<Vec<f64>> {
         let model = structure.model(self.problem, values)?;
-        let parts: Option<Vec<Vec<f64>>> =
+        // All of them even where one fails, so that what is counted does not depend on which thread is first.
+        let parts: Vec<Option<Vec<f64>>> =
             (0..self.records.len()).into_par_iter().map(|r| self.record_residuals(structure, &model, values, r)).collect();
-        Some(parts?.concat())
+        Some(parts.into_iter().collect::<Option<Vec<Vec<f64>>>>()?.concat())
     }
 
     /// Residuals of one record.
@@ -134,8 +129,8 @@ impl<'a> Evaluator<'a> {
         r: usize,
     ) -> Option<Vec<f64>> {
         let record = self.records.get(r)?;
-        self.simulations.fetch_add(1, Ordering::Relaxed);
-        let mut columns = structure.predict_along(self.problem, model, values, (record, r), self.substeps, self.guide.as_ref())?;
+        let along = Along { substeps: self.substeps, guide: self.guide.as_ref(), budget: &self.budget };
+        let mut columns = structure.predict(self.problem, model, values, (record, r), along)?;
         for (column, output) in columns.chunks_exact_mut(record.len).zip(measured(record)) {
             let samples = record.outputs.get(output)?.as_deref()?;
             let (floor, lag) = (
@@ -204,7 +199,7 @@ impl<'a> Evaluator<'a> {
         let parts: Vec<Option<Vec<f64>>> = jobs
             .par_iter()
             .map(|(j, r)| {
-                if self.is_late() {
+                if self.budget.is_halted() {
                     return None;
                 }
                 let (values, model, step) = moved.get(*j)?.as_ref()?;
@@ -245,7 +240,7 @@ impl<'a> Evaluator<'a> {
             return Vec::new();
         };
         let one = |((unknown, r, _), ats): &(Set, Vec<usize>)| {
-            if self.is_late() {
+            if self.budget.is_halted() {
                 return None;
             }
             let (mut values, mut steps) = (outward(structure, own), Vec::new());
@@ -318,7 +313,8 @@ impl<'a> Evaluator<'a> {
                 everything.iter().copied().filter(|j| may_move(&numbers[*j], own[*j], slope[*j], matrix[(*j, *j)])).collect();
             foreseen = step_of(&matrix, &slope, &free, 1e-9).map_or(0.0, |step| free.iter().zip(&step).map(|(j, s)| -slope[*j] * s).sum());
             let unit = cost / residuals.len().max(1) as f64;
-            let ended = self.is_late() || steps >= effort.steps || weak >= 3;
+            self.budget.count(algebra(residuals.len(), own.len()));
+            let ended = self.budget.is_over() || steps >= effort.steps || weak >= 3;
             if ended {
                 break;
             }
@@ -412,9 +408,9 @@ impl<'a> Evaluator<'a> {
         structure.numbers.iter().map(|n| column(n).cloned().or_else(|| new.next()).unwrap_or_else(|| vec![0.0; residuals.len()])).collect()
     }
 
-    /// Whether fits should come to an end.
-    pub fn is_late(&self) -> bool {
-        self.stop.is_some_and(|s| s.load(Ordering::Relaxed)) || self.until.is_some_and(|t| crate::clock::Moment::now() > t)
+    /// The same, counted by another budget.
+    pub fn within(&self, budget: Budget<'a>) -> Evaluator<'a> {
+        Evaluator { budget, ..self.clone() }
     }
 
     /// The best of fits from several starts.
@@ -441,6 +437,11 @@ const APART: usize = 6;
 /// The values in the model of a fit's own.
 fn outward(structure: &Structure, own: &[f64]) -> Vec<f64> {
     structure.numbers.iter().zip(own).map(|(n, x)| n.outward(*x)).collect()
+}
+
+/// What the normal equations of a step take: about 200 products in the time of a step of a linear network.
+fn algebra(residuals: usize, numbers: usize) -> Steps {
+    (residuals * numbers * (numbers + 1) / 2 / 200) as Steps
 }
 
 /// Outputs that a record has.

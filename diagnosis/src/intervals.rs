@@ -1,13 +1,12 @@
 //! How sure the numbers of a fit are.
 
-use crate::clock::Moment;
 use crate::fit::Evaluator;
 use crate::normal_equations::normal_equations;
 use crate::search::Candidate;
 use crate::simulate::TWICE;
+use crate::work::{Budget, Limit, Steps};
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
-use std::time::Duration;
 
 /// Standard deviations of a fit's numbers, in the fit's own unit (logarithms where it steps in them), and their correlations. Residuals
 /// that hang together count as fewer, and what is left over counts as error.
@@ -27,8 +26,8 @@ const NORMAL_975: f64 = 1.959_964;
 const CHANCE: f64 = 1e-3;
 /// Blocks that each recording's output is divided into, where the scores of a fit are summed.
 const BLOCKS: usize = 25;
-/// What a simulation of all recordings may take before it counts as slow.
-const SLOW: Duration = Duration::from_millis(200);
+/// What a simulation of all recordings may compute before it counts as slow.
+const SLOW: Steps = 10_000_000;
 
 impl Spread {
     /// From the curvature where the fit ended.
@@ -58,10 +57,10 @@ impl Spread {
         let mut spread = Spread::of(candidate);
         let structure = &candidate.structure;
         let own: Vec<f64> = structure.numbers.iter().zip(&candidate.fit.values).map(|(n, v)| n.inward(*v)).collect();
-        let began = Moment::now();
-        let Some(residuals) = evaluator.residuals(structure, &candidate.fit.values) else { return spread };
+        let counted = evaluator.within(Budget::new(Steps::MAX, Limit::default()));
+        let Some(residuals) = counted.residuals(structure, &candidate.fit.values) else { return spread };
         // Where simulations are slow, derivatives come from fewer substeps, and finer ones are not tried.
-        let slow = began.elapsed() > SLOW;
+        let slow = counted.budget.spent() > SLOW;
         let coarser = Evaluator { substeps: if slow { 8 } else { evaluator.substeps }, ..evaluator.clone() };
         let Some(there) = (if slow { coarser.residuals(structure, &candidate.fit.values) } else { Some(residuals.clone()) }) else {
             return spread;

@@ -1,13 +1,11 @@
 //! The first part of a race, along the measured path: simulations are short there, fits go far in a step, and what is left over tells laws
 //! apart that a free simulation does not show until all else is right.
 
-use crate::clock::Moment;
 use crate::fit::{Effort, Evaluator, Fit};
 use crate::hypothesis::{Hypothesis, Parameter, Place};
 use crate::race::{Course, Seed, distinct_fits, hopeful, own_first};
 use crate::structure::Structure;
-use rayon::prelude::*;
-use std::time::Duration;
+use crate::work::{Budget, Steps};
 
 /// How many times the best cost ends a race.
 const BEHIND: f64 = 2.5;
@@ -19,8 +17,8 @@ const PLACES: usize = 2;
 const FORESEEN: f64 = 0.95;
 /// Structures that start from a free simulation beside those that were led.
 const FREE: usize = 2;
-/// Time in which every law at a place takes its first step; starts beyond the first of each come last.
-const LAWS: Duration = Duration::from_millis(2500);
+/// Work in which every law at a place takes its first step; starts beyond the first of each come last.
+const LAWS: Steps = 120_000_000;
 
 /// A structure and values to start from.
 pub type Entry = (Structure, Vec<Vec<f64>>);
@@ -67,21 +65,19 @@ impl Course<'_> {
     }
 
     /// One step of each, as far as there is time.
-    fn first_steps(&self, seeds: &[Seed], time: Option<Duration>) -> Vec<(Structure, Fit)> {
+    fn first_steps(&self, seeds: &[Seed], work: Option<Steps>) -> Vec<(Structure, Fit)> {
         let Some((held, base)) = self.along else { return Vec::new() };
-        let began = Moment::now();
-        let step = |seed: &Seed| {
-            if self.evaluator.is_late() || time.is_some_and(|t| began.elapsed() > t) {
-                return None;
-            }
+        let budget = &self.evaluator.budget;
+        let budget = work.map_or_else(|| budget.clone(), |work| budget.next(work));
+        let begun = budget.abreast(seeds, |budget, seed| {
+            let held = held.within(budget.clone());
             let (structure, starts) = self.entry(seed);
             let known = Some((&base.structure, &base.fit));
-            let start = own_first(held, known, &structure, starts.first()?.clone());
+            let start = own_first(&held, known, &structure, starts.first()?.clone());
             let fit = held.fit_knowing(&structure, &start, Effort { steps: 1, tolerance: 3.0 }, known)?;
             Some((structure, fit))
-        };
-        // In their order, two at a time.
-        seeds.par_iter().with_max_len(1).filter_map(step).collect()
+        });
+        begun.into_iter().flatten().flatten().collect()
     }
 
     /// More steps of fewer; in the end so many, best first.
@@ -89,11 +85,9 @@ impl Course<'_> {
         let Some((held, _)) = self.along else { return led };
         for (keep, steps) in [(3 * count, 1), (2 * count, 2), (count + 2, 3)] {
             rank(&mut led, keep);
-            led.par_iter_mut().filter(|_| !self.evaluator.is_late()).for_each(|(structure, fit)| {
-                let effort = Effort { steps, tolerance: 3.0 };
-                if let Some(next) = held.fit_knowing(structure, &fit.values, effort, Some((structure, fit))) {
-                    *fit = next;
-                }
+            let effort = Effort { steps, tolerance: 3.0 };
+            self.go_on(&mut led, |budget, structure, fit| {
+                held.within(budget).fit_knowing(structure, &fit.values, effort, Some((structure, fit)))
             });
         }
         rank(&mut led, count);
@@ -105,13 +99,20 @@ impl Course<'_> {
         let Some((held, _)) = self.along else { return led };
         let guide = held.guide.as_ref().map(|g| g.with(0.1 * g.strength));
         let held = Evaluator { guide, ..held.clone() };
-        led.par_iter_mut().filter(|_| !self.evaluator.is_late()).for_each(|(structure, fit)| {
-            if let Some(next) = held.fit(structure, &fit.values, Effort { steps: 3, tolerance: 3.0 }) {
-                *fit = next;
-            }
-        });
+        let effort = Effort { steps: 3, tolerance: 3.0 };
+        self.go_on(&mut led, |budget, structure, fit| held.within(budget).fit(structure, &fit.values, effort));
         rank(&mut led, count);
         led
+    }
+
+    /// Fits go on side by side; those that cannot stay as they are.
+    fn go_on<'b>(&'b self, fits: &mut [(Structure, Fit)], next: impl Fn(Budget<'b>, &Structure, &Fit) -> Option<Fit> + Sync) {
+        let nexts = self.evaluator.budget.abreast(fits, |budget, (structure, fit)| next(budget.clone(), structure, fit));
+        for ((_, fit), next) in fits.iter_mut().zip(nexts) {
+            if let Some(next) = next.flatten() {
+                *fit = next;
+            }
+        }
     }
 
     /// Every law at the place of each effect of a structure, the others as they are; first starts first.

@@ -8,7 +8,6 @@
 #![cfg_attr(not(test), warn(clippy::print_stdout, clippy::print_stderr))]
 
 pub mod audit;
-pub mod clock;
 pub mod compare;
 pub mod evidence;
 pub mod experiment;
@@ -33,3 +32,4 @@ pub mod structure;
 pub mod unknown;
 pub mod verdict;
 pub mod words;
+pub mod work;

@@ -6,7 +6,7 @@
 use crate::fit::{Evaluator, Fit, dot};
 use crate::guide::Guide;
 use crate::problem::Record;
-use crate::simulate::motion_at;
+use crate::simulate::{Conditions, motion_at};
 use crate::structure::Structure;
 use backdrive_plant::set::Initial;
 use rayon::prelude::*;
@@ -54,12 +54,23 @@ impl Parts {
         let cut = |(r, range): (usize, &Range<usize>)| {
             let begins = match range.start {
                 0 => Vec::new(),
-                at => motion_at(&model, &seen[r], (&[], &[]), evaluator.substeps, firm.as_ref().map(|g| (g, r)), at)?,
+                at => motion_at(
+                    &model,
+                    &seen[r],
+                    &Conditions {
+                        starts: &[],
+                        curves: &[],
+                        substeps: evaluator.substeps,
+                        guide: firm.as_ref().map(|g| (g, r)),
+                        budget: &evaluator.budget,
+                    },
+                    at,
+                )?,
             };
             let skip = if range.start == 0 { 0 } else { (FORGOTTEN * range.len() as f64) as usize };
             Some(records[r].part(range.clone(), begins, skip))
         };
-        let parts = ranges.par_iter().enumerate().map(cut).collect::<Option<Vec<Record>>>()?;
+        let parts = ranges.par_iter().enumerate().map(cut).collect::<Vec<_>>().into_iter().collect::<Option<Vec<Record>>>()?;
         let of: Vec<(usize, Range<usize>, f64)> = ranges.into_iter().enumerate().map(|(r, range)| (r, range, records[r].period)).collect();
         Some(Parts { records: parts, guide: evaluator.guide.as_ref().map(|g| g.of_parts(&of)) })
     }

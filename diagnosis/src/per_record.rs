@@ -1,17 +1,15 @@
 //! The same structure fitted to each record by itself: numbers that differ from record to record by more than their errors are the sign
 //! of a wrong structure, for a device has one set of numbers.
 
-use crate::clock::Moment;
 use crate::fit::{Effort, Evaluator};
 use crate::intervals::Spread;
 use crate::numbers::name_of;
 use crate::problem::{Problem, Record};
 use crate::search::{Candidate, candidate};
 use crate::structure::{Role, Structure};
-use rayon::prelude::*;
+use crate::work::Budget;
 use serde::Serialize;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
-use std::sync::atomic::AtomicBool;
 
 /// A number as one record alone has it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -54,25 +52,26 @@ const SURPRISE: f64 = 1e-3;
 const UNSURE: f64 = 0.5;
 
 /// Fits the structure of `joint` to each record by itself, from the joint values on. `floor` is the measuring error of each output, in
-/// its unit. Fits end early once `stop` is set or at `until`.
-pub fn fit_each(problem: &Problem, joint: &Candidate, floor: &[f64], stop: Option<&AtomicBool>, until: Option<Moment>) -> PerRecord {
+/// its unit. Fits end early once the budget is used up.
+pub fn fit_each<'a>(problem: &'a Problem, joint: &Candidate, floor: &[f64], budget: &Budget<'a>) -> PerRecord {
     let stated = joint.structure.stated_of(problem, &joint.fit.values);
     let added = joint.structure.added_of(&joint.fit.values);
     let own = joint.structure.of_records(&joint.fit.values);
-    let one = |(index, record): (usize, &Record)| -> Option<(String, Candidate, Spread)> {
-        let records = std::slice::from_ref(record);
+    let one = |budget: &Budget<'a>, (index, record): &(usize, &'a Record)| -> Option<(String, Candidate, Spread)> {
+        let records = std::slice::from_ref(*record);
         let mut evaluator = Evaluator::on(problem, records);
-        (evaluator.floor, evaluator.stop, evaluator.until) = (floor.to_vec(), stop, until);
+        (evaluator.floor, evaluator.budget) = (floor.to_vec(), budget.clone());
         let structure = Structure::new(problem, records, joint.structure.added.clone());
         let here: Vec<(Role, f64)> =
-            own.iter().filter(|(role, _)| role.in_record(index) == *role).map(|(role, value)| (role.in_record(0), *value)).collect();
+            own.iter().filter(|(role, _)| role.in_record(*index) == *role).map(|(role, value)| (role.in_record(0), *value)).collect();
         let start = structure.values(problem, &stated, &added, &here);
         let fit = evaluator.fit(&structure, &start, Effort { steps: 25, tolerance: 0.3 })?;
         let candidate = candidate(&evaluator, structure, fit);
         let spread = Spread::of(&candidate);
         Some((record.name.clone(), candidate, spread))
     };
-    let fits: Vec<_> = problem.fit.par_iter().enumerate().filter_map(one).collect();
+    let records: Vec<(usize, &'a Record)> = problem.fit.iter().enumerate().collect();
+    let fits: Vec<_> = budget.abreast(&records, one).into_iter().flatten().flatten().collect();
     let shared = joint.structure.numbers.iter().enumerate().filter(|(_, n)| matches!(n.role, Role::Stated(_) | Role::Added(..)));
     let numbers = shared.filter_map(|(index, number)| across(problem, joint, index, &number.role, &fits)).collect();
     PerRecord { records: fits.iter().map(|f| f.0.clone()).collect(), levels: fits.iter().map(|f| f.1.levels.clone()).collect(), numbers }

@@ -7,7 +7,6 @@ use crate::screen::worst_records;
 use crate::search::{Candidate, MIDDLE, candidate, key_of};
 use crate::structure::{Role, Structure};
 use backdrive_plant::set::Initial;
-use rayon::prelude::*;
 use std::collections::HashSet;
 
 /// A structure to be fitted: its hypotheses, where each starts, and the stated numbers to start from.
@@ -75,29 +74,24 @@ impl Course<'_> {
         let coarse = Evaluator { substeps: self.coarse, records: &some, widest: 1.0, ..evaluator.clone() };
         let nominal_there = if whole { self.nominal.fit.clone() } else { restricted(evaluator, &self.nominal.fit, &few) };
         let entries = self.entries(&seeds, keep[0] + 2);
-        let mut running: Vec<(Structure, Fit)> = entries
-            .into_par_iter()
-            .filter_map(|(structure, starts)| {
-                if evaluator.is_late() {
-                    return None;
-                }
-                // Along the path the numbers have moved far from where the nominal model's derivatives hold.
-                let known = if self.along.is_some() { None } else { Some((&self.nominal.structure, &nominal_there)) };
-                let effort = Effort { steps: 2, tolerance: 3.0 };
-                let starts = starts.into_iter().map(|start| {
-                    let problem = evaluator.problem;
-                    let numbers = (structure.stated_of(problem, &start), structure.added_of(&start));
-                    let anew =
-                        || structure.values(problem, &numbers.0, &numbers.1, &self.nominal.structure.of_records(&nominal_there.values));
-                    // Along the measured path, and on parts of recordings, next to nothing is known of an unknown curve.
-                    let start = if problem.unknown.is_empty() { start } else { anew() };
-                    own_first(&coarse, Some((&self.nominal.structure, &nominal_there)), &structure, start)
-                });
-                let fits = starts.filter_map(|start| coarse.fit_knowing(&structure, &start, effort, known));
-                let best = fits.min_by(|a, b| hopeful(a).total_cmp(&hopeful(b)))?;
-                Some((structure, best))
-            })
-            .collect();
+        let begun = evaluator.budget.abreast(&entries, |budget, (structure, starts)| {
+            let coarse = coarse.within(budget.clone());
+            // Along the path the numbers have moved far from where the nominal model's derivatives hold.
+            let known = if self.along.is_some() { None } else { Some((&self.nominal.structure, &nominal_there)) };
+            let effort = Effort { steps: 2, tolerance: 3.0 };
+            let starts = starts.iter().cloned().map(|start| {
+                let problem = evaluator.problem;
+                let numbers = (structure.stated_of(problem, &start), structure.added_of(&start));
+                let anew = || structure.values(problem, &numbers.0, &numbers.1, &self.nominal.structure.of_records(&nominal_there.values));
+                // Along the measured path, and on parts of recordings, next to nothing is known of an unknown curve.
+                let start = if problem.unknown.is_empty() { start } else { anew() };
+                own_first(&coarse, Some((&self.nominal.structure, &nominal_there)), structure, start)
+            });
+            let fits = starts.filter_map(|start| coarse.fit_knowing(structure, &start, effort, known));
+            let best = fits.min_by(|a, b| hopeful(a).total_cmp(&hopeful(b)))?;
+            Some((structure.clone(), best))
+        });
+        let mut running: Vec<(Structure, Fit)> = begun.into_iter().flatten().flatten().collect();
         let middle = Evaluator { substeps: MIDDLE.max(self.coarse), widest: 8.0, ..evaluator.clone() };
         let stages = [
             (if self.along.is_some() { 0 } else { keep[0] + 4 }, &coarse, Effort { steps: 3, tolerance: 2.0 }),
@@ -121,19 +115,20 @@ impl Course<'_> {
             let rest = if stage == 2 { running.split_off(count.min(running.len())) } else { Vec::new() };
             running.truncate(count);
             let lead = running.first().map_or(0.0, |(_, f)| hopeful(f));
-            running = running
-                .into_par_iter()
-                .map(|(structure, fit)| {
-                    // Beside one that leaves nothing over, others only have to show that they do no better; those far behind have.
-                    let beaten = stage == 2 && lead < 1.1 * floor && hopeful(&fit) > lead;
-                    if beaten && hopeful(&fit) > margin * lead {
-                        return (structure, fit);
-                    }
-                    let effort = if beaten { Effort { steps: 6, ..effort } } else { effort };
-                    let next = held_against.fit_knowing(&structure, &fit.values, effort, Some((&structure, &fit))).unwrap_or(fit);
-                    (structure, next)
-                })
-                .collect();
+            let next = evaluator.budget.abreast(&running, |budget, (structure, fit)| {
+                // Beside one that leaves nothing over, others only have to show that they do no better; those far behind have.
+                let beaten = stage == 2 && lead < 1.1 * floor && hopeful(fit) > lead;
+                if beaten && hopeful(fit) > margin * lead {
+                    return None;
+                }
+                let effort = if beaten { Effort { steps: 6, ..effort } } else { effort };
+                held_against.within(budget.clone()).fit_knowing(structure, &fit.values, effort, Some((structure, fit)))
+            });
+            for ((_, fit), next) in running.iter_mut().zip(next) {
+                if let Some(next) = next.flatten() {
+                    *fit = next;
+                }
+            }
             running.extend(rest);
         }
         let size = evaluator.len();

@@ -1,12 +1,11 @@
 //! Which hypotheses could explain what a fit leaves over: their effects, as residuals see them, held against it.
 
-use crate::clock::Moment;
 use crate::fit::{Evaluator, Fit, dot};
 use crate::hypothesis::Hypothesis;
 use crate::structure::Structure;
+use crate::work::Steps;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
-use std::time::Duration;
 
 /// What a hypothesis could explain.
 #[derive(Debug, Clone)]
@@ -101,13 +100,13 @@ const STARTS: usize = 70;
 
 impl Screen {
     /// Simulates every hypothesis beside a base: all starts on the two recordings that are explained worst, the best ones on all.
-    /// In about the time given: where that is short, fewer starts of each are tried.
-    pub fn new(evaluator: &Evaluator, base: &Structure, fit: &Fit, hypotheses: &[Hypothesis], time: Duration) -> Screen {
+    /// With about so much work: where that is little, fewer starts of each are tried.
+    pub fn new(evaluator: &Evaluator, base: &Structure, fit: &Fit, hypotheses: &[Hypothesis], work: Steps) -> Screen {
         let stride = fit.residuals.len().div_ceil(KEPT).max(1);
         let problem = evaluator.problem;
         let (stated, added, own) = (base.stated_of(problem, &fit.values), base.added_of(&fit.values), base.of_records(&fit.values));
         // What a simulation of a recording takes, by a sample of the hypotheses: nonlinear ones are slower than a linear base.
-        let began = Moment::now();
+        let before = evaluator.budget.spent();
         let sample: Vec<&Hypothesis> = hypotheses.iter().step_by((hypotheses.len() / 8).max(1)).collect();
         sample.par_iter().for_each(|h| {
             let structure = Structure::new(problem, evaluator.records, [base.added.clone(), vec![(*h).clone()]].concat());
@@ -117,9 +116,9 @@ impl Screen {
                 let _ = evaluator.record_residuals(&structure, &model, &values, 0);
             }
         });
-        let each = began.elapsed().as_secs_f64() / sample.len().max(1) as f64;
-        // Half of the time for either pass.
-        let affordable = (time.as_secs_f64() / each.max(1e-6)) as usize / 2;
+        let each = (evaluator.budget.spent() - before) / sample.len().max(1) as Steps;
+        // Half of the work for either pass.
+        let affordable = (work / each.max(1)) as usize / 2;
         let mut few = worst_records(evaluator, &fit.residuals, 2);
         let starts: usize = hypotheses.iter().map(|h| h.starts.len()).sum();
         if 2 * starts > affordable {
@@ -135,7 +134,6 @@ impl Screen {
         // First starts first: where simulations are slower than the sample, the last ones are left out.
         let rank = |(index, start): &(usize, &Vec<f64>)| hypotheses[*index].starts.iter().position(|s| std::ptr::eq(s, *start));
         jobs.sort_by_key(rank);
-        let first_pass = Moment::now();
         let most = (affordable / (2 * evaluator.records.len()).max(1)).clamp(24, STARTS);
         let with = |index: usize| {
             let mut with = base.added.clone();
@@ -155,22 +153,19 @@ impl Screen {
             let mut left = before.clone();
             small.apply(&mut left);
             let total = dot(&left, &left);
-            let mut scores: Vec<(f64, (usize, &Vec<f64>))> = jobs
-                .par_iter()
-                .filter_map(|(index, start)| {
-                    if first_pass.elapsed() > time.mul_f64(0.6) {
-                        return None;
-                    }
-                    let structure = with(*index);
-                    let values = structure.values(problem, &stated, &[added.clone(), vec![start.to_vec()]].concat(), &own);
-                    let model = structure.model(problem, &values)?;
-                    let parts: Option<Vec<Vec<f64>>> =
-                        few.iter().map(|r| evaluator.record_residuals(&structure, &model, &values, *r)).collect();
-                    let mut column = unit(parts?.concat().into_iter().step_by(stride).zip(&before).map(|(a, b)| a - b).collect())?;
-                    small.apply(&mut column);
-                    Some((share(&[&column], &left, total), (*index, *start)))
-                })
-                .collect();
+            let first_pass = evaluator.budget.next((work as f64 * 0.6) as Steps);
+            let scored = first_pass.abreast(&jobs, |budget, (index, start)| {
+                let evaluator = evaluator.within(budget.clone());
+                let structure = with(*index);
+                let values = structure.values(problem, &stated, &[added.clone(), vec![start.to_vec()]].concat(), &own);
+                let model = structure.model(problem, &values)?;
+                let parts: Option<Vec<Vec<f64>>> =
+                    few.iter().map(|r| evaluator.record_residuals(&structure, &model, &values, *r)).collect();
+                let mut column = unit(parts?.concat().into_iter().step_by(stride).zip(&before).map(|(a, b)| a - b).collect())?;
+                small.apply(&mut column);
+                Some((share(&[&column], &left, total), (*index, *start)))
+            });
+            let mut scores: Vec<(f64, (usize, &Vec<f64>))> = scored.into_iter().flatten().flatten().collect();
             scores.sort_by(|a, b| b.0.total_cmp(&a.0));
             let mut seen = vec![0; hypotheses.len()];
             scores.retain(|s| {
@@ -183,27 +178,22 @@ impl Screen {
             let room = most.saturating_sub(firsts.len());
             jobs = firsts.into_iter().take(most).chain(seconds.into_iter().take(room)).collect();
         }
-        let second_pass = Moment::now();
-        let effects = jobs
-            .par_iter()
-            .map(|(index, start)| {
-                let structure = with(*index);
-                let effect = |values: &Vec<f64>| -> Option<(Vec<f64>, f64)> {
-                    if evaluator.is_late() || second_pass.elapsed() > time {
-                        return None;
-                    }
-                    let all = [added.clone(), vec![values.clone()]].concat();
-                    let residuals = evaluator.residuals(&structure, &structure.values(problem, &stated, &all, &own))?;
-                    measured(residuals.iter().step_by(stride).zip(fit.residuals.iter().step_by(stride)).map(|(a, b)| a - b).collect())
-                };
-                let values = [start.to_vec(), weakened(&hypotheses[*index], start)];
-                let (full, weak) = (effect(&values[0]), effect(&values[1]));
-                // Every so manieth residual was kept.
-                let length = weak.as_ref().map_or(0.0, |w| w.1 * (stride as f64).sqrt());
-                Effect { hypothesis: *index, values, columns: [full.map(|e| e.0), weak.map(|e| e.0)], length }
-            })
-            .collect();
-        Screen { stride, effects }
+        let second_pass = evaluator.budget.next(work);
+        let effects = second_pass.abreast(&jobs, |budget, (index, start)| {
+            let evaluator = evaluator.within(budget.clone());
+            let structure = with(*index);
+            let effect = |values: &Vec<f64>| -> Option<(Vec<f64>, f64)> {
+                let all = [added.clone(), vec![values.clone()]].concat();
+                let residuals = evaluator.residuals(&structure, &structure.values(problem, &stated, &all, &own))?;
+                measured(residuals.iter().step_by(stride).zip(fit.residuals.iter().step_by(stride)).map(|(a, b)| a - b).collect())
+            };
+            let values = [start.to_vec(), weakened(&hypotheses[*index], start)];
+            let (full, weak) = (effect(&values[0]), effect(&values[1]));
+            // Every so manieth residual was kept.
+            let length = weak.as_ref().map_or(0.0, |w| w.1 * (stride as f64).sqrt());
+            Effect { hypothesis: *index, values, columns: [full.map(|e| e.0), weak.map(|e| e.0)], length }
+        });
+        Screen { stride, effects: effects.into_iter().flatten().collect() }
     }
 
     /// For each start (hypothesis, values of the weakened effect) the length of what its effect adds beyond all that the fit's numbers can do, floors.

@@ -2,9 +2,16 @@
 
 use crate::guide::Guide;
 use crate::problem::Record;
+use crate::work::{Budget, Steps};
 use backdrive_plant::model::Model;
 use backdrive_plant::set::Condition;
 use backdrive_plant::stepper::{Options, Plant, Segment, ahead, segments};
+
+/// What it takes to set a simulation up.
+const SETTING_UP: Steps = 200;
+
+/// Substeps per sample, at most, whatever the model asks for.
+pub const FINEST: usize = 64;
 
 /// As a number of substeps: twice as many as the model asks for.
 pub const TWICE: usize = usize::MAX;
@@ -12,27 +19,36 @@ pub const TWICE: usize = usize::MAX;
 /// A motion that a record starts with: body, position in m, velocity in m/s.
 pub type Start = (usize, f64, f64);
 
-/// Predictions of a record's measured outputs, one column after the other in the order of the model, `record.len` samples each.
-/// At most `substeps` per sample. `None` where the model cannot be simulated or its motion leaves all bounds.
-pub fn predict(model: &Model, record: &Record, starts: &[Start], substeps: usize) -> Option<Vec<f64>> {
-    predict_along(model, record, (starts, &[]), substeps, None)
-}
-
 /// An input and its samples, in the place of those of a record.
 pub type Curve = (usize, Vec<f64>);
 
-/// The same with inputs of its own, led by a guide: which, and the record's place in it.
-pub fn predict_along(
-    model: &Model,
-    record: &Record,
-    own: (&[Start], &[Curve]),
-    substeps: usize,
-    guide: Option<(&Guide, usize)>,
-) -> Option<Vec<f64>> {
+/// How a model is run on a record.
+#[derive(Clone, Copy)]
+pub struct Conditions<'r> {
+    /// Motions that bodies start with, beside those of the record.
+    pub starts: &'r [Start],
+    /// Inputs of its own.
+    pub curves: &'r [Curve],
+    /// Substeps per sample, at most; [`TWICE`] for twice as many as the model asks for.
+    pub substeps: usize,
+    /// A guide that couples the model to what was measured, and the record's place in it.
+    pub guide: Option<(&'r Guide, usize)>,
+    /// Counts the work.
+    pub budget: &'r Budget<'r>,
+}
+
+/// Predictions of a record's measured outputs, one column after the other in the order of the model, `record.len` samples each.
+/// At most `substeps` per sample. `None` where the model cannot be simulated or its motion leaves all bounds.
+pub fn predict(model: &Model, record: &Record, substeps: usize) -> Option<Vec<f64>> {
+    predict_under(model, record, &Conditions { starts: &[], curves: &[], substeps, guide: None, budget: &Budget::default() })
+}
+
+/// The same under other conditions.
+pub fn predict_under(model: &Model, record: &Record, conditions: &Conditions) -> Option<Vec<f64>> {
     let measured: Vec<usize> = (0..model.outputs.len()).filter(|o| record.outputs.get(*o).is_some_and(Option::is_some)).collect();
     let mut columns = vec![0.0; measured.len() * record.len];
     let mut values = vec![0.0; model.outputs.len()];
-    run(model, record, own, substeps, guide, record.len, &mut |plant, sample| {
+    run(model, record, conditions, record.len, &mut |plant, sample| {
         plant.outputs(&mut values);
         for (column, output) in measured.iter().enumerate() {
             columns[column * record.len + sample] = values[*output];
@@ -42,16 +58,9 @@ pub fn predict_along(
 }
 
 /// Position and velocity of each body at a sample of a record.
-pub fn motion_at(
-    model: &Model,
-    record: &Record,
-    own: (&[Start], &[Curve]),
-    substeps: usize,
-    guide: Option<(&Guide, usize)>,
-    at: usize,
-) -> Option<Vec<Start>> {
+pub fn motion_at(model: &Model, record: &Record, conditions: &Conditions, at: usize) -> Option<Vec<Start>> {
     let mut motion = Vec::new();
-    run(model, record, own, substeps, guide, at + 1, &mut |plant, sample| {
+    run(model, record, conditions, at + 1, &mut |plant, sample| {
         if sample == at {
             motion = (0..model.bodies.len()).map(|body| (body, plant.position(body), plant.velocity(body))).collect();
         }
@@ -60,15 +69,8 @@ pub fn motion_at(
 }
 
 /// Runs a model on the first samples of a record, and shows the plant at each.
-fn run(
-    model: &Model,
-    record: &Record,
-    (starts, curves): (&[Start], &[Curve]),
-    substeps: usize,
-    guide: Option<(&Guide, usize)>,
-    samples: usize,
-    show: &mut dyn FnMut(&mut Plant, usize),
-) -> Option<()> {
+fn run(model: &Model, record: &Record, conditions: &Conditions, samples: usize, show: &mut dyn FnMut(&mut Plant, usize)) -> Option<()> {
+    let Conditions { starts, curves, substeps, guide, budget } = *conditions;
     let conditioned;
     let model = if record.conditions.iter().any(|(_, c)| matches!(c, Condition::Value(_))) {
         let mut changed = model.clone();
@@ -110,6 +112,7 @@ fn run(
     if wanted != plant.substeps() {
         plant = Plant::new(model, record.period, &Options { substeps: Some(wanted), ..Options::default() }).ok()?;
     }
+    budget.simulated(SETTING_UP + samples.min(record.len) as u64 * plant.cost());
     let mut first: Vec<f64> = columns.iter().map(|samples| samples.first().copied().unwrap_or(0.0)).collect();
     first.extend(moved.iter().map(|path| path.first().map_or(0.0, |s| s.c[0])));
     plant.start_at(&first);

@@ -3,8 +3,9 @@
 use crate::guide::Guide;
 use crate::hypothesis::Hypothesis;
 use crate::problem::{Problem, Record, Stated};
-use crate::simulate::{Curve, Start, predict_along};
+use crate::simulate::{Conditions, Curve, Start, predict_under};
 use crate::unknown::Unknown;
+use crate::work::Budget;
 use backdrive_plant::model::Model;
 use backdrive_plant::set::{Condition, Initial};
 use backdrive_plant::stepper::segments;
@@ -83,6 +84,17 @@ impl Number {
     pub fn bounds(&self) -> (f64, f64) {
         if self.log { (self.range.0.max(f64::MIN_POSITIVE).ln(), self.range.1.ln()) } else { self.range }
     }
+}
+
+/// How a structure is simulated.
+#[derive(Clone, Copy)]
+pub struct Along<'r> {
+    /// Substeps per sample, at most.
+    pub substeps: usize,
+    /// A guide along the records, if it is to be coupled to what was measured.
+    pub guide: Option<&'r Guide>,
+    /// Counts the work.
+    pub budget: &'r Budget<'r>,
 }
 
 /// A nominal model with physics added.
@@ -223,28 +235,14 @@ impl Structure {
         Some(model)
     }
 
-    /// Predictions of one of `records`; see [`crate::simulate::predict`].
+    /// Predictions of one of the records that the structure was made for, where it stands among them; see [`crate::simulate::predict`].
     pub fn predict(
         &self,
         problem: &Problem,
         model: &Model,
         values: &[f64],
-        record: &Record,
-        index: usize,
-        substeps: usize,
-    ) -> Option<Vec<f64>> {
-        self.predict_along(problem, model, values, (record, index), substeps, None)
-    }
-
-    /// The same, led by a guide of these records.
-    pub fn predict_along(
-        &self,
-        problem: &Problem,
-        model: &Model,
-        values: &[f64],
         (record, index): (&Record, usize),
-        substeps: usize,
-        guide: Option<&Guide>,
+        along: Along,
     ) -> Option<Vec<f64>> {
         let mut starts: Vec<Start> = Vec::new();
         let mut changed: Option<Model> = None;
@@ -262,7 +260,9 @@ impl Structure {
         let curve =
             |(u, unknown): (usize, &Unknown)| (unknown.input, unknown.curve(&self.weights(values, u, index).collect::<Vec<_>>(), record));
         let curves: Vec<Curve> = problem.unknown.iter().enumerate().map(curve).collect();
-        predict_along(changed.as_ref().unwrap_or(model), record, (&starts, &curves), substeps, guide.map(|g| (g, index)))
+        let Along { substeps, guide, budget } = along;
+        let conditions = Conditions { starts: &starts, curves: &curves, substeps, guide: guide.map(|g| (g, index)), budget };
+        predict_under(changed.as_ref().unwrap_or(model), record, &conditions)
     }
 
     /// Records with the curves that values give the inputs which nobody measured.

@@ -7,6 +7,7 @@ use backdrive_diagnosis::problem::{Problem, Record};
 use backdrive_diagnosis::search::{Settings, search};
 use backdrive_diagnosis::structure::Structure;
 use backdrive_diagnosis::verdict::verdict;
+use backdrive_diagnosis::work::Limit;
 use backdrive_plant::model::Model;
 use backdrive_plant::recording::Recording;
 use backdrive_plant::set::{Condition, Initial};
@@ -112,7 +113,7 @@ fn refitted_numbers_lie_in_their_intervals() {
 #[test]
 fn a_force_limit_that_was_left_out_is_named() {
     let problem = recorded(&NOMINAL.replace("on = \"motor\"\n", "on = \"motor\"\nsaturation = 3.7\n"), 5);
-    let found = search(&problem, &Settings::default(), None, &|_| {}).unwrap();
+    let found = search(&problem, &Settings::default(), Limit::default(), &|_| {}).unwrap();
     let said = verdict(&problem, &found, "after.toml").unwrap();
     assert_eq!(said.json["verdict"], "missing", "{:#}", said.json);
     let [only] = said.json["findings"].as_array().unwrap().as_slice() else { panic!("{:#}", said.json) };
@@ -124,7 +125,7 @@ fn a_force_limit_that_was_left_out_is_named() {
 #[test]
 fn dry_friction_that_was_left_out_is_named() {
     let problem = recorded(&format!("{NOMINAL}{COULOMB}"), 2);
-    let found = search(&problem, &Settings::default(), None, &|_| {}).unwrap();
+    let found = search(&problem, &Settings::default(), Limit::default(), &|_| {}).unwrap();
     let said = verdict(&problem, &found, "after.toml").unwrap();
     assert_eq!(said.json["verdict"], "missing", "{:#}", said.json);
     assert_eq!(said.json["findings"][0]["physics"], "coulomb", "{:#}", said.json);
@@ -141,7 +142,7 @@ fn dry_friction_that_was_left_out_is_named() {
 fn two_effects_at_once_are_both_named() {
     let late = NOMINAL.replace("on = \"motor\"\n", "on = \"motor\"\ndelay = 0.004\n");
     let problem = recorded(&format!("{late}{COULOMB}"), 8);
-    let found = search(&problem, &Settings::default(), None, &|_| {}).unwrap();
+    let found = search(&problem, &Settings::default(), Limit::default(), &|_| {}).unwrap();
     let said = verdict(&problem, &found, "after.toml").unwrap();
     assert_eq!(said.json["verdict"], "missing", "{:#}", said.json);
     let findings = said.json["findings"].as_array().unwrap();
@@ -158,7 +159,7 @@ fn two_effects_at_once_are_both_named() {
 fn without_the_true_law_no_other_is_claimed_surely() {
     let problem = recorded(&format!("{NOMINAL}{COULOMB}"), 9);
     let settings = Settings { without: vec!["coulomb".to_string()], ..Settings::default() };
-    let found = search(&problem, &settings, None, &|_| {}).unwrap();
+    let found = search(&problem, &settings, Limit::default(), &|_| {}).unwrap();
     let said = verdict(&problem, &found, "after.toml").unwrap();
     let sure = said.json["findings"][0]["confidence"].as_f64().unwrap_or(0.0);
     let word = said.json["verdict"].as_str().unwrap();
@@ -169,7 +170,7 @@ fn without_the_true_law_no_other_is_claimed_surely() {
 #[test]
 fn wrong_numbers_alone_are_no_physics() {
     let problem = recorded(&NOMINAL.replace("900.0", "1300.0").replace("load = 0.4", "load = 0.33"), 3);
-    let found = search(&problem, &Settings::default(), None, &|_| {}).unwrap();
+    let found = search(&problem, &Settings::default(), Limit::default(), &|_| {}).unwrap();
     let said = verdict(&problem, &found, "after.toml").unwrap();
     assert_eq!(said.json["verdict"], "parameters", "{:#}", said.json);
 }
@@ -178,7 +179,7 @@ fn wrong_numbers_alone_are_no_physics() {
 fn a_right_model_lacks_nothing() {
     for seed in 4..7 {
         let problem = recorded(NOMINAL, seed);
-        let found = search(&problem, &Settings::default(), None, &|_| {}).unwrap();
+        let found = search(&problem, &Settings::default(), Limit::default(), &|_| {}).unwrap();
         let said = verdict(&problem, &found, "after.toml").unwrap();
         assert_eq!(said.json["verdict"], "nothing_missing", "{:#}", said.json);
     }
@@ -258,7 +259,7 @@ fn switched_on_again(condition: Option<Condition>) -> Problem {
 fn where_an_encoder_counts_from_is_a_number_of_its_session() {
     let verdict_of = |condition: Option<Condition>| {
         let problem = switched_on_again(condition);
-        let found = search(&problem, &Settings::default(), None, &|_| ()).unwrap();
+        let found = search(&problem, &Settings::default(), Limit::default(), &|_| ()).unwrap();
         verdict(&problem, &found, "found.toml").unwrap().json
     };
     // Where the set does not say so, the recordings that no fit has seen speak against a ripple.

@@ -39,7 +39,9 @@ pub fn page(shown: &Shown) -> Page {
     for remark in found.remarks.iter().filter(|r| r.weight > Weight::Note).take(4) {
         page.warning(&capital(&remark.to_string()));
     }
-    if found.search.stopped {
+    if found.search.cut {
+        page.warning("The search was cut off by the clock (--patience) or interrupted: on another machine it may come to another verdict.");
+    } else if found.search.exhausted {
         page.warning("The search ended before everything was tried.");
     }
     findings(&mut page, json);
@@ -116,8 +118,13 @@ fn to_do(found: &Found) -> Vec<(String, Option<String>)> {
     if let Some(remark) = found.remarks.iter().find(|r| r.weight > Weight::Note && !r.signal.is_empty()) {
         items.push((format!("Check this signal: {remark}"), None));
     }
-    if found.search.stopped {
-        items.push(("Give the search longer: the same command with a larger --patience.".to_string(), Some(command())));
+    if found.search.exhausted || found.search.cut {
+        let more = if found.search.cut {
+            "Let the search come to its end: the same command with a larger --patience."
+        } else {
+            "Let it search more: the same command with a larger --effort."
+        };
+        items.push((more.to_string(), Some(command())));
     }
     items
 }

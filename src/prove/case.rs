@@ -145,8 +145,11 @@ pub fn prove(options: &cli::Prove, folder: &Path, drawn: &Draw, stop: &AtomicBoo
     }
     let session = record(&nominal, "session")?;
     let found = folder.join("diagnosis");
-    let patience = (options.patience * if drawn.shows_hand { 1.0 } else { LONGER }).to_string();
-    busy(&at("diagnosing"), || ours(folder, "diagnose", &[&"diagnose", &session, &"--out", &found, &"--patience", &patience]))?;
+    let effort = (options.effort * if drawn.shows_hand { 1.0 } else { LONGER }).to_string();
+    let patience = options.patience.to_string();
+    busy(&at("diagnosing"), || {
+        ours(folder, "diagnose", &[&"diagnose", &session, &"--out", &found, &"--effort", &effort, &"--patience", &patience])
+    })?;
     let verdict: Value = serde_json::from_str(&read(&found.join("verdict.json"))?).map_err(Failure::input)?;
 
     let error = |key: &str| verdict["held_out"][key].as_f64();

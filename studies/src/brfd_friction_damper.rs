@@ -70,8 +70,8 @@ fn run(context: &Context) -> Result<Report, StudyError> {
             dead.extend(dead_zones(&x, &f));
         }
     }
-    let patience = if context.quick { 25.0 } else { 150.0 };
-    let ask = Ask { name: "", set: "set.toml", model: "model.toml", without: &[], effects: 3, patience };
+    let effort = if context.quick { 1.05 } else { 6.25 };
+    let ask = Ask { name: "", set: "set.toml", model: "model.toml", without: &[], effects: 3, effort };
     let found = diagnose(context, &ask)?;
     let json = &found.said.json;
     let model = diagnosed_model(context, &ask)?;
@@ -139,7 +139,7 @@ fn run(context: &Context) -> Result<Report, StudyError> {
 
 /// The play and the friction of each direction that are known to be there, fitted in the place of what was named.
 fn rival(report: &mut Report, context: &Context, dead_zone: f64) -> Result<(), StudyError> {
-    let ask = Ask { name: "play", set: "set.toml", model: "play.toml", without: &[], effects: 1, patience: 20.0 };
+    let ask = Ask { name: "play", set: "set.toml", model: "play.toml", without: &[], effects: 1, effort: 0.85 };
     let found = refit(context, &ask)?;
     let [gap, forward, backward] =
         ["elements.linkage.gap", "elements.band.positive", "elements.band.negative"].map(|path| refitted(&found, path));

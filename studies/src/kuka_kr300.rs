@@ -38,8 +38,8 @@ fn run(context: &Context) -> Result<Report, StudyError> {
         }
         let skew = skews.iter().sum::<f64>() / skews.len() as f64;
         let (name, set, model) = (format!("axis-{axis}"), format!("set-{axis}.toml"), format!("axis-{axis}.toml"));
-        let patience = if context.quick { 20.0 } else { 90.0 };
-        let found = diagnose(context, &Ask { name: &name, set: &set, model: &model, without: &[], effects: 3, patience })?;
+        let effort = if context.quick { 0.85 } else { 3.75 };
+        let found = diagnose(context, &Ask { name: &name, set: &set, model: &model, without: &[], effects: 3, effort })?;
         let json = &found.said.json;
         let named = findings(json);
         let verdict = said(json);

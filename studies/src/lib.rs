@@ -47,7 +47,7 @@ pub struct Context<'a> {
     pub out: &'a Path,
     /// Whether only the short part is wanted, less than half a minute on a machine that is free.
     pub quick: bool,
-    /// How many times longer than usual each search may last.
+    /// How many times more than usual each search may compute.
     pub longer: f64,
 }
 

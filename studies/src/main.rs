@@ -27,7 +27,7 @@ struct Options {
     /// Only the short part of each: less than half a minute on a machine that is free.
     #[arg(long)]
     quick: bool,
-    /// How many times longer than usual each search may last: for a machine that is busy or slow.
+    /// How many times more than usual each search may compute.
     #[arg(long, value_name = "FACTOR", default_value_t = 1.0, value_parser = factor)]
     longer: f64,
     /// Folder with a folder of recordings per device; BACKDRIVE_DATA comes before it, and without both it is ../shared/data beside the project.

@@ -65,7 +65,7 @@ fn run(context: &Context) -> Result<Report, StudyError> {
                 model: &model,
                 without: WITHOUT,
                 effects: 2,
-                patience: if context.quick { 15.0 } else { 30.0 },
+                effort: if context.quick { 0.6 } else { 1.25 },
             },
         )?;
         let json = &found.said.json;

@@ -24,8 +24,8 @@ const LAG: [&str; 3] = ["delay", "bandwidth", "damper"];
 fn run(context: &Context) -> Result<Report, StudyError> {
     let train = csv_columns::read_at_least(&context.data.join("model.csv"), &["u_V", "y_um"], 1000)?;
     let ramps = csv_columns::read_at_least(&context.data.join("test.csv"), &["u_V", "y_um"], 1000)?;
-    let patience = if context.quick { 25.0 } else { 150.0 };
-    let ask = Ask { name: "", set: "set.toml", model: "model.toml", without: &[], effects: 3, patience };
+    let effort = if context.quick { 1.05 } else { 6.25 };
+    let ask = Ask { name: "", set: "set.toml", model: "model.toml", without: &[], effects: 3, effort };
     let found = diagnose(context, &ask)?;
     let json = &found.said.json;
     let model = diagnosed_model(context, &ask)?;

@@ -9,7 +9,6 @@ use backdrive_plant::model::Model;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
-use std::time::Duration;
 use toml_edit::{Array, DocumentMut, Item};
 
 /// How a diagnosis is made.
@@ -25,8 +24,8 @@ pub struct Ask<'a> {
     pub without: &'a [&'a str],
     /// How many physics may be missing at once, at most.
     pub effects: usize,
-    /// How long to search, at most, s.
-    pub patience: f64,
+    /// How much the search may compute, as a multiple of what it does by default.
+    pub effort: f64,
 }
 
 /// Diagnoses a set of the study: verdict.json, report.html, model.diagnosed.toml, the nominal model and a set.toml that `backdrive diagnose`
@@ -50,7 +49,8 @@ pub fn diagnose(context: &Context, ask: &Ask) -> Result<Found, StudyError> {
     let settings = Settings {
         without: ask.without.iter().map(|s| s.to_string()).collect(),
         effects: ask.effects,
-        patience: Duration::from_secs_f64(ask.patience * context.longer),
+        effort: ask.effort * context.longer,
+        ..Settings::default()
     };
     let Diagnosed { found, .. } = diagnose_into(opened, &settings, &out, Some(&out.join(REPORT)), &AtomicBool::new(false))?;
     Ok(found)

@@ -45,7 +45,7 @@ fn run(context: &Context) -> Result<Report, StudyError> {
         csv_columns::write(&context.out.join(name), &["t", "u", "y"], &[&t, &u[rows.clone()], &y[rows]])?;
     }
     let ask =
-        Ask { name: "", set: "set.toml", model: "model.toml", without: &[], effects: 3, patience: if context.quick { 20.0 } else { 60.0 } };
+        Ask { name: "", set: "set.toml", model: "model.toml", without: &[], effects: 3, effort: if context.quick { 0.85 } else { 2.5 } };
     let found = diagnose(context, &ask)?;
     let json = &found.said.json;
     let model = diagnosed_model(context, &ask)?;

@@ -77,7 +77,7 @@ fn left_over(problem: &Problem, record: &Record, period: f64) -> Option<f64> {
     record.period = period;
     record.segments =
         problem.model.inputs.iter().zip(&record.inputs).map(|(input, samples)| segments(input.hold, samples, period)).collect();
-    let predicted = predict(&problem.model, &record, &[], 16)?;
+    let predicted = predict(&problem.model, &record, 16)?;
     let share = |(place, output): (usize, usize)| {
         let column = predicted.get(place * record.len..(place + 1) * record.len)?;
         let samples = record.outputs.get(output)?.as_deref()?;

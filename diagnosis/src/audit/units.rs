@@ -31,7 +31,7 @@ fn known(kind: &OutputKind, motion: Motion) -> &'static [(f64, &'static str)] {
 /// One remark for each output whose sign or unit looks wrong.
 pub(super) fn remarks(problem: &Problem) -> Vec<Remark> {
     let mut all = Vec::new();
-    let predicted: Vec<_> = problem.fit.iter().map(|r| predict(&problem.model, r, &[], 16)).collect();
+    let predicted: Vec<_> = problem.fit.iter().map(|r| predict(&problem.model, r, 16)).collect();
     for (index, output) in problem.model.outputs.iter().enumerate() {
         let mut of_records = Vec::new();
         for (record, predicted) in problem.fit.iter().zip(&predicted) {

@@ -15,11 +15,11 @@ mod sensor;
 mod tests;
 mod words;
 
-use crate::clock::Moment;
 use crate::fit::{Evaluator, Fit};
 use crate::problem::Problem;
 use crate::search::Candidate;
 use crate::structure::{Role, Structure};
+use crate::work::{Budget, Steps};
 use backdrive_plant::model::Model;
 use backdrive_plant::write::round_significant;
 use menu::{Stand, plays};
@@ -91,7 +91,7 @@ const SETTING_UP: f64 = 2.0;
 const REACH: f64 = 1.3;
 /// Standard deviation over the number itself from which on [`excite`] takes it as open.
 const KNOWN: f64 = 0.05;
-/// Share of the time for simulating everything, and for simulating and evaluating it.
+/// Share of the work for simulating everything, and for simulating and evaluating it.
 const SHARES: (f64, f64) = (0.4, 0.75);
 /// Substeps per sample for choosing, and for the figures of the best.
 const SUBSTEPS: (usize, usize) = (4, 16);
@@ -99,22 +99,27 @@ const SUBSTEPS: (usize, usize) = (4, 16);
 const FINALISTS: usize = 3;
 
 /// The excitation that tells fitted structures apart, the likeliest first. `floor` is the standard deviation of each output's
-/// measuring error; what is not done by `until` is left out.
+/// measuring error; what the budget does not suffice for is left out.
 ///
 /// # Errors
 /// Says why when no excitation would: fewer than two structures, none that can be simulated, or a difference too small; then also which sensor would help.
-pub fn separate(problem: &Problem, candidates: &[&Candidate], floor: &[f64], until: Moment) -> Result<Experiment, Reason> {
+pub fn separate<'a>(problem: &'a Problem, candidates: &[&Candidate], floor: &[f64], budget: &Budget<'a>) -> Result<Experiment, Reason> {
     let fitted: Vec<(&Structure, &Fit)> = candidates.iter().map(|c| (&c.structure, &c.fit)).collect();
-    separate_fitted(problem, &fitted, floor, until)
+    separate_fitted(problem, &fitted, floor, budget)
 }
 
-fn separate_fitted(problem: &Problem, fitted: &[(&Structure, &Fit)], floor: &[f64], until: Moment) -> Result<Experiment, Reason> {
+fn separate_fitted<'a>(
+    problem: &'a Problem,
+    fitted: &[(&Structure, &Fit)],
+    floor: &[f64],
+    budget: &Budget<'a>,
+) -> Result<Experiment, Reason> {
     let mut names = std::collections::HashSet::new();
     let others = fitted.iter().filter(|(structure, _)| names.insert(ids(structure)));
     let rivals: Vec<Rival> = others.take(MOST_RIVALS).map(|(structure, fit)| Rival::of(problem, structure, fit)).collect();
     let all: Vec<(usize, usize)> = (0..rivals.len()).flat_map(|b| (0..b).map(move |a| (a, b))).collect();
     let Some(first) = all.first() else { return Err(Reason("there is only one explanation".to_string())) };
-    let stage = Stage::new(problem, floor, until)?;
+    let stage = Stage::new(problem, floor, budget)?;
     let apart: Vec<(usize, usize)> = all.iter().copied().filter(|(a, b)| !same(rivals[*a].structure, rivals[*b].structure)).collect();
     let mut shows = stage.shows(&rivals);
     if shows.is_empty() {
@@ -136,7 +141,7 @@ fn separate_fitted(problem: &Problem, fitted: &[(&Structure, &Fit)], floor: &[f6
         let left = |p: &(usize, usize)| {
             let left = refitted(&fine, &rivals, trial, *p);
             // A refit that was cut short leaves too much.
-            (*p, if Moment::now() > until { left.min(e.of(*p)) } else { left })
+            (*p, if budget.is_over() { left.min(e.of(*p)) } else { left })
         };
         let worst = open.iter().map(left).min_by(|a, b| a.1.total_cmp(&b.1))?;
         Some((e.show, worst.0, worst.1))
@@ -153,24 +158,24 @@ fn separate_fitted(problem: &Problem, fitted: &[(&Structure, &Fit)], floor: &[f6
 }
 
 /// The excitation that determines numbers of a structure which the recordings do not: `numbers` are places among
-/// [`Structure::numbers`], `model` the structure's model with `values`. What is not done by `until` is left out.
+/// [`Structure::numbers`], `model` the structure's model with `values`. What the budget does not suffice for is left out.
 ///
 /// # Errors
 /// Says why when no excitation would determine them.
-pub fn excite(
-    problem: &Problem,
+pub fn excite<'a>(
+    problem: &'a Problem,
     model: &Model,
     structure: &Structure,
     values: &[f64],
     numbers: &[usize],
     floor: &[f64],
-    until: Moment,
+    budget: &Budget<'a>,
 ) -> Result<Experiment, Reason> {
     let numbers: Vec<usize> = numbers.iter().copied().filter(|j| structure.numbers.get(*j).is_some_and(|n| n.records.is_none())).collect();
     if numbers.is_empty() || values.len() != structure.numbers.len() {
         return Err(Reason("there is no number to determine".to_string()));
     }
-    let stage = Stage::new(problem, floor, until)?;
+    let stage = Stage::new(problem, floor, budget)?;
     let mut evaluator = Evaluator::new(problem);
     (evaluator.floor, evaluator.substeps) = (stage.scene.sensors.floor.clone(), SUBSTEPS.0);
     let own: Vec<f64> = structure.numbers.iter().zip(values).map(|(n, v)| n.inward(*v)).collect();
@@ -185,18 +190,15 @@ pub fn excite(
     let shows = stage.shows(std::slice::from_ref(&known));
     // The size that a number must be seen with: all of it, or what the recordings leave open.
     let size = |j: usize| if whole(j) > 0.0 { whole(j).min(before[j]) } else { before[j] };
-    let gains: Vec<(usize, f64, Vec<f64>)> = shows
-        .par_iter()
-        .enumerate()
-        .filter(|_| Moment::now() < until)
-        .map(|(s, show)| {
-            let jacobian = known.jacobian(&stage.scene, &show.trial, &known.own, &show.seen[0]);
-            let after = known.deviations(Some(&jacobian));
-            let worst = numbers.iter().map(|j| size(*j) / after[*j]).fold(f64::INFINITY, f64::min);
-            (s, worst, after)
-        })
-        .filter(|g| g.1.is_finite())
-        .collect();
+    let places: Vec<usize> = (0..shows.len()).collect();
+    let determined = stage.scene.budget.abreast(&places, |budget, s| {
+        let show = &shows[*s];
+        let jacobian = known.jacobian(&stage.scene.within(budget), &show.trial, &known.own, &show.seen[0]);
+        let after = known.deviations(Some(&jacobian));
+        let worst = numbers.iter().map(|j| size(*j) / after[*j]).fold(f64::INFINITY, f64::min);
+        (*s, worst, after)
+    });
+    let gains: Vec<(usize, f64, Vec<f64>)> = determined.into_iter().flatten().filter(|g| g.1.is_finite()).collect();
     let rate = |g: &(usize, f64, Vec<f64>)| g.1 * g.1 / (shows[g.0].trial.seconds() + SETTING_UP);
     let best = gains.iter().max_by(|a, b| rate(a).total_cmp(&rate(b)));
     let names: Vec<String> = numbers.iter().map(|j| name_of(problem, structure, *j)).collect();
@@ -264,7 +266,7 @@ fn same(a: &Structure, b: &Structure) -> bool {
 
 /// What is left between two rivals when either is refitted to the other, standard deviations; infinite where there is no time to say.
 fn refitted(scene: &Scene, rivals: &[Rival], trial: &Trial, (a, b): (usize, usize)) -> f64 {
-    if Moment::now() > scene.until {
+    if scene.budget.is_over() {
         return f64::INFINITY;
     }
     let unit = rivals[a].unit.max(rivals[b].unit);
@@ -309,43 +311,41 @@ struct Stage<'a> {
     stands: Vec<Option<Stand>>,
     rate_hz: f64,
     longest: f64,
-    /// When simulating, and when evaluating, comes to an end.
-    ends: (Moment, Moment),
+    /// Counts at which simulating, and evaluating, come to an end.
+    ends: (Steps, Steps),
 }
 
 impl<'a> Stage<'a> {
-    fn new(problem: &'a Problem, floor: &[f64], until: Moment) -> Result<Stage<'a>, Reason> {
+    fn new(problem: &'a Problem, floor: &[f64], budget: &Budget<'a>) -> Result<Stage<'a>, Reason> {
         let stands: Vec<Option<Stand>> = (0..problem.model.inputs.len()).map(|i| Stand::of(problem, i)).collect();
         let lengths = problem.fit.iter().map(|r| (r.len as f64 * r.period, r.period));
         let longest = lengths.max_by(|a, b| a.0.total_cmp(&b.0));
         let Some((longest, period)) = longest.filter(|_| stands.iter().any(Option::is_some)) else {
             return Err(Reason("no input moves in any recording, so nothing says what the device stands".to_string()));
         };
-        let now = Moment::now();
-        let time = until.since(now);
-        let ends = (now + time.mul_f64(SHARES.0), now + time.mul_f64(SHARES.1));
-        let scene = Scene { problem, sensors: Sensors::of(problem, floor), extra: Vec::new(), substeps: SUBSTEPS.0, until };
+        let end = |share: f64| budget.spent() + (share * budget.left() as f64) as Steps;
+        let ends = (end(SHARES.0), end(SHARES.1));
+        let scene =
+            Scene { problem, sensors: Sensors::of(problem, floor), extra: Vec::new(), substeps: SUBSTEPS.0, budget: budget.clone() };
         Ok(Stage { scene, stands, rate_hz: round_significant(1.0 / period, 6), longest, ends })
     }
 
     /// Every excitation that all rivals can be simulated on, within what the device was shown to stand.
     fn shows(&self, rivals: &[Rival]) -> Vec<Show> {
         let plays = plays(self.scene.problem, &self.stands, 1.0 / self.rate_hz, self.longest);
-        let one = |play: &menu::Play| {
-            if Moment::now() > self.ends.0 {
-                return None;
-            }
-            let mut trial = self.scene.trial(play, &self.stands, self.rate_hz)?;
-            let far = |trial: &Trial| rivals.first().and_then(|rival| self.scene.excursion(rival, trial));
+        let one = |budget: &Budget<'a>, play: &menu::Play| {
+            let scene = self.scene.within(budget);
+            let mut trial = scene.trial(play, &self.stands, self.rate_hz)?;
+            let far = |trial: &Trial| rivals.first().and_then(|rival| scene.excursion(rival, trial));
             let reached = far(&trial)?;
             if reached > REACH {
-                trial = self.scene.smaller(&trial, 0.9 * REACH / reached, &self.stands, self.rate_hz)?;
+                trial = scene.smaller(&trial, 0.9 * REACH / reached, &self.stands, self.rate_hz)?;
                 far(&trial).filter(|reached| *reached <= 1.1 * REACH)?;
             }
-            let seen = rivals.iter().map(|r| r.prediction(&self.scene, &trial)).collect::<Option<Vec<_>>>()?;
+            let seen = rivals.iter().map(|r| r.prediction(&scene, &trial)).collect::<Option<Vec<_>>>()?;
             Some(Show { trial, seen })
         };
-        plays.par_iter().filter_map(one).collect()
+        self.scene.budget.until(self.ends.0).abreast(&plays, one).into_iter().flatten().flatten().collect()
     }
 
     /// How well experiments separate the rivals by first order. Those whose whole difference is no better than what others have left
@@ -361,7 +361,7 @@ impl<'a> Stage<'a> {
         shows.sort_by(|a, b| promised(b).total_cmp(&promised(a)));
         let mut all: Vec<Evaluated> = Vec::new();
         let mut at = 0;
-        while at < shows.len() && (at == 0 || Moment::now() < self.ends.1) {
+        while at < shows.len() && (at == 0 || self.scene.budget.spent() < self.ends.1) {
             let best = all.iter().filter(|e| e.pairs.iter().all(|p| p.1 >= least)).map(|e| e.score(pairs, shows)).fold(0.0, f64::max);
             if pairs.is_empty() || promised(&shows[at]) < best {
                 break;

@@ -1,13 +1,13 @@
 //! Fitted structures on an experiment that was not made yet: what each predicts, and how far one can imitate another.
 
 use super::menu::{Play, Stand, constant, scaled};
-use crate::clock::Moment;
 use crate::fit::{Effort, Evaluator, Fit, dot, measured};
 use crate::normal_equations::normal_equations;
 use crate::problem::{Problem, Record};
-use crate::simulate::predict;
+use crate::simulate::{Conditions, predict_under};
 use crate::statistics::correlation_time;
 use crate::structure::{Number, Structure};
+use crate::work::Budget;
 use backdrive_plant::excitation::Excitation;
 use backdrive_plant::model::{Model, OutputKind};
 use backdrive_plant::recording::Recording;
@@ -137,7 +137,7 @@ impl<'a> Rival<'a> {
         let mut wider = scene.problem.clone();
         wider.fit.push(record);
         let mut evaluator = Evaluator::new(&wider);
-        (evaluator.floor, evaluator.substeps, evaluator.until) = (scene.sensors.floor.clone(), scene.substeps, Some(scene.until));
+        (evaluator.floor, evaluator.substeps, evaluator.budget) = (scene.sensors.floor.clone(), scene.substeps, scene.budget.clone());
         let values: Vec<f64> = self.structure.numbers.iter().zip(&self.own).map(|(n, x)| n.outward(*x)).collect();
         let fit = evaluator.fit(self.structure, &values, Effort { steps: 20, tolerance: 1.0 })?;
         evaluator.records = &scene.problem.fit;
@@ -171,8 +171,8 @@ pub(super) struct Scene<'a> {
     pub extra: Vec<OutputKind>,
     /// Substeps per sample, at most.
     pub substeps: usize,
-    /// When refits and searches come to an end.
-    pub until: Moment,
+    /// Counts what is computed, and ends refits and searches.
+    pub budget: Budget<'a>,
 }
 
 /// An excitation as a recording without outputs.
@@ -183,7 +183,12 @@ pub(super) struct Trial {
     pub record: Record,
 }
 
-impl Scene<'_> {
+impl<'a> Scene<'a> {
+    /// The same, counted by another budget.
+    pub(super) fn within(&self, budget: &Budget<'a>) -> Scene<'a> {
+        Scene { budget: budget.clone(), ..self.clone() }
+    }
+
     /// An excitation as a recording, made smaller until it stays within what the input was shown to stand.
     pub(super) fn trial(&self, play: &Play, stands: &[Option<Stand>], rate_hz: f64) -> Option<Trial> {
         let stand = stands.get(play.input)?.as_ref()?;
@@ -250,10 +255,14 @@ impl Scene<'_> {
         Some(columns)
     }
 
+    fn conditions(&self) -> Conditions<'_> {
+        Conditions { starts: &[], curves: &[], substeps: self.substeps, guide: None, budget: &self.budget }
+    }
+
     /// What a model predicts, in the outputs' units.
     fn raw(&self, model: &Model, trial: &Trial) -> Option<Vec<f64>> {
         if self.extra.is_empty() {
-            return predict(model, &trial.record, &[], self.substeps);
+            return predict_under(model, &trial.record, &self.conditions());
         }
         let mut seen = model.clone();
         let mut record = trial.record.clone();
@@ -261,7 +270,7 @@ impl Scene<'_> {
             seen.outputs.push(super::sensor::output(&self.problem.model, model, kind)?);
             record.outputs.push(Some(Vec::new()));
         }
-        predict(&seen, &record, &[], self.substeps)
+        predict_under(&seen, &record, &self.conditions())
     }
 
     /// Indices of the outputs that predictions have.

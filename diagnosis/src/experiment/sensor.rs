@@ -50,7 +50,7 @@ pub(super) fn best(scene: &Scene, trials: &[&Trial], pair: [&Rival; 2]) -> Optio
     let lag = scene.sensors.lag.iter().copied().max().unwrap_or(0);
     let mut found: Option<Sensor> = None;
     for (index, trial) in trials.iter().enumerate() {
-        if index > 0 && crate::clock::Moment::now() > scene.until {
+        if index > 0 && scene.budget.is_over() {
             break;
         }
         let own = scene.outputs(&trial.record).len() * trial.record.len;

@@ -2,12 +2,12 @@
 
 use super::nominal::{Nominal, to_its_end};
 use super::trials::BLUR;
-use super::{Candidate, MIDDLE, Time, candidate, done, key_of, sort};
-use crate::clock::Moment;
+use super::{Candidate, MIDDLE, Work, candidate, done, key_of, sort};
 use crate::compare::unseen;
 use crate::fit::{Effort, Evaluator, Fit};
 use crate::race::Course;
 use crate::structure::Structure;
+use crate::work::Budget;
 use rayon::prelude::*;
 
 /// Steps from the best to something simpler, at most.
@@ -21,9 +21,9 @@ const FINALISTS: usize = 8;
 
 /// An effect may only have led the rest out of a wrong valley: each of the best's is left out again, the others from where they are now; and a law of many
 /// numbers has to win over those that it contains. One such step may open the next.
-pub(super) fn make_simpler(course: &Course, found: &mut Vec<Candidate>, time: &Time) {
+pub(super) fn make_simpler(course: &Course, found: &mut Vec<Candidate>, work: &Work) {
     let samples = course.nominal.fit.residuals.len();
-    let last = Evaluator { until: Some(time.at(0.95)), ..course.evaluator.clone() };
+    let last = course.evaluator.within(work.up_to(0.95));
     for _ in 0..SIMPLER {
         let before = found.first().map(|c| key_of(&c.structure.added));
         let mut starts = course.fewer(found);
@@ -40,25 +40,26 @@ pub(super) fn make_simpler(course: &Course, found: &mut Vec<Candidate>, time: &T
 
 /// Brings those that could still win, or tie with the best, to their ends. Far from the noise a fit may have ended at parameters that make up for
 /// what few substeps err by: it is judged, and goes on, with as many as the model asks for, even where the time is up.
-pub(super) fn bring_to_their_ends(evaluator: &Evaluator, found: &mut [Candidate], samples: usize, time: &Time) {
-    let last = Evaluator { until: Some(time.at(0.95)), ..evaluator.clone() };
-    let exact = Evaluator { until: Some(time.at(0.95).max(Moment::now() + time.share(REFITTED))), ..evaluator.clone() };
+pub(super) fn bring_to_their_ends(evaluator: &Evaluator, found: &mut [Candidate], samples: usize, work: &Work) {
+    let exact_end = work.share(0.95).max(work.budget.spent() + work.share(REFITTED));
+    let (last, exact) = (work.up_to(0.95), work.budget.extended(exact_end));
     let best = found.first().map_or(f64::INFINITY, |c| c.fit.cost);
     let unit = best / samples as f64;
     let open = |c: &Candidate| c.fit.foreseen > 0.5 * unit && c.fit.cost - 2.0 * c.fit.foreseen < best + 20.0 * unit * c.correlation_time;
     let near: Vec<usize> = (0..found.len().min(6)).filter(|i| found[*i].fit.cost < 1.5 * best).collect();
-    let polish = |i: usize| -> Option<(usize, Fit)> {
+    let polish = |budget: &Budget, i: usize| -> Option<(usize, Fit)> {
         let c = &found[i];
+        let evaluator = evaluator.within(budget.clone());
         let cost = evaluator.residuals(&c.structure, &c.fit.values).map_or(f64::INFINITY, |r| evaluator.cost(&r));
         let is_blurred = (cost - c.fit.cost).abs() > BLUR * c.fit.cost;
         let by = match (is_blurred, open(c)) {
-            (true, _) => &exact,
-            (false, true) => &last,
+            (true, _) => budget.clone(),
+            (false, true) => budget.until(last.end()),
             (false, false) => return None,
         };
-        Some((i, by.fit(&c.structure, &c.fit.values, POLISH)?))
+        Some((i, evaluator.within(by).fit(&c.structure, &c.fit.values, POLISH)?))
     };
-    let polished: Vec<(usize, Fit)> = near.par_iter().filter_map(|i| polish(*i)).collect();
+    let polished: Vec<(usize, Fit)> = exact.abreast(&near, |budget, i| polish(budget, *i)).into_iter().flatten().flatten().collect();
     for (i, fit) in polished {
         found[i] = candidate(evaluator, found[i].structure.clone(), fit);
     }
@@ -66,7 +67,7 @@ pub(super) fn bring_to_their_ends(evaluator: &Evaluator, found: &mut [Candidate]
 }
 
 /// The nominal model at its end. The numbers of what was found may lead it out of a wrong basin: then there was less to find.
-pub(super) fn nominal_at_its_end(nominal: &Nominal, found: &[Candidate], time: &Time) -> Candidate {
+pub(super) fn nominal_at_its_end(nominal: &Nominal, found: &[Candidate], work: &Work) -> Candidate {
     let (evaluator, refitted) = (&nominal.evaluator, &nominal.refitted);
     let problem = evaluator.problem;
     let numbers = |c: &Candidate| (c.structure.stated_of(problem, &c.fit.values), c.structure.of_records(&c.fit.values));
@@ -74,7 +75,7 @@ pub(super) fn nominal_at_its_end(nominal: &Nominal, found: &[Candidate], time: &
     // Far from the noise its last thousandths say nothing.
     let effort = if nominal.is_far { Effort { steps: 8, tolerance: 3.0 } } else { Effort::FULL };
     let substeps = if nominal.is_far { MIDDLE } else { evaluator.substeps };
-    let last = Evaluator { until: Some(time.at(0.97)), substeps, ..evaluator.clone() };
+    let last = Evaluator { substeps, ..evaluator.within(work.up_to(0.97)) };
     let mut better = None;
     for (stated, of_records) in others.chain(nominal.is_far.then(|| numbers(refitted))) {
         let start = refitted.structure.values(problem, &stated, &[], &of_records);
@@ -109,6 +110,8 @@ pub(super) fn hold_against_unseen(evaluator: &Evaluator, found: &mut [Candidate]
 
 /// Each fitted from where it starts.
 pub(super) fn polished(evaluator: &Evaluator, structures: Vec<(Structure, Vec<f64>)>) -> Vec<Candidate> {
-    let fits = structures.into_par_iter().filter_map(|(structure, start)| Some((evaluator.fit(&structure, &start, POLISH)?, structure)));
-    fits.map(|(fit, structure)| candidate(evaluator, structure, fit)).collect()
+    let fit = |budget: &Budget, (structure, start): &(Structure, Vec<f64>)| evaluator.within(budget.clone()).fit(structure, start, POLISH);
+    let fits = evaluator.budget.abreast(&structures, fit);
+    let fitted = structures.iter().zip(fits).filter_map(|((structure, _), fit)| Some((structure, fit.flatten()?)));
+    fitted.map(|(structure, fit)| candidate(evaluator, structure.clone(), fit)).collect()
 }

@@ -7,7 +7,6 @@ mod trials;
 mod view;
 mod wave;
 
-use crate::clock::Moment;
 use crate::compare::Unseen;
 use crate::fit::{Effort, Evaluator, Fit};
 use crate::hypothesis::{self, Hypothesis, Place};
@@ -16,11 +15,12 @@ use crate::problem::Problem;
 use crate::race::Course;
 use crate::statistics::{advantage, correlation_time, levels, slowness};
 use crate::structure::Structure;
+use crate::work::{Budget, Limit, PER_SECOND, Steps};
 use ending::polished;
 use nominal::{Nominal, SHOWN};
 use std::collections::HashSet;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Duration;
+use std::sync::atomic::AtomicBool;
+use std::time::{Duration, Instant};
 use trials::Trials;
 use view::View;
 
@@ -31,13 +31,38 @@ pub struct Settings {
     pub without: Vec<String>,
     /// Effects at once, at most.
     pub effects: usize,
-    /// When the search has to come to an end, from its start: computing time, see [`crate::clock`].
+    /// How much it may compute, as a multiple of what it does by default: the verdict depends on this, and not on how fast or busy a machine is.
+    pub effort: f64,
+    /// How long it may take on the clock, all in all. What that cuts off may differ from machine to machine, so a verdict says where it did.
     pub patience: Duration,
 }
 
+/// What a search computes with an effort of 1.
+pub const EFFORT: Steps = 1_200_000_000;
+
+/// How long a search may take on the clock where nothing else is said: far longer than the default effort takes on a slow machine.
+pub const PATIENCE: Duration = Duration::from_secs(600);
+
 impl Default for Settings {
     fn default() -> Settings {
-        Settings { without: Vec::new(), effects: 3, patience: Duration::from_secs(26) }
+        Settings { without: Vec::new(), effects: 3, effort: 1.0, patience: PATIENCE }
+    }
+}
+
+impl Settings {
+    /// Work that the search may do.
+    pub fn work(&self) -> Steps {
+        (self.effort.max(0.0) * EFFORT as f64) as Steps
+    }
+
+    /// What ends a search that begins now from outside.
+    pub fn limit<'a>(&self, stop: Option<&'a AtomicBool>) -> Limit<'a> {
+        Limit { stop, deadline: Instant::now().checked_add(self.patience) }
+    }
+
+    /// About how long that takes on two threads of a laptop, for progress bars.
+    pub fn expected(&self) -> Duration {
+        Duration::from_secs_f64((self.work() as f64 / PER_SECOND).min(self.patience.as_secs_f64()))
     }
 }
 
@@ -117,9 +142,13 @@ pub struct Search {
     /// What would have been seen beside the refitted nominal model, each physics at the place where it shows best.
     pub detectable: Vec<Detectable>,
     /// Simulations of a recording.
-    pub simulations: usize,
-    /// Whether it was stopped before its end.
-    pub stopped: bool,
+    pub simulations: u64,
+    /// Steps of simulations, of the model with its elements taken together: what it computed.
+    pub work: Steps,
+    /// Whether its effort ended before everything was tried.
+    pub exhausted: bool,
+    /// Whether it was interrupted, or the time on the clock ended it.
+    pub cut: bool,
 }
 
 /// Why a search cannot start.
@@ -151,27 +180,25 @@ const NOMINAL_END: f64 = 5.0;
 /// A residual at its floor has this level, up to chance and rounding.
 pub const AT_FLOOR: f64 = 1.04;
 
-/// How much time a search has, and when it began.
-struct Time<'a> {
-    began: Moment,
-    patience: Duration,
-    stop: Option<&'a AtomicBool>,
+/// How much work a search may do.
+struct Work<'a> {
+    budget: Budget<'a>,
 }
 
-impl Time<'_> {
+impl<'a> Work<'a> {
     /// So much of it.
-    fn share(&self, share: f64) -> Duration {
-        self.patience.mul_f64(share)
+    fn share(&self, share: f64) -> Steps {
+        (share * self.budget.end() as f64) as Steps
     }
 
-    /// When so much of it is gone.
-    fn at(&self, share: f64) -> Moment {
-        self.began + self.share(share)
+    /// A budget that ends when so much of it is gone.
+    fn up_to(&self, share: f64) -> Budget<'a> {
+        self.budget.extended(self.share(share))
     }
 
     /// Whether so much of it is gone, or the search is to stop.
     fn is_past(&self, share: f64) -> bool {
-        self.began.elapsed() > self.share(share) || self.stop.is_some_and(|s| s.load(Ordering::Relaxed))
+        self.up_to(share).is_over()
     }
 }
 
@@ -179,14 +206,9 @@ impl Time<'_> {
 ///
 /// # Errors
 /// When the nominal model cannot be simulated on the recordings.
-pub fn search(
-    problem: &Problem,
-    settings: &Settings,
-    stop: Option<&AtomicBool>,
-    report: &(dyn Fn(&str) + Sync),
-) -> Result<Search, SearchError> {
-    let time = Time { began: Moment::now(), patience: settings.patience, stop };
-    let nominal = Nominal::refitted(problem, &time, report)?;
+pub fn search(problem: &Problem, settings: &Settings, limit: Limit, report: &(dyn Fn(&str) + Sync)) -> Result<Search, SearchError> {
+    let work = Work { budget: Budget::new(settings.work(), limit) };
+    let nominal = Nominal::refitted(problem, &work, report)?;
     let (evaluator, refitted) = (&nominal.evaluator, &nominal.refitted);
     let samples = refitted.fit.residuals.len();
     let mut hypotheses = hypotheses_for(&nominal, settings);
@@ -194,7 +216,7 @@ pub fn search(
     let ripples = view::ripples(&nominal.seen, &nominal.model, &evaluator.floor, &mut hypotheses);
     report("screening");
     let led = &nominal.led;
-    let seeing = time.share(if nominal.far { 0.08 } else { 0.2 });
+    let seeing = work.share(if nominal.far { 0.08 } else { 0.2 });
     let base = (&refitted.structure, led.fit.clone());
     let mut views = vec![View::of(&led.coarse, led.parts.as_ref(), base, &hypotheses, seeing, nominal.guided)];
     // Some effects show better on a free simulation; and the refit of a wrong structure may have carried the numbers off, so that
@@ -216,14 +238,14 @@ pub fn search(
         coarse: COARSE,
     };
     let mut tried = promised(&views, &hypotheses);
-    let mut trials = Trials::new(course, &views, &tried, &ripples, nominal.far, &time);
+    let mut trials = Trials::new(course, &views, &tried, &ripples, nominal.far, &work);
     trials.run(settings, report);
+    let exhausted = trials.left_out;
     let mut found = trials.found;
-    let stopped = time.is_past(1.0);
     report("fitting the best to the end");
-    ending::make_simpler(&course, &mut found, &time);
-    ending::bring_to_their_ends(evaluator, &mut found, samples, &time);
-    let mut refitted = ending::nominal_at_its_end(&nominal, &found, &time);
+    ending::make_simpler(&course, &mut found, &work);
+    ending::bring_to_their_ends(evaluator, &mut found, samples, &work);
+    let mut refitted = ending::nominal_at_its_end(&nominal, &found, &work);
     let mut seen = HashSet::new();
     found.retain(|c| seen.insert(key_of(&c.structure.added)));
     let unseen_samples = ending::hold_against_unseen(evaluator, &mut found, &mut refitted);
@@ -240,8 +262,10 @@ pub fn search(
         samples,
         unseen_samples,
         detectable: view::detectable(view, samples, &hypotheses),
-        simulations: evaluator.simulations.load(Ordering::Relaxed),
-        stopped,
+        simulations: work.budget.simulations(),
+        work: work.budget.spent(),
+        exhausted,
+        cut: work.budget.was_cut(),
         nominal: refitted,
     })
 }

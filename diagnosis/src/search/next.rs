@@ -8,8 +8,8 @@ use crate::led::inherited;
 use crate::race::{Course, Seed};
 use crate::screen::{Promise, Screen};
 use crate::structure::Structure;
+use crate::work::Steps;
 use std::collections::HashSet;
-use std::time::Duration;
 
 /// Share of what promises most that a law has to promise, where a stated number is to give back what it may have taken on.
 const PROMISED: f64 = 0.5;
@@ -237,10 +237,10 @@ impl Course<'_> {
 
     /// A structure with each of what promises most added, screened beside it: an offset shows as one only where the spring behind it is bent, a law
     /// at low speed only where the friction at speed is right.
-    pub(super) fn anew(&self, evaluator: &Evaluator, base: &Candidate, time: Duration) -> Vec<Seed> {
+    pub(super) fn anew(&self, evaluator: &Evaluator, base: &Candidate, work: Steps) -> Vec<Seed> {
         let problem = self.evaluator.problem;
         let Some(fit) = evaluator.fit(&base.structure, &base.fit.values, Effort { steps: 4, tolerance: 2.0 }) else { return Vec::new() };
-        let screen = Screen::new(evaluator, &base.structure, &fit, self.hypotheses, time);
+        let screen = Screen::new(evaluator, &base.structure, &fit, self.hypotheses, work);
         let own = self.effects_of(&base.structure, &fit.values);
         let seed = |p: Promise, guided| {
             Seed::beside(problem, (&base.structure, &fit.values), [own.clone(), vec![(p.hypothesis, p.values)]].concat(), guided)

@@ -1,6 +1,6 @@
 //! The nominal model: refitted, and led along the recordings where it stays far from the noise.
 
-use super::{COARSE, Candidate, MIDDLE, NOMINAL_END, SearchError, Time, candidate, white};
+use super::{COARSE, Candidate, MIDDLE, NOMINAL_END, SearchError, Work, candidate, white};
 use crate::fit::{Effort, Evaluator, Fit};
 use crate::floor;
 use crate::guide::Guide;
@@ -98,10 +98,9 @@ impl Path<'_> {
 
 impl<'a> Nominal<'a> {
     /// Refits the nominal model, and leads it.
-    pub fn refitted(problem: &'a Problem, time: &Time<'a>, report: &(dyn Fn(&str) + Sync)) -> Result<Nominal<'a>, SearchError> {
+    pub fn refitted(problem: &'a Problem, work: &Work<'a>, report: &(dyn Fn(&str) + Sync)) -> Result<Nominal<'a>, SearchError> {
         let mut evaluator = Evaluator::new(problem);
-        evaluator.stop = time.stop;
-        evaluator.until = Some(time.at(0.75));
+        evaluator.budget = work.up_to(0.75);
         if friction_on_prescribed(problem) {
             evaluator.robust = FAR_OFF;
         }

@@ -2,22 +2,20 @@
 
 use super::view::View;
 use super::wave::Wave;
-use super::{AT_FLOOR, COARSE, Candidate, MIDDLE, NOMINAL_END, Settings, Time, Tried, distinct_structures, done, key_of, polished, sort};
-use crate::clock::Moment;
+use super::{AT_FLOOR, COARSE, Candidate, MIDDLE, NOMINAL_END, Settings, Tried, Work, distinct_structures, done, key_of, polished, sort};
 use crate::fit::Evaluator;
 use crate::hypothesis::Hypothesis;
 use crate::race::{Course, NEAR, Seed, distinct};
+use crate::simulate::FINEST;
 use std::collections::HashSet;
 
 /// What the best of many hypotheses takes from a cost of white noise by chance, squares of the noise.
 const CHANCE: f64 = 25.0;
-/// Substeps per sample, at most, whatever the model asks for.
-const FINEST: usize = 64;
 /// Share of what is left over, in squares, that too few substeps may make up.
 pub(super) const BLUR: f64 = 0.02;
 /// Share of the time for screening beside a structure that was found.
 const ANEW: f64 = 0.06;
-/// Times the cost of the best up to which a law leaves less than twice as much over.
+/// Works the cost of the best up to which a law leaves less than twice as much over.
 const TWICE: f64 = 4.0;
 /// Share of the time for numbers that come back.
 const REVIVING: f64 = 0.2;
@@ -37,7 +35,7 @@ pub(super) struct Trials<'s, 'a> {
     /// Whether the nominal model stays far from the noise.
     pub far: bool,
     /// How much time there is.
-    pub time: &'s Time<'s>,
+    pub work: &'s Work<'s>,
     /// What was found, best first.
     pub found: Vec<Candidate>,
     singles: std::vec::IntoIter<Seed>,
@@ -50,6 +48,8 @@ pub(super) struct Trials<'s, 'a> {
     related: String,
     /// The law that other places were tried for.
     moved_about: String,
+    /// Whether the work did not suffice for something that was wanted.
+    pub left_out: bool,
 }
 
 impl<'s, 'a> Trials<'s, 'a> {
@@ -60,7 +60,7 @@ impl<'s, 'a> Trials<'s, 'a> {
         tried: &'s [Tried],
         ripples: &'s [(usize, Vec<f64>)],
         far: bool,
-        time: &'s Time<'s>,
+        work: &'s Work<'s>,
     ) -> Trials<'s, 'a> {
         let none = || Vec::new().into_iter();
         let (singles, plain) = (none(), none());
@@ -71,7 +71,7 @@ impl<'s, 'a> Trials<'s, 'a> {
             tried,
             ripples,
             far,
-            time,
+            work,
             found: Vec::new(),
             singles,
             plain,
@@ -79,6 +79,7 @@ impl<'s, 'a> Trials<'s, 'a> {
             fine: COARSE,
             related,
             moved_about,
+            left_out: false,
         };
         all.singles = all.promising().into_iter();
         all.plain = all.of_one_number().into_iter();
@@ -171,7 +172,11 @@ impl<'s, 'a> Trials<'s, 'a> {
         let takes_more = |c: &Candidate| c.structure.numbers.len() > self.course.nominal.structure.numbers.len() + 1;
         let of_the_best = matches!(wave, Wave::GivenBack | Wave::Relatives | Wave::Elsewhere)
             || wave == Wave::Plain && self.found.first().is_some_and(takes_more);
-        if self.time.is_past(if of_the_best { 0.85 } else { 0.7 }) || (!of_the_best && self.is_done()) {
+        if !of_the_best && self.is_done() {
+            return false;
+        }
+        if self.work.is_past(if of_the_best { 0.85 } else { 0.7 }) {
+            self.left_out |= !self.is_done();
             return false;
         }
         if wave == Wave::Elsewhere {
@@ -259,7 +264,7 @@ impl<'s, 'a> Trials<'s, 'a> {
                 let best = fewer().next();
                 // The first step to it may have been the wrong one: so from the best without that, too.
                 let without = |first: &Hypothesis| fewer().find(|c| c.structure.added.iter().all(|h| h.physics != first.physics));
-                let late = self.time.is_past(0.5);
+                let late = self.work.is_past(0.5);
                 let other = best.and_then(|b| b.structure.added.first()).filter(|_| !late).and_then(without);
                 // And far from the noise from what does nearly as well with fewer numbers: it leaves more open.
                 let has_fewer = |c: &&Candidate| best.is_some_and(|b| c.structure.numbers.len() < b.structure.numbers.len());
@@ -270,7 +275,7 @@ impl<'s, 'a> Trials<'s, 'a> {
                 for base in best.into_iter().chain(other).chain(plain) {
                     let substeps = substeps_for(&view.evaluator, base);
                     self.fine = self.fine.max(substeps);
-                    seeds.extend(course.anew(&Evaluator { substeps, ..view.evaluator.clone() }, base, self.time.share(ANEW)));
+                    seeds.extend(course.anew(&Evaluator { substeps, ..view.evaluator.clone() }, base, self.work.share(ANEW)));
                 }
                 seeds
             }
@@ -290,11 +295,10 @@ impl<'s, 'a> Trials<'s, 'a> {
         seeds.retain(|s| anew || !known.contains(&key_of(s.effects.iter().map(|(h, _)| &hypotheses[*h]))));
         // Where it leaves much over, another effect may be what is missing: other laws in its place have their share of the time, and no more.
         let more_to_come = self.found.first().is_none_or(|c| c.fit.cost > NEAR * samples as f64);
-        let aside = Moment::now() + self.time.share(if more_to_come { wave.aside() } else { 1.0 });
         // A simpler law that does as well is worth a little more than the time.
         let of_the_best = matches!(wave, Wave::Elsewhere | Wave::Relatives);
-        let end = if of_the_best { Some(self.time.at(0.92)) } else { evaluator.until };
-        let held_against = Evaluator { until: end.map(|end| end.min(aside)), ..evaluator.clone() };
+        let budget = if of_the_best { self.work.up_to(0.92) } else { evaluator.budget.clone() };
+        let held_against = evaluator.within(budget.next(self.work.share(if more_to_come { wave.aside() } else { 1.0 })));
         let course = Course { evaluator: &held_against, ..self.course };
         // What only shows beside a law that was found shows little along the path of the nominal model.
         let raced = match wave {
@@ -305,10 +309,9 @@ impl<'s, 'a> Trials<'s, 'a> {
         self.found.extend(raced);
         sort(&mut self.found, samples);
         let comes_near = self.found.first().is_some_and(|c| c.levels.iter().all(|l| *l < NOMINAL_END));
-        if wave == Wave::Finer && comes_near && !self.time.is_past(0.6) {
+        if wave == Wave::Finer && comes_near && !self.work.is_past(0.6) {
             // Before others are tried from the numbers of the best; where it leaves much over, more is missing than a mass.
-            let until = self.time.at(0.75).min(Moment::now() + self.time.share(REVIVING));
-            let evaluator = Evaluator { until: Some(until), ..evaluator.clone() };
+            let evaluator = evaluator.within(self.work.up_to(0.75).next(self.work.share(REVIVING)));
             let back = polished(&evaluator, self.course.revived(&self.found));
             self.found.extend(back);
             sort(&mut self.found, samples);

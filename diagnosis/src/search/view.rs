@@ -9,9 +9,9 @@ use crate::problem::Record;
 use crate::race::Seed;
 use crate::screen::{Promise, Screen, pairs};
 use crate::structure::Structure;
+use crate::work::Steps;
 use backdrive_plant::model::Model;
 use std::collections::HashSet;
-use std::time::Duration;
 
 /// Numbers of a physics that is tried first, at most.
 pub(super) const SIMPLE: usize = 6;
@@ -44,7 +44,7 @@ impl<'a> View<'a> {
         parts: Option<&'a Parts>,
         (structure, fit): (&Structure, Fit),
         hypotheses: &[Hypothesis],
-        time: Duration,
+        work: Steps,
         guided: bool,
     ) -> View<'a> {
         let on = parts.map_or_else(|| evaluator.clone(), |p| p.evaluator(evaluator));
@@ -54,7 +54,7 @@ impl<'a> View<'a> {
             (Some(_), Some(there)) => (on, false, there),
             _ => (evaluator.clone(), evaluator.guide.is_none(), fit),
         };
-        let screen = Screen::new(&on, structure, &fit, hypotheses, time);
+        let screen = Screen::new(&on, structure, &fit, hypotheses, work);
         let promises = screen.look(&fit, &|_| true);
         let (simple, rich) = promises.into_iter().partition(|p| hypotheses[p.hypothesis].parameters.len() <= SIMPLE);
         View { screen, base: candidate(&on, structure.clone(), fit), evaluator: on, guided, whole, simple, rich }

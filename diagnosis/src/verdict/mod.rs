@@ -8,7 +8,6 @@ mod signals;
 
 pub use choice::chosen;
 
-use crate::clock::Moment;
 use crate::experiment::{excite, separate};
 use crate::fit::Evaluator;
 use crate::intervals::Spread;
@@ -17,6 +16,7 @@ use crate::search::{AT_FLOOR, Candidate, Search};
 use crate::statistics::advantage;
 use crate::structure::{Number, Role, Structure};
 use crate::words;
+use crate::work::{Budget, Limit, Steps};
 use backdrive_plant::write::round_significant;
 use choice::{alike, nearest};
 use findings::{adequacy, detectable, findings, moved};
@@ -24,7 +24,6 @@ use models::{held_out, model_text, rival_models};
 use remaining::remaining;
 use serde_json::{Value as Json, json};
 use signals::{bursts, place_in_signals, unknown_inputs};
-use std::time::Duration;
 
 /// A verdict, ready to be written.
 #[derive(Debug)]
@@ -48,8 +47,8 @@ pub fn rival_file(number: usize) -> String {
     format!("model.rival-{number}.toml")
 }
 
-/// How long the next experiment is looked for.
-const EXPERIMENT: Duration = Duration::from_secs(2);
+/// Work in which the next experiment is looked for.
+const EXPERIMENT: Steps = 100_000_000;
 
 /// Why a verdict cannot be written.
 #[derive(Debug, thiserror::Error)]
@@ -100,15 +99,15 @@ pub fn verdict(problem: &Problem, search: &Search, model_name: &str) -> Result<V
         () if !is_excited(problem, search) => "cannot_tell",
         () => "nothing_missing",
     };
-    let until = Moment::now() + EXPERIMENT;
+    let budget = Budget::new(EXPERIMENT, Limit::default());
     let planned = match word {
         "ambiguous" => {
             let rivals = if alike.is_empty() { nearest(search, best) } else { alike.clone() };
-            Some(separate(problem, &[&[best], rivals.as_slice()].concat(), &search.floor, until))
+            Some(separate(problem, &[&[best], rivals.as_slice()].concat(), &search.floor, &budget))
         }
         "cannot_tell" => best.structure.model(problem, &best.fit.values).map(|model| {
             let all: Vec<usize> = (0..best.structure.numbers.len()).collect();
-            excite(problem, &model, &best.structure, &best.fit.values, &all, &search.floor, until)
+            excite(problem, &model, &best.structure, &best.fit.values, &all, &search.floor, &budget)
         }),
         _ => None,
     };

@@ -44,6 +44,8 @@ pub const MAX_ELEMENTS: usize = 64;
 /// Places in the state arrays: free bodies from the first on, ground last, those on motion inputs before it, downwards.
 const SLOTS: usize = MAX_BODIES + 1;
 const GROUND: usize = SLOTS - 1;
+/// Evaluations of a law that a substep takes where it is solved implicitly, beyond one.
+const IMPLICIT: usize = 6;
 
 /// Place of the p-th body on a motion input.
 const fn prescribed_slot(p: usize) -> usize {
@@ -346,5 +348,12 @@ impl Plant {
     /// Substeps in each period.
     pub fn substeps(&self) -> usize {
         self.substeps
+    }
+
+    /// About how much a step of one period computes, in steps of a linear network: contacts and paths add to each substep, those that are solved
+    /// implicitly several evaluations of their law.
+    pub fn cost(&self) -> u64 {
+        let implicit = self.paths.iter().filter(|p| p.constraint.is_some()).count();
+        (self.substeps * (1 + self.frictions.len() + self.paths.len() + IMPLICIT * implicit)) as u64
     }
 }

@@ -37,7 +37,7 @@ fn run(context: &Context) -> Result<Report, StudyError> {
     if context.quick {
         return Ok(report);
     }
-    let symmetric = Ask { name: "symmetric", set: "set.toml", model: "symmetric.toml", without: &[], effects: 4, patience: 150.0 };
+    let symmetric = Ask { name: "symmetric", set: "set.toml", model: "symmetric.toml", without: &[], effects: 4, effort: 6.25 };
     told(&mut report, context, &symmetric, &train, &pulses)?;
     let linear = Ask { name: "linear", model: "linear.toml", ..symmetric.clone() };
     told(&mut report, context, &linear, &train, &pulses)?;
@@ -78,7 +78,7 @@ fn numbers(report: &mut Report, context: &Context) -> Result<(), StudyError> {
         [("symmetric", "symmetric.toml", symmetric.as_slice()), ("asymmetric", "asymmetric.toml", asymmetric.as_slice())]
     {
         let folder = format!("refit-{name}");
-        let found = refit(context, &Ask { name: &folder, set: "whole.toml", model, without: &[], effects: 1, patience: 20.0 })?;
+        let found = refit(context, &Ask { name: &folder, set: "whole.toml", model, without: &[], effects: 1, effort: 0.85 })?;
         let mass = shared.map(|(what, path, a, b)| (what, path, if name == "symmetric" { a } else { b }));
         for (what, path, published) in mass.iter().chain(rest) {
             let value = refitted(&found, path);

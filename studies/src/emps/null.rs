@@ -22,7 +22,7 @@ pub(super) fn run(report: &mut Report, context: &Context, model: &Model, train: 
     let fit = simulated(model, train)?.write_strokes(context.out, "null-train")?;
     let held_out = simulated(model, pulses)?.write_strokes(context.out, "null-pulses")?;
     write(&context.out.join("null-set.toml"), &format!("model = \"model.toml\"\nfit = {fit:?}\nheld_out = {held_out:?}\n"))?;
-    let ask = Ask { name: "null", set: "null-set.toml", model: "found.toml", without: &[], effects: 3, patience: 60.0 };
+    let ask = Ask { name: "null", set: "null-set.toml", model: "found.toml", without: &[], effects: 3, effort: 2.5 };
     let found = diagnose(context, &ask)?;
     let json = &found.said.json;
     let word = json["verdict"].as_str().unwrap_or("");

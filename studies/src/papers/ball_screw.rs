@@ -81,7 +81,7 @@ fn run(context: &Context) -> Result<Report, StudyError> {
     let story = Story { truth, first: &first, rate: 200.0, drives: &drives, steps: STEPS };
     story.record(context.out)?;
     let mut report = Report::new("Paper 000, told blind: LuGre friction");
-    let walked = walk(&mut report, context, &Walk { effects: &[1], again: if context.quick { 0 } else { 1 }, patience: 60.0 })?;
+    let walked = walk(&mut report, context, &Walk { effects: &[1], again: if context.quick { 0 } else { 1 }, effort: 2.5 })?;
     score(&mut report, context.out, PAPER, &walked)?;
     Ok(report)
 }

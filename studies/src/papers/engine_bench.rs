@@ -146,7 +146,7 @@ fn run(context: &Context) -> Result<Report, StudyError> {
         let walked = walk(
             &mut report,
             &Context { out: &out, ..*context },
-            &Walk { effects: &[1], again: if context.quick { 0 } else { 1 }, patience: if context.quick { 30.0 } else { 75.0 } },
+            &Walk { effects: &[1], again: if context.quick { 0 } else { 1 }, effort: if context.quick { 1.25 } else { 3.1 } },
         )?;
         hits += score(&mut report, &out, PAPER, &walked)?;
     }

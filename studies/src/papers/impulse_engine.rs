@@ -75,8 +75,8 @@ fn run(context: &Context) -> Result<Report, StudyError> {
     let story = Story { truth, first: &first, rate: 2500.0, drives: &drives, steps: STEPS };
     story.record(context.out)?;
     let mut report = Report::new("Paper 002, told blind: linear master, held in a comfortable grasp");
-    let (effects, patience): (&[usize], _) = if context.quick { (&[1], 60.0) } else { (&[1, 3], 120.0) };
-    let walked = walk(&mut report, context, &Walk { effects, again: if context.quick { 0 } else { 2 }, patience })?;
+    let (effects, effort): (&[usize], _) = if context.quick { (&[1], 2.5) } else { (&[1, 3], 5.0) };
+    let walked = walk(&mut report, context, &Walk { effects, again: if context.quick { 0 } else { 2 }, effort })?;
     score(&mut report, context.out, PAPER, &walked)?;
     Ok(report)
 }

@@ -131,7 +131,7 @@ pub(super) struct Walk<'a> {
     /// How often the found model is put in the place of the one before, at most.
     pub again: usize,
     /// s, how long one diagnosis searches at most.
-    pub patience: f64,
+    pub effort: f64,
 }
 
 /// What a diagnosis named.
@@ -168,7 +168,7 @@ pub(super) fn walk(report: &mut Report, outer: &Context, walk: &Walk) -> Result<
     let set = out.join(SET);
     let context = Context { folder: &set, data: &set, out, quick: false, longer: outer.longer };
     let mut stage = |name: &str, model: &str, effects: usize| -> Result<Value, StudyError> {
-        let ask = Ask { name, set: "set.toml", model, without: &[], effects, patience: walk.patience };
+        let ask = Ask { name, set: "set.toml", model, without: &[], effects, effort: walk.effort };
         let json = diagnose(&context, &ask)?.said.json;
         told(report, name, &json);
         Ok(json)

@@ -77,8 +77,8 @@ fn run(context: &Context) -> Result<Report, StudyError> {
     Story { truth: truth.clone(), first: &first, rate: 500.0, drives: &half, steps: &[] }.record(&shorter)?;
     Story { truth, first: &first, rate: 500.0, drives: &whole, steps: STEPS }.record(context.out)?;
     let mut report = Report::new("Paper 001, told blind: the linear design of the compensator");
-    let (effects, patience): (&[usize], _) = if context.quick { (&[3], 60.0) } else { (&[1, 3], 240.0) };
-    let walked = walk(&mut report, context, &Walk { effects, again: if context.quick { 0 } else { 1 }, patience })?;
+    let (effects, effort): (&[usize], _) = if context.quick { (&[3], 2.5) } else { (&[1, 3], 10.0) };
+    let walked = walk(&mut report, context, &Walk { effects, again: if context.quick { 0 } else { 1 }, effort })?;
     parasitic(&mut report, &context.out.join(&walked.best).join(MODEL))?;
     let found = Model::load(&context.out.join(&walked.best).join(MODEL))?;
     bias(&mut report, &first, &found, context, "4, 2 and 1 mm")?;
@@ -118,7 +118,7 @@ fn between(report: &mut Report, outer: &Context) -> Result<(), StudyError> {
     let out = outer.out;
     let set = out.join(SET);
     let here = Context { folder: &set, data: &set, out, quick: false, longer: outer.longer };
-    let ask = Ask { name: "from-friction", set: "set.toml", model: "friction.toml", without: &[], effects: 1, patience: 60.0 };
+    let ask = Ask { name: "from-friction", set: "set.toml", model: "friction.toml", without: &[], effects: 1, effort: 2.5 };
     let json = diagnose(&here, &ask)?.said.json;
     told(report, "from-friction", &json);
     for (what, key, published) in [("gap", "gap", "3.36e-4 m"), ("stiffness", "stiffness", "861000 N/m")] {
@@ -140,7 +140,7 @@ fn bias(report: &mut Report, first: &Model, found: &Model, outer: &Context, stro
                     \n[[elements]]\nname = \"parasitic_damping\"\nkind = \"damper\"\nbetween = [\"disc\", \"ground\"]\ndamping = 1000.0\n";
     write(&set.join("friction.toml"), &format!("{}{friction}", first.to_toml()))?;
     let here = Context { folder: &set, data: &set, out, quick: false, longer: outer.longer };
-    let ask = Ask { name: "without-backlash", set: "set.toml", model: "friction.toml", without: &[], effects: 1, patience: 60.0 };
+    let ask = Ask { name: "without-backlash", set: "set.toml", model: "friction.toml", without: &[], effects: 1, effort: 2.5 };
     let fitted = refit(&here, &ask)?;
     let without = refitted(&fitted, STIFFNESS);
     let with = found.values_at(STIFFNESS).ok().and_then(|v| v.first().copied()).unwrap_or(f64::NAN);
