@@ -595,7 +595,7 @@ pub struct TestBench {
 }
 
 fn physics(name: &str) -> Result<String, String> {
-    use backdrive_diagnosis::hypothesis::{PHYSICS, physics_named};
+    use backdrive_diagnosis::physics::{PHYSICS, physics_named};
     let known = || PHYSICS.iter().map(|p| p.name).collect::<Vec<_>>().join(", ");
     physics_named(name).map(|p| p.name.to_string()).ok_or_else(|| format!("no such physics; there are {}", known()))
 }

@@ -9,9 +9,9 @@ use crate::output;
 use crate::progress;
 use crate::recordings::{self, Opened};
 use backdrive_diagnosis::audit::{self, Remark};
-use backdrive_diagnosis::evidence;
 use backdrive_diagnosis::locate::{self, Location, locate};
 use backdrive_diagnosis::per_record::{PerRecord, fit_each};
+use backdrive_diagnosis::physics::physics_named;
 use backdrive_diagnosis::problem::Problem;
 use backdrive_diagnosis::search::{Search, Settings, search};
 use backdrive_diagnosis::verdict::{EXPERIMENT_FILE, Verdict, rival_file, verdict};
@@ -181,7 +181,7 @@ fn state(verdict: &Value, location: Option<&Location>) -> Option<String> {
                 (_, Some(signal)) => signal.to_string(),
                 _ => return None,
             };
-            Some(evidence::state(finding["physics"].as_str()?, &place))
+            Some(physics_named(finding["physics"].as_str()?)?.state_at(&place))
         }
         Some("unexplained") => location.and_then(locate::state),
         _ => None,

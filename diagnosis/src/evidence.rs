@@ -1,6 +1,6 @@
 //! The force that gave a finding away: what the recordings ask for at its place when it alone is left out, beside what its law does there.
 
-use crate::hypothesis::{Hypothesis, Place};
+use crate::hypothesis::{Against, Hypothesis, Place};
 use crate::locate::{self, Course, force_along, locate};
 use crate::problem::{Problem, Record};
 use crate::search::Candidate;
@@ -9,23 +9,6 @@ use backdrive_plant::describe::unit_for;
 use backdrive_plant::model::{Element, Input, InputKind, Model, Output, OutputKind};
 use backdrive_plant::set::Condition;
 use backdrive_plant::stepper::{Options, simulate};
-
-/// What a law's force is drawn against.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Against {
-    /// Velocity across the place.
-    Velocity,
-    /// Displacement across the place.
-    Displacement,
-    /// Acceleration of the body.
-    Acceleration,
-    /// The command at an input, or the reading at an output.
-    Signal,
-    /// Its rate of change.
-    SignalRate,
-    /// Time.
-    Time,
-}
 
 /// Two curves over one variable.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -78,41 +61,6 @@ pub struct Evidence {
 
 /// Samples that a force is estimated at, at most.
 const SAMPLES: usize = 8000;
-/// Physics whose force depends on the path.
-const MEMORY: [&str; 7] = ["dahl", "lugre", "maxwell_slip", "preisach_lugre", "hysteretic_spring", "bouc_wen", "backlash"];
-
-/// What a physics is drawn against, by its name.
-pub fn against(physics: &str) -> Against {
-    match physics {
-        "coulomb" | "asymmetric_coulomb" | "stribeck" | "friction_deficit" | "damper" | "asymmetric_damper" | "quadratic_drag"
-        | "back_emf" => Against::Velocity,
-        "inertia" | "inerter" => Against::Acceleration,
-        "saturation" | "gain" => Against::Signal,
-        "delay" | "bandwidth" => Against::SignalRate,
-        "bias" | "offset" => Against::Time,
-        _ => Against::Displacement,
-    }
-}
-
-/// In which state a physics shows at a place (as places are written, `drum-ground` or a signal's name), in words.
-pub fn state(physics: &str, place: &str) -> String {
-    match physics {
-        "coulomb" | "asymmetric_coulomb" | "stribeck" | "friction_deficit" | "dahl" | "lugre" | "maxwell_slip" | "preisach_lugre" => {
-            format!("reversals of the velocity across {place}")
-        }
-        "contact" | "hunt_crossley" | "backlash" => format!("where the displacement across {place} meets or leaves its contact"),
-        "saturation" => format!("large values of {place}"),
-        "cogging" => format!("periodically in the displacement across {place}"),
-        _ => match against(physics) {
-            Against::Velocity => format!("with the velocity across {place}"),
-            Against::Displacement => format!("with the displacement across {place}"),
-            Against::Acceleration => format!("with the acceleration across {place}"),
-            Against::Signal => format!("with the value of {place}"),
-            Against::SignalRate => format!("with the rate of change of {place}"),
-            Against::Time => format!("all the time, at {place}"),
-        },
-    }
-}
 
 /// Evidence of one of the physics that a candidate adds; `None` where nothing can be located there. `floor` is the measuring error of
 /// each output, in its unit.
@@ -134,7 +82,7 @@ pub fn evidence(problem: &Problem, best: &Candidate, floor: &[f64], which: usize
     let options = locate::Options { most_samples: SAMPLES, only: Some(finding.place.clone()), ..locate::Options::quick() };
     let location = locate(&without, &runs, floor, &options).ok()?;
     let found = location.ranking.into_iter().find(|c| c.place.same(&finding.place))?;
-    let against = against(finding.physics);
+    let against = finding.physics.against;
     let scene = Scene { without: &without, with: &with, finding, place: &found.place, against };
     let traces = records.iter().zip(&found.courses).filter_map(|(record, course)| scene.trace(record, course)).collect();
     let (variable_unit, displacement_unit, force_unit) = scene.units(problem);
@@ -145,7 +93,7 @@ pub fn evidence(problem: &Problem, best: &Candidate, floor: &[f64], which: usize
         variable_unit,
         displacement_unit,
         force_unit,
-        memory: MEMORY.contains(&finding.physics),
+        memory: finding.physics.memory,
         replaces: finding.replaces.clone(),
         traces,
     })
@@ -257,7 +205,7 @@ impl Scene<'_> {
         let first = self.body(self.without, a);
         let replaced = self.without.elements.iter().filter(|e| self.finding.replaces.contains(&e.name));
         // A joint that is split keeps its elements, which then act in a row with the new ones.
-        let split = self.finding.physics == "series_compliance";
+        let split = self.finding.splits_joint();
         let joint = self.without.elements.iter().filter(move |e| split && self.is_here(e));
         replaced.chain(joint).map(|e| (e, if e.between[0] == first { 1.0 } else { -1.0 })).collect()
     }
@@ -294,7 +242,7 @@ impl Scene<'_> {
             }
         }
         let mut force = vec![0.0; record.len];
-        if self.finding.physics == "inertia" {
+        if self.finding.adds_inertia() {
             let inertia = |m: &Model| ends[0].or(ends[1]).and_then(|b| m.bodies.get(b)).map_or(0.0, |b| b.inertia);
             let more = inertia(self.with) - inertia(self.without);
             force.iter_mut().zip(&across[2]).for_each(|(f, a)| *f = more * a);

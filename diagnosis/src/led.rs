@@ -2,7 +2,7 @@
 //! apart that a free simulation does not show until all else is right.
 
 use crate::fit::{Effort, Evaluator, Fit};
-use crate::hypothesis::{Hypothesis, Parameter, Place};
+use crate::hypothesis::{Hypothesis, Place, inherited};
 use crate::race::{Course, Seed, distinct_fits, hopeful, own_first};
 use crate::structure::Structure;
 use crate::work::{Budget, Steps};
@@ -127,13 +127,12 @@ impl Course<'_> {
         let own = self.effects_of(structure, values);
         let mut seeds: Vec<(usize, Seed)> = Vec::new();
         for (slot, (effect, own_values)) in structure.added.iter().zip(structure.added_of(values)).enumerate() {
-            let known: Vec<(&str, f64)> = effect.parameters.iter().zip(&own_values).map(|(p, v)| (p.key.as_str(), *v)).collect();
             let beside = |h: &Hypothesis| structure.added.iter().enumerate().all(|(i, other)| i == slot || other.compatible(h));
             for (index, h) in self.hypotheses.iter().enumerate() {
                 if !h.place.same(&effect.place) || h.id == effect.id || !beside(h) {
                     continue;
                 }
-                let same = h.starts.first().map(|s| inherited(h, s, &known)).filter(|s| !h.starts.contains(s));
+                let same = h.starts.first().map(|s| inherited(h, s, effect, &own_values)).filter(|s| !h.starts.contains(s));
                 for (rank, start) in same.into_iter().chain(h.starts.iter().cloned()).enumerate() {
                     let mut effects = own.clone();
                     if let Some(place) = effects.get_mut(slot) {
@@ -156,18 +155,4 @@ fn rank(led: &mut Vec<(Structure, Fit)>, keep: usize) {
     let on_its_way = |f: &Fit| f.cost - f.foreseen.min(FORESEEN * f.cost);
     led.retain(|(_, f)| on_its_way(f) < BEHIND * best);
     led.truncate(keep);
-}
-
-/// A start with the values that another law at the same place has for what both have: keys of the same name, levels of friction.
-pub(crate) fn inherited(hypothesis: &Hypothesis, start: &[f64], from: &[(&str, f64)]) -> Vec<f64> {
-    let level = |key: &str| ["force", "coulomb", "static"].contains(&key);
-    let value = |key: &str| {
-        let same = from.iter().find(|(other, _)| *other == key);
-        same.or_else(|| from.iter().find(|(other, _)| level(key) && level(other))).map(|(_, value)| *value)
-    };
-    let one = |(p, s): (&Parameter, &f64)| match value(&p.key).filter(|_| p.index.is_none()) {
-        Some(value) => value.clamp(p.range.0, p.range.1),
-        None => *s,
-    };
-    hypothesis.parameters.iter().zip(start).map(one).collect()
 }

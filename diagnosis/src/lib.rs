@@ -22,6 +22,7 @@ pub(crate) mod normal_equations;
 pub mod numbers;
 pub mod parts;
 pub mod per_record;
+pub mod physics;
 pub mod problem;
 pub mod race;
 pub mod screen;

@@ -8,6 +8,7 @@ use crate::guide::Guide;
 use crate::problem::Record;
 use crate::simulate::{Conditions, motion_at};
 use crate::structure::Structure;
+use backdrive_plant::elements::Mechanics;
 use backdrive_plant::set::Initial;
 use rayon::prelude::*;
 use std::ops::Range;
@@ -35,7 +36,8 @@ impl Parts {
         // Led firmly, so that a part begins as it was measured and not as a model has it that lacks something.
         let firm = evaluator.guide.as_ref().map(|g| g.with(FIRM * g.strength));
         let layout = evaluator.layout();
-        let remembers = model.elements.iter().any(|e| MEMORY.contains(&e.law.kind().name));
+        // No part can begin with a memory of what came before.
+        let remembers = model.elements.iter().any(|e| e.law.memory_len() > 0);
         let ranges: Vec<Range<usize>> = records
             .iter()
             .enumerate()
@@ -81,8 +83,6 @@ impl Parts {
     }
 }
 
-/// Kinds whose force depends on more than what moves now: no part can begin with it.
-const MEMORY: [&str; 6] = ["dahl", "lugre", "maxwell_slip", "preisach_lugre", "bouc_wen", "hysteretic_spring"];
 /// Share of a part that does not begin where its recording does, until what came before is forgotten.
 const FORGOTTEN: f64 = 0.3;
 /// Share of the most that a part could show which is enough for one that begins where its recording does.

@@ -59,6 +59,8 @@ pub struct Number {
     pub prior: Option<(f64, f64)>,
 }
 
+/// Step of differences by a number that shifts a signal, sample periods: behind a zero hold less than a sample has no gradient.
+const WITHIN_A_SAMPLE: f64 = 0.7;
 /// How far, as a factor e^2, a stated number may be off without surprise: only numbers that the recordings do not determine feel it.
 const PRIOR_SPREAD: f64 = 2.0;
 
@@ -126,20 +128,17 @@ impl Structure {
                 let width = (parameter.range.1 - parameter.range.0).abs();
                 let size = hypothesis.starts.iter().filter_map(|s| s.get(p)).fold(0.0f64, |a, x| a.max(x.abs())).min(width);
                 let step = match () {
-                    // Behind a zero hold less than a sample has no gradient.
-                    () if parameter.key == "delay" => 0.7 * period,
+                    () if parameter.in_samples => WITHIN_A_SAMPLE * period,
                     () if parameter.log => 1e-3,
                     () if size > 0.0 && size.is_finite() => 1e-3 * size,
                     () => 1e-5 * width,
                 };
-                // A delay is searched as it is: it may well be none.
-                let log = parameter.log && parameter.key != "delay";
                 numbers.push(Number {
                     role: Role::Added(h, p),
                     range: parameter.range,
-                    log,
+                    log: parameter.log,
                     step,
-                    coarse: parameter.key == "delay",
+                    coarse: parameter.in_samples,
                     records: None,
                     prior: None,
                 });

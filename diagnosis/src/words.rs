@@ -1,56 +1,11 @@
 //! Physics and places in words, from one table: what headlines, texts and pages say in place of ids.
 
+use crate::physics::physics_named;
 use serde_json::Value;
-
-/// Name of a physics in a verdict, in words, and the parameter that says how large it is.
-const NAMES: &[(&str, &str, &str)] = &[
-    ("bias", "a constant force", "force"),
-    ("offset", "a sensor offset", "offset"),
-    ("gain", "a gain that is off", "gain"),
-    ("inertia", "additional inertia", "inertia"),
-    ("damper", "viscous friction", "damping"),
-    ("back_emf", "back-EMF", "back_emf"),
-    ("spring", "a spring", "stiffness"),
-    ("inerter", "an inertance", "inertance"),
-    ("coulomb", "dry friction", "force"),
-    ("quadratic_drag", "quadratic drag", "coefficient"),
-    ("delay", "a delay", "delay"),
-    ("bandwidth", "a limited bandwidth", "bandwidth"),
-    ("saturation", "saturation", "saturation"),
-    ("asymmetric_damper", "viscous friction that differs by direction", "positive"),
-    ("asymmetric_coulomb", "dry friction that differs by direction", "positive"),
-    ("cubic_spring", "a stiffening spring", "cubic"),
-    ("dahl", "dry friction with presliding (Dahl)", "coulomb"),
-    ("stribeck", "dry friction with stiction (Stribeck)", "static"),
-    ("friction_deficit", "dry friction that is lower near rest", "coulomb"),
-    ("cogging", "a ripple over position (cogging)", "amplitude"),
-    ("backlash", "backlash", "gap"),
-    ("contact", "a contact", "stiffness"),
-    ("hunt_crossley", "a contact (Hunt-Crossley)", "stiffness"),
-    ("series_compliance", "a compliance in series", "stiffness"),
-    ("bouc_wen", "hysteresis (Bouc-Wen)", "stiffness"),
-    ("lugre", "dry friction with presliding (LuGre)", "coulomb"),
-    ("hysteretic_spring", "a hysteretic spring", "stiffness_positive"),
-    ("maxwell_slip", "presliding hysteresis (Maxwell slip)", "force"),
-    ("preisach_lugre", "presliding hysteresis (Preisach)", "coulomb"),
-];
 
 /// A physics in words; its name with spaces where the table has none.
 pub fn physics(name: &str) -> String {
-    NAMES.iter().find(|n| n.0 == name).map_or_else(|| name.replace('_', " "), |n| n.1.to_string())
-}
-
-/// What a family of physics has in common, in words; `None` where that says nothing.
-fn family(name: &str) -> Option<&'static str> {
-    match crate::hypothesis::physics_named(name)?.family {
-        "friction" => Some("dry friction"),
-        "hysteresis" => Some("hysteresis"),
-        "contact" => Some("a contact or backlash"),
-        "stiffness" => Some("stiffness"),
-        "damping" => Some("viscous friction"),
-        "lag" => Some("a delay or lag"),
-        _ => None,
-    }
+    physics_named(name).map_or_else(|| name.replace('_', " "), |p| p.words.to_string())
 }
 
 /// Where a finding of a verdict sits, in words: `at the motor`, `between motor and drum`, `at the input or output force`.
@@ -67,8 +22,7 @@ pub fn place(finding: &Value) -> String {
 /// A finding of a verdict in words: `backlash between motor and drum, 0.31 mm`.
 pub fn finding(finding: &Value) -> String {
     let name = finding["physics"].as_str().unwrap_or("");
-    let size =
-        NAMES.iter().find(|n| n.0 == name).and_then(|n| sized(&finding["parameters"][n.2])).map_or(String::new(), |s| format!(", {s}"));
+    let size = physics_named(name).and_then(|p| sized(&finding["parameters"][p.size])).map_or(String::new(), |s| format!(", {s}"));
     format!("{} {}{size}", physics(name), place(finding))
 }
 
@@ -84,6 +38,7 @@ pub fn any_of(all: &[&Value]) -> String {
         });
         seen.join(" or ")
     };
+    let family = |name: &str| physics_named(name)?.family.words();
     let kin = names.first().and_then(|n| family(n)).filter(|first| names.iter().all(|n| family(n) == Some(first)));
     match kin {
         Some(kin) => format!("{kin}, {}", unique(all.iter().map(|f| place(f)).collect())),
@@ -118,13 +73,6 @@ pub fn share(value: f64) -> String {
 mod tests {
     use super::*;
     use serde_json::json;
-
-    #[test]
-    fn every_physics_has_a_name_in_words() {
-        for physics in crate::hypothesis::PHYSICS {
-            assert!(NAMES.iter().any(|n| n.0 == physics.name), "{}", physics.name);
-        }
-    }
 
     #[test]
     fn a_finding_reads_in_words() {

@@ -3,8 +3,8 @@
 use super::adds;
 use crate::diagnose::Found;
 use crate::recordings::file_name;
-use backdrive_diagnosis::evidence::{Against, Curve, Evidence, Trace, evidence};
-use backdrive_diagnosis::hypothesis::Place;
+use backdrive_diagnosis::evidence::{Curve, Evidence, Trace, evidence};
+use backdrive_diagnosis::hypothesis::{Against, Place};
 use backdrive_diagnosis::locate::{Candidate as Located, Location, Variable};
 use backdrive_diagnosis::search::Candidate;
 use backdrive_diagnosis::words;
@@ -50,7 +50,7 @@ pub(super) fn in_words(best: &Candidate, which: usize) -> String {
         Place::Between(a, b) => serde_json::json!({ "between": [a, b] }),
         Place::Signal(name) => serde_json::json!({ "signal": name }),
     };
-    super::capital(&format!("{} {}", words::physics(own.physics), words::place(&place))).trim_end_matches('.').to_string()
+    super::capital(&format!("{} {}", words::physics(own.physics.name), words::place(&place))).trim_end_matches('.').to_string()
 }
 
 /// How a place reads.

@@ -3,7 +3,7 @@
 use crate::{Context, StudyError};
 use backdrive::diagnose::{Diagnosed, Found, MODEL, REPORT, diagnose_into};
 use backdrive::recordings;
-use backdrive_diagnosis::hypothesis::PHYSICS;
+use backdrive_diagnosis::physics::PHYSICS;
 use backdrive_diagnosis::search::Settings;
 use backdrive_plant::model::Model;
 use serde_json::Value;

@@ -2,7 +2,8 @@
 
 use super::*;
 use crate::fit::{Effort, Fit};
-use crate::hypothesis::{self, Hypothesis, Scales};
+use crate::hypothesis::{Hypothesis, Scales};
+use crate::physics;
 use crate::problem::Record;
 use backdrive_plant::excitation::load_experiments;
 use backdrive_plant::recording::Recording;
@@ -75,7 +76,7 @@ fn problem(nominal: &str, truth: &str, column: Vec<f64>, noise: f64) -> Problem 
 
 fn hypotheses(problem: &Problem) -> Vec<Hypothesis> {
     let runs: Vec<(Vec<Vec<f64>>, f64)> = problem.fit.iter().map(|r| (r.inputs.clone(), r.period)).collect();
-    hypothesis::all(&problem.model, &Scales::of(&problem.model, &runs).unwrap())
+    physics::all(&problem.model, &Scales::of(&problem.model, &runs).unwrap())
 }
 
 /// The nominal model with some of its hypotheses, fitted.

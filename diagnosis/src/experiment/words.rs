@@ -1,7 +1,7 @@
 //! An experiment in words and as a file.
 
 use super::rivals::Trial;
-use crate::hypothesis::Hypothesis;
+use crate::hypothesis::{Hypothesis, Mark};
 use crate::structure::Structure;
 use backdrive_plant::excitation::{Excitation, Shape};
 use backdrive_plant::model::{InputKind, Model, Motion};
@@ -127,33 +127,32 @@ pub(super) fn separator(a: &Structure, b: &Structure) -> Option<&'static str> {
     let (a, b) = (only(a, b), only(b, a));
     let ([a], [b]) = (a.as_slice(), b.as_slice()) else { return None };
     let same_place = a.place.same(&b.place);
-    let (x, y) = (kind(a.physics), kind(b.physics));
-    let pair = |p: &str, q: &str| (x == p && y == q) || (x == q && y == p);
+    let (x, y) = (a.physics.mark, b.physics.mark);
+    use Mark::*;
+    let pair = |p: Mark, q: Mark| (x == p && y == q) || (x == q && y == p);
     let said = match () {
         () if x == y && !same_place => "the same physics loads other bodies there, and each of these has its own frequency",
-        () if pair("dry", "viscous") => "dry friction is the same at every speed, viscous friction grows with it: two speeds tell",
-        () if pair("dry", "drag") || pair("viscous", "drag") => "drag grows with the square of the speed: two speeds tell",
-        () if pair("dry", "near rest") => "what friction does near rest shows in slow motion",
-        () if pair("dry", "presliding") || pair("near rest", "presliding") => {
+        () if pair(Dry, Viscous) => "dry friction is the same at every speed, viscous friction grows with it: two speeds tell",
+        () if pair(Dry, Drag) || pair(Viscous, Drag) => "drag grows with the square of the speed: two speeds tell",
+        () if pair(Dry, NearRest) => "what friction does near rest shows in slow motion",
+        () if pair(Dry, Presliding) || pair(NearRest, Presliding) => {
             "presliding gives way over a distance from each reversal, dry friction jumps with the velocity"
         }
-        () if pair("presliding", "memory") => "reversals within reversals show how much of the past the force remembers",
-        () if pair("dry", "gap") || pair("presliding", "gap") => {
+        () if pair(Presliding, Memory) => "reversals within reversals show how much of the past the force remembers",
+        () if pair(Dry, Gap) || pair(Presliding, Gap) => {
             "in a gap nothing pulls, and small motion stays within it; friction is there at any amplitude"
         }
-        () if pair("delay", "gap") || pair("lag", "gap") => {
-            "the lag of a gap falls with the amplitude, that of a delay grows with the frequency"
-        }
-        () if pair("delay", "lag") => "a delay turns the phase and leaves the gain, a lag takes the gain too: high frequencies tell",
-        () if pair("delay", "mass") || pair("lag", "mass") => "inertia takes gain and turns no phase by itself; a lag turns the phase",
-        () if pair("delay", "soft") || pair("lag", "soft") => "a compliance brings a resonance, a lag does not",
-        () if pair("limit", "shape") => {
+        () if pair(Delay, Gap) || pair(Lag, Gap) => "the lag of a gap falls with the amplitude, that of a delay grows with the frequency",
+        () if pair(Delay, Lag) => "a delay turns the phase and leaves the gain, a lag takes the gain too: high frequencies tell",
+        () if pair(Delay, Mass) || pair(Lag, Mass) => "inertia takes gain and turns no phase by itself; a lag turns the phase",
+        () if pair(Delay, Soft) || pair(Lag, Soft) => "a compliance brings a resonance, a lag does not",
+        () if pair(Limit, Shape) => {
             "a limit of the drive belongs to the command, a softening spring to the displacement: several amplitudes tell"
         }
-        () if pair("lopsided", "bias") => "an offset is there at rest and at every speed, lopsided friction has the sign of the motion",
-        () if pair("ripple", "dry") || pair("ripple", "bias") => "a ripple keeps its place in both directions",
-        () if pair("dry", "lopsided") => "lopsided friction is another in each direction: motion both ways about a bias tells",
-        () if ["spring", "shape", "mass", "soft", "limit"].iter().any(|other| pair("dry", other)) => {
+        () if pair(Lopsided, Bias) => "an offset is there at rest and at every speed, lopsided friction has the sign of the motion",
+        () if pair(Ripple, Dry) || pair(Ripple, Bias) => "a ripple keeps its place in both directions",
+        () if pair(Dry, Lopsided) => "lopsided friction is another in each direction: motion both ways about a bias tells",
+        () if [Spring, Shape, Mass, Soft, Limit].iter().any(|other| pair(Dry, *other)) => {
             "dry friction does not grow with the motion: several amplitudes tell"
         }
         () => return None,
@@ -161,45 +160,8 @@ pub(super) fn separator(a: &Structure, b: &Structure) -> Option<&'static str> {
     Some(said)
 }
 
-/// What a physics is among those that are easily taken for each other.
-fn kind(physics: &str) -> &'static str {
-    match physics {
-        "coulomb" => "dry",
-        "damper" | "back_emf" => "viscous",
-        "quadratic_drag" => "drag",
-        "stribeck" | "friction_deficit" => "near rest",
-        "dahl" | "lugre" => "presliding",
-        "maxwell_slip" | "preisach_lugre" | "bouc_wen" | "hysteretic_spring" => "memory",
-        "backlash" | "contact" | "hunt_crossley" => "gap",
-        "delay" => "delay",
-        "bandwidth" => "lag",
-        "inertia" | "inerter" => "mass",
-        "series_compliance" => "soft",
-        "saturation" => "limit",
-        "cubic_spring" => "shape",
-        "asymmetric_coulomb" | "asymmetric_damper" => "lopsided",
-        "bias" | "offset" => "bias",
-        "cogging" => "ripple",
-        "spring" => "spring",
-        _ => "other",
-    }
-}
-
 /// What would have to be known of two structures that no recording of the same signals tells apart.
 pub(super) fn same_force(a: &Structure, b: &Structure) -> &'static str {
     let own = [only(a, b), only(b, a)].concat();
-    let has = |name: &str| own.iter().any(|h| h.physics == name);
-    match () {
-        () if has("back_emf") => {
-            "back-EMF and a damper to ground on the driven body are the same force: the motor's current would tell, or letting the device coast with the winding open"
-        }
-        () if has("delay") || has("bandwidth") => {
-            "a delay at the only input and at the only output move the same signal: a second sensor would tell"
-        }
-        () if has("inertia") || has("inerter") => "inertia and an inerter to ground are the same force: weighing the body would tell",
-        () if has("asymmetric_coulomb") => {
-            "lopsided dry friction and dry friction with a bias are the same force: a force sensor at rest would tell"
-        }
-        () => "they are the same force under two names",
-    }
+    own.iter().find_map(|h| h.physics.twin).unwrap_or("they are the same force under two names")
 }

@@ -1,12 +1,62 @@
 //! Hypotheses as edits, and edits made to a model in memory as [`backdrive_plant::write::patch`] makes them to its file.
 
-use super::{ElementForm, Form, Hypothesis, HypothesisError, Source};
+use super::types::{ElementForm, Form, Hypothesis, HypothesisError, Source};
 use backdrive_plant::elements::{Law, kind_named};
 use backdrive_plant::model::{Body, Element, Model, OutputKind, Place};
 use backdrive_plant::write::{Edit, ElementSpec, Value};
 
+impl Hypothesis {
+    /// The model with this physics added.
+    ///
+    /// # Errors
+    /// When the values are not one for each parameter or not possible, or the model is not the one that the hypothesis was made for.
+    pub fn apply(&self, model: &Model, values: &[f64]) -> Result<Model, HypothesisError> {
+        let mut edited = model.clone();
+        apply_edits(&mut edited, &self.edits(model, values)?).map_err(|reason| HypothesisError::Value { id: self.id.clone(), reason })?;
+        Ok(edited)
+    }
+
+    /// The same on the text of the model's file: [`backdrive_plant::write::patch`] with these edits gives the file of the edited model.
+    ///
+    /// # Errors
+    /// As [`Hypothesis::apply`].
+    pub fn edits(&self, model: &Model, values: &[f64]) -> Result<Vec<Edit>, HypothesisError> {
+        if values.len() != self.parameters.len() {
+            return Err(HypothesisError::Count { id: self.id.clone(), expected: self.parameters.len(), found: values.len() });
+        }
+        edits(self, model, values)
+    }
+
+    /// The same hypothesis as its parameters stand in a model that it was applied to: what a later fit of the whole starts from.
+    pub fn values_in(&self, edited: &Model, without: &Model) -> Option<Vec<f64>> {
+        let own = match &self.form {
+            Form::Inertia { body } => without.values_at(&format!("bodies.{body}")).ok()?.first().copied()?,
+            _ => 0.0,
+        };
+        self.parameters.iter().map(|p| Some(edited.values_at(&p.path).ok()?.get(p.index.unwrap_or(0))? - own)).collect()
+    }
+
+    /// Whether both may be applied to one model: they neither take the place of the same element nor set the same number.
+    pub fn compatible(&self, other: &Hypothesis) -> bool {
+        let same_element = self.replaces.iter().any(|name| other.replaces.contains(name));
+        let same_number = self.parameters.iter().any(|p| other.parameters.iter().any(|q| p.path == q.path));
+        let same_joint = self.splits_joint() && other.splits_joint() && self.place.same(&other.place);
+        !same_element && !same_number && !same_joint && self.class != other.class
+    }
+
+    /// Whether it adds a body behind the elements of a joint.
+    pub fn splits_joint(&self) -> bool {
+        matches!(self.form, Form::Series { .. })
+    }
+
+    /// Whether it adds to the inertia of a body.
+    pub fn adds_inertia(&self) -> bool {
+        matches!(self.form, Form::Inertia { .. })
+    }
+}
+
 /// The edits of a hypothesis; `values` are one for each of its parameters.
-pub(super) fn edits(hypothesis: &Hypothesis, model: &Model, values: &[f64]) -> Result<Vec<Edit>, HypothesisError> {
+fn edits(hypothesis: &Hypothesis, model: &Model, values: &[f64]) -> Result<Vec<Edit>, HypothesisError> {
     let wrong = |reason: String| HypothesisError::Value { id: hypothesis.id.clone(), reason };
     let no_such = |what, name: &str| HypothesisError::NoSuch { id: hypothesis.id.clone(), what, name: name.to_string() };
     match &hypothesis.form {

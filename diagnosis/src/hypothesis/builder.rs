@@ -1,13 +1,13 @@
 //! Puts hypotheses together: names, units and paths follow from the element registry and the site.
 
 use super::sites::{Site, Sites};
-use super::{ElementForm, Form, Hypothesis, Parameter, Physics, Place, Source};
+use super::types::{ElementForm, Form, Hypothesis, Parameter, Physics, Place, Source};
 use backdrive_plant::describe::unit_for;
 use backdrive_plant::elements::{Kind, Law, kind_named};
 use backdrive_plant::model::{InputKind, Model};
 
 /// An element in the making.
-pub(super) struct ElementBuilder<'a> {
+pub(crate) struct ElementBuilder<'a> {
     sites: &'a Sites<'a>,
     physics: &'static Physics,
     kind: &'static Kind,
@@ -23,24 +23,24 @@ pub(super) struct ElementBuilder<'a> {
 
 /// What a fit may do with a parameter.
 #[derive(Clone, Copy)]
-pub(super) struct Freedom {
+pub(crate) struct Freedom {
     pub range: (f64, f64),
     pub neutral: Option<f64>,
     pub log: bool,
 }
 
 /// From `low` to `high` in even steps, without effect at `neutral`.
-pub(super) fn even(low: f64, high: f64, neutral: f64) -> Freedom {
+pub(crate) fn even(low: f64, high: f64, neutral: f64) -> Freedom {
     Freedom { range: (low, high), neutral: Some(neutral), log: false }
 }
 
 /// From `low` to `high` in even steps, of no matter where others have no effect.
-pub(super) fn any(low: f64, high: f64) -> Freedom {
+pub(crate) fn any(low: f64, high: f64) -> Freedom {
     Freedom { range: (low, high), neutral: None, log: false }
 }
 
 /// From `low` to `high`, both above 0, by its logarithm.
-pub(super) fn log(low: f64, high: f64) -> Freedom {
+pub(crate) fn log(low: f64, high: f64) -> Freedom {
     Freedom { range: (low, high), neutral: None, log: true }
 }
 
@@ -142,6 +142,7 @@ impl<'a> ElementBuilder<'a> {
             range: freedom.range,
             neutral: freedom.neutral,
             log: freedom.log,
+            in_samples: false,
         });
     }
 
@@ -167,7 +168,7 @@ impl<'a> ElementBuilder<'a> {
 }
 
 /// A key of an input (`inputs`) or an output (`outputs`) that the file does not state.
-pub(super) fn key(
+pub(crate) fn key(
     sites: &Sites,
     physics: &'static Physics,
     section: &str,
@@ -185,6 +186,7 @@ pub(super) fn key(
         range: freedom.range,
         neutral: freedom.neutral,
         log: freedom.log,
+        in_samples: false,
     };
     let place = Place::Signal(signal.to_string());
     let id = id(physics.name, &place, "");
@@ -192,7 +194,7 @@ pub(super) fn key(
 }
 
 /// More inertia on a body.
-pub(super) fn inertia(sites: &Sites, physics: &'static Physics, body: &str, freedom: Freedom, starts: &[f64]) -> Hypothesis {
+pub(crate) fn inertia(sites: &Sites, physics: &'static Physics, body: &str, freedom: Freedom, starts: &[f64]) -> Hypothesis {
     let parameter = Parameter {
         key: "inertia".to_string(),
         unit: unit_for(sites.model.motion, "kg"),
@@ -201,6 +203,7 @@ pub(super) fn inertia(sites: &Sites, physics: &'static Physics, body: &str, free
         range: freedom.range,
         neutral: freedom.neutral,
         log: freedom.log,
+        in_samples: false,
     };
     let place = Place::Between(body.to_string(), "ground".to_string());
     let id = id(physics.name, &place, "");
@@ -209,7 +212,7 @@ pub(super) fn inertia(sites: &Sites, physics: &'static Physics, body: &str, free
 }
 
 /// A body added into a joint; `ranges` are those of stiffness, damping and inertia, as are the numbers of each start.
-pub(super) fn series(
+pub(crate) fn series(
     sites: &Sites,
     physics: &'static Physics,
     joint: [String; 2],
@@ -238,6 +241,7 @@ pub(super) fn series(
             range: freedom.range,
             neutral: freedom.neutral,
             log: freedom.log,
+            in_samples: false,
         })
         .collect();
     let place = Place::Between(joint[0].clone(), joint[1].clone());
@@ -247,51 +251,39 @@ pub(super) fn series(
 
 impl Hypothesis {
     /// Says which number of the model does the same.
-    pub(super) fn same_as(mut self, path: Option<String>) -> Hypothesis {
+    pub(crate) fn same_as(mut self, path: Option<String>) -> Hypothesis {
         self.same_as = path;
         self
     }
 
+    /// Says that its parameters shift a signal in time.
+    pub(crate) fn in_samples(mut self) -> Hypothesis {
+        self.parameters.iter_mut().for_each(|p| p.in_samples = true);
+        self
+    }
+
     /// Puts it into a class with others that no recording can tell from it.
-    pub(super) fn class(mut self, class: String) -> Hypothesis {
+    pub(crate) fn class(mut self, class: String) -> Hypothesis {
         self.class = class;
         self
     }
 }
 
 /// Class of the lags that a device with one driven force and one sensor shows at both, if it is such a device.
-pub(super) fn only_input_and_output(model: &Model) -> bool {
+pub(crate) fn only_input_and_output(model: &Model) -> bool {
     model.inputs.len() == 1 && model.outputs.len() == 1 && model.inputs[0].kind == InputKind::Force
 }
 
 /// The number of a linear element of this kind between a body and ground.
-pub(super) fn stated(model: &Model, body: usize, kind: &str, key: &str) -> Option<String> {
+pub(crate) fn stated(model: &Model, body: usize, kind: &str, key: &str) -> Option<String> {
     let to_ground = |between: [Option<usize>; 2]| between.contains(&Some(body)) && between.contains(&None);
     let found = model.elements.iter().find(|e| e.law.kind().name == kind && to_ground(e.between));
     found.map(|e| format!("elements.{}.{key}", e.name))
 }
 
 /// The only number of a law.
-pub(super) fn first_value(law: &Law) -> f64 {
+pub(crate) fn first_value(law: &Law) -> f64 {
     law.values().first().and_then(|v| v.first()).copied().unwrap_or(0.0)
-}
-
-/// Level of a dry friction at speed, whatever its kind, N or N m.
-pub(super) fn friction_level(law: &Law) -> f64 {
-    let kind = law.kind();
-    let named = |key: &str| kind.parameters.iter().zip(law.values()).find(|(p, _)| p.key == key).map(|(_, v)| v);
-    let sum = |v: Vec<f64>| v.iter().sum::<f64>();
-    match kind.name {
-        "asymmetric_coulomb" => 0.5 * (named("positive").map_or(0.0, sum) + named("negative").map_or(0.0, sum)),
-        _ => named("coulomb").or_else(|| named("force")).map_or(0.0, sum),
-    }
-}
-
-/// Level of the dry friction that another kind is to take the place of, and the value at which that changes nothing, if there is one:
-/// only plain Coulomb friction is a special case of the others.
-pub(super) fn replaced_friction(law: &Law) -> (f64, Option<f64>) {
-    let level = friction_level(law);
-    (level, (law.kind().name == "coulomb").then_some(level))
 }
 
 fn id(physics: &str, place: &Place, tag: &str) -> String {
@@ -321,16 +313,5 @@ fn finish(
             *x = x.max(p.range.0).min(p.range.1);
         }
     }
-    Hypothesis {
-        class: id.clone(),
-        id,
-        physics: physics.name,
-        place,
-        replaces,
-        family: physics.family,
-        parameters,
-        starts,
-        same_as: None,
-        form,
-    }
+    Hypothesis { class: id.clone(), id, physics, place, replaces, parameters, starts, same_as: None, form }
 }

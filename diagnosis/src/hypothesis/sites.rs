@@ -1,11 +1,12 @@
 //! The places of a device where physics may have been left out.
 
-use super::Scales;
+use super::scales::Scales;
+use backdrive_plant::elements::{Law, Mechanics, Role};
 use backdrive_plant::model::{Element, InputKind, Model, OutputKind, Place};
 
 /// How two places belong together.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Reach {
+pub(crate) enum Reach {
     /// A body and ground.
     Ground,
     /// Two bodies that an element joins.
@@ -16,7 +17,7 @@ pub(super) enum Reach {
 
 /// A pair of places, with what moves and pushes there.
 #[derive(Debug, Clone)]
-pub(super) struct Site {
+pub(crate) struct Site {
     pub ends: [Place; 2],
     pub between: [String; 2],
     pub reach: Reach,
@@ -34,22 +35,49 @@ pub(super) struct Site {
 }
 
 /// The places of a model, with its scales.
-pub(super) struct Sites<'a> {
+pub(crate) struct Sites<'a> {
     pub model: &'a Model,
     pub scales: &'a Scales,
     pub pairs: Vec<Site>,
+    kin: Vec<Kin>,
 }
 
-/// Kinds that are dry friction, with or without presliding.
-pub(super) const FRICTION: [&str; 8] =
-    ["coulomb", "asymmetric_coulomb", "stribeck", "friction_deficit", "dahl", "lugre", "maxwell_slip", "preisach_lugre"];
-/// Kinds that jump with the sign of the velocity.
-pub(super) const SET_VALUED: [&str; 4] = ["coulomb", "asymmetric_coulomb", "stribeck", "friction_deficit"];
-/// Kinds that hold a joint.
-pub(super) const ELASTIC: [&str; 7] = ["spring", "cubic_spring", "hysteretic_spring", "bouc_wen", "backlash", "contact", "hunt_crossley"];
+/// What an element is to others in the same place.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Kin {
+    /// Level of a dry friction at speed, N or N m; `None` of what is none.
+    pub level: Option<f64>,
+    /// Whether it holds the joint, as a spring does.
+    pub holds: bool,
+}
+
+/// A dry friction that the model has at a site.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct DryFriction {
+    /// Its place among the model's elements.
+    pub index: usize,
+    /// Its kind.
+    pub kind: &'static str,
+    /// Its level at speed, N or N m.
+    pub level: f64,
+    /// Whether it has one level at any speed and no memory: a special case of the others.
+    plain: bool,
+}
+
+impl DryFriction {
+    /// Whether it has one level at any speed and no memory.
+    pub fn is_plain(&self) -> bool {
+        self.plain
+    }
+
+    /// The level with which a richer law changes nothing, if there is one: only a plain level is a special case of the others.
+    pub fn neutral(&self) -> Option<f64> {
+        self.plain.then_some(self.level)
+    }
+}
 
 impl<'a> Sites<'a> {
-    pub fn of(model: &'a Model, scales: &'a Scales) -> Sites<'a> {
+    pub fn of(model: &'a Model, scales: &'a Scales, kin: impl Fn(&Law) -> Kin) -> Sites<'a> {
         let n = model.bodies.len();
         let joined = |a: usize, b: usize| model.elements.iter().any(|e| e.between == [Some(a), Some(b)] || e.between == [Some(b), Some(a)]);
         let mut pairs = Vec::new();
@@ -73,7 +101,7 @@ impl<'a> Sites<'a> {
                 }
             }
         }
-        Sites { model, scales, pairs }
+        Sites { model, scales, pairs, kin: model.elements.iter().map(|e| kin(&e.law)).collect() }
     }
 
     /// Bodies against ground, and joints.
@@ -92,6 +120,26 @@ impl<'a> Sites<'a> {
 
     pub fn has(&self, site: &Site, kinds: &[&str]) -> bool {
         self.first_of(site, kinds).is_some()
+    }
+
+    /// The first dry friction at a site.
+    pub fn dry_friction(&self, site: &Site) -> Option<DryFriction> {
+        self.elements_at(site).find_map(|(index, element)| {
+            let (level, kind) = (self.kin[index].level?, element.law.kind().name);
+            // One number is its level.
+            let plain = element.law.kind().parameters.len() == 1;
+            Some(DryFriction { index, kind, level, plain })
+        })
+    }
+
+    /// Whether a friction there jumps with the sign of the velocity.
+    pub fn has_set_valued(&self, site: &Site) -> bool {
+        self.elements_at(site).any(|(_, e)| matches!(e.law.role(), Role::Friction(_)))
+    }
+
+    /// The first element that holds the joint, as a spring does.
+    pub fn holding(&self, site: &Site) -> Option<(usize, &'a Element)> {
+        self.elements_at(site).find(|(index, _)| self.kin[*index].holds)
     }
 }
 

@@ -9,8 +9,9 @@ mod wave;
 
 use crate::compare::Unseen;
 use crate::fit::{Effort, Evaluator, Fit};
-use crate::hypothesis::{self, Hypothesis, Place};
+use crate::hypothesis::{Hypothesis, Place};
 use crate::parts::Parts;
+use crate::physics;
 use crate::problem::Problem;
 use crate::race::Course;
 use crate::statistics::{advantage, correlation_time, levels, slowness};
@@ -274,7 +275,7 @@ pub fn search(problem: &Problem, settings: &Settings, limit: Limit, report: &(dy
 fn hypotheses_for(nominal: &Nominal, settings: &Settings) -> Vec<Hypothesis> {
     let problem = nominal.evaluator.problem;
     let withheld: Vec<&str> = settings.without.iter().map(String::as_str).collect();
-    let mut hypotheses = hypothesis::without(hypothesis::all(&nominal.model, &nominal.scales), &withheld);
+    let mut hypotheses = physics::without(physics::all(&nominal.model, &nominal.scales), &withheld);
     let mut classes = HashSet::new();
     hypotheses.retain(|h| {
         let is_number = h.same_as.as_ref().is_some_and(|path| problem.stated.iter().any(|s| s.path == *path));

@@ -4,7 +4,7 @@ use super::view::{SIMPLE, View};
 use super::{Candidate, candidate, distinct_structures};
 use crate::fit::{Effort, Evaluator};
 use crate::hypothesis::{self, Hypothesis, Place};
-use crate::led::inherited;
+use crate::physics;
 use crate::race::{Course, Seed};
 use crate::screen::{Promise, Screen};
 use crate::structure::Structure;
@@ -38,7 +38,7 @@ impl Course<'_> {
         for promise in promises.iter().filter(|p| p.share > chance.max(PROMISED * top) && used.insert(p.hypothesis)) {
             let Some(law) = self.hypotheses.get(promise.hypothesis) else { continue };
             let (Place::Between(a, b), [parameter]) = (&law.place, law.parameters.as_slice()) else { continue };
-            for element in problem.model.elements.iter().filter(|e| e.law.kind().name == law.physics) {
+            for element in problem.model.elements.iter().filter(|e| e.law.kind().name == law.physics.name) {
                 let ends = element.between.map(|end| problem.model.place_name(end));
                 let path = format!("elements.{}.{}", element.name, parameter.key);
                 let own = problem.stated.iter().zip(&stated).enumerate().find(|(_, (s, _))| s.path == path);
@@ -63,7 +63,7 @@ impl Course<'_> {
         for (out, (effect, values)) in best.structure.added.iter().zip(best.structure.added_of(&best.fit.values)).enumerate() {
             let relative = |h: &Hypothesis| {
                 h.place.same(&effect.place)
-                    && h.family == effect.family
+                    && h.physics.family == effect.physics.family
                     && h.id != effect.id
                     && h.parameters.len() < effect.parameters.len() + if done { 0 } else { 2 }
             };
@@ -176,14 +176,11 @@ impl Course<'_> {
                 all.push(made(rest.collect()));
             }
             let simpler = |h: &&Hypothesis| {
-                h.place.same(&effect.place)
-                    && hypothesis::contains(effect.physics, h.physics)
-                    && h.parameters.len() < effect.parameters.len()
+                h.place.same(&effect.place) && physics::contains(effect.physics, h.physics) && h.parameters.len() < effect.parameters.len()
             };
-            let known: Vec<(&str, f64)> = effect.parameters.iter().zip(values).map(|(p, v)| (p.key.as_str(), *v)).collect();
             for law in self.hypotheses.iter().filter(simpler) {
                 let Some(start) = hypothesis::starts_beside(effect, values, law).into_iter().next() else { continue };
-                let start = inherited(law, &start, &known);
+                let start = hypothesis::inherited(law, &start, effect, values);
                 let mut effects = own.clone();
                 effects[out] = (law.clone(), start);
                 all.push(made(effects));

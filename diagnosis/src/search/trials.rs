@@ -4,7 +4,7 @@ use super::view::View;
 use super::wave::Wave;
 use super::{AT_FLOOR, COARSE, Candidate, MIDDLE, NOMINAL_END, Settings, Tried, Work, distinct_structures, done, key_of, polished, sort};
 use crate::fit::Evaluator;
-use crate::hypothesis::Hypothesis;
+use crate::hypothesis::{Family, Hypothesis};
 use crate::race::{Course, NEAR, Seed, distinct};
 use crate::simulate::FINEST;
 use std::collections::HashSet;
@@ -237,7 +237,9 @@ impl<'s, 'a> Trials<'s, 'a> {
             Wave::Richer => {
                 // In the place of what is the best of its kind.
                 let best = distinct_structures(found, 1).next().map(|c| &c.structure.added[0]);
-                let like = |h: &Hypothesis| best.is_some_and(|b| b.place.same(&h.place) && ["friction", "hysteresis"].contains(&b.family));
+                let like = |h: &Hypothesis| {
+                    best.is_some_and(|b| b.place.same(&h.place) && matches!(b.physics.family, Family::Friction | Family::Hysteresis))
+                };
                 let rich = view.rich.iter().find(|p| like(&hypotheses[p.hypothesis]));
                 rich.map(|p| view.seed(vec![(p.hypothesis, p.values.clone())])).into_iter().collect()
             }

@@ -2,7 +2,7 @@
 
 use super::{Candidate, Detectable, candidate};
 use crate::fit::{Effort, Evaluator, Fit};
-use crate::hypothesis::Hypothesis;
+use crate::hypothesis::{Family, Hypothesis};
 use crate::locate::{self, Ripple};
 use crate::parts::Parts;
 use crate::problem::Record;
@@ -87,7 +87,9 @@ pub(super) fn ripples(records: &[Record], model: &Model, floor: &[f64], hypothes
     let Ok(location) = locate::locate(model, &runs, floor, &options) else { return Vec::new() };
     let mut alone: Vec<(f64, usize, Vec<f64>)> = Vec::new();
     for place in &location.ranking {
-        for (index, h) in hypotheses.iter_mut().enumerate().filter(|(_, h)| h.physics == "cogging" && h.place.same(&place.place)) {
+        for (index, h) in
+            hypotheses.iter_mut().enumerate().filter(|(_, h)| h.physics.family == Family::Ripple && h.place.same(&place.place))
+        {
             let start = |r: &Ripple| vec![r.amplitude, r.period, r.phase];
             let inside = |start: &Vec<f64>| start.iter().zip(&h.parameters).all(|(x, p)| (p.range.0..=p.range.1).contains(x));
             let next = place.ripples.get(1).map_or(0.0, |r| r.share);
@@ -103,7 +105,6 @@ pub(super) fn ripples(records: &[Record], model: &Model, floor: &[f64], hypothes
 
 /// Physics whose effect grows in proportion to their first parameter: what an effect is worth claiming, at the place where the least is enough.
 pub(super) fn detectable(view: &View, samples: usize, hypotheses: &[Hypothesis]) -> Vec<Detectable> {
-    const LINEAR: [&str; 9] = ["coulomb", "damper", "spring", "quadratic_drag", "cogging", "bias", "inertia", "delay", "back_emf"];
     let base = &view.base;
     // All of the recordings show what their parts do, and more.
     let more = samples as f64 / base.fit.residuals.len().max(1) as f64;
@@ -114,11 +115,12 @@ pub(super) fn detectable(view: &View, samples: usize, hypotheses: &[Hypothesis])
         let h = &hypotheses[index.0];
         let (Some(parameter), Some(value)) = (h.parameters.first(), index.1.first()) else { continue };
         let size = value.abs() * (needed / (more * length * length)).sqrt();
-        if !LINEAR.contains(&h.physics) || !size.is_finite() || parameter.neutral != Some(0.0) {
+        if !h.physics.proportional || !size.is_finite() || parameter.neutral != Some(0.0) {
             continue;
         }
-        let new = Detectable { physics: h.physics, place: h.place.clone(), key: parameter.key.clone(), size, unit: parameter.unit.clone() };
-        match found.iter_mut().find(|d| d.physics == h.physics) {
+        let new =
+            Detectable { physics: h.physics.name, place: h.place.clone(), key: parameter.key.clone(), size, unit: parameter.unit.clone() };
+        match found.iter_mut().find(|d| d.physics == h.physics.name) {
             Some(d) if d.size <= size => {}
             Some(d) => *d = new,
             None => found.push(new),

@@ -1,6 +1,7 @@
 //! Which of the structures is claimed, and which cannot be told from it.
 
-use crate::hypothesis::{Hypothesis, PHYSICS, physics_named, withheld};
+use crate::hypothesis::{Hypothesis, Physics};
+use crate::physics::{PHYSICS, withheld};
 use crate::search::{Candidate, Search, advantage_over};
 use std::collections::HashSet;
 
@@ -41,7 +42,7 @@ pub fn chosen(search: &Search) -> &Candidate {
 }
 
 fn order(h: &Hypothesis) -> usize {
-    PHYSICS.iter().position(|p| p.name == h.physics).unwrap_or(usize::MAX)
+    PHYSICS.iter().position(|p| *p == h.physics).unwrap_or(usize::MAX)
 }
 
 /// What the fits and the recordings that no fit has seen say for a candidate against another one, as a difference of information
@@ -108,6 +109,6 @@ pub(super) fn nearest<'s>(search: &'s Search, best: &Candidate) -> Vec<&'s Candi
 }
 
 /// Whether a physics has another one, or one of its family at the same place, as a special or limiting case.
-pub(super) fn contains(rich: &str, own: &Hypothesis) -> bool {
-    withheld(&[own.physics]).contains(&rich) || physics_named(rich).is_some_and(|p| p.family == own.family)
+pub(super) fn contains(rich: &Physics, own: &Hypothesis) -> bool {
+    withheld(&[own.physics.name]).contains(&rich.name) || rich.family == own.physics.family
 }

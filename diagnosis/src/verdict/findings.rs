@@ -43,13 +43,13 @@ pub(super) fn findings(search: &Search, best: &Candidate, spread: &Spread, adequ
             .take(6)
             .map(|((rival, _), weight)| {
                 let mut entry = place(&rival.place);
-                entry["physics"] = json!(rival.physics);
+                entry["physics"] = json!(rival.physics.name);
                 entry["confidence"] = json!(round_significant(weight / sum, 3));
                 entry
             })
             .collect();
         let mut entry = place(&hypothesis.place);
-        entry["physics"] = json!(hypothesis.physics);
+        entry["physics"] = json!(hypothesis.physics.name);
         entry["parameters"] = parameters_of(best, spread, h);
         entry["replaces"] = json!(hypothesis.replaces);
         entry["confidence"] = json!(round_significant(adequacy / sum, 3));

@@ -37,6 +37,6 @@ fn looks_like(search: &Search, best: &Candidate) -> Option<String> {
     let next = search.found.iter().filter(more).min_by(|a, b| a.fit.cost.total_cmp(&b.fit.cost))?;
     let effect = next.structure.added.iter().find(|h| !own.contains(&h.id.as_str()))?;
     let mut named = findings::place(&effect.place);
-    named["physics"] = json!(effect.physics);
-    Some(format!("{} {}", words::physics(effect.physics), words::place(&named)))
+    named["physics"] = json!(effect.physics.name);
+    Some(format!("{} {}", words::physics(effect.physics.name), words::place(&named)))
 }

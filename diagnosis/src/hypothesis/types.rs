@@ -1,0 +1,313 @@
+//! A physics, what is known of it before any device is looked at, and a physics at a place.
+
+use super::sites::Sites;
+use backdrive_plant::elements::Kind;
+use serde::Serialize;
+
+/// What a physics belongs to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Family {
+    /// A force that has always the same sign and size, or a reading that is off by as much.
+    Bias,
+    /// An actuator or sensor of another scale.
+    Scale,
+    /// Force over acceleration.
+    Inertia,
+    /// Force over velocity.
+    Damping,
+    /// Force over displacement.
+    Stiffness,
+    /// Dry friction, with or without presliding.
+    Friction,
+    /// A signal that comes late.
+    Lag,
+    /// A signal that ends at some size.
+    Limit,
+    /// A force that repeats with position.
+    Ripple,
+    /// Bodies that touch and part.
+    Contact,
+    /// A joint that is softer than the model has it.
+    Compliance,
+    /// Stiffness that loses energy whatever the rate.
+    Hysteresis,
+}
+
+impl Family {
+    /// What all of a family have in common, in words; `None` where that says nothing.
+    pub fn words(self) -> Option<&'static str> {
+        match self {
+            Family::Friction => Some("dry friction"),
+            Family::Hysteresis => Some("hysteresis"),
+            Family::Contact => Some("a contact or backlash"),
+            Family::Stiffness => Some("stiffness"),
+            Family::Damping => Some("viscous friction"),
+            Family::Lag => Some("a delay or lag"),
+            Family::Bias | Family::Scale | Family::Inertia | Family::Limit | Family::Ripple | Family::Compliance => None,
+        }
+    }
+}
+
+/// The variable that a physics' force is drawn against.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Against {
+    /// Velocity across the place.
+    Velocity,
+    /// Displacement across the place.
+    Displacement,
+    /// Acceleration across the place.
+    Acceleration,
+    /// Value of the signal.
+    Signal,
+    /// Rate of change of the signal.
+    SignalRate,
+    /// Time.
+    Time,
+}
+
+/// In which state of the device a physics shows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum State {
+    /// Where the velocity changes its sign.
+    Reversals,
+    /// Where bodies meet or part.
+    Contact,
+    /// At large values of the signal.
+    Large,
+    /// Again and again over the displacement.
+    Periodic,
+    /// With the variable that it is drawn against.
+    WithItsVariable,
+}
+
+/// What a physics is among those that are easily taken for each other: two with different marks are told apart by what
+/// [`crate::experiment`] says of the pair.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[allow(missing_docs)]
+pub enum Mark {
+    Dry,
+    Viscous,
+    Drag,
+    NearRest,
+    Presliding,
+    Memory,
+    Gap,
+    Delay,
+    Lag,
+    Mass,
+    Soft,
+    Limit,
+    Shape,
+    Lopsided,
+    Bias,
+    Ripple,
+    Spring,
+    Other,
+}
+
+/// A physics: everything that diagnosis knows of it before any device is looked at.
+pub struct Physics {
+    /// Name in verdicts: an element kind, the key of a signal, `inertia` or `series_compliance`.
+    pub name: &'static str,
+    /// What it belongs to.
+    pub family: Family,
+    /// Its name in words, with an article where it takes one.
+    pub words: &'static str,
+    /// The parameter that says how large it is.
+    pub size: &'static str,
+    /// Whether its force grows in proportion to its first parameter, so that the smallest size that would show can be told.
+    pub proportional: bool,
+    /// What its force is drawn against.
+    pub against: Against,
+    /// In which state of the device it shows.
+    pub state: State,
+    /// What it is among those that are easily taken for each other.
+    pub mark: Mark,
+    /// What would have to be known to tell it from a physics whose force is the same in the same place; `None` where there is none.
+    pub twin: Option<&'static str>,
+    /// Of dry friction: the parameters whose mean is the level at speed (the values of a list add up).
+    pub sliding: &'static [&'static str],
+    /// Parameters that start from the level of a dry friction that stood in its place.
+    pub from_level: &'static [&'static str],
+    /// Whether its force depends on the path: its element kind has a memory.
+    pub memory: bool,
+    /// Whether it holds a joint, as a spring does.
+    pub holds: bool,
+    /// Values with which a hypothesis of this physics does nearly what a coarser one at the same place does with its own, where it is the same
+    /// law resolved more finely: friction that builds up over a distance is that of many contacts, described by one state.
+    pub refine: fn(&Hypothesis, &[f64], &Hypothesis) -> Option<Vec<f64>>,
+    /// Physics that it contains as a special or limiting case: who withholds one of these withholds it too.
+    pub contains: &'static [&'static str],
+    /// The hypotheses that it makes of a device.
+    pub(crate) propose: fn(&Sites) -> Vec<Hypothesis>,
+}
+
+impl std::fmt::Debug for Physics {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        write!(f, "{}", self.name)
+    }
+}
+
+impl PartialEq for Physics {
+    fn eq(&self, other: &Physics) -> bool {
+        self.name == other.name
+    }
+}
+
+impl Physics {
+    /// In which state it shows at a place (as places are written, `drum-ground` or a signal's name), in words.
+    pub fn state_at(&self, place: &str) -> String {
+        match (self.state, self.against) {
+            (State::Reversals, _) => format!("reversals of the velocity across {place}"),
+            (State::Contact, _) => format!("where the displacement across {place} meets or leaves its contact"),
+            (State::Large, _) => format!("large values of {place}"),
+            (State::Periodic, _) => format!("periodically in the displacement across {place}"),
+            (State::WithItsVariable, Against::Velocity) => format!("with the velocity across {place}"),
+            (State::WithItsVariable, Against::Displacement) => format!("with the displacement across {place}"),
+            (State::WithItsVariable, Against::Acceleration) => format!("with the acceleration across {place}"),
+            (State::WithItsVariable, Against::Signal) => format!("with the value of {place}"),
+            (State::WithItsVariable, Against::SignalRate) => format!("with the rate of change of {place}"),
+            (State::WithItsVariable, Against::Time) => format!("all the time, at {place}"),
+        }
+    }
+}
+
+/// Where a physics sits.
+#[derive(Debug, Clone, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Place {
+    /// Between two bodies, or a body and `ground`.
+    Between(String, String),
+    /// At an input or an output.
+    Signal(String),
+}
+
+impl Place {
+    /// Whether both are the same place; the order of the ends does not matter.
+    pub fn same(&self, other: &Place) -> bool {
+        match (self, other) {
+            (Place::Between(a, b), Place::Between(c, d)) => (a, b) == (c, d) || (a, b) == (d, c),
+            _ => self == other,
+        }
+    }
+}
+
+impl std::fmt::Display for Place {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        match self {
+            Place::Between(a, b) => write!(f, "{a}-{b}"),
+            Place::Signal(name) => write!(f, "{name}"),
+        }
+    }
+}
+
+/// A number that a hypothesis adds.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Parameter {
+    /// Its name in a verdict.
+    pub key: String,
+    /// Its unit in this model.
+    pub unit: String,
+    /// Where it stands in the edited model, as [`Model::values_at`] takes it. For `inertia` that holds the body's own as well.
+    pub path: String,
+    /// Its place in the list, where the path leads to one.
+    pub index: Option<usize>,
+    /// Smallest and largest value a fit may try.
+    pub range: (f64, f64),
+    /// Value at which it has no effect, which may be infinite; `None` where it does not matter once the others have none.
+    pub neutral: Option<f64>,
+    /// Whether a fit steps in its logarithm; the range is then above 0.
+    pub log: bool,
+    /// Whether it shifts a signal in time, so that differences by it take about a sample period.
+    pub in_samples: bool,
+}
+
+/// A physics at a place.
+#[derive(Debug, Clone)]
+pub struct Hypothesis {
+    /// Such as `coulomb@drum-ground`: unique among the hypotheses of a model.
+    pub id: String,
+    /// Which physics.
+    pub physics: &'static Physics,
+    /// Where it sits.
+    pub place: Place,
+    /// Names of the elements it takes the place of, first the one whose name it keeps.
+    pub replaces: Vec<String>,
+    /// What it adds.
+    pub parameters: Vec<Parameter>,
+    /// Where fits start, most plausible first: one value for each parameter.
+    pub starts: Vec<Vec<f64>>,
+    /// Path of a number that the model states and that does the same; nothing is gained where a fit has that one free.
+    pub same_as: Option<String>,
+    /// Equal for hypotheses that no recording can tell apart.
+    pub class: String,
+    pub(super) form: Form,
+}
+
+/// What a hypothesis does to a model.
+#[derive(Debug, Clone)]
+pub(super) enum Form {
+    /// Puts an element, new or in the place of another.
+    Element(ElementForm),
+    /// Sets a key of an input or output.
+    Key { path: String },
+    /// Adds to a body's inertia.
+    Inertia { body: String },
+    /// Adds a body behind the elements of a joint, and a spring and a damper from it to the joint's other end.
+    Series { joint: [String; 2], body: String, spring: String, damper: String },
+}
+
+#[derive(Debug, Clone)]
+pub(super) struct ElementForm {
+    pub name: String,
+    pub between: [String; 2],
+    /// Whether it takes the place of the element of that name, whose ends it then takes, too.
+    pub in_place: bool,
+    pub kind: &'static Kind,
+    /// For each parameter of the kind: where its values come from.
+    pub slots: Vec<Vec<Source>>,
+    /// Brings values that contradict each other to the nearest ones that do not.
+    pub tidy: fn(&mut [Vec<f64>]),
+    /// Elements that go.
+    pub removes: Vec<String>,
+}
+
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Source {
+    Parameter(usize),
+    Fixed(f64),
+}
+
+/// Why a hypothesis cannot be applied.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum HypothesisError {
+    /// Not one value for each parameter.
+    #[error("{id} takes {expected} values, not {found}")]
+    Count {
+        /// The hypothesis.
+        id: String,
+        /// How many it takes.
+        expected: usize,
+        /// How many there are.
+        found: usize,
+    },
+    /// A value that a model cannot hold.
+    #[error("{id}: {reason}")]
+    Value {
+        /// The hypothesis.
+        id: String,
+        /// One sentence.
+        reason: String,
+    },
+    /// The model is another than the one the hypothesis was made for.
+    #[error("{id}: the model has no {what} \"{name}\"; the hypothesis was made for another model")]
+    NoSuch {
+        /// The hypothesis.
+        id: String,
+        /// `element` or `body`.
+        what: &'static str,
+        /// Its name.
+        name: String,
+    },
+}

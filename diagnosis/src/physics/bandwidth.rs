@@ -1,0 +1,29 @@
+//! An actuator that follows its command with a first-order lag.
+
+use crate::hypothesis::{Against, Family, Mark, Physics, State};
+use crate::hypothesis::builder::{Freedom, key};
+use backdrive_plant::model::InputKind;
+
+pub(super) const PHYSICS: Physics = Physics {
+    name: "bandwidth",
+    family: Family::Lag,
+    words: "a limited bandwidth",
+    size: "bandwidth",
+    proportional: false,
+    against: Against::SignalRate,
+    state: State::WithItsVariable,
+    mark: Mark::Lag,
+    twin: Some("a delay at the only input and at the only output move the same signal: a second sensor would tell"),
+    sliding: &[],
+    from_level: &[],
+    memory: false,
+    holds: false,
+    refine: |_, _, _| None,
+    contains: &[],
+    propose: |sites| {
+        let inputs = sites.model.inputs.iter().filter(|i| i.kind == InputKind::Force && i.bandwidth == f64::INFINITY);
+        let rate = 1.0 / sites.scales.period;
+        let room = Freedom { range: (1.0 / sites.scales.duration, 20.0 * rate), neutral: Some(f64::INFINITY), log: true };
+        inputs.map(|i| key(sites, &PHYSICS, "inputs", &i.name, "Hz", room, &[0.1 * rate, 0.02 * rate, 0.5 * rate, 0.004 * rate])).collect()
+    },
+};

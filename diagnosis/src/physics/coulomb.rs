@@ -1,0 +1,32 @@
+//! Dry friction of one level.
+
+use crate::hypothesis::{Against, Family, Mark, Physics, State};
+use crate::hypothesis::builder::{ElementBuilder, even};
+
+pub(super) const PHYSICS: Physics = Physics {
+    name: "coulomb",
+    family: Family::Friction,
+    words: "dry friction",
+    size: "force",
+    proportional: true,
+    against: Against::Velocity,
+    state: State::Reversals,
+    mark: Mark::Dry,
+    twin: None,
+    sliding: &["force"],
+    from_level: &["force"],
+    memory: false,
+    holds: false,
+    refine: |_, _, _| None,
+    contains: &[],
+    propose: |sites| {
+        // Also beside presliding friction: where two rub, one may slip at once.
+        let places = sites.pairs.iter().filter(|site| !sites.has_set_valued(site));
+        let one = |site| {
+            let new = ElementBuilder::new(sites, &PHYSICS, site)?;
+            let f = site.force;
+            Some(new.number("force", even(0.0, 20.0 * f, 0.0)).starts(vec![vec![0.05 * f], vec![0.3 * f]]))
+        };
+        places.filter_map(one).collect()
+    },
+};

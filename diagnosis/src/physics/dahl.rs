@@ -1,0 +1,47 @@
+//! Friction that builds up over a distance.
+
+use crate::hypothesis::{Against, Family, Mark, Physics, State};
+use crate::hypothesis::builder::{ElementBuilder, log};
+
+/// Forces over displacements of the recordings up to which friction builds up over a distance that could show: stiffer, it is dry friction, and a fit only
+/// imitates the steps of whoever simulated or sampled it.
+pub(super) const STIFFEST: f64 = 1e4;
+
+pub(super) const PHYSICS: Physics = Physics {
+    name: "dahl",
+    family: Family::Friction,
+    words: "dry friction with presliding (Dahl)",
+    size: "coulomb",
+    proportional: false,
+    against: Against::Displacement,
+    state: State::Reversals,
+    mark: Mark::Presliding,
+    twin: None,
+    sliding: &["coulomb"],
+    from_level: &["coulomb"],
+    memory: true,
+    holds: false,
+    refine: |_, _, _| None,
+    // Infinitely stiff, it is dry friction.
+    contains: &["coulomb"],
+    propose: |sites| {
+        let one = |site| {
+            let new = ElementBuilder::new(sites, &PHYSICS, site)?;
+            let (f, x) = (site.force, site.displacement);
+            let (new, stated) = match sites.dry_friction(site) {
+                None => (new, None),
+                Some(there) if there.kind == PHYSICS.name => return None,
+                Some(there) => (new.replacing(there.index), Some(there.level)),
+            };
+            let c = stated.unwrap_or(0.1 * f);
+            let most = 20.0 * f.max(c);
+            let mut coulomb = log(1e-6 * f, most);
+            coulomb.neutral = stated.is_none().then_some(1e-6 * f);
+            let new = new.number("stiffness", log(0.01 * f / x, STIFFEST * f / x)).number("coulomb", coulomb);
+            let starts =
+                vec![vec![c / (0.05 * x), c], vec![c / (0.5 * x), c], vec![c / (0.005 * x), c], vec![3.0 * c / (0.2 * x), 3.0 * c]];
+            Some(new.starts(starts))
+        };
+        sites.near().filter_map(one).collect()
+    },
+};

@@ -1,0 +1,31 @@
+//! Viscous friction.
+
+use crate::hypothesis::{Against, Family, Mark, Physics, State};
+use crate::hypothesis::builder::{ElementBuilder, even};
+
+pub(super) const PHYSICS: Physics = Physics {
+    name: "damper",
+    family: Family::Damping,
+    words: "viscous friction",
+    size: "damping",
+    proportional: true,
+    against: Against::Velocity,
+    state: State::WithItsVariable,
+    mark: Mark::Viscous,
+    twin: None,
+    sliding: &[],
+    from_level: &[],
+    memory: false,
+    holds: false,
+    refine: |_, _, _| None,
+    contains: &["back_emf"],
+    propose: |sites| {
+        let places = sites.pairs.iter().filter(|site| !sites.has(site, &["damper", "asymmetric_damper", "backlash"]));
+        let one = |site| {
+            let new = ElementBuilder::new(sites, &PHYSICS, site)?;
+            let b = site.force / site.speed;
+            Some(new.number("damping", even(0.0, 1000.0 * b, 0.0)).starts(vec![vec![0.05 * b], vec![0.5 * b]]))
+        };
+        places.filter_map(one).collect()
+    },
+};

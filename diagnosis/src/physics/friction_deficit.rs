@@ -1,0 +1,42 @@
+//! Dry friction that is lower near rest.
+
+use crate::hypothesis::{Against, Family, Mark, Physics, State};
+use crate::hypothesis::builder::{ElementBuilder, Freedom, log};
+
+pub(super) const PHYSICS: Physics = Physics {
+    name: "friction_deficit",
+    family: Family::Friction,
+    words: "dry friction that is lower near rest",
+    size: "coulomb",
+    proportional: false,
+    against: Against::Velocity,
+    state: State::Reversals,
+    mark: Mark::NearRest,
+    twin: None,
+    sliding: &["coulomb"],
+    from_level: &["coulomb"],
+    memory: false,
+    holds: false,
+    refine: |_, _, _| None,
+    contains: &["coulomb"],
+    propose: |sites| {
+        let one = |site| {
+            let new = ElementBuilder::new(sites, &PHYSICS, site)?;
+            let (f, v) = (site.force, site.speed);
+            let (new, stated) = match sites.dry_friction(site) {
+                None => (new, (0.1 * f, Some(0.0))),
+                Some(there) if there.kind == PHYSICS.name => return None,
+                Some(there) => (new.replacing(there.index), (there.level, there.neutral())),
+            };
+            let (c, neutral) = stated;
+            let most = 20.0 * f.max(c);
+            let level = |least: f64| Freedom { range: (least, most), neutral: neutral.map(|n| n.max(least)), log: false };
+            let starts = vec![vec![1.2 * c, 0.6 * c, 0.1 * v], vec![1.4 * c, 0.5 * c, 0.5 * v], vec![c, 0.5 * c, 0.02 * v]];
+            let new = new.number("coulomb", level(1e-9 * most)).number("rest", level(0.0));
+            // Strictly below the level at speed.
+            let tidy = |values: &mut [Vec<f64>]| values[1][0] = values[1][0].min(values[0][0] * (1.0 - 1e-9));
+            Some(new.number("velocity", log(1e-4 * v, 3.0 * site.speed_peak)).tidy(tidy).starts(starts))
+        };
+        sites.near().filter_map(one).collect()
+    },
+};

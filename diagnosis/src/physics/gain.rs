@@ -1,0 +1,28 @@
+//! An actuator or a sensor of another scale than 1.
+
+use crate::hypothesis::{Against, Family, Mark, Physics, State};
+use crate::hypothesis::builder::{even, key};
+
+pub(super) const PHYSICS: Physics = Physics {
+    name: "gain",
+    family: Family::Scale,
+    words: "a gain that is off",
+    size: "gain",
+    proportional: false,
+    against: Against::Signal,
+    state: State::WithItsVariable,
+    mark: Mark::Other,
+    twin: None,
+    sliding: &[],
+    from_level: &[],
+    memory: false,
+    holds: false,
+    refine: |_, _, _| None,
+    contains: &[],
+    propose: |sites| {
+        // A gain other than 1 is stated, so it is a number that may be off.
+        let inputs = sites.model.inputs.iter().filter(|i| i.gain == 1.0).map(|i| ("inputs", &i.name));
+        let outputs = sites.model.outputs.iter().filter(|o| o.gain == 1.0).map(|o| ("outputs", &o.name));
+        inputs.chain(outputs).map(|(section, name)| key(sites, &PHYSICS, section, name, "-", even(0.1, 10.0, 1.0), &[1.1, 0.9])).collect()
+    },
+};

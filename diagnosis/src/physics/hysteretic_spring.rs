@@ -1,0 +1,49 @@
+//! A spring whose force runs on one line when it is stretched and on another when it is let go.
+
+use crate::hypothesis::{Against, Family, Mark, Physics, State};
+use crate::hypothesis::builder::{ElementBuilder, even, first_value, log};
+
+pub(super) const PHYSICS: Physics = Physics {
+    name: "hysteretic_spring",
+    family: Family::Hysteresis,
+    words: "a hysteretic spring",
+    size: "stiffness_positive",
+    proportional: false,
+    against: Against::Displacement,
+    state: State::WithItsVariable,
+    mark: Mark::Memory,
+    twin: None,
+    sliding: &[],
+    from_level: &[],
+    memory: true,
+    holds: true,
+    refine: |_, _, _| None,
+    // Without slopes, and the same both ways, it is the Dahl friction.
+    contains: &["spring", "dahl"],
+    propose: |sites| {
+        let one = |site| {
+            let new = ElementBuilder::new(sites, &PHYSICS, site)?;
+            let (f, x) = (site.force, site.displacement);
+            let (new, stated) = match sites.holding(site) {
+                None => (new, None),
+                Some((index, e)) if e.law.kind().name == "spring" => (new.replacing(index), Some(first_value(&e.law))),
+                Some(_) => return None,
+            };
+            let neutral = stated.unwrap_or(0.0).max(0.0);
+            let most = (f / x).max(neutral);
+            let slope = even(0.0, 1000.0 * most, neutral);
+            let offset = even(-100.0 * most * x, 100.0 * most * x, 0.0);
+            let new = new
+                .number("stiffness_positive", slope)
+                .number("stiffness_negative", slope)
+                .number("offset_positive", offset)
+                .number("offset_negative", offset)
+                .number("bandwidth", log(0.1 / x, 1e4 / x));
+            let k = if neutral > 0.0 { neutral } else { 0.05 * f / x };
+            let half = 0.1 * k * x;
+            let start = |bandwidth: f64| vec![k, k, half, -half, bandwidth / x];
+            Some(new.starts(vec![start(10.0), start(100.0), start(2.0)]))
+        };
+        sites.near().filter_map(one).collect()
+    },
+};

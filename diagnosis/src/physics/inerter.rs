@@ -1,0 +1,33 @@
+//! Force from relative acceleration: a flywheel behind a gear, fluid that is moved between two chambers.
+
+use crate::hypothesis::{Against, Family, Mark, Physics, State};
+use crate::hypothesis::builder::{ElementBuilder, even};
+use crate::hypothesis::sites::{Reach, Site};
+
+pub(super) const PHYSICS: Physics = Physics {
+    name: "inerter",
+    family: Family::Inertia,
+    words: "an inertance",
+    size: "inertance",
+    proportional: false,
+    against: Against::Acceleration,
+    state: State::WithItsVariable,
+    mark: Mark::Mass,
+    twin: Some("inertia and an inerter to ground are the same force: weighing the body would tell"),
+    sliding: &[],
+    from_level: &[],
+    memory: false,
+    holds: false,
+    refine: |_, _, _| None,
+    // To ground it is added inertia, which `inertia` proposes.
+    contains: &["inertia"],
+    propose: |sites| {
+        let places = sites.pairs.iter().filter(|site| site.reach != Reach::Ground && !sites.has(site, &["inerter"]));
+        let one = |site: &Site| {
+            let new = ElementBuilder::new(sites, &PHYSICS, site)?;
+            let m = site.force / site.acceleration;
+            Some(new.number("inertance", even(0.0, 100.0 * m, 0.0)).starts(vec![vec![0.05 * m], vec![0.5 * m]]))
+        };
+        places.filter_map(one).collect()
+    },
+};

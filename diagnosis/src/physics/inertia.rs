@@ -1,0 +1,36 @@
+//! Inertia that a body has beyond what the model says.
+
+use crate::hypothesis::{Against, Family, Mark, Physics, State};
+use crate::hypothesis::builder::{even, inertia, stated};
+use crate::hypothesis::sites::{Reach, Site};
+
+pub(super) const PHYSICS: Physics = Physics {
+    name: "inertia",
+    family: Family::Inertia,
+    words: "additional inertia",
+    size: "inertia",
+    proportional: true,
+    against: Against::Acceleration,
+    state: State::WithItsVariable,
+    mark: Mark::Mass,
+    twin: Some("inertia and an inerter to ground are the same force: weighing the body would tell"),
+    sliding: &[],
+    from_level: &[],
+    memory: false,
+    holds: false,
+    refine: |_, _, _| None,
+    contains: &["inerter"],
+    propose: |sites| {
+        let bodies = sites.pairs.iter().filter(|s| s.reach == Reach::Ground);
+        let one = |site: &Site| {
+            let body = site.ends[0]?;
+            let own = sites.model.bodies[body].inertia;
+            let typical = site.force / site.acceleration;
+            let name = &site.between[0];
+            let same = (own > 0.0).then(|| format!("bodies.{name}")).or_else(|| stated(sites.model, body, "inerter", "inertance"));
+            let room = even(0.0, 100.0 * typical.max(own), 0.0);
+            Some(inertia(sites, &PHYSICS, name, room, &[0.1 * typical, typical]).same_as(same))
+        };
+        bodies.filter_map(one).collect()
+    },
+};

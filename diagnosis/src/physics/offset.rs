@@ -1,0 +1,38 @@
+//! A sensor that does not read 0 at 0.
+
+use crate::hypothesis::{Against, Family, Mark, Physics, State};
+use crate::hypothesis::builder::{even, key};
+use backdrive_plant::model::OutputKind;
+
+pub(super) const PHYSICS: Physics = Physics {
+    name: "offset",
+    family: Family::Bias,
+    words: "a sensor offset",
+    size: "offset",
+    proportional: false,
+    against: Against::Time,
+    state: State::WithItsVariable,
+    mark: Mark::Bias,
+    twin: None,
+    sliding: &[],
+    from_level: &[],
+    memory: false,
+    holds: false,
+    refine: |_, _, _| None,
+    contains: &[],
+    propose: |sites| {
+        let outputs = sites.model.outputs.iter().enumerate().filter(|(_, o)| o.offset == 0.0);
+        let one = |(index, output): (usize, &backdrive_plant::model::Output)| {
+            let span = sites.scales.output(index);
+            let unit = match output.kind {
+                OutputKind::Position(_) => "m",
+                OutputKind::Velocity(_) => "m/s",
+                OutputKind::Acceleration(_) => "m/s²",
+                OutputKind::Force(_) | OutputKind::Reaction(_) => "N",
+            };
+            let room = even(-10.0 * span.peak, 10.0 * span.peak, 0.0);
+            (span.peak > 0.0).then(|| key(sites, &PHYSICS, "outputs", &output.name, unit, room, &[0.05 * span.rms, -0.05 * span.rms]))
+        };
+        outputs.filter_map(one).collect()
+    },
+};
