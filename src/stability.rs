@@ -384,7 +384,7 @@ fn text(found: &Answer) -> String {
         line("differs", d.text.clone());
     }
     for warning in &found.warnings {
-        line("note", warning.clone());
+        line("note", warning.to_string());
     }
     if let Some(advice) = &found.advice {
         line("record", advice.clone());

@@ -8,7 +8,6 @@ pub mod energy;
 pub mod frequency;
 pub mod from_bag;
 mod grid;
-pub mod headline;
 mod master_run;
 pub mod model_check;
 pub mod oscillation;

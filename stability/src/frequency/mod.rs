@@ -11,6 +11,7 @@ mod delays;
 mod dithered;
 mod edge;
 mod local;
+mod note;
 mod prepared;
 mod rows;
 mod swap;
@@ -22,6 +23,7 @@ mod tests;
 pub use answer::{FrequencyAnswer, Verdict};
 pub use delays::{Delays, Hop};
 pub use edge::Edge;
+pub use note::Note;
 pub use rows::RowCount;
 pub use swap::{PartError, Parts};
 
@@ -73,7 +75,7 @@ pub struct Frequency {
     /// The method and its numbers, for a reader.
     pub method: String,
     /// What a reader has to know.
-    pub notes: Vec<String>,
+    pub notes: Vec<Note>,
     /// Why nothing can be told.
     pub cannot_tell: Option<CannotTell>,
     /// What to record for a better answer.
@@ -193,11 +195,11 @@ pub fn analyse(session: &Session, options: &Options) -> Result<Frequency, Freque
     drop_unknown_gains(&mut rows);
     let has_dither = session.axes.iter().any(|a| a.dither.as_ref().is_some_and(|d| d.iter().any(|x| x.is_finite() && *x != 0.0)));
     if rows.hand_moves && has_dither {
-        notes.push("the hand never rests in contact: all of the contact was used, and below a few Hz its motion is noise".to_string());
+        notes.push(Note::HandNeverRests);
     }
     // The release at the end is one.
     if rows.count.contact_losses > 1 && rows.count.free > 0 {
-        notes.push(format!("contact was lost {} times; rows without contact and {} ms after are left out", rows.count.contact_losses, 200));
+        notes.push(Note::ContactLost { times: rows.count.contact_losses });
     }
     let advice = advice(&session);
     let mut result = Frequency {

@@ -1,6 +1,6 @@
 //! The headline: the least favourable of what is known, in one verdict with one edge and one frequency.
 //!
-//! [`crate::verdict`] says which method leads. What it says is then held against everything else that is known and counts (a [`Witness`]):
+//! `decide.rs` says which method leads. What it says is then held against everything else that is known and counts (a [`Witness`]):
 //! - with the models leading: the loop run again with every grip of the range asked about, for nobody knows a grip exactly; and the measured
 //!   frequency response, where its edge lies below the others' by more than the uncertainty of both. Delays that the models lack are in the
 //!   measured loop, so they count by it;
@@ -10,65 +10,10 @@
 //! asked about lies below that edge and outside of its 95 % interval: a gain beyond an edge at which one run happens to look stable is not stable,
 //! and one within the interval is too close to call. Where witnesses differ the reason names both, and the lower edge is the one to act on.
 
+use super::types::{Answer, Method, Word};
+use super::witness::Witness;
 use crate::frequency;
-use crate::outcome::Outcome;
 use crate::resimulate::edge::Edge;
-use crate::verdict::{Answer, Method, Word};
-use serde::Serialize;
-
-/// One way of asking, with what it says.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Witness {
-    /// Such as `the loop run again with a grip 1.15 times as firm`.
-    pub name: String,
-    /// By which method.
-    pub method: Method,
-    /// Factor on the grip; `None` for what was measured with the hand as it was.
-    pub grip: Option<f64>,
-    /// At the gain asked about.
-    pub verdict: Word,
-    /// What was seen there, in words.
-    pub seen: String,
-    /// The lowest mu*lambda at which it is not stable; `None` where none is known.
-    pub critical_gain: Option<f64>,
-    /// Highest mu*lambda up to which it is known to be stable.
-    pub at_least: Option<f64>,
-    /// Frequency on the edge, Hz; 0 where it runs away without oscillating; `None` where it is not known.
-    pub frequency_hz: Option<f64>,
-    /// What is seen beyond the edge.
-    #[serde(skip)]
-    pub beyond: Option<Outcome>,
-}
-
-impl Witness {
-    fn of_run(name: String, grip: f64, at_asked: &Outcome, edge: &Edge) -> Witness {
-        Witness {
-            name,
-            method: Method::Resimulation,
-            grip: Some(grip),
-            verdict: Word::of(at_asked),
-            seen: at_asked.to_string(),
-            critical_gain: edge.critical_gain,
-            at_least: Some(edge.at_least),
-            frequency_hz: edge.frequency_hz,
-            beyond: edge.outcome_beyond,
-        }
-    }
-
-    /// Where its stable range ends: at an edge, or where a clamp comes first.
-    fn end(&self) -> Option<f64> {
-        let limited = matches!(self.beyond, Some(Outcome::Limited { .. }));
-        self.critical_gain.or(self.at_least.filter(|_| limited))
-    }
-
-    /// What it says at the gain: a gain beyond its edge is not stable, even where one run there looks so.
-    fn word_at(&self, gain: f64) -> Word {
-        match (self.verdict, self.end()) {
-            (Word::Stable, Some(end)) if gain >= end => self.beyond.as_ref().map_or(Word::Unstable, Word::of),
-            (word, _) => word,
-        }
-    }
-}
 
 /// How bad a word is.
 fn rank(word: Word) -> u8 {
@@ -82,7 +27,7 @@ fn rank(word: Word) -> u8 {
 }
 
 /// A grip in words.
-pub fn grip_name(scale: f64) -> String {
+fn grip_name(scale: f64) -> String {
     if scale == 1.0 { "the grip as recorded".to_string() } else { format!("a grip {scale} times as firm") }
 }
 
@@ -123,11 +68,12 @@ impl Answer {
         all
     }
 
-    /// Makes the verdict, the edge and its frequency those of the least favourable witness.
-    pub(crate) fn least_favourable(&mut self) {
+    /// Makes the verdict, the edge and its frequency those of the least favourable witness. Says whether the reason then names both it and the
+    /// one that leads, each with its edge.
+    pub(super) fn least_favourable(&mut self) -> bool {
         let witnesses = self.witnesses();
         let asked = self.gain.product();
-        let Some(leads) = witnesses.first() else { return };
+        let Some(leads) = witnesses.first() else { return false };
         // The edge: the lowest.
         let lowest =
             witnesses.iter().filter(|w| w.end().is_some()).min_by(|a, b| a.end().unwrap_or(0.0).total_cmp(&b.end().unwrap_or(0.0)));
@@ -150,14 +96,17 @@ impl Answer {
         let negative = |word: Word| rank(word).min(2);
         let worse = worst.filter(|w| negative(w.word_at(asked)) > negative(leads.word_at(asked))).unwrap_or(leads);
         let word = worse.word_at(asked);
+        let mut both_named = false;
         if negative(word) > negative(self.verdict) {
-            self.reason = reason(worse, asked, (worse.name != leads.name).then_some(leads));
+            both_named = worse.name != leads.name;
+            self.reason = reason(worse, asked, both_named.then_some(leads));
             self.verdict = word;
             self.from = worse.method;
         }
         self.too_close(asked);
         self.decided_by = Some(lowest.filter(|_| leads.method == Method::Resimulation).unwrap_or(worse).name.clone());
         self.witnesses = witnesses;
+        both_named
     }
 
     /// Within the interval of its edge a gain is neither.
@@ -185,9 +134,9 @@ impl Answer {
     }
 
     /// Tells in the reason whose edge the headline's is, and beside which other.
-    pub(crate) fn name_the_edge(&mut self) {
+    pub(super) fn name_the_edge(&mut self) {
         let (Some(by), Some(leads)) = (&self.decided_by, self.witnesses.first()) else { return };
-        if self.from == Method::Frequency || self.reason.contains("act on the lower") {
+        if self.from == Method::Frequency {
             return;
         }
         if let Some(end) = self.limited_from.filter(|_| leads.name != *by) {
@@ -226,36 +175,4 @@ fn reason(worst: &Witness, asked: f64, leads: Option<&Witness>) -> String {
         text += &format!("; {} says: {} ({}); act on the lower edge", leads.name, leads.seen, edge(leads));
     }
     text
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn witness(verdict: Word, edge: f64) -> Witness {
-        Witness {
-            name: "a run".into(),
-            method: Method::Resimulation,
-            grip: Some(1.0),
-            verdict,
-            seen: verdict.text().into(),
-            critical_gain: Some(edge),
-            at_least: Some(0.99 * edge),
-            frequency_hz: Some(60.0),
-            beyond: Some(Outcome::LimitCycle { amplitude_m: 1e-3, frequency_hz: 60.0 }),
-        }
-    }
-
-    #[test]
-    fn a_stable_run_beyond_its_edge_is_not_stable() {
-        assert_eq!(witness(Word::Stable, 3.0).word_at(2.0), Word::Stable);
-        assert_eq!(witness(Word::Stable, 3.0).word_at(3.5), Word::LimitCycle);
-        assert_eq!(witness(Word::CannotTell, 3.0).word_at(2.0), Word::CannotTell);
-        let limited = Witness {
-            critical_gain: None,
-            beyond: Some(Outcome::Limited { clamped_share: 0.2, beyond_travel: false }),
-            ..witness(Word::Stable, 3.0)
-        };
-        assert_eq!((limited.end(), limited.word_at(3.5)), (Some(0.99 * 3.0), Word::Limited));
-    }
 }
