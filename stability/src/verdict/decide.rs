@@ -2,8 +2,10 @@
 
 use super::question::{Question, Swapped};
 use super::recorded::recorded_outcome;
-use super::types::{Answer, Method, Word};
-use super::warning::{self, Warning};
+use super::types::Answer;
+use super::warn::of_the_recording;
+use super::warning::Warning;
+use super::word::{Method, Word};
 use crate::energy::energy;
 use crate::frequency::{self, CannotTell, Frequency};
 use crate::model_check::PartCheck;
@@ -17,7 +19,7 @@ impl Answer {
         let session = question.session;
         let gains = (0..session.len()).map(|row| session.gain(row)).filter(|g| g.is_finite());
         let range = gains.fold(None, |r: Option<[f64; 2]>, g| Some(r.map_or([g, g], |[a, b]| [a.min(g), b.max(g)])));
-        let mut warnings = warning::of_the_recording(session, &frequency);
+        let mut warnings = of_the_recording(session, &frequency);
         let recorded_outcome = recorded_outcome(session);
         let mut frequency = frequency;
         if let Some(Outcome::Unstable { growth_per_s }) = recorded_outcome {

@@ -10,8 +10,9 @@
 //! asked about lies below that edge and outside of its 95 % interval: a gain beyond an edge at which one run happens to look stable is not stable,
 //! and one within the interval is too close to call. Where witnesses differ the reason names both, and the lower edge is the one to act on.
 
-use super::types::{Answer, Method, Word};
+use super::types::Answer;
 use super::witness::Witness;
+use super::word::{Method, Word};
 use crate::frequency;
 use crate::resimulate::edge::Edge;
 

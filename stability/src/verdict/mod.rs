@@ -19,13 +19,16 @@ mod output;
 mod question;
 mod recorded;
 mod types;
+mod warn;
 mod warning;
 mod witness;
+mod word;
 
 pub use question::{Question, Swapped};
-pub use types::{Answer, AnswerError, Apart, Disagreement, LoopCheck, Method, Resimulated, Word};
+pub use types::{Answer, AnswerError, Apart, Disagreement, LoopCheck, Resimulated};
 pub use warning::Warning;
 pub use witness::Witness;
+pub use word::{Method, Word};
 
 use crate::energy::energy;
 use crate::frequency::{self, Parts};

@@ -1,6 +1,7 @@
 //! The answer for programs.
 
-use super::types::{Answer, Method, Word};
+use super::types::Answer;
+use super::word::{Method, Word};
 use crate::energy::{EnergyAnswer, EnergyVerdict};
 use crate::outcome::Outcome;
 use serde_json::{Value, json};

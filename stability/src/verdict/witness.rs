@@ -1,6 +1,6 @@
 //! One way of asking whether a gain is stable, with what it says.
 
-use super::types::{Method, Word};
+use super::word::{Method, Word};
 use crate::outcome::Outcome;
 use crate::resimulate::edge::Edge;
 use serde::Serialize;
