@@ -5,8 +5,9 @@
 //! `mu lambda = 1 / [K_e (|Ghat(0)| - |G(0)|)]` with K_e the static stiffness of slave and environment in series.
 
 use super::edge::{Edge, Search, edge};
-use super::{ResimulateError, RunOptions, Scenario, grips};
+use super::{ResimulateError, RunOptions, Scenario};
 use crate::outcome::Outcome;
+use crate::resimulate::grip;
 use backdrive_control::device::{Device, DeviceOptions, Role};
 use backdrive_nodes::graph::{DeviceFiles, NodeKind, Settings};
 use backdrive_plant::linear::{LinearError, LinearModel, Operating};
@@ -83,7 +84,7 @@ pub fn over_cancelling(
     for scale in &every {
         let mut held = master.clone();
         if let Some(grip) = &mut held.fragment {
-            grips::scale(grip, *scale);
+            grip::scale(grip, *scale);
         }
         for (axis, stiffness) in environment_stiffness.iter().enumerate() {
             let travel = held.model.as_ref().and_then(|m| m.axes.get(axis)).and_then(|a| a.travel);
