@@ -5,21 +5,10 @@ use crate::fit::Fitted;
 use crate::lag::{Observation, lag};
 use crate::maps::{dynamometer_map, engine_map};
 use crate::mechanics::{damping_by_poles, inertia_of_dynamometer, refine};
+use crate::numbers::Bench;
 use crate::record::{BenchError, Record};
-use backdrive_control::dynamometer::DynamometerModel;
 use backdrive_control::engine::{Engine, Grid};
 use backdrive_control::observer::Shaft;
-
-/// A bench in numbers.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Bench {
-    /// Inertias, stiffness, damping.
-    pub shaft: Shaft,
-    /// Map and lag.
-    pub engine: Engine,
-    /// Map and linear part.
-    pub dynamometer: DynamometerModel,
-}
 
 /// What is known before, and how to look.
 #[derive(Debug, Clone, PartialEq)]

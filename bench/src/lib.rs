@@ -6,18 +6,20 @@
 //! the correlations that the paper validates with.
 
 mod columns;
-pub mod dynamometer;
-pub mod fit;
+mod dynamometer;
+mod fit;
 mod identify;
 pub mod lag;
-pub mod maps;
-pub mod mechanics;
+mod maps;
+mod mechanics;
+mod numbers;
 mod record;
 mod simulate;
 mod validate;
 
 pub use columns::{correlation, mean, rms, smooth};
-pub use identify::{Asked, Bench, Identified, identify};
+pub use identify::{Asked, Identified, identify};
+pub use numbers::Bench;
 pub use record::{BenchError, Record};
 pub use simulate::{Trajectory, closed_loop, open_loop};
 pub use validate::{Validation, validate};

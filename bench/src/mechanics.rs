@@ -2,7 +2,7 @@
 
 use crate::columns::smooth;
 use crate::fit::{Fitted, positive};
-use crate::identify::Bench;
+use crate::numbers::Bench;
 use crate::record::{BenchError, Record};
 use crate::simulate::closed_loop;
 use backdrive_control::observer::Shaft;

@@ -1,6 +1,6 @@
 //! A bench simulated with identified numbers.
 
-use crate::identify::Bench;
+use crate::numbers::Bench;
 use crate::record::Record;
 use backdrive_control::dynamometer::Dynamometer;
 use backdrive_control::observer::Shaft;

@@ -2,8 +2,8 @@
 
 use crate::columns::correlation;
 use crate::dynamometer::torque_of;
-use crate::identify::Bench;
 use crate::lag::{Observation, engine_torque};
+use crate::numbers::Bench;
 use crate::record::{BenchError, Record};
 use crate::simulate::{Trajectory, closed_loop, open_loop};
 

@@ -1,7 +1,7 @@
 //! How a process becomes a node of a running graph: ours and a user's own alike.
 
+use crate::paths::RunPaths;
 use crate::place::{Place, Wire};
-use crate::rundir::RunPaths;
 use backdrive_bags::{BagError, BagHeader, Recorder, RecorderOptions, TopicInfo};
 use backdrive_control::core::Core;
 use backdrive_nodes::build::{self, GraphTopic, credit_listeners, listeners_on, topics};

@@ -9,7 +9,7 @@ pub mod frequency;
 pub mod from_bag;
 mod grid;
 mod master_run;
-pub mod model_check;
+mod model_check;
 pub mod oscillation;
 pub mod outcome;
 mod phases;

@@ -89,7 +89,8 @@ fn tree(words: &[String], before: &[String], found: &mut Vec<Import>) {
         match words[at].as_str() {
             "::" => {}
             "{" => {
-                for part in parts(&words[at + 1..]) {
+                // Behind a last comma is nothing.
+                for part in parts(&words[at + 1..]).into_iter().filter(|part| !part.is_empty()) {
                     tree(part, &path, found);
                 }
                 return;
