@@ -93,13 +93,13 @@ where
     };
     let mut options = ProcessOptions::default();
     let expected = |t: GraphTopic| {
-        let listeners = match (&place.host, place.wire) {
+        let listeners = match (place.wire, &place.host) {
             // In shared memory the bridge listens for all that are elsewhere.
-            (Some(host), Wire::Iceoryx2) => {
+            (Wire::Iceoryx2, Some(host)) => {
                 let here = listeners_on(&graph, &t.topic, host);
                 here + usize::from(here < t.listeners)
             }
-            _ => t.listeners,
+            (Wire::Iceoryx2, None) | (Wire::Ros2, _) => t.listeners,
         };
         (t.topic.name, listeners)
     };

@@ -57,7 +57,9 @@ impl Modules {
         let of = |m: &Module| {
             let names = m.source.test_modules.clone().into_iter();
             let folder = m.folder.clone();
-            names.flat_map(move |name| [folder.join(format!("{name}.rs")), folder.join(&name).join("mod.rs"), folder.join(name)]).collect::<Vec<_>>()
+            names
+                .flat_map(move |name| [folder.join(format!("{name}.rs")), folder.join(&name).join("mod.rs"), folder.join(name)])
+                .collect::<Vec<_>>()
         };
         self.0.iter().flat_map(of).collect()
     }
