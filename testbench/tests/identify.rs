@@ -1,11 +1,11 @@
 //! A bench simulated without noise is identified as what it is.
 
-use backdrive_bench::lag::Observation;
-use backdrive_bench::{Asked, Bench, Record, closed_loop, identify, open_loop};
 use backdrive_control::dynamometer::DynamometerModel;
 use backdrive_control::engine::{Engine, Grid};
 use backdrive_control::observer::Shaft;
 use backdrive_control::speed_control::SpeedControl;
+use backdrive_testbench::lag::Observation;
+use backdrive_testbench::{Asked, Bench, Record, closed_loop, identify, open_loop};
 
 const PERIOD: f64 = 1e-3;
 
