@@ -1,6 +1,6 @@
 //! How other threads reach a node that runs, and what it tells them.
 
-use crate::protocol::{MarginStatus, NodeStatus};
+use crate::protocol::NodeStatus;
 use backdrive_msgs::{Gains, LAYOUT};
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -56,33 +56,5 @@ pub enum Told {
     /// An event, as it is published.
     Event(backdrive_msgs::Event),
     /// About ten times a second of real time.
-    Status(Report),
-}
-
-/// The numbers of a [`NodeStatus`].
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Report {
-    /// As in [`NodeStatus`].
-    pub steps: u64,
-    /// As in [`NodeStatus`].
-    pub missed_deadlines: u64,
-    /// As in [`NodeStatus`].
-    pub lost: u64,
-    /// As in [`NodeStatus`].
-    pub loop_p50_us: f64,
-    /// As in [`NodeStatus`].
-    pub loop_p99_us: f64,
-    /// As in [`NodeStatus`].
-    pub peak_effort: f64,
-    /// As in [`NodeStatus`].
-    pub recorded: Option<(u64, u64)>,
-    /// As in [`NodeStatus`].
-    pub margin: Option<MarginStatus>,
-}
-
-impl From<Report> for NodeStatus {
-    fn from(r: Report) -> NodeStatus {
-        let Report { steps, missed_deadlines, lost, loop_p50_us, loop_p99_us, peak_effort, recorded, margin } = r;
-        NodeStatus { steps, missed_deadlines, lost, loop_p50_us, loop_p99_us, peak_effort, recorded, margin }
-    }
+    Status(NodeStatus),
 }

@@ -15,7 +15,7 @@ mod state;
 mod step;
 mod teller;
 
-pub use control::{Control, Options, Report, Told};
+pub use control::{Control, Options, Told};
 pub use error::RunError;
 pub use state::Runner;
 
@@ -41,6 +41,6 @@ impl Runner {
         }
         let peak_effort = self.teller.report.peak_effort;
         let report = self.report(&self.loop_time);
-        Ok(Report { peak_effort, ..report }.into())
+        Ok(NodeStatus { peak_effort, ..report })
     }
 }

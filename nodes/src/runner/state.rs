@@ -1,12 +1,13 @@
 //! A node whose publishers and subscribers exist.
 
-use super::control::{Options, Report, Told};
+use super::control::{Options, Told};
 use super::error::RunError;
 use super::stage::{Output, Stage};
 use super::teller::Teller;
 use crate::book::{Book, NO_VALUE, Wanted};
 use crate::histogram::Histogram;
 use crate::input::Input;
+use crate::protocol::NodeStatus;
 use crate::stage::{NodePlan, PACE_PORT, Timing};
 use crate::transport::{Subscriber, Transport, TransportError};
 use backdrive_control::core::{Events, Port};
@@ -87,7 +88,7 @@ impl Runner {
             timing: timing.clone(),
             options,
             stages,
-            teller: Teller { book, events, status, noted: Events::default(), report: Report::default(), broken_told_at: i64::MIN },
+            teller: Teller { book, events, status, noted: Events::default(), report: NodeStatus::default(), broken_told_at: i64::MIN },
             gains_in,
             gains_out,
             margin_out,

@@ -1,13 +1,13 @@
 //! One step of a stage, and what is told of the steps.
 
-use super::control::{Control, Report, Told};
+use super::control::{Control, Told};
 use super::stage::{lost, want};
 use super::state::Runner;
 use crate::book::Health;
 use crate::clock::now_ns;
 use crate::histogram::Histogram;
 use crate::input::Input;
-use crate::protocol::MarginStatus;
+use crate::protocol::{MarginStatus, NodeStatus};
 use crate::sentences::sentence;
 use crate::transport::TransportError;
 use backdrive_control::core::Tick;
@@ -121,9 +121,9 @@ impl Runner {
         }
     }
 
-    pub(super) fn report(&self, times: &Histogram) -> Report {
+    pub(super) fn report(&self, times: &Histogram) -> NodeStatus {
         let us = |q: f64| times.quantile(q) * 1e-3;
-        Report { lost: lost(&self.stages), loop_p50_us: us(0.5), loop_p99_us: us(0.99), ..self.teller.report }
+        NodeStatus { lost: lost(&self.stages), loop_p50_us: us(0.5), loop_p99_us: us(0.99), ..self.teller.report }
     }
 }
 

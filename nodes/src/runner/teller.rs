@@ -1,8 +1,9 @@
 //! Publishes events and status, and passes them on to whoever watches.
 
-use super::control::{Report, Told};
+use super::control::Told;
 use super::stage::Output;
 use crate::book::{Book, NO_VALUE};
+use crate::protocol::NodeStatus;
 use crate::transport::TransportError;
 use backdrive_control::core::Events;
 use backdrive_msgs::Message;
@@ -14,7 +15,7 @@ pub(super) struct Teller {
     pub(super) events: Output,
     pub(super) status: Output,
     pub(super) noted: Events,
-    pub(super) report: Report,
+    pub(super) report: NodeStatus,
     /// When a broken connection was last told, ns: once a second is enough.
     pub(super) broken_told_at: i64,
 }
