@@ -25,7 +25,7 @@ pub use delays::{Delays, Hop};
 pub use edge::Edge;
 pub use note::Note;
 pub use rows::RowCount;
-pub use swap::{PartError, Parts};
+pub use swap::{ExchangedParts, PartError};
 pub use types::{AxisEstimate, CannotTell, Frequency, FrequencyError, GainEstimate, LevelEstimate, Options, Provenance, Response};
 
 use crate::session::Session;
@@ -78,7 +78,7 @@ pub fn analyse(session: &Session, options: &Options) -> Result<Frequency, Freque
     Ok(result)
 }
 
-fn provenance(parts: &Parts) -> Provenance {
+fn provenance(parts: &ExchangedParts) -> Provenance {
     let of = |there: bool| if there { "from model" } else { "measured" };
     let canceller = match parts.canceller {
         Some((files, _)) if files.model.is_none() => "none",

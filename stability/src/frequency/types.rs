@@ -4,7 +4,7 @@ use super::delays::Delays;
 use super::edge::{Edge, Loop};
 use super::note::Note;
 use super::rows::RowCount;
-use super::swap::{PartError, Parts};
+use super::swap::{ExchangedParts, PartError};
 use crate::spectra::Averaging;
 use serde::Serialize;
 
@@ -16,12 +16,12 @@ pub struct Options<'a> {
     /// Of the draws: the same record gives the same answer.
     pub seed: u64,
     /// Parts to exchange.
-    pub parts: Parts<'a>,
+    pub parts: ExchangedParts<'a>,
 }
 
 impl Default for Options<'_> {
     fn default() -> Self {
-        Options { draws: 400, seed: 1, parts: Parts::default() }
+        Options { draws: 400, seed: 1, parts: ExchangedParts::default() }
     }
 }
 

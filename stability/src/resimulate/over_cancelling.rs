@@ -8,7 +8,7 @@ use super::edge::{Edge, Search, edge};
 use super::{ResimulateError, RunOptions, Scenario};
 use crate::outcome::Outcome;
 use crate::resimulate::grip;
-use backdrive_control::device::{Device, DeviceOptions, Role};
+use backdrive_control::device::{Device, DeviceOptions, DeviceRole};
 use backdrive_nodes::graph::{DeviceFiles, NodeKind, Settings};
 use backdrive_plant::linear::{LinearError, LinearModel, Operating};
 use std::sync::atomic::AtomicBool;
@@ -174,7 +174,7 @@ fn environment_stiffness(scenario: &Scenario, options: &RunOptions, cancel: &Ato
     let Some(model) = &files.model else { return Ok(vec![0.0; session.axes.len()]) };
     let device_options = DeviceOptions { substeps: files.substeps, noise_seed: None, quantise: false };
     let period_s = graph.period_s();
-    let slave = Device::new(model, files.fragment.as_ref(), Role::Slave, period_s, &device_options)
+    let slave = Device::new(model, files.fragment.as_ref(), DeviceRole::Slave, period_s, &device_options)
         .map_err(|error| ResimulateError::Device { what: "the slave", error })?;
     let push = |axis: &crate::session::AxisSignals| {
         let still = |k: &usize| axis.intent.as_ref().is_none_or(|x| *k > 0 && x[*k] == x[*k - 1]);

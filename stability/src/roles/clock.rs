@@ -1,7 +1,7 @@
 //! Signals of different clocks and rates on one row of times.
 
 use super::file::Located;
-use crate::from_bag::Role;
+use crate::from_bag::SignalRole;
 use crate::grid::{Grid, Ordered, Resampled, Series, even_period};
 use crate::unjudged::Unjudged;
 
@@ -10,7 +10,7 @@ const SAME_CLOCK_NS: i64 = 100_000_000;
 
 /// Orders every signal in time since the first message; signals whose stamps are of another clock are moved by the difference
 /// that the log times show.
-pub(super) fn on_one_clock(wanted: &[(Role, &Located)], series: &[Series], notes: &mut Vec<String>) -> Vec<Ordered> {
+pub(super) fn on_one_clock(wanted: &[(SignalRole, &Located)], series: &[Series], notes: &mut Vec<String>) -> Vec<Ordered> {
     let offsets: Vec<i64> = series.iter().map(Series::clock_offset).collect();
     let told = || offsets.iter().zip(series).filter(|(_, s)| !s.values.is_empty()).map(|(o, _)| *o);
     let (least, most) = (told().min().unwrap_or(0), told().max().unwrap_or(0));

@@ -1,6 +1,6 @@
 //! The roles file: which field of which topic is which signal.
 
-use crate::from_bag::{Role, SessionError};
+use crate::from_bag::{SessionError, SignalRole};
 use backdrive_bags::Signal;
 use backdrive_plant::elements::Range;
 use backdrive_plant::model::Hold;
@@ -27,7 +27,7 @@ pub struct Roles {
 pub struct AxisRoles {
     /// Name of the axis.
     pub name: String,
-    pub(super) signals: Vec<(Role, Located)>,
+    pub(super) signals: Vec<(SignalRole, Located)>,
 }
 
 /// A signal, and where the roles file names it.
@@ -39,14 +39,14 @@ pub(super) struct Located {
 }
 
 /// Keys of `[signals]`, whether they must be there, and how they run between their samples.
-const KEYS: [(&str, Role, bool, Hold); 7] = [
-    ("x_m", Role::Master, true, Hold::Linear),
-    ("F_f", Role::Force, true, Hold::Zero),
-    ("x_c", Role::Command, true, Hold::Linear),
-    ("F_s", Role::Contact, true, Hold::Zero),
-    ("x_s", Role::Slave, false, Hold::Linear),
-    ("dither", Role::Dither, false, Hold::Zero),
-    ("operator", Role::Intent, false, Hold::Linear),
+const KEYS: [(&str, SignalRole, bool, Hold); 7] = [
+    ("x_m", SignalRole::Master, true, Hold::Linear),
+    ("F_f", SignalRole::Force, true, Hold::Zero),
+    ("x_c", SignalRole::Command, true, Hold::Linear),
+    ("F_s", SignalRole::Contact, true, Hold::Zero),
+    ("x_s", SignalRole::Slave, false, Hold::Linear),
+    ("dither", SignalRole::Dither, false, Hold::Zero),
+    ("operator", SignalRole::Intent, false, Hold::Linear),
 ];
 
 impl Roles {
@@ -120,7 +120,7 @@ impl Roles {
     }
 }
 
-pub(super) fn is_required(role: Role) -> bool {
+pub(super) fn is_required(role: SignalRole) -> bool {
     KEYS.iter().any(|(_, r, required, _)| *r == role && *required)
 }
 
@@ -175,7 +175,7 @@ mod tests {
     fn strings_tables_and_lists_are_read() {
         let roles = Roles::from_toml(GOOD, "r.toml").unwrap();
         assert_eq!((roles.axes.len(), roles.axes[1].name.as_str(), roles.mu, roles.lambda), (2, "y", Some(2.0), None));
-        let force = &roles.axes[0].signals.iter().find(|(role, _)| *role == Role::Force).unwrap().1.signal;
+        let force = &roles.axes[0].signals.iter().find(|(role, _)| *role == SignalRole::Force).unwrap().1.signal;
         assert_eq!((force.topic.as_str(), force.field.as_str(), force.scale, force.hold), ("/f", "wrench.force.x", -1.0, Hold::Zero));
         let position = &roles.axes[1].signals[0].1.signal;
         assert_eq!((position.topic.as_str(), position.field.as_str(), position.hold), ("/m", "position[1]", Hold::Linear));

@@ -1,7 +1,7 @@
 //! The wanted signals, read from the bags in one pass.
 
 use super::file::{Located, Roles, is_required};
-use crate::from_bag::{Role, SessionError};
+use crate::from_bag::{SessionError, SignalRole};
 use crate::grid::Series;
 use crate::rosbag::mcap_files;
 use backdrive_bags::{FieldPath, Reader, Schema};
@@ -18,7 +18,7 @@ struct Plan {
 }
 
 /// Reads every wanted signal in one pass over each file.
-pub(super) fn gather(path: &Path, roles: &Roles, wanted: &[(Role, &Located)]) -> Result<(Vec<Series>, bool), SessionError> {
+pub(super) fn gather(path: &Path, roles: &Roles, wanted: &[(SignalRole, &Located)]) -> Result<(Vec<Series>, bool), SessionError> {
     let mut closed = true;
     let mut series: Vec<Series> = wanted.iter().map(|_| Series { stamped: true, ..Series::default() }).collect();
     let mut available: Vec<String> = Vec::new();
@@ -77,7 +77,12 @@ pub(super) fn gather(path: &Path, roles: &Roles, wanted: &[(Role, &Located)]) ->
     Ok((series, closed))
 }
 
-fn plan(reader: &Reader, roles: &Roles, wanted: &[(Role, &Located)], seen: &mut [bool]) -> Result<HashMap<usize, Plan>, SessionError> {
+fn plan(
+    reader: &Reader,
+    roles: &Roles,
+    wanted: &[(SignalRole, &Located)],
+    seen: &mut [bool],
+) -> Result<HashMap<usize, Plan>, SessionError> {
     let mut plans: HashMap<usize, Plan> = HashMap::new();
     for (place, (_, located)) in wanted.iter().enumerate() {
         let Some(topic) = reader.topics().iter().find(|t| t.name == located.signal.topic) else { continue };

@@ -28,7 +28,7 @@ mod gather;
 
 pub use file::{AxisRoles, Roles};
 
-use crate::from_bag::{Role, SessionError};
+use crate::from_bag::{SessionError, SignalRole};
 use crate::grid::{Grid, Ordered, step_of};
 use crate::session::{AxisSignals, Session};
 use crate::unjudged::{BRIDGED_S, Unjudged};
@@ -49,7 +49,7 @@ impl Session {
     /// that have no time in common.
     pub fn from_roles(path: &Path, roles: &Roles) -> Result<Session, SessionError> {
         let wrong = |what: String| SessionError::Rows { path: path.to_owned(), what };
-        let wanted: Vec<(Role, &Located)> = roles.axes.iter().flat_map(|a| a.signals.iter().map(|(r, l)| (*r, l))).collect();
+        let wanted: Vec<(SignalRole, &Located)> = roles.axes.iter().flat_map(|a| a.signals.iter().map(|(r, l)| (*r, l))).collect();
         let (series, closed) = gather(path, roles, &wanted)?;
         let mut notes = Vec::new();
         let ordered = on_one_clock(&wanted, &series, &mut notes);
@@ -75,7 +75,7 @@ impl Session {
                 next += 1;
                 let laid = signal.on(&grid, located.signal.hold);
                 note_resampled(located, signal, &laid, &grid, &mut notes);
-                if *role == Role::Master {
+                if *role == SignalRole::Master {
                     axis.resolution = step_of(&signal.values);
                 }
                 put(&mut axis, *role, laid.values);
@@ -105,15 +105,15 @@ fn rate_source(roles: &Roles) -> &'static str {
     if roles.rate_hz.is_some() { "the rate is the roles file's" } else { "the rate is that of the most frequent signal" }
 }
 
-fn put(axis: &mut AxisSignals, role: Role, values: Vec<f64>) {
+fn put(axis: &mut AxisSignals, role: SignalRole, values: Vec<f64>) {
     match role {
-        Role::Master => axis.master = values,
-        Role::Force => axis.force = values,
-        Role::Command => axis.command = values,
-        Role::Contact => axis.contact = values,
-        Role::Slave => axis.slave = Some(values),
-        Role::Dither => axis.dither = Some(values),
-        Role::Intent => axis.intent = Some(values),
-        Role::Induced => axis.induced = Some(values),
+        SignalRole::Master => axis.master = values,
+        SignalRole::Force => axis.force = values,
+        SignalRole::Command => axis.command = values,
+        SignalRole::Contact => axis.contact = values,
+        SignalRole::Slave => axis.slave = Some(values),
+        SignalRole::Dither => axis.dither = Some(values),
+        SignalRole::Intent => axis.intent = Some(values),
+        SignalRole::Induced => axis.induced = Some(values),
     }
 }

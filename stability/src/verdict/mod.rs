@@ -31,7 +31,7 @@ pub use witness::Witness;
 pub use word::{Method, Word};
 
 use crate::energy::energy;
-use crate::frequency::{self, Parts};
+use crate::frequency::{self, ExchangedParts};
 use crate::model_check::check;
 use crate::resimulate::edge::{Search, edge};
 use crate::resimulate::grips::grips;
@@ -87,7 +87,7 @@ fn with_recovered_hand(question: &Question) -> Option<Session> {
 }
 
 /// The parts of a graph that are not those that recorded the session.
-fn exchanged(graph: &Graph, swapped: Swapped) -> Parts<'_> {
+fn exchanged(graph: &Graph, swapped: Swapped) -> ExchangedParts<'_> {
     let files = |kind: NodeKind| graph.node_of(kind).map(|n| &n.settings);
     let device = |kind: NodeKind| -> Option<&DeviceFiles> {
         match files(kind) {
@@ -95,7 +95,7 @@ fn exchanged(graph: &Graph, swapped: Swapped) -> Parts<'_> {
             _ => None,
         }
     };
-    Parts {
+    ExchangedParts {
         canceller: match files(NodeKind::Canceller) {
             Some(Settings::Canceller(files, corner)) if swapped.canceller => Some((files, *corner)),
             _ => None,
