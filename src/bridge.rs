@@ -123,7 +123,7 @@ fn crossings(graph: &Graph, host: Option<&str>) -> (Vec<Crossing>, Vec<Crossing>
         let here = is_here(&topic.publisher);
         let stands_for = match host {
             Some(host) if !here => listeners_on(graph, &topic.topic, host),
-            _ => 1,
+            Some(_) | None => 1,
         };
         let crossing = Crossing { topic: topic.topic, listeners: topic.listeners, stands_for };
         if here { out.push(crossing) } else { back.push(crossing) }

@@ -1,6 +1,6 @@
 //! From the command line, the environment and the graph to where on the network a run meets.
 
-use crate::cli::{self, Transport};
+use crate::cli;
 use crate::failure::Failure;
 use backdrive_launch::{Place, Wire};
 use backdrive_nodes::graph::Graph;
@@ -40,12 +40,12 @@ fn address(name: &str) -> Result<Ipv4Addr, Failure> {
     first.ok_or_else(|| Failure::input(format!("--peer {name}: has IPv6 addresses only, and {only}")))
 }
 
-/// Where the nodes of a graph meet, on one of its hosts if one is named.
-pub fn place(graph: &Graph, transport: Option<Transport>, host: Option<&str>, options: &cli::Network) -> Result<Place, Failure> {
-    let wire = match (transport, host) {
-        (Some(Transport::Iceoryx2) | None, None) => return Ok(Place::default()),
-        (Some(Transport::Iceoryx2), Some(_)) => Wire::Iceoryx2,
-        _ => Wire::Ros2,
+/// Where the nodes of a graph meet, on one of its hosts if one is named. Without a `wire`: shared memory on one host, else ROS 2.
+pub fn place(graph: &Graph, wire: Option<Wire>, host: Option<&str>, options: &cli::Network) -> Result<Place, Failure> {
+    let wire = match (wire, host) {
+        (Some(Wire::Iceoryx2) | None, None) => return Ok(Place::default()),
+        (Some(Wire::Iceoryx2), Some(_)) => Wire::Iceoryx2,
+        (Some(Wire::Ros2), _) | (None, Some(_)) => Wire::Ros2,
     };
     let mut network = network(options)?;
     if let Some(name) = host {

@@ -84,16 +84,8 @@ pub fn replay(options: &cli::Replay) -> Result<u8, Failure> {
         let lost = reader.completeness().map_or(0, |c| c.lost());
         summary.hold_back(cut_short(&reader, planned as usize, rows).or((lost > 0).then_some(Unjudged::Lost { messages: lost })));
     }
-    if let Some(html) = &options.html {
-        output::file(html, page(&done, &graph, &heard, Some(path)).html())?;
-        output::note(format_args!("wrote {}", html.display()));
-    }
-    if options.json {
-        output::line(done.json())?;
-    } else {
-        output::line(done.text())?;
-    }
-    Ok(done.exit_code())
+    let page = options.html.as_deref().map(|html| (html, page(&done, &graph, &heard, Some(path))));
+    done.tell(page, options.json)
 }
 
 /// Two numbers per step, per axis.

@@ -4,13 +4,13 @@ use crate::cli;
 use crate::columns::columns;
 use crate::failure::Failure;
 use crate::output;
-use backdrive_bench::lag::Observation;
-use backdrive_bench::{Asked, BenchError, Identified, Record, Validation, identify, validate};
 use backdrive_control::engine::Ripple;
 use backdrive_nodes::graph::bench::{EngineFile, dynamometer_to_toml};
 use backdrive_plant::elements::Law;
 use backdrive_plant::model::Model;
 use backdrive_report::number;
+use backdrive_testbench::lag::Observation;
+use backdrive_testbench::{Asked, BenchError, Identified, Record, Validation, identify, validate};
 use serde_json::{Value, json};
 use std::path::Path;
 

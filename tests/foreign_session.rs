@@ -1,8 +1,8 @@
 //! Sessions: from a bag of ours, and the same run in the dress of other people's recordings.
 
 mod common;
-#[path = "common/skipped.rs"]
-mod skipped;
+#[path = "common/python.rs"]
+mod python;
 
 use backdrive_bags::{BagHeader, Clock, Reader, Recorder, RecorderOptions, TopicInfo};
 use backdrive_msgs::{Message, Sample, flag};
@@ -14,10 +14,13 @@ use backdrive_stability::roles::Roles;
 use backdrive_stability::session::Session;
 use backdrive_stability::transparency::transparency;
 use mcap::records::MessageHeader;
-use skipped::skipped;
+use python::python;
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::Command;
+
+/// What the Python must have.
+const NEEDS: &str = "that has tests/python/requirements.txt";
 
 /// Noise on the force channel, N.
 fn dither(size: f64) -> Vec<f64> {
@@ -544,21 +547,10 @@ fn the_example_of_the_documentation_is_a_roles_file() {
     Roles::load(&common::file("docs/roles-example.toml")).unwrap();
 }
 
-/// The interpreter to use, or `None` to skip.
-fn python() -> Option<PathBuf> {
-    if let Some(python) = std::env::var_os("BACKDRIVE_PYTHON") {
-        return Some(python.into());
-    }
-    let why = "BACKDRIVE_PYTHON is not set: it names a Python that has tests/python/requirements.txt";
-    assert!(std::env::var_os("BACKDRIVE_REQUIRE_PYTHON").is_none_or(|required| required != "1"), "{why}");
-    skipped(why);
-    None
-}
-
 /// A session that the Python package rosbags wrote: a rosbag2 folder with its own metadata, schemas and serialisation.
 #[test]
 fn a_session_written_by_rosbags_is_read() {
-    let Some(python) = python() else { return };
+    let Some(python) = python(NEEDS) else { return };
     let dir = tempfile::tempdir().unwrap();
     let graph = graph(true, 0.3, 0.05);
     let truth = Truth::of(&run(&graph));

@@ -4,7 +4,7 @@ mod common;
 
 use backdrive_nodes::graph::{Graph, NodeKind, Settings};
 use backdrive_plant::excitation::Excitation;
-use backdrive_stability::frequency::{Frequency, Options, Parts, Verdict, analyse};
+use backdrive_stability::frequency::{ExchangedParts, Frequency, Options, Verdict, analyse};
 use backdrive_stability::session::{AxisSignals, Session};
 use common::{cancel_with, edge, growth, linear, response, run};
 
@@ -148,7 +148,7 @@ fn swapped_parts_are_answered_from_the_record_and_a_model() {
         model.outputs[measured].gain *= 0.5;
     });
     let Settings::Canceller(canceller, corner) = &other.node_of(NodeKind::Canceller).unwrap().settings else { unreachable!() };
-    let parts = Parts { canceller: Some((canceller, *corner)), ..Parts::default() };
+    let parts = ExchangedParts { canceller: Some((canceller, *corner)), ..ExchangedParts::default() };
     let found = analyse(&record, &Options { parts, ..Options::default() }).unwrap();
     println!("half cancelled: {:?}, expected {:.4}", found.edge, 2.0 * bare);
     assert!((found.edge.gain.unwrap() / (2.0 * bare) - 1.0).abs() < 0.02, "{:?}", found.edge);
@@ -156,7 +156,10 @@ fn swapped_parts_are_answered_from_the_record_and_a_model() {
     // Master and slave from their models: the same loop as was recorded.
     let Settings::Master(master) = &graph.node_of(NodeKind::Master).unwrap().settings else { unreachable!() };
     let Settings::Slave(slave) = &graph.node_of(NodeKind::Slave).unwrap().settings else { unreachable!() };
-    for parts in [Parts { master: Some(master), ..Parts::default() }, Parts { slave: Some(slave), ..Parts::default() }] {
+    for parts in [
+        ExchangedParts { master: Some(master), ..ExchangedParts::default() },
+        ExchangedParts { slave: Some(slave), ..ExchangedParts::default() },
+    ] {
         let found = analyse(&record, &Options { parts, ..Options::default() }).unwrap();
         println!("from model: {:?} {:?}, expected {bare:.4}", found.provenance, found.edge);
         assert!((found.edge.gain.unwrap() / bare - 1.0).abs() < 0.02, "{:?}", found.edge);

@@ -3,27 +3,20 @@
 //! `BACKDRIVE_PYTHON` names a Python that has `tests/python/requirements.txt`; `tests/run` makes one. Without it these are
 //! skipped, unless `BACKDRIVE_REQUIRE_PYTHON=1`. The independent simulator is looked for in `../shared/concealed`.
 
-#[path = "common/skipped.rs"]
-mod skipped;
+#[path = "common/python.rs"]
+mod python;
 
-use skipped::skipped;
-use std::path::{Path, PathBuf};
+use python::python;
+use python::skipped::skipped;
+use std::path::Path;
 use std::process::Command;
 
-/// The interpreter to use, or `None` to skip.
-fn python() -> Option<PathBuf> {
-    if let Some(python) = std::env::var_os("BACKDRIVE_PYTHON") {
-        return Some(python.into());
-    }
-    let why = "BACKDRIVE_PYTHON is not set: it names a Python that has tests/python/requirements.txt";
-    assert!(std::env::var_os("BACKDRIVE_REQUIRE_PYTHON").is_none_or(|required| required != "1"), "{why}");
-    skipped(why);
-    None
-}
+/// What the Python must have.
+const NEEDS: &str = "that has tests/python/requirements.txt";
 
 /// Runs a script of `tests/python` on the program that was built, and shows its table.
 fn run(script: &str, more: &[&Path]) {
-    let Some(python) = python() else { return };
+    let Some(python) = python(NEEDS) else { return };
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/python").join(script);
     let output = Command::new(&python)
         .arg(path)

@@ -4,25 +4,17 @@
 //! skipped, unless `BACKDRIVE_REQUIRE_PYTHON=1`.
 
 mod common;
-#[path = "../../tests/common/skipped.rs"]
-mod skipped;
+#[path = "../../tests/common/python.rs"]
+mod python;
 
 use backdrive_bags::{Reader, recover};
+use python::python;
 use serde_json::{Value, json};
-use skipped::skipped;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::Command;
 
-/// The interpreter to use, or `None` to skip.
-fn python() -> Option<PathBuf> {
-    if let Some(python) = std::env::var_os("BACKDRIVE_PYTHON") {
-        return Some(python.into());
-    }
-    let why = "BACKDRIVE_PYTHON is not set: it names a Python with mcap, mcap-ros2-support, rosbags and numpy";
-    assert!(std::env::var_os("BACKDRIVE_REQUIRE_PYTHON").is_none_or(|required| required != "1"), "{why}");
-    skipped(why);
-    None
-}
+/// What the Python must have.
+const NEEDS: &str = "with mcap, mcap-ros2-support, rosbags and numpy";
 
 fn read_with(python: &Path, bag: &Path) -> Value {
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/python/read_bag.py");
@@ -48,7 +40,7 @@ fn compare(python: &Path, bag: &Path) {
 
 #[test]
 fn other_peoples_readers_decode_every_message() {
-    let Some(python) = python() else { return };
+    let Some(python) = python(NEEDS) else { return };
     let dir = tempfile::tempdir().expect("a directory");
     let (path, cut, saved) = (dir.path().join("run.mcap"), dir.path().join("cut.mcap"), dir.path().join("saved.mcap"));
     common::record(&path, 1_501);

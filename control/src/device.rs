@@ -81,7 +81,7 @@ pub struct Device {
 
 /// Which side of the loop a device is on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Role {
+pub enum DeviceRole {
     /// Its feedback is a force.
     Master,
     /// Its feedback is a commanded motion, or a force that a controller commands; of all its axes the same.
@@ -104,7 +104,7 @@ impl Device {
     pub fn new(
         model: &Model,
         fragment: Option<&Fragment>,
-        role: Role,
+        role: DeviceRole,
         period_s: f64,
         options: &DeviceOptions,
     ) -> Result<Device, DeviceError> {
@@ -122,8 +122,8 @@ impl Device {
         for (index, axis) in model.axes.clone().iter().enumerate() {
             let kind = model.inputs[axis.feedback].kind;
             let (role_name, needed, fits) = match role {
-                Role::Master => ("master", "force", kind == InputKind::Force),
-                Role::Slave => match model.inputs[model.axes[0].feedback].kind {
+                DeviceRole::Master => ("master", "force", kind == InputKind::Force),
+                DeviceRole::Slave => match model.inputs[model.axes[0].feedback].kind {
                     InputKind::Motion => ("slave that follows commands", "motion", kind == InputKind::Motion),
                     InputKind::Force => ("slave that is driven by forces", "force", kind == InputKind::Force),
                 },

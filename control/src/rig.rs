@@ -143,7 +143,7 @@ impl Core for Rig {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::device::{DeviceOptions, Role};
+    use crate::device::{DeviceOptions, DeviceRole};
     use backdrive_plant::model::{Fragment, Model};
     use std::f64::consts::TAU;
 
@@ -154,7 +154,7 @@ mod tests {
         let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../plant/");
         let model = Model::load(format!("{folder}models/hydraulic-ram.toml").as_ref()).unwrap();
         let specimen = specimen.map(|name| Fragment::load(format!("{folder}environments/{name}.toml").as_ref()).unwrap());
-        let device = Device::new(&model, specimen.as_ref(), Role::Slave, PERIOD, &DeviceOptions::default()).unwrap();
+        let device = Device::new(&model, specimen.as_ref(), DeviceRole::Slave, PERIOD, &DeviceOptions::default()).unwrap();
         Rig::new(device, settings, vec![demand], None, PERIOD)
     }
 

@@ -1,7 +1,7 @@
 //! How a process becomes a node of a running graph: ours and a user's own alike.
 
+use crate::paths::RunPaths;
 use crate::place::{Place, Wire};
-use crate::rundir::RunPaths;
 use backdrive_bags::{BagError, BagHeader, Recorder, RecorderOptions, TopicInfo};
 use backdrive_control::core::Core;
 use backdrive_nodes::build::{self, GraphTopic, credit_listeners, listeners_on, topics};
@@ -93,13 +93,13 @@ where
     };
     let mut options = ProcessOptions::default();
     let expected = |t: GraphTopic| {
-        let listeners = match (&place.host, place.wire) {
+        let listeners = match (place.wire, &place.host) {
             // In shared memory the bridge listens for all that are elsewhere.
-            (Some(host), Wire::Iceoryx2) => {
+            (Wire::Iceoryx2, Some(host)) => {
                 let here = listeners_on(&graph, &t.topic, host);
                 here + usize::from(here < t.listeners)
             }
-            _ => t.listeners,
+            (Wire::Iceoryx2, None) | (Wire::Ros2, _) => t.listeners,
         };
         (t.topic.name, listeners)
     };

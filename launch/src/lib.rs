@@ -1,13 +1,13 @@
 //! Runs a graph: starts one process per node, watches them, shows how they do, restarts or stops them,
 //! and leaves nothing behind.
 //!
-//! - [`plan`]: what the supervisor needs to know of a graph
-//! - [`rundir`]: the directory of a run; [`sweep`]: removing what dead runs have left
+//! - `plan`: what the supervisor needs to know of a graph
+//! - `rundir`: the directory of a run; `sweep`: removing what dead runs have left
 //! - `child`: one process, heard and ended; `slot`: the place of a node in a run, over all its lives
-//! - [`mod@supervise`]: starting and ending a run; `watch`: what happens between
-//! - `hosts`: a run on several hosts starts together; [`place`]: where its nodes meet
-//! - [`status`], `screen`: what a person sees meanwhile
-//! - [`report`]: what is known afterwards
+//! - `supervise`: starting and ending a run; `watch`: what happens between
+//! - `hosts`: a run on several hosts starts together; `place`: where its nodes meet
+//! - `status`, `screen`: what a person sees meanwhile
+//! - `report`: what is known afterwards
 //!
 //! A run is three things on the machine: its directory, the files `/dev/shm/bd<id>_*`, and its processes.
 //! The supervisor holds a lock in the directory for as long as it lives. A run whose lock is free is dead,
@@ -20,26 +20,31 @@ mod child;
 mod error;
 mod hosts;
 pub mod join;
+mod options;
 mod pace;
-pub mod place;
-pub mod plan;
-pub mod report;
-pub mod rundir;
+mod paths;
+mod place;
+mod plan;
+mod remains;
+mod report;
+mod rundir;
 mod screen;
 mod signals;
 mod slot;
-pub mod status;
-pub mod supervise;
-pub mod sweep;
+mod status;
+mod supervise;
+mod sweep;
 mod tell;
 mod watch;
 
 pub use error::LaunchError;
 pub use hosts::Begun;
+pub use options::{Command, OnDeath, SuperviseOptions};
+pub use paths::RunPaths;
 pub use place::{Place, Wire};
 pub use plan::{NodePlan, Plan};
 pub use report::{Cause, Death, NodeReport, RunEvent, RunReport};
-pub use rundir::{RunDir, RunHome, RunPaths};
+pub use rundir::{RunDir, RunHome};
 pub use screen::Display;
-pub use supervise::{Command, OnDeath, SuperviseOptions, run, supervise, supervise_plan};
+pub use supervise::{run, supervise, supervise_plan};
 pub use sweep::{Swept, SweptRun};

@@ -1,6 +1,6 @@
 //! Where a run's nodes meet, where that is not shared memory alone: written into the run directory for its processes.
 
-use crate::rundir::RunPaths;
+use crate::paths::RunPaths;
 use backdrive_nodes::build::{credit_topic, topics};
 use backdrive_nodes::graph::Graph;
 use backdrive_nodes::stage::Clock;

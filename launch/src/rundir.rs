@@ -14,7 +14,10 @@
 //! it and is free the moment that process is gone. So the lock alone says whether a run is alive.
 
 use crate::error::LaunchError;
-use backdrive_nodes::transport::Location;
+use crate::paths::GRAPH;
+use crate::paths::MIDDLEWARE;
+use crate::paths::RunPaths;
+use crate::paths::failed;
 use nix::errno::Errno;
 use nix::fcntl::{Flock, FlockArg};
 use std::fs::{DirBuilder, File, OpenOptions};
@@ -26,9 +29,6 @@ use std::time::{SystemTime, UNIX_EPOCH};
 
 pub(crate) const LOCK: &str = "supervisor.lock";
 pub(crate) const PIDS: &str = "pids";
-const GRAPH: &str = "graph.toml";
-const PLACE: &str = "place.json";
-const MIDDLEWARE: &str = "middleware";
 
 /// A run gets its directory under this name and takes its lock before it gets the name that others look at.
 pub(crate) const UNBORN: &str = ".new-";
@@ -154,59 +154,6 @@ impl RunHome {
     }
 }
 
-/// Where the things of a run are: what a process needs that belongs to it.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct RunPaths {
-    pub(crate) root: PathBuf,
-    pub(crate) id: String,
-}
-
-impl RunPaths {
-    /// The run whose directory this is, such as a node gets it with `--run`.
-    ///
-    /// # Errors
-    /// It is not the directory of a run.
-    pub fn open(root: &Path) -> Result<RunPaths, LaunchError> {
-        let advice = "give the directory that the supervisor made";
-        let root = std::path::absolute(root).map_err(|e| failed(root, "find it", e, advice))?;
-        let id = root.file_name().and_then(|n| n.to_str()).filter(|n| is_id(n)).map(str::to_string);
-        match id {
-            Some(id) if root.join(GRAPH).is_file() => Ok(RunPaths { root, id }),
-            _ => Err(failed(&root, "join it", "it is not the directory of a run", advice)),
-        }
-    }
-
-    /// Name of the run: 20 hexadecimal digits.
-    pub fn id(&self) -> &str {
-        &self.id
-    }
-
-    /// The directory.
-    pub fn root(&self) -> &Path {
-        &self.root
-    }
-
-    /// The graph.
-    pub fn graph(&self) -> PathBuf {
-        self.root.join(GRAPH)
-    }
-
-    /// Where its nodes meet, if that is not shared memory alone.
-    pub fn place(&self) -> PathBuf {
-        self.root.join(PLACE)
-    }
-
-    /// What the names of the run's files in shared memory begin with.
-    pub fn prefix(&self) -> String {
-        prefix_of(&self.id)
-    }
-
-    /// Where the transport meets.
-    pub fn location(&self) -> Location {
-        Location { prefix: self.prefix(), root: self.root.join(MIDDLEWARE) }
-    }
-}
-
 /// The directory of a run that is alive because this exists. Dropped without [`RunDir::remove`], it is left to the next sweep.
 #[derive(Debug)]
 pub struct RunDir {
@@ -234,7 +181,7 @@ impl RunDir {
 
     /// Notes a process of the run, so that it can be ended should it outlive the supervisor.
     pub(crate) fn note(&mut self, pid: i32, name: &str) {
-        if let Some(started) = crate::sweep::start_time(pid) {
+        if let Some(started) = crate::remains::start_time(pid) {
             let _ = writeln!(self.pids, "{pid} {started} {name}");
         }
     }
@@ -246,10 +193,10 @@ impl RunDir {
     pub fn remove(self) -> Result<(), LaunchError> {
         let advice = "run `backdrive clean`";
         let mut first = None;
-        match crate::sweep::shm_files(&self.shm, &[&self.paths.prefix()]) {
+        match crate::remains::shm_files(&self.shm, &[&self.paths.prefix()]) {
             Ok(files) => {
                 for file in files {
-                    if let Err(e) = crate::sweep::remove_file(&file) {
+                    if let Err(e) = crate::remains::remove_file(&file) {
                         first.get_or_insert(failed(&file, "remove it", e, advice));
                     }
                 }
@@ -257,7 +204,7 @@ impl RunDir {
             Err(e) => first = Some(failed(&self.shm, "read it", e, advice)),
         }
         // Last, and with the lock still held: what remains of a removal that is cut short is swept.
-        if let Err(e) = crate::sweep::remove_dir(&self.paths.root) {
+        if let Err(e) = crate::remains::remove_dir(&self.paths.root) {
             first.get_or_insert(failed(&self.paths.root, "remove it", e, advice));
         }
         first.map_or(Ok(()), Err)
@@ -272,15 +219,6 @@ pub(crate) fn try_lock(path: &Path) -> std::io::Result<Option<Flock<File>>> {
         Err((_, Errno::EWOULDBLOCK)) => Ok(None),
         Err((_, e)) => Err(e.into()),
     }
-}
-
-pub(crate) fn prefix_of(id: &str) -> String {
-    format!("bd{id}_")
-}
-
-/// Whether a file name is the name of a run.
-pub(crate) fn is_id(name: &str) -> bool {
-    name.len() == 20 && name.bytes().all(|b| b.is_ascii_digit() || (b'a'..=b'f').contains(&b))
 }
 
 /// Time, process and chance, in fixed widths: sorts by time, and none begins another.
@@ -300,13 +238,10 @@ pub(crate) fn uid() -> u32 {
     unsafe { nix::libc::geteuid() }
 }
 
-fn failed(path: &Path, action: &'static str, reason: impl ToString, advice: &'static str) -> LaunchError {
-    LaunchError::RunDir { path: path.to_path_buf(), action, reason: reason.to_string(), advice }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::paths::is_id;
 
     type Outcome = Result<(), Box<dyn std::error::Error>>;
 

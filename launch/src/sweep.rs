@@ -2,7 +2,13 @@
 //!
 //! Only what bears the name of a run whose lock is free is touched; everything else on the machine is somebody else's.
 
-use crate::rundir::{LOCK, PIDS, RunHome, UNBORN, boot_id, is_id, prefix_of, try_lock, uid};
+use crate::paths::{is_id, prefix_of};
+use crate::remains::name_of;
+use crate::remains::remove_dir;
+use crate::remains::remove_file;
+use crate::remains::shm_files;
+use crate::remains::start_time;
+use crate::rundir::{LOCK, PIDS, RunHome, UNBORN, boot_id, try_lock, uid};
 use nix::fcntl::Flock;
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
@@ -203,42 +209,6 @@ fn end_orphans(dead: &mut [Dead]) {
                 });
             }
         }
-    }
-}
-
-/// When a process started, clock ticks since boot; `None` if it is gone or only waits to be reaped.
-pub(crate) fn start_time(pid: i32) -> Option<u64> {
-    let stat = std::fs::read_to_string(format!("/proc/{pid}/stat")).ok()?;
-    // The program's name is in parentheses and may hold anything.
-    let mut fields = stat.rsplit_once(')')?.1.split_whitespace();
-    if matches!(fields.next()?, "Z" | "X") {
-        return None;
-    }
-    fields.nth(18)?.parse().ok()
-}
-
-/// Files in shared memory whose names begin with one of these.
-pub(crate) fn shm_files(shm: &Path, prefixes: &[&str]) -> std::io::Result<Vec<PathBuf>> {
-    let entries = std::fs::read_dir(shm)?.flatten().map(|e| e.path());
-    Ok(entries.filter(|path| prefixes.iter().any(|p| name_of(path).starts_with(p))).collect())
-}
-
-fn name_of(path: &Path) -> &str {
-    path.file_name().and_then(|n| n.to_str()).unwrap_or_default()
-}
-
-pub(crate) fn remove_file(path: &Path) -> std::io::Result<()> {
-    absent_is_fine(std::fs::remove_file(path))
-}
-
-pub(crate) fn remove_dir(path: &Path) -> std::io::Result<()> {
-    absent_is_fine(std::fs::remove_dir_all(path))
-}
-
-fn absent_is_fine(result: std::io::Result<()>) -> std::io::Result<()> {
-    match result {
-        Err(e) if e.kind() == ErrorKind::NotFound => Ok(()),
-        other => other,
     }
 }
 

@@ -6,7 +6,7 @@ use backdrive_control::canceller::Canceller;
 use backdrive_control::controller::Controller;
 use backdrive_control::core::{Core, Events, Port, Tick};
 use backdrive_control::cycle::CycleNode;
-use backdrive_control::device::{Device, DeviceError, DeviceOptions, Role};
+use backdrive_control::device::{Device, DeviceError, DeviceOptions, DeviceRole};
 use backdrive_control::dynamometer::{Dynamometer, DynamometerNode};
 use backdrive_control::engine::EngineNode;
 use backdrive_control::exciter::Exciter;
@@ -217,7 +217,7 @@ fn cores(graph: &Graph, node: &Node) -> Result<Vec<Box<dyn Core>>, DeviceError> 
     let period_s = graph.period_s();
     let stale = graph.stale_after_s;
     let seed = graph.seed.wrapping_mul(0x9e37_79b9).wrapping_add(source_id(&node.name) as u64);
-    let simulated = |files: &DeviceFiles, role: Role| -> Result<Option<Device>, DeviceError> {
+    let simulated = |files: &DeviceFiles, role: DeviceRole| -> Result<Option<Device>, DeviceError> {
         let Some(model) = &files.model else { return Ok(None) };
         let options = options(files, seed);
         Device::new(model, files.fragment.as_ref(), role, period_s, &options).map(Some)
@@ -226,10 +226,10 @@ fn cores(graph: &Graph, node: &Node) -> Result<Vec<Box<dyn Core>>, DeviceError> 
     Ok(match &node.settings {
         Settings::Operator(intents) => vec![Box::new(Operator::new(intents.clone()))],
         Settings::Master(files) => {
-            vec![Box::new(Master::new(Box::new(needed(simulated(files, Role::Master)?)?), stale, period_s))]
+            vec![Box::new(Master::new(Box::new(needed(simulated(files, DeviceRole::Master)?)?), stale, period_s))]
         }
         Settings::Canceller(files, high_pass_hz) => {
-            vec![Box::new(Canceller::new(simulated(files, Role::Master)?, *high_pass_hz, period_s))]
+            vec![Box::new(Canceller::new(simulated(files, DeviceRole::Master)?, *high_pass_hz, period_s))]
         }
         Settings::Scaling { dither, guard } => {
             // What a dither shakes is no oscillation of the loop's own.
@@ -240,7 +240,7 @@ fn cores(graph: &Graph, node: &Node) -> Result<Vec<Box<dyn Core>>, DeviceError> 
                 Box::new(Backward::new(graph.gains.clone(), dither.clone(), guard, period_s)),
             ]
         }
-        Settings::Slave(files) => vec![Box::new(Slave::new(needed(simulated(files, Role::Slave)?)?, stale, period_s))],
+        Settings::Slave(files) => vec![Box::new(Slave::new(needed(simulated(files, DeviceRole::Slave)?)?, stale, period_s))],
         Settings::Controller { law, model } => vec![Box::new(Controller::new(node.axes, law, model.as_ref(), stale, period_s)?)],
         Settings::Exciter(forces) => vec![Box::new(Exciter::new(forces.clone()))],
         Settings::Observer(files) => vec![Box::new(observer(graph, node, files)?)],
@@ -257,7 +257,7 @@ fn cores(graph: &Graph, node: &Node) -> Result<Vec<Box<dyn Core>>, DeviceError> 
         Settings::Recorder => Vec::new(),
         Settings::Rig(files, settings, demand) => {
             let seed = files.real_sensors.then(|| graph.seed.wrapping_mul(0x9e37_79b9).wrapping_add(u64::from(source_id("load cell"))));
-            let device = needed(simulated(files, Role::Slave)?)?;
+            let device = needed(simulated(files, DeviceRole::Slave)?)?;
             vec![Box::new(Rig::new(device, *settings, demand.clone(), seed, period_s))]
         }
     })

@@ -181,7 +181,7 @@ fn write_lines(said: &Receiver<Out>) {
 
 fn spell(told: Told) -> FromNode {
     match told {
-        Told::Status(report) => FromNode::Status(report.into()),
+        Told::Status(report) => FromNode::Status(report),
         Told::Event(event) => FromNode::Event {
             step: event.step,
             severity: event.severity,

@@ -70,8 +70,8 @@ pub enum FromNode {
     },
 }
 
-/// How a node is doing.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+/// How a node is doing. Small and without a heap, for it is told while stepping.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct NodeStatus {
     /// Steps done.
     pub steps: u64,

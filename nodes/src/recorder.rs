@@ -8,7 +8,7 @@
 use crate::clock::{Start, now_ns};
 use crate::process::{GRACE, Line};
 use crate::protocol::NodeStatus;
-use crate::runner::{Report, RunError, Told};
+use crate::runner::{RunError, Told};
 use crate::sentences::sentence;
 use crate::stage::{Clock, Timing};
 use crate::transport::{Publisher, Subscriber, Transport, TransportError};
@@ -96,7 +96,7 @@ struct Arrived {
 }
 
 /// A recorder whose subscribers exist.
-pub struct Recording {
+pub struct RunningRecorder {
     heard: Vec<Heard>,
     credit: Option<(Box<dyn Publisher>, usize)>,
     credited: u64,
@@ -113,7 +113,7 @@ pub struct Recording {
     _transport: Box<dyn Transport>,
 }
 
-impl Recording {
+impl RunningRecorder {
     /// Subscribes to every topic.
     ///
     /// # Errors
@@ -123,7 +123,7 @@ impl Recording {
         timing: &Timing,
         mut transport: Box<dyn Transport>,
         sink: Box<dyn Sink>,
-    ) -> Result<Recording, TransportError> {
+    ) -> Result<RunningRecorder, TransportError> {
         let mut heard = Vec::new();
         for topic in &plan.topics {
             let subscriber = transport.subscriber(topic, usize::MAX, false)?;
@@ -134,7 +134,7 @@ impl Recording {
             None => None,
         };
         let (source, clock, by_wall_clock) = (source_id(&plan.name), timing.clock, plan.by_wall_clock);
-        Ok(Recording {
+        Ok(RunningRecorder {
             heard,
             credit,
             credited: 0,
@@ -241,9 +241,9 @@ impl Recording {
         self.heard.iter().all(|h| !h.subscriber.has_publisher())
     }
 
-    fn report(&self) -> Report {
+    fn report(&self) -> NodeStatus {
         let (written, bytes, lost) = self.sink.health();
-        Report { steps: self.steps(), lost, recorded: Some((written, bytes)), ..Report::default() }
+        NodeStatus { steps: self.steps(), lost, recorded: Some((written, bytes)), ..NodeStatus::default() }
     }
 
     /// Takes over until every topic has reached the last of `steps`, or `stopped` says so; then what is still
@@ -307,7 +307,7 @@ impl Recording {
         let report = self.report();
         let completeness = self.sink.finish()?;
         match completeness.lost() {
-            0 => Ok(Report { recorded: Some((completeness.written(), report.recorded.map_or(0, |r| r.1))), ..report }.into()),
+            0 => Ok(NodeStatus { recorded: Some((completeness.written(), report.recorded.map_or(0, |r| r.1))), ..report }),
             lost => Err(RunError::Incomplete { lost }),
         }
     }
@@ -317,11 +317,11 @@ impl Recording {
 /// The exit code is 4 when messages were lost.
 pub fn run_recorder(plan: &RecorderPlan, timing: &Timing, transport: Box<dyn Transport>, sink: Box<dyn Sink>) -> ExitCode {
     Line::open(GRACE).supervised(|line| {
-        let mut recording = Recording::new(plan, timing, transport, sink)?;
-        let Some(start) = line.meet(|| recording.missing()) else {
-            return recording.finish();
+        let mut recorder = RunningRecorder::new(plan, timing, transport, sink)?;
+        let Some(start) = line.meet(|| recorder.missing()) else {
+            return recorder.finish();
         };
-        recording.run(start, timing.steps, || line.control.is_stopped(), &mut |told| line.tell(told))?;
-        recording.finish()
+        recorder.run(start, timing.steps, || line.control.is_stopped(), &mut |told| line.tell(told))?;
+        recorder.finish()
     })
 }

@@ -6,7 +6,7 @@ mod common;
 use backdrive_nodes::clock::Start;
 use backdrive_nodes::process::{ProcessOptions, run_process};
 use backdrive_nodes::protocol::{FromNode, ToNode};
-use backdrive_nodes::recorder::Recording;
+use backdrive_nodes::recorder::RunningRecorder;
 use backdrive_nodes::runner::{Control, Options, Runner};
 use backdrive_nodes::sequence::Sequence;
 use backdrive_nodes::stage::{Clock, Impairment, Timing};
@@ -41,7 +41,7 @@ fn in_one_thread(impairment: Option<Impairment>) -> Heard {
 fn in_threads(impairment: Option<Impairment>) -> Heard {
     let hub = Hub::default();
     let (keeping, heard) = Keeping::new(recorder_plan().topics.len());
-    let mut recording = Recording::new(&recorder_plan(), &lockstep(), Box::new(hub.join()), Box::new(keeping)).unwrap();
+    let mut recording = RunningRecorder::new(&recorder_plan(), &lockstep(), Box::new(hub.join()), Box::new(keeping)).unwrap();
     let barrier = Arc::new(std::sync::Barrier::new(NODES.len()));
     std::thread::scope(|scope| {
         for plan in plans(impairment, true) {
@@ -118,7 +118,7 @@ fn in_processes(impairment: Option<Impairment>) -> Heard {
     let location = Location { prefix, root: root.path().join("run") };
     let (keeping, heard) = Keeping::new(recorder_plan().topics.len());
     let transport = Box::new(Iceoryx2::open(&location, "recorder").unwrap());
-    let mut recording = Recording::new(&recorder_plan(), &lockstep(), transport, Box::new(keeping)).unwrap();
+    let mut recording = RunningRecorder::new(&recorder_plan(), &lockstep(), transport, Box::new(keeping)).unwrap();
     let mut processes: Vec<Process> = NODES.iter().map(|name| Process::start(name, &location, impairment)).collect();
     for process in &mut processes {
         assert_eq!(process.next(), FromNode::Created);

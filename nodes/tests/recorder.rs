@@ -5,7 +5,7 @@ mod common;
 use backdrive_bags::Completeness;
 use backdrive_msgs::{LAYOUT, Message, Sample};
 use backdrive_nodes::clock::{Start, now_ns};
-use backdrive_nodes::recorder::{RecorderPlan, Recording, Sink};
+use backdrive_nodes::recorder::{RecorderPlan, RunningRecorder, Sink};
 use backdrive_nodes::runner::RunError;
 use backdrive_nodes::stage::Clock;
 use backdrive_nodes::transport::Transport;
@@ -43,7 +43,7 @@ fn each_message_has_the_time_at_which_it_arrived() {
     let plan = RecorderPlan { name: "recorder".into(), topics: topics.clone(), credit: None, by_wall_clock: false };
     let told = Told::default();
     let timing = timing(Clock::Realtime, 1000.0, Some(STEPS));
-    let mut recording = Recording::new(&plan, &timing, Box::new(hub.join()), Box::new(Keeping(Arc::clone(&told)))).unwrap();
+    let mut recording = RunningRecorder::new(&plan, &timing, Box::new(hub.join()), Box::new(Keeping(Arc::clone(&told)))).unwrap();
     // Another day than that of the machine's clock, which must not matter.
     let start = Start { t0_ns: now_ns(), unix_ns: 1_000_000_000_000_000_000 };
     let sent = std::thread::scope(|scope| {

@@ -26,7 +26,7 @@ mod figure;
 mod limits;
 mod number;
 mod page;
-pub mod plot;
+mod plot;
 mod style;
 mod table;
 mod thin;

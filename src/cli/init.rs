@@ -1,6 +1,6 @@
 //! Options of `backdrive init`: every question that it asks has one.
 
-use super::positive;
+use super::values::positive;
 use clap::{Args, ValueEnum};
 use std::path::PathBuf;
 

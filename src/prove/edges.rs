@@ -5,7 +5,7 @@ use crate::failure::Failure;
 use backdrive_nodes::graph::{Graph, NodeKind, Overrides, Settings};
 use backdrive_plant::model::InputKind;
 use backdrive_stability::resimulate::edge::{Edge, Search, edge};
-use backdrive_stability::resimulate::{OwnCores, RunOptions, Scenario, grips};
+use backdrive_stability::resimulate::{OwnCores, RunOptions, Scenario, grip};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -106,6 +106,6 @@ fn firmer(graph: &mut Graph, factor: f64) {
         let Some(model) = &mut files.model else { continue };
         let hands: Vec<usize> = model.inputs.iter().filter(|i| i.kind == InputKind::Motion).map(|i| i.on).collect();
         let of_hand = |between: &[Option<usize>; 2]| between.iter().flatten().any(|body| hands.contains(body));
-        model.elements.iter_mut().filter(|e| of_hand(&e.between)).for_each(|e| grips::scale_element(e, factor));
+        model.elements.iter_mut().filter(|e| of_hand(&e.between)).for_each(|e| grip::scale_element(e, factor));
     }
 }

@@ -28,7 +28,7 @@ pub fn page(found: &Answer, session: &Session, curve: &[&Point]) -> Page {
         page.warning(&capital(&d.text));
     }
     for warning in &found.warnings {
-        page.note(&capital(warning));
+        page.note(&capital(&warning.to_string()));
     }
     page.table(methods(found));
 

@@ -51,7 +51,7 @@ pub enum SessionError {
 
 /// The signals of a session: what they are, and what cannot be told without them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Role {
+pub(crate) enum SignalRole {
     Master,
     Force,
     Command,
@@ -62,32 +62,32 @@ pub(crate) enum Role {
     Induced,
 }
 
-impl Role {
+impl SignalRole {
     /// For messages.
     pub(crate) fn text(self) -> &'static str {
         match self {
-            Role::Master => "x_m, the master's measured position",
-            Role::Force => "F_f, the force applied to the master",
-            Role::Command => "x_c, the slave's commanded position",
-            Role::Contact => "F_s, the force of the environment on the slave",
-            Role::Slave => "x_s, the slave's position",
-            Role::Dither => "the dither",
-            Role::Intent => "x_u, the operator's intent",
-            Role::Induced => "the canceller's predicted induced motion",
+            SignalRole::Master => "x_m, the master's measured position",
+            SignalRole::Force => "F_f, the force applied to the master",
+            SignalRole::Command => "x_c, the slave's commanded position",
+            SignalRole::Contact => "F_s, the force of the environment on the slave",
+            SignalRole::Slave => "x_s, the slave's position",
+            SignalRole::Dither => "the dither",
+            SignalRole::Intent => "x_u, the operator's intent",
+            SignalRole::Induced => "the canceller's predicted induced motion",
         }
     }
 
     /// What cannot be told where it is missing.
     pub(crate) fn without(self) -> &'static str {
         match self {
-            Role::Master => "neither the induced motion nor the loop can be told, nor whether the master oscillates",
-            Role::Force => "neither how the master answers a force nor the loop can be told",
-            Role::Command => "neither how the slave answers a command nor the loop can be told",
-            Role::Contact => "neither what the slave touches nor the loop can be told",
-            Role::Slave => "the environment's impedance is told against the command in place of the slave's motion",
-            Role::Dither => "the master's answer to a force can be told against a recorded operator only",
-            Role::Intent => "the loop cannot be run again with this hand, and rest is told by the signals alone",
-            Role::Induced => "what was cancelled is not known from the record",
+            SignalRole::Master => "neither the induced motion nor the loop can be told, nor whether the master oscillates",
+            SignalRole::Force => "neither how the master answers a force nor the loop can be told",
+            SignalRole::Command => "neither how the slave answers a command nor the loop can be told",
+            SignalRole::Contact => "neither what the slave touches nor the loop can be told",
+            SignalRole::Slave => "the environment's impedance is told against the command in place of the slave's motion",
+            SignalRole::Dither => "the master's answer to a force can be told against a recorded operator only",
+            SignalRole::Intent => "the loop cannot be run again with this hand, and rest is told by the signals alone",
+            SignalRole::Induced => "what was cancelled is not known from the record",
         }
     }
 }
@@ -95,7 +95,7 @@ impl Role {
 /// A topic that is read, and the values of its samples by step.
 struct Heard {
     topic: String,
-    role: Role,
+    role: SignalRole,
     /// Step, flags, then position and effort of every axis.
     rows: Vec<(u64, u32, Vec<[f64; 2]>)>,
 }
@@ -114,34 +114,34 @@ impl Session {
         let path = reader.path().to_owned();
         let node = |kind: NodeKind| graph.nodes.iter().position(|n| n.kind == kind);
         let missing =
-            |role: Role, why: String| SessionError::Missing { path: path.clone(), signal: role.text(), why, without: role.without() };
-        let no_node = |role: Role, kind: NodeKind| missing(role, format!("the graph has no {} node", kind.name()));
+            |role: SignalRole, why: String| SessionError::Missing { path: path.clone(), signal: role.text(), why, without: role.without() };
+        let no_node = |role: SignalRole, kind: NodeKind| missing(role, format!("the graph has no {} node", kind.name()));
 
-        let master = node(NodeKind::Master).ok_or_else(|| no_node(Role::Master, NodeKind::Master))?;
-        let scaling = node(NodeKind::Scaling).ok_or_else(|| no_node(Role::Command, NodeKind::Scaling))?;
-        let slave = node(NodeKind::Slave).ok_or_else(|| no_node(Role::Contact, NodeKind::Slave))?;
+        let master = node(NodeKind::Master).ok_or_else(|| no_node(SignalRole::Master, NodeKind::Master))?;
+        let scaling = node(NodeKind::Scaling).ok_or_else(|| no_node(SignalRole::Command, NodeKind::Scaling))?;
+        let slave = node(NodeKind::Slave).ok_or_else(|| no_node(SignalRole::Contact, NodeKind::Slave))?;
         let axes = graph.nodes[master].axes.min(graph.nodes[slave].axes);
         let mut notes = Vec::new();
 
         let mut heard: Vec<Heard> = Vec::new();
-        let mut hear = |node: usize, port: &str, role: Role| {
+        let mut hear = |node: usize, port: &str, role: SignalRole| {
             heard.push(Heard { topic: graph.topic_of(node, port).name, role, rows: Vec::new() });
         };
-        hear(master, "measured", Role::Master);
-        hear(scaling, "command", Role::Command);
-        hear(slave, "measured", Role::Contact);
+        hear(master, "measured", SignalRole::Master);
+        hear(scaling, "command", SignalRole::Command);
+        hear(slave, "measured", SignalRole::Contact);
         // Only its flags: whether the guard acted.
-        hear(scaling, "force", Role::Force);
+        hear(scaling, "force", SignalRole::Force);
         if matches!(&graph.nodes[scaling].settings, Settings::Scaling { dither, .. } if !dither.is_empty()) {
-            hear(scaling, "dither", Role::Dither);
+            hear(scaling, "dither", SignalRole::Dither);
         }
         match node(NodeKind::Operator) {
-            Some(operator) => hear(operator, "intent", Role::Intent),
-            None => notes.push(format!("the graph has no operator: {}", Role::Intent.without())),
+            Some(operator) => hear(operator, "intent", SignalRole::Intent),
+            None => notes.push(format!("the graph has no operator: {}", SignalRole::Intent.without())),
         }
         let cancels = |n: usize| matches!(&graph.nodes[n].settings, Settings::Canceller(files, _) if files.model.is_some());
         if let Some(canceller) = node(NodeKind::Canceller).filter(|n| cancels(*n)) {
-            hear(canceller, "induced", Role::Induced);
+            hear(canceller, "induced", SignalRole::Induced);
         }
 
         let gains_topic = format!("/{}/gains", graph.nodes[scaling].name);
@@ -169,8 +169,8 @@ impl Session {
                 Err(_) => format!("the bag has no topic {}", topic.topic),
             };
             match topic.role {
-                Role::Master | Role::Command | Role::Contact => return Err(missing(topic.role, why)),
-                Role::Force => notes.push(format!("{why}: whether the guard acted is not known")),
+                SignalRole::Master | SignalRole::Command | SignalRole::Contact => return Err(missing(topic.role, why)),
+                SignalRole::Force => notes.push(format!("{why}: whether the guard acted is not known")),
                 role => notes.push(format!("{} is missing: {why}; {}", role.text(), role.without())),
             }
         }
@@ -178,7 +178,7 @@ impl Session {
             notes.push("the bag was cut off; what it holds is used".to_owned());
         }
 
-        let steps = || heard.iter().filter(|h| h.role != Role::Force).flat_map(|h| h.rows.iter().map(|r| r.0));
+        let steps = || heard.iter().filter(|h| h.role != SignalRole::Force).flat_map(|h| h.rows.iter().map(|r| r.0));
         let (first, last) = (steps().min().unwrap_or(0), steps().max().unwrap_or(0));
         let messages = heard.iter().map(|h| h.rows.len() as u64).sum::<u64>();
         if last - first > messages + MOST_EMPTY_STEPS {
@@ -261,18 +261,18 @@ fn lay(topic: &Heard, axis: usize, first: u64, signals: &mut AxisSignals) {
     };
     let filled = !topic.rows.is_empty();
     match topic.role {
-        Role::Master => {
+        SignalRole::Master => {
             put(&mut signals.master, POSITION);
             put(&mut signals.force, EFFORT);
         }
-        Role::Command => put(&mut signals.command, POSITION),
-        Role::Contact => {
+        SignalRole::Command => put(&mut signals.command, POSITION),
+        SignalRole::Contact => {
             put(&mut signals.contact, EFFORT);
             put(signals.slave.get_or_insert_default(), POSITION);
         }
-        Role::Dither if filled => put(signals.dither.get_or_insert_default(), EFFORT),
-        Role::Intent if filled => put(signals.intent.get_or_insert_default(), POSITION),
-        Role::Induced if filled => put(signals.induced.get_or_insert_default(), POSITION),
+        SignalRole::Dither if filled => put(signals.dither.get_or_insert_default(), EFFORT),
+        SignalRole::Intent if filled => put(signals.intent.get_or_insert_default(), POSITION),
+        SignalRole::Induced if filled => put(signals.induced.get_or_insert_default(), POSITION),
         _ => {}
     }
     for (step, flags, _) in &topic.rows {
@@ -292,8 +292,13 @@ fn lay(topic: &Heard, axis: usize, first: u64, signals: &mut AxisSignals) {
 }
 
 /// The signals that no answer can do without.
-pub(crate) fn required(axis: &AxisSignals) -> [(Role, &Vec<f64>); 4] {
-    [(Role::Master, &axis.master), (Role::Force, &axis.force), (Role::Command, &axis.command), (Role::Contact, &axis.contact)]
+pub(crate) fn required(axis: &AxisSignals) -> [(SignalRole, &Vec<f64>); 4] {
+    [
+        (SignalRole::Master, &axis.master),
+        (SignalRole::Force, &axis.force),
+        (SignalRole::Command, &axis.command),
+        (SignalRole::Contact, &axis.contact),
+    ]
 }
 
 /// An optional signal that says nothing on an axis is none.
@@ -315,7 +320,7 @@ fn drop_silent(axis: &mut AxisSignals, notes: &mut Vec<String>) {
 }
 
 fn note_holes(topic: &Heard, rows: usize, notes: &mut Vec<String>) {
-    if topic.rows.is_empty() || topic.role == Role::Force {
+    if topic.rows.is_empty() || topic.role == SignalRole::Force {
         return;
     }
     let mut steps: Vec<u64> = topic.rows.iter().map(|r| r.0).collect();

@@ -1,10 +1,10 @@
 //! The master of a graph, run once more over what a session recorded.
 
 use crate::session::Session;
-use backdrive_control::device::{Device, DeviceOptions, Role};
+use backdrive_control::device::{Device, DeviceOptions, DeviceRole};
 use backdrive_msgs::MAX_AXES;
 use backdrive_nodes::graph::{Graph, NodeKind, Settings};
-use backdrive_plant::elements::{Mechanics, Role as ElementRole};
+use backdrive_plant::elements::{Mechanics, Role};
 
 /// What the master did.
 #[derive(Debug, Clone, Default)]
@@ -46,12 +46,12 @@ pub(crate) fn run_master(session: &Session, graph: &Graph, wanted: Wanted) -> Re
     let node = graph.node_of(NodeKind::Master).ok_or("the graph has no master node")?;
     let Settings::Master(files) = &node.settings else { return Err("the graph's master has no settings".to_owned()) };
     let model = files.model.as_ref().ok_or_else(|| format!("node \"{}\" has no model: it is a program of its own", node.name))?;
-    let linear = |e: &backdrive_plant::model::Element| matches!(e.law.role(), ElementRole::Linear(_));
+    let linear = |e: &backdrive_plant::model::Element| matches!(e.law.role(), Role::Linear(_));
     let fragment = files.fragment.as_ref();
     let all_linear = model.elements.iter().chain(fragment.iter().flat_map(|f| &f.network.elements)).all(linear);
     let substeps = files.substeps.or((wanted.energy && all_linear).then_some(LINEAR_SUBSTEPS));
     let options = DeviceOptions { substeps, noise_seed: None, quantise: false };
-    let mut device = Device::new(model, fragment, Role::Master, session.period_s, &options).map_err(|e| e.to_string())?;
+    let mut device = Device::new(model, fragment, DeviceRole::Master, session.period_s, &options).map_err(|e| e.to_string())?;
     let axes = device.axes();
     if session.axes.len() < axes {
         return Err(format!("the model has {axes} axes and the record {}", session.axes.len()));
@@ -64,12 +64,8 @@ pub(crate) fn run_master(session: &Session, graph: &Graph, wanted: Wanted) -> Re
     if wanted.energy {
         device.track_energy();
     }
-    let names: Vec<(String, &'static str, bool)> = device
-        .model()
-        .elements
-        .iter()
-        .map(|e| (e.name.clone(), e.law.kind().name, !matches!(e.law.role(), ElementRole::Linear(_))))
-        .collect();
+    let names: Vec<(String, &'static str, bool)> =
+        device.model().elements.iter().map(|e| (e.name.clone(), e.law.kind().name, !matches!(e.law.role(), Role::Linear(_)))).collect();
     let rows = session.len();
     let mut run = MasterRun { position: vec![Vec::with_capacity(rows); axes], taken: Vec::new() };
     if wanted.energy {

@@ -11,9 +11,11 @@ pub mod lmi;
 pub mod riccati;
 mod system;
 mod unknown_input;
+mod weights;
 
 pub use derivative::Derivative;
-pub use design::{Design, DesignError, Weights, design, kalman, norm_squared};
+pub use design::{Design, DesignError, design, kalman, norm_squared};
 pub use extended_kalman::{ExtendedKalman, Shaft};
 pub use system::{Quantity, System, SystemError};
 pub use unknown_input::{ObserverNode, UnknownInput};
+pub use weights::Weights;

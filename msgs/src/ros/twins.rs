@@ -1,6 +1,6 @@
 //! What the CDR encoder and decoder see: the fields of each message in the order of its schema.
 
-use super::{Facts, RosError};
+use super::facts::{Facts, RosError};
 use crate::text::Text;
 use crate::{Event, Gains, MAX_AXES, Margin, NOT_MEASURED, Sample, Status};
 use serde::de::{SeqAccess, Visitor};

@@ -228,3 +228,8 @@ fn only_loops(graph: &Graph, mut stuck: Vec<(usize, usize)>) -> Vec<(usize, usiz
         stuck = kept;
     }
 }
+
+/// All stages as (node, stage) in the order in which they step; a checked graph has one.
+pub fn step_order(graph: &Graph) -> Vec<(usize, usize)> {
+    order(graph).unwrap_or_default()
+}

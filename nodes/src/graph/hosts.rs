@@ -1,22 +1,8 @@
 //! Graphs on several hosts: which node runs where.
 
-use super::{Graph, Node, NodeKind};
+use super::{Graph, Host, Node, NodeKind};
 use backdrive_plant::tomlfile::{FileError, Table, unknown};
-use std::net::Ipv4Addr;
 use std::path::PathBuf;
-
-/// A host of a graph that runs on several, `[hosts.NAME]`. The first says when the run starts.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Host {
-    /// What `--host` names.
-    pub name: String,
-    /// Where the others reach it by unicast, for networks without multicast.
-    pub address: Option<Ipv4Addr>,
-    /// Name or address of the interface that it uses; all without.
-    pub interface: Option<String>,
-    /// Line of the file where it begins.
-    pub line: usize,
-}
 
 /// Reads `[hosts]`.
 pub(super) fn read_hosts(top: &mut Table) -> Result<Vec<Host>, FileError> {

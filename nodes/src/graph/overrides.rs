@@ -1,6 +1,6 @@
 //! What the command line changes in a graph file, without touching the file.
 
-use super::parse::Files;
+use super::files::Files;
 use super::recorded::Recorded;
 use super::{Graph, NodeKind};
 use backdrive_plant::tomlfile::FileError;

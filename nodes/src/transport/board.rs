@@ -5,6 +5,7 @@
 //! again finds its own, and the bell of a dead one is rung once for nothing.
 
 use super::bell::Bell;
+use super::location::SHM;
 use super::{Location, TransportError, name_hash};
 use nix::libc;
 use nix::sys::mman::{MapFlags, ProtFlags, mmap, munmap};
@@ -15,9 +16,6 @@ use std::os::unix::fs::OpenOptionsExt;
 use std::path::Path;
 use std::ptr::NonNull;
 use std::sync::atomic::{AtomicU8, AtomicU64, Ordering};
-
-/// Where shared memory is mounted. A file on a disk would do, but its write-back stalls writers.
-pub(crate) const SHM: &str = "/dev/shm";
 
 const NODES: usize = 64;
 const TOPICS: usize = 512;

@@ -1,6 +1,7 @@
 //! One edge from those of all amplitudes, gains and states of contact, continued to rest and to large motions.
 
 use super::edge::{self, Edge};
+use super::note::Note;
 use super::{Frequency, LevelEstimate};
 use crate::spectra::Window;
 use backdrive_control::margins::critical_factor;
@@ -33,10 +34,10 @@ impl Frequency {
         });
         self.gains_disagree = pairs(&self.gains.iter().map(|g| &g.edge).collect::<Vec<_>>());
         if self.gains_disagree {
-            self.notes.push("the recorded gains give different edges: the loop depends on its gain or its amplitude".to_string());
+            self.notes.push(Note::GainsDisagree);
         }
         if self.amplitude_dependent {
-            self.notes.push("the edge depends on the amplitude of the dither: friction, hysteresis or backlash in the loop".to_string());
+            self.notes.push(Note::AmplitudeDependent);
         }
         let edges: Vec<Edge> = self.levels.iter().map(|l| l.edge).collect();
         let several = self.amplitude_dependent || states.len() > 1;
@@ -70,7 +71,7 @@ impl Frequency {
         if let Some((from, to)) = &mut self.edge.ci95 {
             *from = from.min(limit * low / k2);
             *to = to.map(|to| to.max(limit));
-            self.notes.push(format!("the interval is continued to large amplitudes, where the edge tends to {limit:.3} by the describing function of dry friction"));
+            self.notes.push(Note::ContinuedToLarge { gain: limit });
         }
     }
 
@@ -103,10 +104,7 @@ impl Frequency {
         if let Some((from, to)) = &mut self.edge.ci95 {
             *from = from.min(0.95 * edge.factor);
             *to = to.map(|to| to.max(1.05 * edge.factor));
-            self.notes.push(format!(
-                "the interval is continued to rest: while dry friction holds the master the canceller subtracts all the same, and the edge is {:.3}",
-                edge.factor
-            ));
+            self.notes.push(Note::ContinuedToRest { gain: edge.factor });
         }
     }
 }

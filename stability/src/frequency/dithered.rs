@@ -2,6 +2,7 @@
 
 use super::edge::{self, Loop};
 use super::local::{Columns, DITHERED, LocalFit, MOVED, fit};
+use super::note::Note;
 use super::prepared::{Column, Prepared, column, columns};
 use super::rows::{Rows, State, Stretch};
 use super::{
@@ -39,7 +40,7 @@ pub(super) fn dithered(prepared: &Prepared, options: &Options, result: &mut Freq
                 }
                 result.levels.push(level);
             }
-            None => result.notes.push(format!("a dither of {amplitude:.3} rms acts too shortly to be estimated")),
+            None => result.notes.push(Note::DitherTooShort { rms: amplitude }),
         }
     }
     if rows.gains.len() > 1 {

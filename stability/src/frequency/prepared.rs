@@ -1,6 +1,7 @@
 //! A session made ready: gains that nobody recorded, the columns of all axes, and what to record with.
 
 use super::FrequencyError;
+use super::note::Note;
 use super::rows::Rows;
 use crate::session::Session;
 
@@ -51,27 +52,27 @@ pub(super) fn check_shape(session: &Session) -> Result<(), FrequencyError> {
 }
 
 /// Gains that nobody recorded, from the signals; says whether they stay unknown.
-pub(super) fn complete_gains(session: &mut Session, notes: &mut Vec<String>) -> bool {
+pub(super) fn complete_gains(session: &mut Session, notes: &mut Vec<Note>) -> bool {
     let missing = |column: &[f64]| column.iter().all(|x| !x.is_finite());
     let n = session.len();
     if missing(&session.lambda) {
         let Some((lambda, lag)) = proportional(session, |a, row| a.contact[row], |a, row| a.force[row] - dither(a, row)) else {
             return unknown_gains(session, notes);
         };
-        notes.push(format!("lambda was not recorded: {lambda:.4} from the signals, F_f following F_s by {lag} rows"));
+        notes.push(Note::LambdaFromSignals { lambda, lag });
         session.lambda = vec![lambda; n];
     }
     if missing(&session.mu) {
         let moved = |a: &crate::session::AxisSignals, row: usize| a.master[row] - a.induced.as_ref().map_or(0.0, |i| i[row]);
         let Some((mu, lag)) = proportional(session, moved, |a, row| a.command[row]) else { return unknown_gains(session, notes) };
-        notes.push(format!("mu was not recorded: {mu:.4} from the signals, x_c following x_m by {lag} rows"));
+        notes.push(Note::MuFromSignals { mu, lag });
         session.mu = vec![mu; n];
     }
     false
 }
 
-fn unknown_gains(session: &mut Session, notes: &mut Vec<String>) -> bool {
-    notes.push("the gains were not recorded and the signals do not tell them: all gains are multiples of the recorded one".to_string());
+fn unknown_gains(session: &mut Session, notes: &mut Vec<Note>) -> bool {
+    notes.push(Note::GainsUnknown);
     (session.mu, session.lambda) = (vec![1.0; session.len()], vec![1.0; session.len()]);
     true
 }

@@ -3,7 +3,7 @@
 use crate::session::Session;
 use backdrive_control::canceller::Canceller;
 use backdrive_control::core::{Core, Events, Port, Tick};
-use backdrive_control::device::{Device, DeviceError, DeviceOptions, Role};
+use backdrive_control::device::{Device, DeviceError, DeviceOptions, DeviceRole};
 use backdrive_msgs::{MAX_AXES, Sample};
 use backdrive_nodes::graph::DeviceFiles;
 use backdrive_plant::linear::{LinearError, LinearModel, Operating};
@@ -13,7 +13,7 @@ use std::f64::consts::TAU;
 
 /// Parts to put in the place of those that recorded the session.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct Parts<'a> {
+pub struct ExchangedParts<'a> {
     /// Another canceller: its model with grip (no model: nothing is cancelled), and the corner of its high-pass, Hz (0: none).
     pub canceller: Option<(&'a DeviceFiles, f64)>,
     /// Another master with its grip: G_f comes from its model, linear at a small amplitude.
@@ -22,7 +22,7 @@ pub struct Parts<'a> {
     pub slave: Option<&'a DeviceFiles>,
 }
 
-impl Parts<'_> {
+impl ExchangedParts<'_> {
     pub(super) fn any(&self) -> bool {
         self.canceller.is_some() || self.master.is_some() || self.slave.is_some()
     }
@@ -70,7 +70,7 @@ pub(super) fn induced(session: &Session, files: &DeviceFiles, high_pass_hz: f64)
                 return Err(PartError::Axes { part: "canceller", model: model.axes.len(), session: axes });
             }
             let options = DeviceOptions { substeps: files.substeps, noise_seed: None, quantise: false };
-            let device = Device::new(model, files.fragment.as_ref(), Role::Master, session.period_s, &options);
+            let device = Device::new(model, files.fragment.as_ref(), DeviceRole::Master, session.period_s, &options);
             Some(device.map_err(PartError::Canceller)?)
         }
     };

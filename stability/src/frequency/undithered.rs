@@ -8,6 +8,7 @@ use super::AxisEstimate;
 use super::dithered::{delays, on_lines};
 use super::edge::Loop;
 use super::local::{Columns, LocalFit, MOVED, fit, shaken};
+use super::note::Note;
 use super::prepared::{Column, Prepared, column, columns};
 use super::{CannotTell, Frequency, FrequencyError, LevelEstimate, Options, Response, edge};
 use crate::spectra::{CrossSpectra, welch};
@@ -77,9 +78,9 @@ pub(super) fn analyse(prepared: &Prepared, options: &Options, result: &mut Frequ
     let edge = measured.edge(half.as_ref().map(|h| &h.0));
     // Nothing is known above the band of the operator.
     if edge.gain.is_none() {
-        result.notes.push(format!("the operator shakes the loop up to {broad:.0} Hz only; an edge above that is not seen"));
+        result.notes.push(Note::OperatorBand { hz: broad });
     }
-    result.notes.push("no dither was recorded: the operator's intent, in free motion and in contact, took its place".to_string());
+    result.notes.push(Note::NoDither);
     result.delays = delays(prepared, &touching, &[true]);
     let told = measured.told();
     let pair = |l: Complex<f64>| [l.re, l.im];

@@ -5,9 +5,10 @@
 //! `mu lambda = 1 / [K_e (|Ghat(0)| - |G(0)|)]` with K_e the static stiffness of slave and environment in series.
 
 use super::edge::{Edge, Search, edge};
-use super::{ResimulateError, RunOptions, Scenario, grips};
+use super::{ResimulateError, RunOptions, Scenario};
 use crate::outcome::Outcome;
-use backdrive_control::device::{Device, DeviceOptions, Role};
+use crate::resimulate::grip;
+use backdrive_control::device::{Device, DeviceOptions, DeviceRole};
 use backdrive_nodes::graph::{DeviceFiles, NodeKind, Settings};
 use backdrive_plant::linear::{LinearError, LinearModel, Operating};
 use std::sync::atomic::AtomicBool;
@@ -83,7 +84,7 @@ pub fn over_cancelling(
     for scale in &every {
         let mut held = master.clone();
         if let Some(grip) = &mut held.fragment {
-            grips::scale(grip, *scale);
+            grip::scale(grip, *scale);
         }
         for (axis, stiffness) in environment_stiffness.iter().enumerate() {
             let travel = held.model.as_ref().and_then(|m| m.axes.get(axis)).and_then(|a| a.travel);
@@ -173,7 +174,7 @@ fn environment_stiffness(scenario: &Scenario, options: &RunOptions, cancel: &Ato
     let Some(model) = &files.model else { return Ok(vec![0.0; session.axes.len()]) };
     let device_options = DeviceOptions { substeps: files.substeps, noise_seed: None, quantise: false };
     let period_s = graph.period_s();
-    let slave = Device::new(model, files.fragment.as_ref(), Role::Slave, period_s, &device_options)
+    let slave = Device::new(model, files.fragment.as_ref(), DeviceRole::Slave, period_s, &device_options)
         .map_err(|error| ResimulateError::Device { what: "the slave", error })?;
     let push = |axis: &crate::session::AxisSignals| {
         let still = |k: &usize| axis.intent.as_ref().is_none_or(|x| *k > 0 && x[*k] == x[*k - 1]);

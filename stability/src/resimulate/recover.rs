@@ -79,7 +79,7 @@ pub fn recover_intent(session: &Session, graph: &Graph) -> Result<Recovered, Res
         forces.push(filled(&axis.force));
     }
     let options = DeviceOptions { substeps: files.substeps, noise_seed: None, quantise: false };
-    let device = Device::new(model, files.fragment.as_ref(), device::Role::Master, session.period_s, &options)
+    let device = Device::new(model, files.fragment.as_ref(), device::DeviceRole::Master, session.period_s, &options)
         .map_err(|error| ResimulateError::Device { what: "the master", error })?;
     if (0..device.axes()).any(|axis| !device.has_hand(axis)) {
         return Err(cannot("no grip with a hand holds the master; say with --grip FILE which one did"));

@@ -6,9 +6,11 @@ use super::recover::recover_intent;
 use super::script::Script;
 use super::sweep::{log_grid, sweep};
 use super::*;
-use backdrive_nodes::graph::Overrides;
+use crate::outcome::Outcome;
+use backdrive_control::operator::Intent;
+use backdrive_nodes::graph::{Graph, NodeKind, Overrides, Settings};
 use std::path::PathBuf;
-use std::sync::atomic::AtomicUsize;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 static NEVER: AtomicBool = AtomicBool::new(false);
 
@@ -54,7 +56,7 @@ fn assume_grip(scenario: &Scenario, factor: f64) -> Scenario {
     let mut scenario = scenario.clone();
     for node in &mut scenario.graph.nodes {
         if let Settings::Canceller(files, _) = &mut node.settings {
-            grips::scale(files.fragment.as_mut().unwrap(), factor);
+            grip::scale(files.fragment.as_mut().unwrap(), factor);
         }
     }
     scenario
@@ -90,7 +92,7 @@ fn phase_crossover(scenario: &Scenario, grip_scale: f64) -> (f64, f64) {
         let (mut model, mut fragment) = (files.model.clone().unwrap(), files.fragment.clone().unwrap());
         let axis = model.axes[0].clone();
         if kind == NodeKind::Master {
-            grips::scale(&mut fragment, grip_scale);
+            grip::scale(&mut fragment, grip_scale);
             model.attach(&fragment, axis.user, "port");
             return (model, axis.feedback, axis.measured);
         }

@@ -9,7 +9,7 @@ use crate::table::Report;
 use backdrive_control::controller::{
     AxisModel, Differentiator, Feedforward, Law, Reference, State, Working, backstepping, pd, sliding_mode,
 };
-use backdrive_control::device::{Device, DeviceOptions, Role};
+use backdrive_control::device::{Device, DeviceOptions, DeviceRole};
 use backdrive_plant::elements::{Law as Element, kind_named};
 use backdrive_plant::model::Model;
 use backdrive_plant::preisach::DahlLoop;
@@ -116,7 +116,7 @@ fn device(model: &Model) -> Result<Device, StudyError> {
     let mut model = model.clone();
     model.outputs.iter_mut().for_each(|o| o.noise = NOISE);
     let options = DeviceOptions { substeps: Some(2), noise_seed: Some(1), quantise: true };
-    Device::new(&model, None, Role::Slave, 1.0 / RATE, &options).map_err(failed)
+    Device::new(&model, None, DeviceRole::Slave, 1.0 / RATE, &options).map_err(failed)
 }
 
 /// Time, wanted and reached position, and what is learnt of σ0.

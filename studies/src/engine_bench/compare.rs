@@ -2,11 +2,11 @@
 
 use super::Told;
 use crate::table::Report;
-use backdrive_bench::lag::{Observation, engine_torque};
-use backdrive_bench::{Bench, BenchError, Record, correlation, rms};
 use backdrive_control::butterworth::Butterworth;
 use backdrive_control::engine::Engine;
 use backdrive_control::observer::{Derivative, ExtendedKalman};
+use backdrive_testbench::lag::{Observation, engine_torque};
+use backdrive_testbench::{Bench, BenchError, Record, correlation, rms};
 
 /// Corner of the Butterworth filter behind observer and derivative, Hz: the graph's.
 const CORNER_HZ: f64 = 5.0;

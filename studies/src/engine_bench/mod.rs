@@ -8,8 +8,8 @@ mod world;
 
 use crate::table::Report;
 use crate::{Context, Study, StudyError};
-use backdrive_bench::{Asked, Identified, Record, Validation, identify, validate};
 use backdrive_control::observer::{System, Weights, design, kalman};
+use backdrive_testbench::{Asked, Identified, Record, Validation, identify, validate};
 use compare::Comparison;
 
 /// The study.

@@ -172,7 +172,7 @@ fn engine(page: &mut Page, one: &Told) {
                 ("T_C", "N m"),
                 &steps.times(),
                 [
-                    ("engine model", &backdrive_bench::lag::engine_torque(&one.identified.bench.engine, steps)),
+                    ("engine model", &backdrive_testbench::lag::engine_torque(&one.identified.bench.engine, steps)),
                     ("observed", &one.identified.observed),
                 ],
             ),

@@ -3,8 +3,8 @@
 use crate::table::Report;
 use crate::{Context, StudyError};
 use backdrive_bags::{Reader, Signal, signals};
-use backdrive_bench::{correlation, rms};
 use backdrive_nodes::graph::{Graph, Overrides};
+use backdrive_testbench::{correlation, rms};
 use std::path::Path;
 
 /// What the observer told of a master.

@@ -2,13 +2,13 @@
 
 use crate::StudyError;
 use crate::run::{read, write};
-use backdrive_bench::Identified;
-use backdrive_bench::lag::Observation;
 use backdrive_control::dynamometer::DynamometerModel;
 use backdrive_control::engine::{Engine, Grid};
 use backdrive_control::observer::Shaft;
 use backdrive_nodes::graph::bench::{EngineFile, dynamometer_from_toml, dynamometer_to_toml};
 use backdrive_nodes::graph::{Graph, Overrides};
+use backdrive_testbench::Identified;
+use backdrive_testbench::lag::Observation;
 use std::path::{Path, PathBuf};
 use toml_edit::{DocumentMut, Item, value};
 

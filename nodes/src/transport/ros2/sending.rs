@@ -1,7 +1,7 @@
 //! A publisher over ROS 2.
 
 use super::participant::Writer;
-use super::{FLUSH, Shared};
+use super::shared::{FLUSH, Shared};
 use crate::transport::{Publisher, TransportError, wrong_kind};
 use backdrive_msgs::Message;
 use backdrive_msgs::ros::live;

@@ -2,9 +2,11 @@
 //!
 //! Best effort: all that is said is said again soon, and a lost word must not hold back the next.
 
+use super::inbox::ringing;
+use super::node::Ros2;
 use super::participant::{Participant, open_error};
-use super::receiving::ringing;
-use super::{Ros2, Shared, TransportError};
+use super::shared::Shared;
+use crate::transport::TransportError;
 use crate::transport::bell::{Bell, Spin};
 use rustdds::QosPolicyBuilder;
 use rustdds::no_key::{DataWriterCdr, SimpleDataReaderCdr};

@@ -1,0 +1,67 @@
+//! Where the edge of the running loop is, as it is told.
+
+use backdrive_msgs::margin;
+
+/// Where the edge of the running loop is, as the gain of the force at the present position scale.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub enum Edge {
+    /// Nothing is touched, or not for long enough.
+    #[default]
+    Free,
+    /// In contact, and no edge is below this lambda; where it is is not known.
+    Above {
+        /// Force scale, no unit.
+        lambda: f64,
+    },
+    /// It is here.
+    At {
+        /// Force scale, no unit.
+        lambda: f64,
+        /// Standard deviation of lambda, as a share of it.
+        deviation: f64,
+        /// What it would oscillate at there, Hz; 0 for a loop that runs away without oscillating.
+        frequency_hz: f64,
+    },
+}
+
+/// What a core tells of the loop's margin; the fields of [`backdrive_msgs::Margin`] that are its own.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Told {
+    /// The axis that is nearest to its edge, from 0.
+    pub axis: u32,
+    /// One of [`backdrive_msgs::margin`].
+    pub known: u32,
+    /// mu*lambda now in force.
+    pub gain: f64,
+    /// See [`backdrive_msgs::Margin::factor`].
+    pub factor: f64,
+    /// See [`backdrive_msgs::Margin::deviation`].
+    pub deviation: f64,
+    /// See [`backdrive_msgs::Margin::frequency_hz`].
+    pub frequency_hz: f64,
+    /// See [`backdrive_msgs::Margin::decay_per_s`].
+    pub decay_per_s: f64,
+}
+
+impl Told {
+    /// What is told of an axis at the scales now in force. Without a dither `edge` is `None`.
+    pub fn of(axis: usize, edge: Option<Edge>, mu: f64, lambda: f64, ring: Option<f64>) -> Told {
+        let (known, factor, deviation, frequency_hz) = match edge {
+            None => (margin::NO_DITHER, f64::NAN, f64::NAN, f64::NAN),
+            Some(Edge::Free) => (margin::FREE, f64::NAN, f64::NAN, f64::NAN),
+            Some(Edge::At { lambda: edge, deviation, frequency_hz }) if lambda > 0.0 => {
+                (margin::KNOWN, edge / lambda, deviation, frequency_hz)
+            }
+            // A bound below the gain that is in force says nothing.
+            Some(Edge::Above { lambda: edge }) if lambda > 0.0 && edge > lambda => (margin::ABOVE, edge / lambda, f64::NAN, f64::NAN),
+            Some(_) => (margin::NOISY, f64::NAN, f64::NAN, f64::NAN),
+        };
+        let decay_per_s = ring.unwrap_or(f64::NAN);
+        Told { axis: axis as u32, known, gain: mu * lambda, factor, deviation, frequency_hz, decay_per_s }
+    }
+
+    /// Whether it is the worse news of two axes: a known margin before a bound, that before what is not known.
+    pub fn is_tighter_than(&self, other: &Told) -> bool {
+        self.known > other.known || self.known == other.known && self.factor < other.factor
+    }
+}

@@ -1,0 +1,169 @@
+//! What happens between the start of a run and its end.
+
+mod deaths;
+mod start;
+mod state;
+mod stop;
+mod timers;
+
+use crate::child::{Heard, Notice};
+use crate::error::LaunchError;
+use crate::hosts::Hosts;
+use crate::options::Command;
+use crate::report::{Cause, RunEvent, RunReport};
+use crate::signals::Signals;
+use crate::slot::{Phase, Slot};
+use backdrive_nodes::protocol::{FromNode, ToNode};
+use nix::time::{ClockId, clock_gettime};
+pub(crate) use state::{MOST_EVENTS, Supervisor};
+use std::time::{Duration, Instant};
+use tokio::sync::mpsc;
+
+/// How often timers and signals are looked at.
+const TICK: Duration = Duration::from_millis(50);
+
+impl Supervisor {
+    /// The whole life of the run. Afterwards nothing of it is left.
+    pub async fn run(mut self, mut signals: Signals, commands: Option<mpsc::Receiver<Command>>) -> Result<RunReport, LaunchError> {
+        match Hosts::begin(&self.plan) {
+            Ok(hosts) => self.hosts = hosts,
+            Err(e) => {
+                self.slots.iter_mut().for_each(|s| s.enter(Phase::Ended, Instant::now()));
+                self.give_up(e);
+            }
+        }
+        for index in 0..self.slots.len() {
+            if self.error.is_some() {
+                break;
+            }
+            if let Err(e) = self.spawn(index) {
+                self.slots[index].enter(Phase::Ended, Instant::now());
+                self.give_up(e);
+                self.kill();
+                break;
+            }
+        }
+        self.watch(&mut signals, commands).await;
+        // Nobody is heard any more: a process with much to say must not wait for its listener.
+        self.heard = None;
+        if !self.unkillable {
+            for slot in &mut self.slots {
+                if let Some(child) = slot.child.take() {
+                    child.end().await;
+                }
+            }
+        }
+        let report = self.report();
+        let (screen, directory) = (self.screen, self.directory);
+        if self.unkillable {
+            // A process of it lives: the next sweep tries again.
+            drop(directory);
+        } else if let Err(e) = directory.remove() {
+            screen.line(format!("warning: {e}"));
+        }
+        self.error.map_or(Ok(report), Err)
+    }
+
+    async fn watch(&mut self, signals: &mut Signals, mut commands: Option<mpsc::Receiver<Command>>) {
+        let Some(mut heard) = self.heard.take() else { return };
+        let mut tick = tokio::time::interval(TICK);
+        tick.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
+        while !self.slots.iter().all(Slot::ended) {
+            let command = async {
+                match &mut commands {
+                    Some(commands) => commands.recv().await,
+                    None => std::future::pending().await,
+                }
+            };
+            tokio::select! {
+                Some(notice) = heard.recv() => self.hear(notice),
+                _ = tick.tick() => {
+                    while let Some(signal) = signals.next() {
+                        self.signalled(signal);
+                    }
+                    self.act(Instant::now());
+                    self.show(Instant::now());
+                }
+                command = command => match command {
+                    Some(command) => self.obey(command),
+                    None => commands = None,
+                },
+            }
+        }
+    }
+
+    fn hear(&mut self, notice: Notice) {
+        let now = Instant::now();
+        let index = notice.node;
+        if self.slots[index].life != notice.life {
+            return;
+        }
+        self.slots[index].heard = now;
+        if std::mem::take(&mut self.slots[index].silent) {
+            self.tell(0, "node_back", format!("`{}` is heard again", self.slots[index].plan.name));
+        }
+        match notice.heard {
+            Heard::Said(FromNode::Created) => self.slots[index].created = true,
+            Heard::Said(FromNode::Waiting { missing }) => {
+                self.slots[index].created = true;
+                self.slots[index].missing = missing;
+            }
+            Heard::Said(FromNode::Ready) => self.ready(index, now),
+            Heard::Said(FromNode::Status(status)) => {
+                self.slots[index].take_status(status, now);
+                self.keep_pace(index, now);
+            }
+            Heard::Said(FromNode::Event { step, severity, kind, text, value }) => {
+                let node = self.slots[index].plan.name.clone();
+                let t_s = self.start.map(|s| seconds_since(now, s.at));
+                self.event(Some(index), RunEvent { node, t_s, step: Some(step), severity, kind, text, value });
+            }
+            Heard::Said(FromNode::Done(status)) => {
+                self.slots[index].take_status(status, now);
+                self.slots[index].done = true;
+                self.keep_pace(index, now);
+            }
+            Heard::Said(FromNode::Failed { error, code }) => self.slots[index].failed = Some((error, code)),
+            Heard::Stray(line) => {
+                if !std::mem::replace(&mut self.slots[index].stray, true) {
+                    let name = &self.slots[index].plan.name;
+                    let text = format!("`{name}` writes lines on standard output that are not of the protocol; they are shown here");
+                    self.tell(1, "stray_output", text);
+                }
+                self.pass_on(index, &line, now);
+            }
+            Heard::Wrote(line) => {
+                self.pass_on(index, &line, now);
+                self.slots[index].wrote(line);
+            }
+            Heard::Ended(end) => self.ended(index, end, now),
+        }
+    }
+
+    fn obey(&mut self, command: Command) {
+        match command {
+            Command::Stop => self.stop(Cause::Stopped { by: "command".to_string() }),
+            Command::Gains { mu, lambda, ramp_s } => {
+                if !(mu.is_finite() && lambda.is_finite() && ramp_s.is_finite() && ramp_s >= 0.0) {
+                    let text = format!(
+                        "gains mu = {mu}, lambda = {lambda} over {ramp_s} s are refused: they must be finite, the ramp not negative"
+                    );
+                    return self.tell(1, "gains_refused", text);
+                }
+                self.gains = Some(ToNode::Gains { mu, lambda, ramp_s });
+                for index in 0..self.slots.len() {
+                    self.pass_gains(index);
+                }
+            }
+        }
+    }
+}
+
+fn nanoseconds(clock: ClockId) -> i64 {
+    clock_gettime(clock).map_or(Duration::ZERO, Duration::from).as_nanos() as i64
+}
+
+/// Negative if `at` is in the future.
+pub(crate) fn seconds_since(now: Instant, at: Instant) -> f64 {
+    now.saturating_duration_since(at).as_secs_f64() - at.saturating_duration_since(now).as_secs_f64()
+}

@@ -1,0 +1,60 @@
+//! How other threads reach a node that runs, and what it tells them.
+
+use crate::protocol::NodeStatus;
+use backdrive_msgs::{Gains, LAYOUT};
+use std::collections::BTreeMap;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, PoisonError};
+
+/// How a node runs, beyond what the graph says.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Options {
+    /// Real time: a stage that is further behind than this, s, skips to the step that is due. Long
+    /// enough for what a busy virtual machine withholds in a piece, short enough that forces are never
+    /// computed from a time that the hand has left.
+    pub horizon_s: f64,
+    /// Listeners that each topic should have before the run may start, by name of the topic.
+    pub listeners: BTreeMap<String, usize>,
+}
+
+impl Default for Options {
+    fn default() -> Options {
+        Options { horizon_s: 0.25, listeners: BTreeMap::new() }
+    }
+}
+
+/// How other threads reach a node that runs.
+#[derive(Debug, Default)]
+pub struct Control {
+    stop: AtomicBool,
+    pub(super) has_gains: AtomicBool,
+    pub(super) gains: Mutex<Vec<Gains>>,
+}
+
+impl Control {
+    /// Ends the run after the step at hand.
+    pub fn stop(&self) {
+        self.stop.store(true, Ordering::SeqCst);
+    }
+
+    /// Whether [`Control::stop`] was called.
+    pub fn is_stopped(&self) -> bool {
+        self.stop.load(Ordering::Relaxed)
+    }
+
+    /// Wants other gains from the next step on: scales without unit, and a ramp in s.
+    pub fn set_gains(&self, mu: f64, lambda: f64, ramp_s: f64) {
+        let gains = Gains { layout: LAYOUT, source: 0, step: 0, sequence: 0, stamp_ns: 0, mu, lambda, ramp_s };
+        self.gains.lock().unwrap_or_else(PoisonError::into_inner).push(gains);
+        self.has_gains.store(true, Ordering::SeqCst);
+    }
+}
+
+/// What a running node tells whoever watches it. Small and without a heap, for it is told while stepping.
+#[derive(Debug, Clone, Copy)]
+pub enum Told {
+    /// An event, as it is published.
+    Event(backdrive_msgs::Event),
+    /// About ten times a second of real time.
+    Status(NodeStatus),
+}

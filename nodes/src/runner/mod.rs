@@ -1,0 +1,46 @@
+//! Drives the stages of one node over a transport, in either clock.
+//!
+//! One rule for both: at step k a stage waits until all its inputs for k are there, or, in real time,
+//! until one period has passed since it could have begun; then it steps with what it has. In real time
+//! it does not begin step k before `t0 + k * period`. A stage that is late (the machine was elsewhere)
+//! does its late steps one after the other, each with its own inputs, so a hold-up of the whole machine
+//! costs no sample; only beyond [`Options::horizon_s`] does it go on at the step now due, and says so.
+
+mod control;
+mod error;
+mod lockstep;
+mod realtime;
+mod stage;
+mod state;
+mod step;
+mod teller;
+
+pub use control::{Control, Options, Told};
+pub use error::RunError;
+pub use state::Runner;
+
+use crate::clock::{Start, now_ns};
+use crate::protocol::NodeStatus;
+use crate::stage::Clock;
+use std::sync::Arc;
+
+/// Longest time without a look at [`Control`], ns.
+const SLICE_NS: i64 = 20_000_000;
+
+impl Runner {
+    /// Runs until all steps are done or `control` stops it; tells events and reports on the way, and
+    /// returns the figures of the whole run.
+    ///
+    /// # Errors
+    /// In lockstep a missing input or a lost sample; in either clock a transport that fails for good.
+    pub fn run(&mut self, start: Start, control: &Arc<Control>, tell: &mut dyn FnMut(Told)) -> Result<NodeStatus, RunError> {
+        self.reported_at = now_ns();
+        match self.timing.clock {
+            Clock::Lockstep => self.run_lockstep(control, tell)?,
+            Clock::Realtime => self.run_realtime(start, control, tell)?,
+        }
+        let peak_effort = self.teller.report.peak_effort;
+        let report = self.report(&self.loop_time);
+        Ok(NodeStatus { peak_effort, ..report })
+    }
+}

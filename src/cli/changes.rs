@@ -1,0 +1,180 @@
+//! Changes to a graph, which several verbs take.
+
+use super::values::{not_negative, positive, rate};
+use backdrive_nodes::graph::Overrides;
+use clap::{Args, ValueEnum};
+use std::path::PathBuf;
+
+/// SwappedParts of a graph that are swapped.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Swapped parts")]
+pub struct SwappedParts {
+    /// Model of the master.
+    #[arg(long, value_name = "FILE")]
+    pub master: Option<PathBuf>,
+    /// Grip that holds the master; `none` for no hand.
+    #[arg(long, value_name = "FILE|none")]
+    pub grip: Option<PathBuf>,
+    /// Model of the slave.
+    #[arg(long, value_name = "FILE")]
+    pub slave: Option<PathBuf>,
+    /// What the slave touches; `none` for nothing.
+    #[arg(long, value_name = "FILE|none")]
+    pub environment: Option<PathBuf>,
+    /// Model that predicts the induced motion; `none` to cancel nothing. Without this it stays the graph's, whatever the master is.
+    #[arg(long, value_name = "FILE|none")]
+    pub canceller: Option<PathBuf>,
+    /// Grip that the canceller assumes; without this it stays the graph's, whatever the real grip is.
+    #[arg(long, value_name = "FILE|none")]
+    pub canceller_grip: Option<PathBuf>,
+    /// Corner of a high-pass on the canceller's estimate; 0 for none.
+    #[arg(long, value_name = "HZ", value_parser = not_negative, allow_negative_numbers = true)]
+    pub high_pass: Option<f64>,
+    /// Whether sensors round and are noisy as the model files say.
+    #[arg(long, value_enum)]
+    pub sensors: Option<Sensors>,
+    /// Whether the device's limits of force, rate and speed act; `ignored` asks what the loop would do with stronger motors.
+    #[arg(long, value_enum)]
+    pub limits: Option<Limits>,
+}
+
+impl SwappedParts {
+    /// As the graph's reader takes them.
+    pub fn overrides(&self) -> Overrides {
+        Overrides {
+            master: self.master.clone(),
+            grip: self.grip.clone(),
+            slave: self.slave.clone(),
+            environment: self.environment.clone(),
+            canceller: self.canceller.clone(),
+            canceller_grip: self.canceller_grip.clone(),
+            high_pass_hz: self.high_pass,
+            sensors: self.sensors.map(|s| s.word().to_string()),
+            limits: self.limits.map(|l| l.word().to_string()),
+            ..Overrides::default()
+        }
+    }
+}
+
+/// See [`SwappedParts::sensors`].
+#[derive(Debug, Clone, Copy, ValueEnum)]
+pub enum Sensors {
+    /// As the model files say.
+    AsModelled,
+    /// Exact.
+    Ideal,
+}
+
+impl Sensors {
+    /// As a graph file says it.
+    fn word(self) -> &'static str {
+        match self {
+            Sensors::AsModelled => "as_modelled",
+            Sensors::Ideal => "ideal",
+        }
+    }
+}
+
+/// See [`SwappedParts::limits`].
+#[derive(Debug, Clone, Copy, ValueEnum)]
+pub enum Limits {
+    /// As the model files say.
+    Enforced,
+    /// None act.
+    Ignored,
+}
+
+impl Limits {
+    /// As a graph file says it.
+    fn word(self) -> &'static str {
+        match self {
+            Limits::Enforced => "enforced",
+            Limits::Ignored => "ignored",
+        }
+    }
+}
+
+/// Changes to a graph file.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Changes to the graph")]
+pub struct Changes {
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub parts: SwappedParts,
+    /// Position scale from master to slave.
+    #[arg(long, value_parser = not_negative, allow_negative_numbers = true)]
+    pub mu: Option<f64>,
+    /// Force scale from slave to master.
+    #[arg(long, value_parser = not_negative, allow_negative_numbers = true)]
+    pub lambda: Option<f64>,
+    /// Add a small recorded multisine to the force channel, such as `multisine:peak=0.1,from=1,to=500,period=2`; from it the
+    /// running loop tells its margin in contact, on the status line (`margin 2.4x at 71 Hz`) and on /scaling/margin.
+    #[arg(long, value_name = "EXCITATION", num_args = 0..=1, default_missing_value = DEFAULT_DITHER)]
+    pub dither: Option<String>,
+    /// Watch the loop and back the force gain off when an oscillation grows or stays, when force and master run away together,
+    /// or, with a dither, when the margin is below 1.25x; it stays down until new gains are asked for.
+    #[arg(long)]
+    pub guard: bool,
+    /// Length of the run.
+    #[arg(long, value_name = "S", value_parser = positive, allow_negative_numbers = true)]
+    pub duration: Option<f64>,
+    /// Steps per second, up to 10000.
+    #[arg(long, value_name = "HZ", value_parser = rate, allow_negative_numbers = true)]
+    pub rate: Option<f64>,
+    /// Seed of everything random.
+    #[arg(long)]
+    pub seed: Option<u64>,
+    /// The bag to record.
+    #[arg(long, value_name = "FILE")]
+    pub bag: Option<PathBuf>,
+    /// Replace a bag that exists, whether --bag, --out or the graph file names it; without this it is an error. A bag that
+    /// another run is writing is never replaced.
+    #[arg(long)]
+    pub overwrite: bool,
+    /// Let the bag say on which machine and from which folders it was made. Without this it holds neither; in a graph file:
+    /// record_origin = true.
+    #[arg(long)]
+    pub record_origin: bool,
+}
+
+impl Changes {
+    /// As the graph's reader takes them.
+    pub fn overrides(&self, clock: Option<Clock>) -> Overrides {
+        Overrides {
+            mu: self.mu,
+            lambda: self.lambda,
+            dither: self.dither.clone(),
+            guard: self.guard.then_some(true),
+            bag: self.bag.clone(),
+            overwrite: self.overwrite,
+            record_origin: self.record_origin,
+            clock: clock.map(|c| c.word().to_string()),
+            rate_hz: self.rate,
+            duration_s: self.duration,
+            seed: self.seed,
+            ..self.parts.overrides()
+        }
+    }
+}
+
+/// How time runs.
+#[derive(Debug, Clone, Copy, ValueEnum)]
+pub enum Clock {
+    /// As fast as the machine allows, and reproducible.
+    Lockstep,
+    /// With the wall clock.
+    Realtime,
+}
+
+impl Clock {
+    /// As a graph file says it.
+    fn word(self) -> &'static str {
+        match self {
+            Clock::Lockstep => "lockstep",
+            Clock::Realtime => "realtime",
+        }
+    }
+}
+
+/// A dither that is small beside a finger's force, and broad enough for a frequency response.
+const DEFAULT_DITHER: &str = "multisine:peak=0.05,from=1,to=500,period=2";

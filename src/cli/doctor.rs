@@ -1,0 +1,24 @@
+//! Options of `backdrive doctor`.
+
+use super::network::Network;
+use clap::Args;
+
+/// Examples and exit codes.
+pub const HELP: &str = "Example:
+  backdrive doctor --interface eth0
+
+Exit codes: 0 runs work here, 2 usage, 3 no such interface, 5 something is bad.";
+
+/// `backdrive doctor`
+#[derive(Debug, Args)]
+pub struct Doctor {
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub network: Network,
+    /// How long to listen for other hosts, s; ROS programs announce themselves every 10 to 30 s.
+    #[arg(long = "listen", value_name = "S", default_value_t = 3.0)]
+    pub listen_s: f64,
+    /// Print the findings as JSON.
+    #[arg(long)]
+    pub json: bool,
+}

@@ -1,0 +1,43 @@
+//! Options of `backdrive run`.
+
+use super::changes::{Changes, Clock};
+use super::network::{Network, Transport};
+use clap::Args;
+use std::path::PathBuf;
+
+/// Examples and exit codes.
+pub const HELP: &str = "Example:
+  backdrive run launch/contact.toml --master plant/models/rigid-mass.toml --lambda 0.2
+
+Exit codes: 0 stable, or no loop to judge; 1 not stable; 7 it cannot be told; 4 data lost, 6 a node failed, 130 interrupted.";
+
+/// `backdrive run`
+#[derive(Debug, Args)]
+pub struct Run {
+    /// The graph file.
+    pub graph: PathBuf,
+    /// How messages travel: shared memory without --host, else ROS 2.
+    #[arg(long, value_enum)]
+    pub transport: Option<Transport>,
+    /// Run only the nodes of this host of the graph, together with the other hosts.
+    #[arg(long, value_name = "NAME")]
+    pub host: Option<String>,
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub network: Network,
+    /// How time runs.
+    #[arg(long, value_enum)]
+    pub clock: Option<Clock>,
+    /// Folder for the recordings of a graph with experiments.
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Write a page about the run as one HTML file: what happened, signals, contact, timing, losses, events.
+    #[arg(long, value_name = "FILE")]
+    pub html: Option<PathBuf>,
+    /// Print the result as JSON.
+    #[arg(long)]
+    pub json: bool,
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub changes: Changes,
+}

@@ -1,0 +1,72 @@
+//! Options of `backdrive stability`.
+
+use super::changes::SwappedParts;
+use super::values::positive;
+use clap::Args;
+use std::path::PathBuf;
+
+/// Examples and exit codes.
+pub const HELP: &str = "Examples:
+  backdrive run launch/push-and-hold.toml
+  backdrive stability push-and-hold.mcap --gain 1
+  backdrive stability push-and-hold.mcap --sweep 0.1:50:200 --html out/stability.html
+  backdrive stability push-and-hold.mcap --gain 1 --canceller plant/models/impulse-engine.toml --canceller-grip plant/grips/normal.toml
+  backdrive stability session/ --roles roles.toml --gain 1
+
+Exit codes: 0 stable, 1 not, 2 usage, 3 the bag or a file is wrong, 5 the report cannot be written, 7 it cannot be told, 130 interrupted.";
+
+/// `backdrive stability`
+#[derive(Debug, Args)]
+pub struct Stability {
+    /// The bag of a run; with --roles any MCAP file, or a rosbag2 folder.
+    pub recording: PathBuf,
+    /// The gain product mu*lambda asked about, reached by lambda; without it the bag's own.
+    #[arg(long, value_name = "X", value_parser = positive, allow_negative_numbers = true, conflicts_with_all = ["mu", "lambda"])]
+    pub gain: Option<f64>,
+    /// Position scale asked about; the bag's own if not given.
+    #[arg(long, value_parser = positive, allow_negative_numbers = true)]
+    pub mu: Option<f64>,
+    /// Force scale asked about; the bag's own if not given.
+    #[arg(long, value_parser = positive, allow_negative_numbers = true)]
+    pub lambda: Option<f64>,
+    /// Draw the whole curve: this many gains from one to another, evenly spaced in their logarithm.
+    #[arg(long, value_name = "FROM:TO:COUNT", value_parser = gains)]
+    pub sweep: Option<Gains>,
+    /// Factors on the stiffness and damping of the grip, over which the answer is given.
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = positive, default_values_t = [0.7, 0.85, 1.0, 1.15, 1.3])]
+    pub grips: Vec<f64>,
+    /// A graph file whose operator's hand is played, in place of the hand in the bag.
+    #[arg(long, value_name = "GRAPH")]
+    pub script: Option<PathBuf>,
+    /// Which topic is which, for a bag that we did not record; see docs/roles-example.toml.
+    #[arg(long, value_name = "FILE")]
+    pub roles: Option<PathBuf>,
+    /// Write the report as one HTML file.
+    #[arg(long, value_name = "FILE")]
+    pub html: Option<PathBuf>,
+    /// Print the result as JSON.
+    #[arg(long)]
+    pub json: bool,
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub parts: SwappedParts,
+}
+
+/// Gains of a sweep.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Gains(pub Vec<f64>);
+
+/// Most gains in a sweep.
+const MOST_GAINS: usize = 100_000;
+
+fn gains(text: &str) -> Result<Gains, String> {
+    let parts: Vec<&str> = text.split(':').collect();
+    let [from, to, count] = parts.as_slice() else { return Err("must be FROM:TO:COUNT, such as 0.1:50:200".to_string()) };
+    let (from, to) = (positive(from)?, positive(to)?);
+    let count: usize = count.parse().ok().filter(|n| (1..=MOST_GAINS).contains(n)).ok_or(format!("COUNT must be 1 to {MOST_GAINS}"))?;
+    if to < from {
+        return Err("FROM must not be above TO".to_string());
+    }
+    let at = |i: usize| if count == 1 { from } else { from * (to / from).powf(i as f64 / (count - 1) as f64) };
+    Ok(Gains((0..count).map(at).collect()))
+}

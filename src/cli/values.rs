@@ -1,0 +1,26 @@
+//! Values of options: numbers within their bounds.
+
+use backdrive_nodes::graph::MAX_RATE_HZ;
+
+/// s, how long a search may take on the clock where nothing else is said: the library's own.
+pub const PATIENCE: f64 = backdrive_diagnosis::search::PATIENCE.as_secs() as f64;
+
+/// A finite number.
+pub fn number(text: &str) -> Result<f64, String> {
+    text.parse().ok().filter(|x: &f64| x.is_finite()).ok_or("must be a finite number".to_string())
+}
+
+/// A number of at least 0.
+pub fn not_negative(text: &str) -> Result<f64, String> {
+    number(text).and_then(|x| if x >= 0.0 { Ok(x) } else { Err("must be at least 0".to_string()) })
+}
+
+/// A number above 0.
+pub fn positive(text: &str) -> Result<f64, String> {
+    number(text).and_then(|x| if x > 0.0 { Ok(x) } else { Err("must be above 0".to_string()) })
+}
+
+/// Steps per second.
+pub fn rate(text: &str) -> Result<f64, String> {
+    positive(text).and_then(|x| if x <= MAX_RATE_HZ { Ok(x) } else { Err(format!("must be at most {MAX_RATE_HZ}")) })
+}

@@ -1,0 +1,239 @@
+//! What a run gave, for a person and for programs.
+
+use crate::failure::{Failure, code};
+use crate::output;
+use crate::summary::Summary;
+use backdrive_launch::{Cause, RunReport};
+use backdrive_report::{Page, percent};
+use backdrive_stability::outcome::Outcome;
+use serde_json::json;
+use std::path::{Path, PathBuf};
+
+/// What a run gave.
+pub struct Done {
+    /// Steps done by the node that did most.
+    pub steps: u64,
+    /// Wall-clock time, s.
+    pub duration_s: f64,
+    /// From the supervisor; `None` for a run in one process.
+    pub report: Option<RunReport>,
+    /// Messages that are not in the bag, and samples that a node did not get.
+    pub lost: u64,
+    /// The bag, if one was recorded.
+    pub bag: Option<PathBuf>,
+    /// Whether its recorder ended and nothing is missing in it.
+    pub complete: bool,
+    /// Why the bag cannot be read, where it cannot.
+    pub unreadable: Option<String>,
+    /// What happened.
+    pub summary: Option<Summary>,
+}
+
+impl Done {
+    /// 0 stable, or nothing was asked of a loop; 1 not stable, 7 it cannot be told; before these, of a run that did not go as it should:
+    /// 4 lost data, 6 a node failed, 130 interrupted.
+    pub fn exit_code(&self) -> u8 {
+        match (self.fault_code(), self.summary.as_ref().and_then(|s| s.outcome)) {
+            (0, None | Some(Outcome::Stable)) => 0,
+            (0, Some(Outcome::NotJudged { .. })) => code::CANNOT_TELL,
+            (0, Some(Outcome::LimitCycle { .. } | Outcome::Unstable { .. } | Outcome::Limited { .. })) => code::NEGATIVE,
+            (fault, _) => fault,
+        }
+    }
+
+    /// How it went, whatever the loop did: 0 fine, 4 lost data, 6 a node failed, 130 interrupted.
+    pub fn fault_code(&self) -> u8 {
+        if let Some(report) = &self.report {
+            match &report.cause {
+                Cause::NodeFailed { code, .. } if *code != 0 => return *code,
+                Cause::NodeDied { .. } | Cause::NodeFailed { .. } | Cause::EndedEarly { .. } => return code::NODE,
+                Cause::Stopped { .. } => return code::INTERRUPTED,
+                Cause::Completed if !report.orderly() => return code::NODE,
+                Cause::Completed => {}
+            }
+        }
+        if self.lost > 0 || self.unreadable.is_some() { code::LOST_DATA } else { 0 }
+    }
+
+    /// Writes its page, if one is wanted, prints the result, and gives the exit code.
+    pub fn tell(&self, page: Option<(&Path, Page)>, json: bool) -> Result<u8, Failure> {
+        if let Some((html, page)) = page {
+            output::file(html, page.html())?;
+            output::note(format_args!("wrote {}", html.display()));
+        }
+        if json {
+            output::line(self.json())?;
+        } else {
+            output::line(self.text())?;
+        }
+        Ok(self.exit_code())
+    }
+
+    /// A few lines for a person.
+    pub fn text(&self) -> String {
+        let mut lines = Vec::new();
+        let rate = self.steps as f64 / self.duration_s;
+        let rate = if rate.is_finite() { format!(": {rate:.0} steps/s") } else { String::new() };
+        lines.push(format!("ran      {} steps in {:.3} s{rate}", self.steps, self.duration_s));
+        if let Some(report) = &self.report {
+            lines.extend(timing(report));
+            if report.cause != Cause::Completed {
+                lines.push(format!("ended    {}", report.cause));
+            }
+            let told = match &report.cause {
+                Cause::NodeDied { node, .. } | Cause::NodeFailed { node, .. } => node.as_str(),
+                _ => "",
+            };
+            for death in report.deaths.iter().filter(|d| d.node != told || d.recovered) {
+                lines.push(format!("died     {} {} at {:.3} s", death.node, death.how, death.t_s));
+            }
+        }
+        if let Some(summary) = &self.summary {
+            lines.push(summary.text());
+        }
+        if let Some(bag) = &self.bag {
+            let complete = match self.lost {
+                _ if self.unreadable.is_some() => "cannot be read".to_string(),
+                0 if self.complete => "complete".to_string(),
+                0 => "cut off; `backdrive bag recover` makes a clean copy of what it holds".to_string(),
+                lost => format!("{lost} messages lost"),
+            };
+            lines.push(format!("bag      {} ({complete})", bag.display()));
+        }
+        if let Some(why) = &self.unreadable {
+            lines.push(format!("UNREADABLE {why}"));
+        }
+        lines.retain(|l| !l.is_empty());
+        lines.join("\n")
+    }
+
+    /// For scripts.
+    pub fn json(&self) -> serde_json::Value {
+        let report = self.report.as_ref();
+        let summary = self.summary.as_ref();
+        json!({
+            "steps": self.steps,
+            "duration_s": self.duration_s,
+            "steps_per_s": (self.duration_s > 0.0).then(|| self.steps as f64 / self.duration_s),
+            "loop_p50_us": report.and_then(|r| r.loop_p50_us),
+            "loop_p99_us": report.and_then(|r| r.loop_p99_us),
+            "missed_deadlines": report.map(|r| r.missed_deadlines),
+            "lost": self.lost,
+            "bag": self.bag,
+            "unreadable": self.unreadable,
+            "complete": self.bag.as_ref().map(|_| self.complete),
+            "loop_gain": summary.map(|s| s.loop_gain),
+            "last_loop_gain": summary.map(|s| s.last_loop_gain),
+            "peak_contact_force_n": summary.and_then(|s| s.peak_contact_force),
+            "peak_feedback_force_n": summary.and_then(|s| s.peak_feedback_force),
+            "first_contact_s": summary.and_then(|s| s.first_contact_s),
+            "contact_s": summary.map(|s| s.contact_s),
+            "outcome": summary.and_then(|s| s.outcome).map(|o| o.word()),
+            "outcome_detail": summary.and_then(|s| s.outcome),
+            "run": report,
+        })
+    }
+}
+
+/// Share of a node's steps that may miss their deadline before it is worth a word of advice.
+const MANY_MISSED: f64 = 1e-3;
+
+/// The loop's times and the deadlines that were missed. In real time the node that missed most is the one to show, with its own numbers: the
+/// misses of all nodes beside the times of one that kept its own would hide where the loop is late.
+pub(super) fn timing(report: &RunReport) -> Vec<String> {
+    let times = |p50: f64, p99: f64| format!("p50 {p50:.1} us, p99 {p99:.1} us");
+    let of = |name: &str| report.nodes.iter().find(|n| n.name == name).and_then(|n| n.status.as_ref());
+    let late = report.latest_node.as_ref().and_then(|(name, most)| Some((name, *most, of(name)?)));
+    let Some((name, most, status)) = late else {
+        let timed = report.loop_node.as_ref().zip(report.loop_p50_us.zip(report.loop_p99_us));
+        return timed.map(|(node, (p50, p99))| format!("timing   {node}: {}; 0 missed deadlines", times(p50, p99))).into_iter().collect();
+    };
+    // Steps that were left out to catch up count as missed too, and stand in the count of steps done.
+    let share = most as f64 / status.steps.max(most).max(1) as f64;
+    let period = report.rate_hz.map_or(String::new(), |rate| format!(" (a step is {:.0} us)", 1e6 / rate));
+    let all = match report.missed_deadlines {
+        all if all == most => String::new(),
+        all => format!("; {all} in all nodes together"),
+    };
+    let mut lines = vec![format!(
+        "timing   {name} is the slowest node: {}{period}; {most} of its {} steps ({}) missed their deadline{all}",
+        times(status.loop_p50_us, status.loop_p99_us),
+        status.steps,
+        percent(share),
+    )];
+    if share > MANY_MISSED {
+        lines.push(
+            "to do    lower --rate, close programs beside the run, or let it run in real time: `backdrive doctor` says what this machine lacks \
+             (SCHED_FIFO, timers)"
+                .to_string(),
+        );
+    }
+    lines
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use backdrive_launch::NodeReport;
+    use backdrive_nodes::protocol::NodeStatus;
+    use backdrive_nodes::stage::Clock;
+
+    /// A run at 5 kHz of 20 000 steps in which nodes missed so many deadlines.
+    fn report(missed: &[(&str, u64)]) -> RunReport {
+        let node = |(name, missed): &(&str, u64)| NodeReport {
+            name: name.to_string(),
+            kind: name.to_string(),
+            status: Some(NodeStatus {
+                steps: 20_000,
+                missed_deadlines: *missed,
+                loop_p50_us: 40.0 + *missed as f64,
+                loop_p99_us: 400.0 + *missed as f64,
+                ..NodeStatus::default()
+            }),
+            restarts: 0,
+            end: "done".to_string(),
+        };
+        RunReport {
+            id: String::new(),
+            title: String::new(),
+            clock: Clock::Realtime,
+            rate_hz: Some(5000.0),
+            steps: 20_000,
+            planned_steps: Some(20_000),
+            startup_s: 0.1,
+            duration_s: 4.0,
+            steps_per_s: 5000.0,
+            loop_node: Some("master".to_string()),
+            loop_p50_us: Some(40.0),
+            loop_p99_us: Some(400.0),
+            missed_deadlines: missed.iter().map(|m| m.1).sum(),
+            latest_node: missed.iter().max_by_key(|m| m.1).filter(|m| m.1 > 0).map(|m| (m.0.to_string(), m.1)),
+            lost: 0,
+            unrecorded: Some(0),
+            bag: None,
+            recorded: None,
+            nodes: missed.iter().map(node).collect(),
+            events: Vec::new(),
+            events_left_out: 0,
+            deaths: Vec::new(),
+            killed: Vec::new(),
+            cause: Cause::Completed,
+            outcome: None,
+            peak_contact_force_n: None,
+        }
+    }
+
+    #[test]
+    fn the_slowest_node_is_told_with_its_own_numbers_and_with_advice() {
+        let told = timing(&report(&[("master", 55), ("canceller", 5000), ("slave", 2000)]));
+        let first = "timing   canceller is the slowest node: p50 5040.0 us, p99 5400.0 us (a step is 200 us); 5000 of its 20000 steps (25.0 %) \
+                     missed their deadline; 7055 in all nodes together";
+        assert_eq!(told[0], first);
+        assert!(told[1].starts_with("to do    lower --rate") && told[1].contains("SCHED_FIFO"), "{told:?}");
+        // A few are no reason to do anything, and where one node alone is late its number is the total.
+        let few = timing(&report(&[("master", 12), ("slave", 0)]));
+        assert!(few.len() == 1 && few[0].contains("12 of its 20000 steps") && !few[0].contains("all nodes"), "{few:?}");
+        let none = timing(&report(&[("master", 0), ("slave", 0)]));
+        assert_eq!(none, ["timing   master: p50 40.0 us, p99 400.0 us; 0 missed deadlines"]);
+    }
+}

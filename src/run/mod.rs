@@ -1,0 +1,63 @@
+//! `backdrive run` and `backdrive clean`.
+
+mod done;
+mod way;
+
+pub use done::Done;
+pub use way::{Way, run_graph, run_here};
+
+use crate::cli;
+use crate::failure::{Failure, code};
+use crate::output;
+use crate::run_page::{Heard, page};
+use backdrive_launch::RunHome;
+use backdrive_nodes::graph::Graph;
+use std::time::Duration;
+
+/// Runs a graph, or each experiment of one.
+pub fn run(options: &cli::Run) -> Result<u8, Failure> {
+    let changes = options.changes.overrides(options.clock);
+    let mut graph = Graph::load(&options.graph, &changes)?;
+    if options.host.is_none() {
+        graph = graph.on_one_host();
+    }
+    let way = Way::of(&graph, options)?;
+    if !graph.experiments.is_empty() {
+        return crate::experiments::run(options, &way, &graph, &changes);
+    }
+    if options.out.is_some() {
+        return Err(Failure::input(format!("{}: has no [[experiments]], so --out means nothing here; use --bag", options.graph.display())));
+    }
+    if let Some(html) = &options.html {
+        output::writable(html)?;
+    }
+    let mut heard = Heard::of(&graph);
+    let done = match &way {
+        // What goes by is all there is where no bag is recorded.
+        Way::Here if options.html.is_some() => run_here(&graph, &mut |topic, message| heard.take(topic, message))?,
+        _ => run_graph(&graph, &way)?,
+    };
+    if let (Way::Processes(_), Some(bag), true) = (&way, &done.bag, options.html.is_some()) {
+        heard = Heard::from_bag(&graph, bag)?;
+    }
+    let page = options.html.as_deref().map(|html| (html, page(&done, &graph, &heard, None)));
+    done.tell(page, options.json)
+}
+
+/// Removes what dead runs left.
+pub fn clean() -> Result<u8, Failure> {
+    let swept = RunHome::system().sweep(Duration::from_secs(60));
+    for run in &swept.removed {
+        output::line(format_args!("removed {} and {} files in shared memory", run.root.display(), run.shm.len()))?;
+    }
+    for run in &swept.alive {
+        output::line(format_args!("{run} is alive and was left alone"))?;
+    }
+    for failure in &swept.failed {
+        output::note(format_args!("error: {failure}"));
+    }
+    if swept.removed.is_empty() && swept.failed.is_empty() {
+        output::line(format_args!("nothing to remove"))?;
+    }
+    Ok(if swept.failed.is_empty() { 0 } else { code::MACHINE })
+}

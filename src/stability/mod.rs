@@ -1,0 +1,77 @@
+//! `backdrive stability`: would the loop of a bag be stable at another gain, and how far away is the edge.
+
+mod curve;
+mod loaded;
+mod text;
+
+pub use curve::Point;
+
+use crate::failure::{Failure, code};
+use crate::{cli, interrupt, output, progress};
+use backdrive_stability::resimulate::ResimulateError;
+use backdrive_stability::verdict::{Answer, AnswerError, Word, answer};
+use curve::{curve, curve_text, point_json};
+use loaded::Loaded;
+use serde_json::{Value, json};
+use std::sync::atomic::Ordering;
+use text::text;
+
+/// Answers.
+pub fn stability(options: &cli::Stability) -> Result<u8, Failure> {
+    let cancel = interrupt::heard()?;
+
+    let loaded = progress::busy(&format!("reading {}", options.recording.display()), || Loaded::read(options))?;
+    let question = loaded.question(options)?;
+    if let Some(html) = &options.html {
+        // A report that cannot be written is told before the work, not after it.
+        output::writable(html)?;
+    }
+    let curve = match &options.sweep {
+        Some(gains) => Some(curve(&question, &gains.0, &cancel)?),
+        None => None,
+    };
+    let bar = progress::work();
+    let hear = |what: &str, done: usize, all: usize| {
+        bar.set_message(what.to_string());
+        bar.set_length(all.max(1) as u64);
+        bar.set_position(done as u64);
+    };
+    let found = answer(&question, &hear, &cancel);
+    bar.finish_and_clear();
+    let found = match found {
+        Ok(found) => Some(found),
+        // What was done until then is printed.
+        Err(AnswerError::Resimulate(ResimulateError::Cancelled)) => None,
+        Err(e) => return Err(Failure::input(format!("{}: {e}", options.recording.display()))),
+    };
+    if options.json {
+        let mut all = found.as_ref().map_or(json!({ "bag": question.session.name, "verdict": "interrupted" }), Answer::json);
+        if let Some(curve) = &curve {
+            all["sweep"] = Value::Array(curve.iter().flatten().map(point_json).collect());
+        }
+        output::line(format_args!("{all}"))?;
+    } else {
+        if let Some(curve) = &curve {
+            output::line(curve_text(curve))?;
+        }
+        if let Some(found) = &found {
+            output::line(text(found))?;
+        }
+    }
+    let interrupted = || Failure { code: code::INTERRUPTED, message: "stopped; what was done until then is above".to_string() };
+    let found = found.ok_or_else(interrupted)?;
+    if let Some(html) = &options.html {
+        let points: Vec<&Point> = curve.iter().flatten().flatten().collect();
+        let page = crate::stability_page::page(&found, question.session, &points);
+        output::file(html, page.html())?;
+        output::note(format_args!("wrote {}", html.display()));
+    }
+    if cancel.load(Ordering::SeqCst) {
+        return Err(interrupted());
+    }
+    Ok(match found.verdict {
+        Word::Stable => 0,
+        Word::CannotTell => code::CANNOT_TELL,
+        _ => code::NEGATIVE,
+    })
+}

@@ -1,0 +1,105 @@
+//! What a reader of a frequency response has to know.
+
+use serde::{Serialize, Serializer};
+use std::fmt;
+
+/// A note; its text is made from what it holds.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Note {
+    /// lambda, from the signals.
+    LambdaFromSignals {
+        /// What they say.
+        lambda: f64,
+        /// F_f follows F_s by so many rows.
+        lag: usize,
+    },
+    /// mu, from the signals.
+    MuFromSignals {
+        /// What they say.
+        mu: f64,
+        /// x_c follows x_m by so many rows.
+        lag: usize,
+    },
+    /// Neither was recorded, and the signals do not tell them.
+    GainsUnknown,
+    /// The hand moves throughout the contact.
+    HandNeverRests,
+    /// Contact was lost.
+    ContactLost {
+        /// So often.
+        times: usize,
+    },
+    /// A level of the dither acts too shortly.
+    DitherTooShort {
+        /// Its RMS.
+        rms: f64,
+    },
+    /// Nothing is seen above the band of the operator.
+    OperatorBand {
+        /// Its upper end, Hz.
+        hz: f64,
+    },
+    /// The operator's intent took the dither's place.
+    NoDither,
+    /// Edges from different recorded gains differ.
+    GainsDisagree,
+    /// Edges at different amplitudes differ.
+    AmplitudeDependent,
+    /// The interval reaches to where the edge goes at large amplitudes.
+    ContinuedToLarge {
+        /// That edge.
+        gain: f64,
+    },
+    /// The interval reaches to where the edge is while friction holds the master.
+    ContinuedToRest {
+        /// That edge.
+        gain: f64,
+    },
+}
+
+impl fmt::Display for Note {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Note::LambdaFromSignals { lambda, lag } => {
+                write!(f, "lambda was not recorded: {lambda:.4} from the signals, F_f following F_s by {lag} rows")
+            }
+            Note::MuFromSignals { mu, lag } => {
+                write!(f, "mu was not recorded: {mu:.4} from the signals, x_c following x_m by {lag} rows")
+            }
+            Note::GainsUnknown => {
+                f.write_str("the gains were not recorded and the signals do not tell them: all gains are multiples of the recorded one")
+            }
+            Note::HandNeverRests => {
+                f.write_str("the hand never rests in contact: all of the contact was used, and below a few Hz its motion is noise")
+            }
+            Note::ContactLost { times } => {
+                write!(f, "contact was lost {times} times; rows without contact and 200 ms after are left out")
+            }
+            Note::DitherTooShort { rms } => write!(f, "a dither of {rms:.3} rms acts too shortly to be estimated"),
+            Note::OperatorBand { hz } => {
+                write!(f, "the operator shakes the loop up to {hz:.0} Hz only; an edge above that is not seen")
+            }
+            Note::NoDither => f.write_str("no dither was recorded: the operator's intent, in free motion and in contact, took its place"),
+            Note::GainsDisagree => f.write_str("the recorded gains give different edges: the loop depends on its gain or its amplitude"),
+            Note::AmplitudeDependent => {
+                f.write_str("the edge depends on the amplitude of the dither: friction, hysteresis or backlash in the loop")
+            }
+            Note::ContinuedToLarge { gain } => write!(
+                f,
+                "the interval is continued to large amplitudes, where the edge tends to {gain:.3} by the describing function of dry friction"
+            ),
+            Note::ContinuedToRest { gain } => write!(
+                f,
+                "the interval is continued to rest: while dry friction holds the master the canceller subtracts all the same, and the edge is \
+                 {gain:.3}"
+            ),
+        }
+    }
+}
+
+/// As its text.
+impl Serialize for Note {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(self)
+    }
+}

@@ -1,0 +1,200 @@
+//! The roles file: which field of which topic is which signal.
+
+use crate::from_bag::{SessionError, SignalRole};
+use backdrive_bags::Signal;
+use backdrive_plant::elements::Range;
+use backdrive_plant::model::Hold;
+use backdrive_plant::tomlfile::{FileError, Table};
+use std::path::Path;
+
+/// What a roles file says.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Roles {
+    /// The signals of each axis.
+    pub axes: Vec<AxisRoles>,
+    /// Position scale mu; estimated where `None`.
+    pub mu: Option<f64>,
+    /// Force scale lambda; estimated where `None`.
+    pub lambda: Option<f64>,
+    /// Rows per second, Hz; the rate of the most frequent signal where `None`.
+    pub rate_hz: Option<f64>,
+    /// The roles file, for messages.
+    pub(super) file: String,
+}
+
+/// Where the signals of an axis are.
+#[derive(Debug, Clone, PartialEq)]
+pub struct AxisRoles {
+    /// Name of the axis.
+    pub name: String,
+    pub(super) signals: Vec<(SignalRole, Located)>,
+}
+
+/// A signal, and where the roles file names it.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Located {
+    pub(super) signal: Signal,
+    line: usize,
+    key: String,
+}
+
+/// Keys of `[signals]`, whether they must be there, and how they run between their samples.
+const KEYS: [(&str, SignalRole, bool, Hold); 7] = [
+    ("x_m", SignalRole::Master, true, Hold::Linear),
+    ("F_f", SignalRole::Force, true, Hold::Zero),
+    ("x_c", SignalRole::Command, true, Hold::Linear),
+    ("F_s", SignalRole::Contact, true, Hold::Zero),
+    ("x_s", SignalRole::Slave, false, Hold::Linear),
+    ("dither", SignalRole::Dither, false, Hold::Zero),
+    ("operator", SignalRole::Intent, false, Hold::Linear),
+];
+
+impl Roles {
+    /// Reads a roles file.
+    ///
+    /// # Errors
+    /// What is wrong, at file, line and key.
+    pub fn load(path: &Path) -> Result<Roles, FileError> {
+        Roles::read(Table::open(path)?)
+    }
+
+    /// The same from text; `name` stands for the file in errors.
+    pub fn from_toml(text: &str, name: &str) -> Result<Roles, FileError> {
+        Roles::read(Table::parse(text, name)?)
+    }
+
+    pub(super) fn read(mut top: Table) -> Result<Roles, FileError> {
+        let names = top.strings("axes")?;
+        let mut signals = top.table("signals")?.ok_or_else(|| top.missing("signals"))?;
+        let mut axes: Vec<AxisRoles> = Vec::new();
+        let mut first_key = "";
+        for (key, role, required, hold) in KEYS {
+            let found = read_signals(&mut signals, key, hold)?;
+            if found.is_empty() {
+                if required {
+                    let what = format!("missing key \"{key}\": {}; without it {}", role.text(), role.without());
+                    // A misspelt key is told as such.
+                    let misspelt = signals.missing(key);
+                    return Err(if misspelt.message.contains("did you mean") { misspelt } else { signals.error(what) });
+                }
+                continue;
+            }
+            if axes.is_empty() {
+                first_key = key;
+                let blank = |index| AxisRoles { name: format!("axis{index}"), signals: Vec::new() };
+                axes = (0..found.len()).map(blank).collect();
+            }
+            if found.len() != axes.len() {
+                return Err(signals.error_at(key, format!("has {} axes, but {first_key} has {}", found.len(), axes.len())));
+            }
+            for (axis, located) in axes.iter_mut().zip(found) {
+                axis.signals.push((role, located));
+            }
+        }
+        signals.finish()?;
+        if let Some(names) = names {
+            if names.len() != axes.len() {
+                return Err(top.error_at("axes", format!("has {} names, but [signals] has {} axes", names.len(), axes.len())));
+            }
+            for (axis, name) in axes.iter_mut().zip(names) {
+                axis.name = name;
+            }
+        }
+        let (mut mu, mut lambda, mut rate_hz) = (None, None, None);
+        if let Some(mut gains) = top.table("gains")? {
+            mu = gains.number("mu", Range::Positive)?;
+            lambda = gains.number("lambda", Range::NonNegative)?;
+            gains.finish()?;
+        }
+        if let Some(mut resample) = top.table("resample")? {
+            rate_hz = resample.number("rate_hz", Range::Positive)?;
+            resample.finish()?;
+        }
+        let file = top.file_name().to_owned();
+        top.finish()?;
+        Ok(Roles { axes, mu, lambda, rate_hz, file })
+    }
+
+    pub(super) fn at(&self, located: &Located, message: String) -> SessionError {
+        SessionError::Roles(FileError::at(&self.file, located.line, &located.key, message))
+    }
+}
+
+pub(super) fn is_required(role: SignalRole) -> bool {
+    KEYS.iter().any(|(_, r, required, _)| *r == role && *required)
+}
+
+/// A string, a table, or a list of one of them, one entry per axis; none where the key is absent.
+fn read_signals(table: &mut Table, key: &'static str, hold: Hold) -> Result<Vec<Located>, FileError> {
+    let line = table.line_of(key);
+    if table.is_table(key) {
+        let one = table.table(key)?;
+        return one.into_iter().map(|t| read_table(t, key, hold)).collect();
+    }
+    if table.is_list_of_tables(key) {
+        return table.tables(key)?.into_iter().map(|t| read_table(t, key, hold)).collect();
+    }
+    let specs = table.string_or_strings(key)?.unwrap_or_default();
+    let several = specs.len() > 1;
+    let read = |(index, spec): (usize, &String)| {
+        // Names of topics have no dots.
+        let Some((topic, field)) = spec.split_once('.').filter(|(t, f)| !t.is_empty() && !f.is_empty()) else {
+            let message = format!("expected \"TOPIC.FIELD\", such as \"/joint_states.position[0]\", found \"{spec}\"");
+            return Err(table.error_at(key, message));
+        };
+        let key = if several { format!("signals.{key}[{index}]") } else { format!("signals.{key}") };
+        Ok(Located { signal: Signal { hold, ..Signal::new(&key, topic, field) }, line, key })
+    };
+    specs.iter().enumerate().map(read).collect()
+}
+
+fn read_table(mut table: Table, key: &str, hold: Hold) -> Result<Located, FileError> {
+    let line = table.line();
+    let (topic, field) = (table.need_string("topic")?, table.need_string("field")?);
+    let scale = table.number_or("scale", Range::Any, 1.0)?;
+    if scale == 0.0 {
+        return Err(table.error_at("scale", "must not be 0: the signal would be gone"));
+    }
+    let offset = table.number_or("offset", Range::Any, 0.0)?;
+    let hold = table.one_of("hold", &[("linear", Hold::Linear), ("zero", Hold::Zero)])?.unwrap_or(hold);
+    let key = if table.path().is_empty() { format!("signals.{key}") } else { table.path().to_owned() };
+    let signal = Signal { name: key.clone(), topic, field, scale, offset, hold };
+    table.finish()?;
+    Ok(Located { signal, line, key })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const GOOD: &str = "axes = [\"x\", \"y\"]\n[signals]\nx_m = [\"/m.position[0]\", \"/m.position[1]\"]\n\
+        F_f = [{ topic = \"/f\", field = \"wrench.force.x\", scale = -1.0 }, { topic = \"/f\", field = \"wrench.force.y\" }]\n\
+        x_c = [\"/c.data[0]\", \"/c.data[1]\"]\nF_s = [\"/s.wrench.force.x\", \"/s.wrench.force.y\"]\n[gains]\nmu = 2.0\n";
+
+    #[test]
+    fn strings_tables_and_lists_are_read() {
+        let roles = Roles::from_toml(GOOD, "r.toml").unwrap();
+        assert_eq!((roles.axes.len(), roles.axes[1].name.as_str(), roles.mu, roles.lambda), (2, "y", Some(2.0), None));
+        let force = &roles.axes[0].signals.iter().find(|(role, _)| *role == SignalRole::Force).unwrap().1.signal;
+        assert_eq!((force.topic.as_str(), force.field.as_str(), force.scale, force.hold), ("/f", "wrench.force.x", -1.0, Hold::Zero));
+        let position = &roles.axes[1].signals[0].1.signal;
+        assert_eq!((position.topic.as_str(), position.field.as_str(), position.hold), ("/m", "position[1]", Hold::Linear));
+    }
+
+    #[test]
+    fn what_is_wrong_is_said_with_its_line() {
+        let says = |text: &str, what: &[&str]| {
+            let error = Roles::from_toml(text, "r.toml").unwrap_err().to_string();
+            assert!(what.iter().all(|w| error.contains(w)), "{error}");
+        };
+        says("[signal]\n", &["r.toml:1", "signals"]);
+        says(&GOOD.replace("F_s = [\"/s.wrench.force.x\", \"/s.wrench.force.y\"]\n", ""), &["F_s", "what the slave touches"]);
+        says(&GOOD.replace("\"/c.data[1]\"", "\"/c/data\""), &["r.toml:5", "x_c", "TOPIC.FIELD"]);
+        says(&GOOD.replace(", \"/c.data[1]\"", ""), &["r.toml:5", "x_c", "has 1 axes, but x_m has 2"]);
+        says(&GOOD.replace("scale = -1.0", "skale = -1.0"), &["r.toml:4", "did you mean \"scale\""]);
+        says(&GOOD.replace("scale = -1.0", "scale = 0"), &["r.toml:4", "must not be 0"]);
+        says(&GOOD.replace("mu = 2.0", "mu = -2.0"), &["mu", "above 0"]);
+        says(&GOOD.replace("\"x\", \"y\"", "\"x\""), &["r.toml:1", "axes"]);
+        says(&format!("{GOOD}[resample]\nrate = 5\n"), &["resample", "rate"]);
+    }
+}

@@ -1,0 +1,105 @@
+//! The wanted signals, read from the bags in one pass.
+
+use super::file::{Located, Roles, is_required};
+use crate::from_bag::{SessionError, SignalRole};
+use crate::grid::Series;
+use crate::rosbag::mcap_files;
+use backdrive_bags::{FieldPath, Reader, Schema};
+use backdrive_plant::tomlfile::unknown;
+use std::collections::HashMap;
+use std::path::Path;
+
+/// How the wanted fields of a topic are read.
+struct Plan {
+    schema: Schema,
+    /// Seconds and ns of the header's stamp, where there is one.
+    stamp: Option<[FieldPath; 2]>,
+    fields: Vec<(usize, FieldPath)>,
+}
+
+/// Reads every wanted signal in one pass over each file.
+pub(super) fn gather(path: &Path, roles: &Roles, wanted: &[(SignalRole, &Located)]) -> Result<(Vec<Series>, bool), SessionError> {
+    let mut closed = true;
+    let mut series: Vec<Series> = wanted.iter().map(|_| Series { stamped: true, ..Series::default() }).collect();
+    let mut available: Vec<String> = Vec::new();
+    let mut seen = vec![false; wanted.len()];
+    for file in mcap_files(path)? {
+        let reader = Reader::open(&file)?;
+        closed &= reader.ended_cleanly();
+        available.extend(reader.topics().iter().map(|t| t.name.clone()));
+        let plans = plan(&reader, roles, wanted, &mut seen)?;
+        for entry in reader.messages()? {
+            let entry = entry?;
+            let Some(plan) = plans.get(&entry.topic.index) else { continue };
+            let first = plan.fields.first().and_then(|(place, _)| wanted.get(*place));
+            let damaged = |what: String| match first {
+                Some((_, located)) => roles.at(located, format!("{}, byte {}: {what}", file.display(), entry.offset)),
+                None => SessionError::Rows { path: file.clone(), what },
+            };
+            let read = |field: &FieldPath| plan.schema.read(field, &entry.payload).map_err(&damaged);
+            let logged = entry.log_time_ns as i64;
+            let stamp = match &plan.stamp {
+                // A stamp that nobody filled in is 0.
+                Some([sec, nanosec]) => match (read(sec)?, read(nanosec)?) {
+                    (Some(s), Some(ns)) if s != 0.0 || ns != 0.0 => {
+                        Some((s as i64).saturating_mul(1_000_000_000).saturating_add(ns as i64))
+                    }
+                    _ => None,
+                },
+                None => None,
+            };
+            for (place, field) in &plan.fields {
+                let value = read(field)?.unwrap_or(f64::NAN);
+                let (Some(series), Some((_, located))) = (series.get_mut(*place), wanted.get(*place)) else { continue };
+                series.stamped &= stamp.is_some();
+                series.stamps.push(stamp.unwrap_or(logged));
+                series.logged.push(logged);
+                series.values.push(located.signal.scale * value + located.signal.offset);
+            }
+        }
+    }
+    available.sort();
+    available.dedup();
+    for (((role, located), series), seen) in wanted.iter().zip(&mut series).zip(&seen) {
+        let topic = &located.signal.topic;
+        if !seen {
+            let what = unknown("topic", topic, available.iter().map(String::as_str));
+            return Err(roles.at(located, format!("{what}; the bag has {}", available.join(", "))));
+        }
+        if series.values.is_empty() && is_required(*role) {
+            return Err(roles.at(located, format!("{topic} has no message; without it {}", role.without())));
+        }
+        // Stamps of some messages only would mix two clocks.
+        if !series.stamped {
+            series.stamps.clone_from(&series.logged);
+        }
+    }
+    Ok((series, closed))
+}
+
+fn plan(
+    reader: &Reader,
+    roles: &Roles,
+    wanted: &[(SignalRole, &Located)],
+    seen: &mut [bool],
+) -> Result<HashMap<usize, Plan>, SessionError> {
+    let mut plans: HashMap<usize, Plan> = HashMap::new();
+    for (place, (_, located)) in wanted.iter().enumerate() {
+        let Some(topic) = reader.topics().iter().find(|t| t.name == located.signal.topic) else { continue };
+        if let Some(seen) = seen.get_mut(place) {
+            *seen = true;
+        }
+        let plan = match plans.entry(topic.index) {
+            std::collections::hash_map::Entry::Occupied(plan) => plan.into_mut(),
+            std::collections::hash_map::Entry::Vacant(vacant) => {
+                let schema = topic.parse_schema().map_err(|e| roles.at(located, e.to_string()))?;
+                let stamp = schema.find("header.stamp.sec").ok().zip(schema.find("header.stamp.nanosec").ok());
+                vacant.insert(Plan { stamp: stamp.map(|(s, ns)| [s, ns]), schema, fields: Vec::new() })
+            }
+        };
+        let field = plan.schema.find(&located.signal.field);
+        let field = field.map_err(|what| roles.at(located, format!("{} ({}): {what}", topic.name, topic.type_name)))?;
+        plan.fields.push((place, field));
+    }
+    Ok(plans)
+}

@@ -1,0 +1,119 @@
+//! Other people's bags: a roles file says which field of which topic is which signal.
+//!
+//! ```toml
+//! axes = ["x"]                         # names; optional
+//!
+//! [signals]                            # "TOPIC.FIELD", or a table; for several axes a list of either
+//! x_m = "/omega/joint_states.position[0]"
+//! F_f = { topic = "/omega/wrench_cmd", field = "wrench.force.x", scale = -1.0 }
+//! x_c = "/slave/target.data"
+//! F_s = { topic = "/ft_sensor", field = "wrench.force.z", offset = 0.12 }
+//! x_s = "/slave/pose.pose.position.x"  # optional, as are dither and operator
+//!
+//! [gains]                              # optional: estimated from the signals where absent
+//! mu = 1.0
+//! lambda = 0.3
+//!
+//! [resample]                           # optional: the rate of the most frequent signal where absent
+//! rate_hz = 1000
+//! ```
+//!
+//! `docs/roles-example.toml` has every key with its meaning. Any ROS 2 type can be read whose ros2msg schema is in the bag. Positions
+//! are interpolated linearly between their samples; forces hold the last one, as a servo does (`hold` in a table changes either).
+
+mod clock;
+mod file;
+mod gains;
+mod gather;
+
+pub use file::{AxisRoles, Roles};
+
+use crate::from_bag::{SessionError, SignalRole};
+use crate::grid::{Grid, Ordered, step_of};
+use crate::session::{AxisSignals, Session};
+use crate::unjudged::{BRIDGED_S, Unjudged};
+use clock::{ends_apart, note_resampled, on_one_clock};
+use file::{Located, is_required};
+use gains::{check_signs, settle_gains};
+use gather::gather;
+use std::path::Path;
+
+impl Session {
+    /// Reads somebody else's recording: one `.mcap`, or a rosbag2 folder.
+    ///
+    /// The signals are put on one grid of rows over the time that x_m, F_f, x_c and F_s have in common. What was done to them, and what
+    /// looks wrong with signs, clocks or gains, is in the notes.
+    ///
+    /// # Errors
+    /// A storage that is not read, a damaged bag, a topic or field that is not there (at its line of the roles file), signals
+    /// that have no time in common.
+    pub fn from_roles(path: &Path, roles: &Roles) -> Result<Session, SessionError> {
+        let wrong = |what: String| SessionError::Rows { path: path.to_owned(), what };
+        let wanted: Vec<(SignalRole, &Located)> = roles.axes.iter().flat_map(|a| a.signals.iter().map(|(r, l)| (*r, l))).collect();
+        let (series, closed) = gather(path, roles, &wanted)?;
+        let mut notes = Vec::new();
+        let ordered = on_one_clock(&wanted, &series, &mut notes);
+
+        let needed: Vec<&Ordered> = wanted.iter().zip(&ordered).filter(|((role, _), _)| is_required(*role)).map(|(_, o)| o).collect();
+        for ((role, located), o) in wanted.iter().zip(&ordered) {
+            if is_required(*role) && o.times.is_empty() {
+                let (topic, field) = (&located.signal.topic, &located.signal.field);
+                return Err(roles.at(located, format!("{topic}.{field} was never measured; without it {}", role.without())));
+            }
+        }
+        let grid = Grid::over(&needed, roles.rate_hz).map_err(wrong)?;
+        let period_s = grid.period * 1e-9;
+        let cut_short = if closed { ends_apart(&needed, &grid) } else { Some(Unjudged::NotClosed) };
+        notes.push(format!("{} rows at {:.6} Hz; {}", grid.rows, 1.0 / period_s, rate_source(roles)));
+
+        let mut axes = Vec::new();
+        let mut next = 0;
+        for roles in &roles.axes {
+            let mut axis = AxisSignals { name: roles.name.clone(), clamped: vec![false; grid.rows], ..AxisSignals::default() };
+            for (role, located) in &roles.signals {
+                let Some(signal) = ordered.get(next) else { break };
+                next += 1;
+                let laid = signal.on(&grid, located.signal.hold);
+                note_resampled(located, signal, &laid, &grid, &mut notes);
+                if *role == SignalRole::Master {
+                    axis.resolution = step_of(&signal.values);
+                }
+                put(&mut axis, *role, laid.values);
+            }
+            if axis.resolution > 0.0 {
+                notes.push(format!("axis {}: x_m comes in steps of {:.3e}", axis.name, axis.resolution));
+            }
+            axes.push(axis);
+        }
+        let mut session = Session {
+            name: path.display().to_string(),
+            period_s,
+            axes,
+            mu: Vec::new(),
+            lambda: Vec::new(),
+            notes,
+            cut_short,
+            bridged_s: BRIDGED_S,
+        };
+        settle_gains(&mut session, roles);
+        check_signs(&mut session);
+        Ok(session)
+    }
+}
+
+fn rate_source(roles: &Roles) -> &'static str {
+    if roles.rate_hz.is_some() { "the rate is the roles file's" } else { "the rate is that of the most frequent signal" }
+}
+
+fn put(axis: &mut AxisSignals, role: SignalRole, values: Vec<f64>) {
+    match role {
+        SignalRole::Master => axis.master = values,
+        SignalRole::Force => axis.force = values,
+        SignalRole::Command => axis.command = values,
+        SignalRole::Contact => axis.contact = values,
+        SignalRole::Slave => axis.slave = Some(values),
+        SignalRole::Dither => axis.dither = Some(values),
+        SignalRole::Intent => axis.intent = Some(values),
+        SignalRole::Induced => axis.induced = Some(values),
+    }
+}

@@ -1,0 +1,141 @@
+//! What an answer consists of.
+
+use super::warning::Warning;
+use super::witness::Witness;
+use super::word::{Method, Word};
+use crate::energy::EnergyAnswer;
+use crate::frequency::{Frequency, FrequencyAnswer, FrequencyError};
+use crate::model_check::PartCheck;
+use crate::outcome::Outcome;
+use crate::resimulate::edge::Edge;
+use crate::resimulate::grips::GripEdge;
+use crate::resimulate::over_cancelling::OverCancelling;
+use crate::resimulate::{Gain, ResimulateError};
+use crate::session::Session;
+use crate::transparency::Transparency;
+use crate::unjudged::Unjudged;
+use backdrive_control::margins::Margins;
+use backdrive_nodes::build::BuildError;
+use serde::Serialize;
+
+/// What does not go together.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Apart {
+    /// A model does not do what was recorded.
+    Model,
+    /// Two answers differ.
+    Methods,
+}
+
+/// Two things that do not go together.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Disagreement {
+    /// Which.
+    pub kind: Apart,
+    /// In a sentence.
+    pub text: String,
+}
+
+/// The loop that was measured beside the loop that the models make of the same session.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct LoopCheck {
+    /// RMS of the relative difference over the lines near the edge.
+    pub difference: f64,
+    /// What the noise of both explains of it.
+    pub noise: f64,
+    /// Whether they agree.
+    pub agrees: bool,
+}
+
+/// The re-simulation's part of the answer.
+#[derive(Debug, Clone)]
+pub struct Resimulated {
+    /// What happened at the gain asked.
+    pub outcome: Outcome,
+    /// Its signals.
+    pub signals: Session,
+    /// Where it stops being stable.
+    pub edge: Edge,
+    /// The same for other grips.
+    pub grips: Vec<GripEdge>,
+    /// Whether the canceller takes out too much at rest.
+    pub over_cancelling: Option<OverCancelling>,
+    /// Energy at the gain asked.
+    pub energy: EnergyAnswer,
+    /// What the hand does.
+    pub script: String,
+}
+
+/// The answer.
+#[derive(Debug, Clone)]
+pub struct Answer {
+    /// The bag.
+    pub bag: String,
+    /// The gains asked about.
+    pub gain: Gain,
+    /// mu*lambda at which it was recorded: lowest and highest.
+    pub recorded_gain: Option<[f64; 2]>,
+    /// The verdict.
+    pub verdict: Word,
+    /// Why, in a sentence or two.
+    pub reason: String,
+    /// Which answer leads.
+    pub from: Method,
+    /// The lowest mu*lambda at which it is not stable; `None` where there is none in the range, or it is not known.
+    pub critical_gain: Option<f64>,
+    /// Where there is none: it is at least this.
+    pub at_least: Option<f64>,
+    /// Where a clamp or the travel ends the stable range before any oscillation does: from this mu*lambda on.
+    pub limited_from: Option<f64>,
+    /// 95 % interval; an open upper end is `None`.
+    pub critical_gain_ci95: Option<(f64, Option<f64>)>,
+    /// Frequency on the edge, Hz; 0 where it runs away without oscillating.
+    pub critical_frequency_hz: Option<f64>,
+    /// Margins at the gain asked, by the measured frequency response.
+    pub margins: Option<Margins>,
+    /// The frequency response's answer at the gain.
+    pub frequency_answer: Option<FrequencyAnswer>,
+    /// The frequency response.
+    pub frequency: Option<Frequency>,
+    /// The re-simulation.
+    pub resimulated: Option<Resimulated>,
+    /// Why there is none.
+    pub no_resimulation: Option<String>,
+    /// What the recording itself did at its own gain.
+    pub recorded_outcome: Option<Outcome>,
+    /// Energy as recorded.
+    pub recorded_energy: EnergyAnswer,
+    /// Transparency as recorded, per axis.
+    pub transparency: Vec<Transparency>,
+    /// How well each device's model tells the device.
+    pub checks: Vec<PartCheck>,
+    /// How well the models tell the loop.
+    pub loop_check: Option<LoopCheck>,
+    /// Where answers and models part.
+    pub disagreements: Vec<Disagreement>,
+    /// What a reader has to know.
+    pub warnings: Vec<Warning>,
+    /// What to record for a better answer.
+    pub advice: Option<String>,
+    /// What in the recording keeps a green answer back; `None` where nothing does, or the answer was not green.
+    pub held_back: Option<Unjudged>,
+    /// Everything that counted, the method that leads first.
+    pub witnesses: Vec<Witness>,
+    /// Whose edge and frequency the headline has.
+    pub decided_by: Option<String>,
+}
+
+/// Why there is no answer at all.
+#[derive(Debug, thiserror::Error)]
+pub enum AnswerError {
+    /// Of the session.
+    #[error(transparent)]
+    Frequency(#[from] FrequencyError),
+    /// Of the loop that is run again.
+    #[error(transparent)]
+    Resimulate(#[from] ResimulateError),
+    /// Of a device.
+    #[error(transparent)]
+    Build(#[from] BuildError),
+}
