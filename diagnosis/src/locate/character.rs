@@ -1,10 +1,11 @@
 //! The class of a force: odd or even, with memory or without, dependent on rate or not, and what energy it takes.
 
 use super::law::{Law, Samples, Variable};
-use serde::Serialize;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
 /// What kind of force it is, whatever its name.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Character {
     /// Share of the force's mean over velocity and displacement that turns its sign with the motion; 1 is odd, 0 even.
     pub odd_share: f64,

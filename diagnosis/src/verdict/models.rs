@@ -1,6 +1,7 @@
 //! Models as they are after the diagnosis, and how they predict what no fit has seen.
 
-use super::VerdictError;
+use super::rounded::rounded;
+use super::types::HeldOut;
 use crate::compare::nrmse;
 use crate::hypothesis::apply_edits;
 use crate::intervals::Spread;
@@ -8,7 +9,20 @@ use crate::numbers::stated_edits;
 use crate::problem::Problem;
 use crate::search::{Candidate, Search};
 use backdrive_plant::write::{patch, round_significant};
-use serde_json::{Value as Json, json};
+
+/// Why a verdict cannot be written.
+#[derive(Debug, thiserror::Error)]
+pub enum VerdictError {
+    /// The model's text cannot be edited.
+    #[error(transparent)]
+    Patch(#[from] backdrive_plant::write::PatchError),
+    /// Refitted numbers cannot be put into the model.
+    #[error("the refitted numbers do not fit into the model: {0}")]
+    Refitted(String),
+    /// A physics that was found cannot be put into the model.
+    #[error(transparent)]
+    Hypothesis(#[from] crate::hypothesis::HypothesisError),
+}
 
 /// Rivals whose models are written, at most.
 const RIVALS: usize = 3;
@@ -47,7 +61,8 @@ pub(super) fn rival_models(problem: &Problem, search: &Search, best: &Candidate)
     models.take(RIVALS).map(|model| model.to_toml()).collect()
 }
 
-pub(super) fn held_out(problem: &Problem, search: &Search, best: &Candidate, use_best: bool) -> Json {
+/// Errors on the recordings that no fit has seen, before and after.
+pub(super) fn held_out(problem: &Problem, search: &Search, best: &Candidate, use_best: bool) -> HeldOut {
     let records = if problem.held_out.is_empty() { &problem.fit } else { &problem.held_out };
     let structure = &search.nominal.structure;
     let given: Vec<f64> = problem.stated.iter().map(|s| s.given).collect();
@@ -61,6 +76,11 @@ pub(super) fn held_out(problem: &Problem, search: &Search, best: &Candidate, use
             count += 1;
         }
     }
-    let r = |x: Option<f64>| x.map_or(Json::Null, |x| json!(round_significant(x, 6)));
-    json!({ "nrmse_before": r(before), "nrmse_refit": r(refit), "nrmse_after": r(after), "noise_floor": r(Some(sum / count.max(1) as f64)) })
+    let six = |x: Option<f64>| x.and_then(|x| rounded(x, 6));
+    HeldOut {
+        nrmse_before: six(before),
+        nrmse_refit: six(refit),
+        nrmse_after: six(after),
+        noise_floor: rounded(sum / count.max(1) as f64, 6),
+    }
 }
