@@ -150,6 +150,13 @@ fn dry_friction_that_was_left_out_is_named() {
     assert!((force - 0.6).abs() < 0.02, "{force}");
     let held = &said.held_out;
     assert!(held.nrmse_after.unwrap() < 1.2 * held.noise_floor.unwrap(), "{held:?}");
+    // One output: pooled over recordings its error lies between those of each, and their mean is the average.
+    let each: Vec<f64> = held.per_record.iter().map(|one| one.nrmse_after.unwrap()).collect();
+    let pooled = held.pooled_after.as_ref().unwrap()["position"];
+    let (low, high) = each.iter().fold((f64::INFINITY, 0.0f64), |(low, high), x| (low.min(*x), high.max(*x)));
+    assert!((low..=high).contains(&pooled), "{held:?}");
+    let mean = each.iter().sum::<f64>() / each.len() as f64;
+    assert!((mean / held.nrmse_after.unwrap() - 1.0).abs() < 1e-5 && each.len() == problem.held_out.len(), "{held:?}");
     assert!(files.model.contains("# a motor and a load"));
     Model::from_toml(&files.model, "after").unwrap();
 }

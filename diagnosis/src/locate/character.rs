@@ -15,7 +15,7 @@ pub struct Character {
     pub rate_dependent: bool,
     /// Energy that it takes from the device in a cycle, J: the median over cycles.
     pub dissipated_per_cycle: f64,
-    /// Exponent of that energy over the amplitude of the cycle: 1 is dry friction, 2 viscous or hysteretic; `None` where amplitudes hardly differ.
+    /// Exponent of that energy over the amplitude of the cycle: 1 is dry friction, 2 viscous or hysteretic; none (in files null) where amplitudes hardly differ.
     pub energy_exponent: Option<f64>,
     /// Cycles that it was taken from.
     pub cycles: usize,

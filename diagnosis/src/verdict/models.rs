@@ -1,8 +1,5 @@
-//! Models as they are after the diagnosis, and how they predict what no fit has seen.
+//! Models as they are after the diagnosis.
 
-use super::rounded::rounded;
-use super::types::HeldOut;
-use crate::compare::nrmse;
 use crate::hypothesis::apply_edits;
 use crate::intervals::Spread;
 use crate::numbers::stated_edits;
@@ -59,28 +56,4 @@ pub(super) fn rival_models(problem: &Problem, search: &Search, best: &Candidate)
     rivals.sort_by(|a, b| a.fit.cost.total_cmp(&b.fit.cost));
     let models = rivals.into_iter().filter_map(|c| c.structure.model(problem, &c.fit.values));
     models.take(RIVALS).map(|model| model.to_toml()).collect()
-}
-
-/// Errors on the recordings that no fit has seen, before and after.
-pub(super) fn held_out(problem: &Problem, search: &Search, best: &Candidate, use_best: bool) -> HeldOut {
-    let records = if problem.held_out.is_empty() { &problem.fit } else { &problem.held_out };
-    let structure = &search.nominal.structure;
-    let given: Vec<f64> = problem.stated.iter().map(|s| s.given).collect();
-    let before = nrmse(problem, records, structure, &structure.values(problem, &given, &[], &[]));
-    let refit = nrmse(problem, records, structure, &search.nominal.fit.values);
-    let after = if use_best { nrmse(problem, records, &best.structure, &best.fit.values) } else { before };
-    let (mut sum, mut count) = (0.0, 0usize);
-    for record in records {
-        for output in crate::fit::measured(record) {
-            sum += search.floor[output] / record.spread[output];
-            count += 1;
-        }
-    }
-    let six = |x: Option<f64>| x.and_then(|x| rounded(x, 6));
-    HeldOut {
-        nrmse_before: six(before),
-        nrmse_refit: six(refit),
-        nrmse_after: six(after),
-        noise_floor: rounded(sum / count.max(1) as f64, 6),
-    }
 }

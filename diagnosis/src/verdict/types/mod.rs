@@ -164,6 +164,35 @@ pub struct HeldOut {
     pub nrmse_after: Option<f64>,
     /// What the sensors' noise alone would leave.
     pub noise_floor: Option<f64>,
+    /// The same of the nominal model as it was given, by output: the root of the summed squared errors over that of the summed squared deviations
+    /// from each recording's mean, all recordings together.
+    pub pooled_before: Option<BTreeMap<String, f64>>,
+    /// As `pooled_before`, of the nominal structure with its numbers refitted.
+    pub pooled_refit: Option<BTreeMap<String, f64>>,
+    /// As `pooled_before`, of the diagnosed model.
+    pub pooled_after: Option<BTreeMap<String, f64>>,
+    /// As `pooled_before`, of the sensors' noise alone.
+    pub pooled_floor: Option<BTreeMap<String, f64>>,
+    /// Every pair of recording and output by itself.
+    #[serde(default)]
+    pub per_record: Vec<RecordErrors>,
+}
+
+/// Errors at one output in one recording, over the standard deviation of the measured signal. Null where a model cannot be simulated.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct RecordErrors {
+    /// The recording's file, without its folder.
+    pub record: String,
+    /// The output.
+    pub output: String,
+    /// Of the nominal model as it was given.
+    pub nrmse_before: Option<f64>,
+    /// Of the nominal structure with its numbers refitted.
+    pub nrmse_refit: Option<f64>,
+    /// Of the diagnosed model.
+    pub nrmse_after: Option<f64>,
+    /// What the sensors' noise alone would leave.
+    pub noise_floor: Option<f64>,
 }
 
 /// What was seen in the recordings before any physics.
