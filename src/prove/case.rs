@@ -1,8 +1,8 @@
 //! One proof: draw and seal, record, diagnose, raise the gain, and only then look at the truth.
 
-use super::absolute;
 use super::chosen::{Chosen, Task, choose};
 use super::edges::{Canceller, Loop, Moved};
+use super::files::{absolute, ours, read, write};
 use super::hidden::{Hidden, Opened, program};
 use super::live::{self, LiveRun, hide};
 use super::score::{Finding, Handed, Mark, findings, is_nonlinear, mark, name_of};
@@ -17,7 +17,7 @@ use backdrive_sealed::truth::Truth;
 use serde::Serialize;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::process::Command;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use toml_edit::{Array, DocumentMut, Item, value};
@@ -434,32 +434,4 @@ fn still(options: &cli::Prove, session: &Path) -> Result<PathBuf, Failure> {
     let still = session.join("still.toml");
     write(&still, &set.to_string())?;
     Ok(still)
-}
-
-/// Runs this program again as a process of its own, its output in a file beside the case; what it said.
-pub(super) fn ours(folder: &Path, name: &str, arguments: &[&dyn AsRef<std::ffi::OsStr>]) -> Result<String, Failure> {
-    let exe = std::env::current_exe().map_err(Failure::machine)?;
-    let log = folder.join(format!("{name}.log"));
-    let file = std::fs::File::create(&log).map_err(|e| Failure::write(&log, e))?;
-    let errors = file.try_clone().map_err(Failure::machine)?;
-    let mut command = Command::new(exe);
-    command.args(arguments).stdin(Stdio::null()).stdout(file).stderr(errors);
-    let status = command.status().map_err(Failure::machine)?;
-    let said = std::fs::read_to_string(&log).unwrap_or_default();
-    // 1 is a negative answer, which is one.
-    match status.code() {
-        Some(0 | 1 | 7) => Ok(said),
-        _ => {
-            let why = said.lines().rev().find_map(|line| line.strip_prefix("error: ")).unwrap_or("its output says why");
-            Err(Failure::input(format!("{name} ended with {status}: {why} ({})", log.display())))
-        }
-    }
-}
-
-fn read(path: &Path) -> Result<String, Failure> {
-    std::fs::read_to_string(path).map_err(|e| Failure::input(format!("{}: cannot be read: {e}", path.display())))
-}
-
-pub(super) fn write(path: &Path, text: &str) -> Result<(), Failure> {
-    crate::output::file(path, text)
 }
