@@ -18,6 +18,7 @@ use std::time::{Duration, Instant};
 
 /// Name of the report, where no other is asked for.
 pub const REPORT: &str = "report.html";
+
 /// Diagnoses, writes, and says what was found.
 pub fn diagnose(options: &cli::Diagnose) -> Result<u8, Failure> {
     let began = Instant::now();

@@ -10,6 +10,7 @@ mod remaining;
 mod rounded;
 mod schema;
 mod sentence;
+mod shows;
 mod signals;
 pub(crate) mod types;
 
@@ -31,7 +32,8 @@ use held_out::held_out;
 use models::{model_text, rival_models};
 use remaining::remaining;
 use sentence::sentence;
-use signals::{shows, unknown_inputs};
+use shows::shows;
+use signals::unknown_inputs;
 use std::collections::BTreeMap;
 use std::time::Duration;
 
