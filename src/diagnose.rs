@@ -8,41 +8,15 @@ use crate::interrupt;
 use crate::output;
 use crate::progress;
 use crate::recordings::{self, Opened};
-use backdrive_diagnosis::audit::{self, Remark};
-use backdrive_diagnosis::locate::{self, Location, locate};
-use backdrive_diagnosis::per_record::{PerRecord, fit_each};
-use backdrive_diagnosis::physics::physics_named;
-use backdrive_diagnosis::problem::Problem;
-use backdrive_diagnosis::search::{Search, Settings, search};
-use backdrive_diagnosis::verdict::{EXPERIMENT_FILE, Verdict, rival_file, verdict};
-use backdrive_diagnosis::work::{Budget, Steps};
-use serde_json::{Value, json};
+use backdrive_diagnosis::diagnose::{self, Diagnosis};
+use backdrive_diagnosis::search::Settings;
+use backdrive_diagnosis::verdict::{EXPERIMENT_FILE, MODEL_FILE, VERDICT_FILE, Word, rival_file};
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-/// Name of the model file that is written.
-pub const MODEL: &str = "model.diagnosed.toml";
 /// Name of the report, where no other is asked for.
 pub const REPORT: &str = "report.html";
-/// Work in which each record is fitted by itself, at most.
-const PER_RECORD: Steps = 200_000_000;
-
-/// Everything that was found.
-pub struct Found {
-    /// The model and its recordings.
-    pub problem: Problem,
-    /// What the recordings say of themselves.
-    pub remarks: Vec<Remark>,
-    /// Structures and their fits.
-    pub search: Search,
-    /// What follows.
-    pub said: Verdict,
-    /// The refitted nominal model fitted to each record by itself.
-    pub per_record: PerRecord,
-    /// The latent force that the refitted nominal model needs, at every place; `None` where it cannot be had.
-    pub location: Option<Location>,
-}
 
 /// Diagnoses, writes, and says what was found.
 pub fn diagnose(options: &cli::Diagnose) -> Result<u8, Failure> {
@@ -51,7 +25,7 @@ pub fn diagnose(options: &cli::Diagnose) -> Result<u8, Failure> {
 
     let open = || recordings::open(&options.set, options.model.as_deref(), options.grip.as_deref(), &options.ignore_signal);
     let opened = progress::busy("reading the recordings", open)?;
-    for name in [MODEL, EXPERIMENT_FILE] {
+    for name in [MODEL_FILE, EXPERIMENT_FILE] {
         recordings::not_onto(&options.out.join(name), &opened.files, false)?;
     }
     for note in &opened.notes {
@@ -70,7 +44,7 @@ pub fn diagnose(options: &cli::Diagnose) -> Result<u8, Failure> {
     let path = options.out.join("time.txt");
     output::file(&path, format!("{seconds:.2}\n"))?;
     if options.json {
-        output::json(&found.said.json)?;
+        output::json(&found.verdict)?;
     } else {
         output::line(text(&found))?;
         output::line(format_args!("wrote     {}: {} ({seconds:.1} s)", shown(&options.out), written.join(", ")))?;
@@ -78,13 +52,13 @@ pub fn diagnose(options: &cli::Diagnose) -> Result<u8, Failure> {
     if stop.load(Ordering::SeqCst) {
         return Err(Failure { code: code::INTERRUPTED, message: "stopped; what was found until then is written".to_string() });
     }
-    Ok(exit_code(&found.said.json))
+    Ok(exit_code(found.verdict.word))
 }
 
 /// A diagnosis, and the files that were written of it.
 pub struct Diagnosed {
     /// Everything that was found.
-    pub found: Found,
+    pub found: Diagnosis,
     /// Names of the files in the folder that was given, and the path of a report that went elsewhere.
     pub written: Vec<String>,
 }
@@ -104,21 +78,23 @@ pub fn diagnose_into(
     // What cannot be written is told before the work, not after it.
     output::folder(out)?;
     report.map_or(Ok(()), output::writable)?;
-    let found = progress::about(settings.expected(), |report| find(opened.problem, settings, stop, report))?;
+    let found = progress::about(settings.expected(), |report| {
+        diagnose::diagnose(opened.problem, settings, Some(stop), report).map_err(Failure::input)
+    })?;
 
     let write = |name: &str, text: &str| output::file(&out.join(name), text);
-    let json = serde_json::to_string_pretty(&found.said.json).map_err(Failure::input)?;
-    write("verdict.json", &format!("{json}\n"))?;
-    write(MODEL, &found.said.model)?;
-    let mut written = vec!["verdict.json".to_string(), MODEL.to_string()];
+    let json = serde_json::to_string_pretty(&found.verdict).map_err(Failure::input)?;
+    write(VERDICT_FILE, &format!("{json}\n"))?;
+    write(MODEL_FILE, &found.files.model)?;
+    let mut written = vec![VERDICT_FILE.to_string(), MODEL_FILE.to_string()];
     // Rivals of an earlier diagnosis are none of this one.
     for number in 1..=9 {
         let _ = std::fs::remove_file(out.join(rival_file(number)));
     }
-    for (index, rival) in found.said.rivals.iter().enumerate() {
+    for (index, rival) in found.files.rivals.iter().enumerate() {
         write(&rival_file(index + 1), rival)?;
     }
-    if let Some(experiment) = &found.said.experiment {
+    if let Some(experiment) = &found.files.experiment {
         write(EXPERIMENT_FILE, experiment)?;
         written.push(EXPERIMENT_FILE.to_string());
     }
@@ -136,65 +112,12 @@ fn shown(folder: &Path) -> String {
 }
 
 /// By what the verdict says.
-pub fn exit_code(verdict: &Value) -> u8 {
-    match verdict["verdict"].as_str() {
-        Some("nothing_missing" | "parameters") => 0,
-        Some("cannot_tell") => code::CANNOT_TELL,
-        _ => code::NEGATIVE,
+pub fn exit_code(word: Word) -> u8 {
+    match word {
+        Word::NothingMissing | Word::Parameters => 0,
+        Word::Missing | Word::Unexplained | Word::Ambiguous => code::NEGATIVE,
+        Word::CannotTell => code::CANNOT_TELL,
     }
-}
-
-/// Audit, search, verdict, and what shows it.
-fn find(problem: Problem, settings: &Settings, stop: &AtomicBool, report: &(dyn Fn(&str) + Sync)) -> Result<Found, Failure> {
-    let limit = settings.limit(Some(stop));
-    report("looking at the recordings");
-    let remarks = audit::audit(&problem);
-    let search = search(&problem, settings, limit, report).map_err(Failure::input)?;
-    report("deciding");
-    let mut said = verdict(&problem, &search, MODEL).map_err(Failure::input)?;
-    if said.json.get("audit").is_none_or(Value::is_null) {
-        said.json["audit"] = audit::json(&remarks);
-    }
-    report("fitting each record by itself");
-    let per_record = fit_each(&problem, &search.nominal, &search.floor, &Budget::new(PER_RECORD, limit));
-    report("locating the missing force");
-    let location = located(&problem, &search);
-    if said.json["where"].is_object() && said.json["where"]["state"].is_null() {
-        said.json["where"]["state"] = json!(state(&said.json, location.as_ref()));
-    }
-    if said.json["verdict"] == "unexplained"
-        && let Some(best) = location.as_ref().and_then(|l| l.ranking.first())
-    {
-        // What kind of force it is, where no law is its name.
-        said.json["where"]["class"] = serde_json::to_value(best.character).unwrap_or(Value::Null);
-    }
-    Ok(Found { problem, remarks, search, said, per_record, location })
-}
-
-/// In which state the mismatch shows: as the law that is claimed has it, else as the latent force does.
-fn state(verdict: &Value, location: Option<&Location>) -> Option<String> {
-    match verdict["verdict"].as_str() {
-        Some("missing" | "ambiguous") => {
-            let finding = &verdict["findings"][0];
-            let place = match (finding["between"].as_array(), finding["signal"].as_str()) {
-                (Some(ends), _) => ends.iter().filter_map(Value::as_str).collect::<Vec<_>>().join("-"),
-                (_, Some(signal)) => signal.to_string(),
-                _ => return None,
-            };
-            Some(physics_named(finding["physics"].as_str()?)?.state_at(&place))
-        }
-        Some("unexplained") => location.and_then(locate::state),
-        _ => None,
-    }
-}
-
-/// The latent force that the refitted nominal model needs.
-fn located(problem: &Problem, search: &Search) -> Option<Location> {
-    let nominal = &search.nominal;
-    let model = nominal.structure.model(problem, &nominal.fit.values)?;
-    let records = nominal.structure.with_unknown(problem, &problem.fit, &nominal.fit.values);
-    let runs: Vec<locate::Run> = records.iter().map(locate::Run::from).collect();
-    locate(&model, &runs, &search.floor, &locate::Options::quick()).ok()
 }
 
 #[cfg(test)]
@@ -202,19 +125,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_state_is_that_of_the_claimed_law() {
-        let verdict = json!({ "verdict": "missing", "findings": [{ "physics": "coulomb", "between": ["drum", "ground"] }] });
-        assert_eq!(state(&verdict, None).as_deref(), Some("reversals of the velocity across drum-ground"));
-        let verdict = json!({ "verdict": "missing", "findings": [{ "physics": "delay", "signal": "force" }] });
-        assert_eq!(state(&verdict, None).as_deref(), Some("with the rate of change of force"));
-        assert_eq!(state(&json!({ "verdict": "nothing_missing" }), None), None);
-    }
-
-    #[test]
     fn exit_codes_follow_the_verdict() {
-        let code_of = |word: &str| exit_code(&json!({ "verdict": word }));
-        assert_eq!(["nothing_missing", "parameters"].map(code_of), [0, 0]);
-        assert_eq!(["missing", "unexplained", "ambiguous"].map(code_of), [1, 1, 1]);
-        assert_eq!(code_of("cannot_tell"), 7);
+        assert_eq!([Word::NothingMissing, Word::Parameters].map(exit_code), [0, 0]);
+        assert_eq!([Word::Missing, Word::Unexplained, Word::Ambiguous].map(exit_code), [1, 1, 1]);
+        assert_eq!(exit_code(Word::CannotTell), 7);
     }
 }

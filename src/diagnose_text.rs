@@ -1,25 +1,24 @@
 //! What `backdrive diagnose` prints: a dozen lines for a person, from the same data as the verdict file.
 
-use crate::diagnose::Found;
-use crate::recordings::file_name;
 use backdrive_diagnosis::audit::Weight;
+use backdrive_diagnosis::diagnose::Diagnosis;
 use backdrive_diagnosis::intervals::Spread;
 use backdrive_diagnosis::numbers::rows;
+use backdrive_diagnosis::verdict::{Alternative, Estimate, Finding, HeldOut, Interval, NextExperiment, Parameter, Remaining, Where};
 use backdrive_diagnosis::words;
 use backdrive_report::{number, si};
-use serde_json::Value;
 use std::fmt::Write as _;
 
 /// Remarks of the audit that are printed, at most; all are in the report.
 const REMARKS: usize = 3;
 
 /// The dozen lines.
-pub fn text(found: &Found) -> String {
+pub fn text(found: &Diagnosis) -> String {
     let mut out = String::new();
     let mut line = |name: &str, text: String| {
         let _ = writeln!(out, "{name:<9} {text}");
     };
-    let json = &found.said.json;
+    let verdict = &found.verdict;
     line("audit", recordings(found));
     let mut cautions = found.remarks.iter().filter(|r| r.weight > Weight::Note);
     for remark in cautions.by_ref().take(REMARKS) {
@@ -30,39 +29,24 @@ pub fn text(found: &Found) -> String {
         more => line("", format!("and {more} more cautions, see the report")),
     }
     line("refit", refit(found));
-    let word = json["verdict"].as_str().unwrap_or("").replace('_', " ").to_uppercase();
-    line("verdict", format!("{word}: {}", found.said.sentence));
-    let claimed = matches!(json["verdict"].as_str(), Some("missing" | "ambiguous"));
-    for finding in json["findings"].as_array().into_iter().flatten() {
-        line(if claimed { "found" } else { "nearest" }, described(finding));
-        let others: Vec<String> = list(&finding["alternatives"]).iter().take(3).map(with_confidence).collect();
+    line("verdict", format!("{}: {}", verdict.word.spoken().to_uppercase(), verdict.sentence));
+    for finding in &verdict.findings {
+        line(if verdict.word.claims() { "found" } else { "nearest" }, described(finding));
+        let others = alternatives(finding);
         if !others.is_empty() {
             line("", format!("or instead {}", others.join(", ")));
         }
     }
-    let place = &json["where"];
-    if word != "NOTHING MISSING" && word != "PARAMETERS" && place.is_object() {
+    if let Some(place) = verdict.shows.as_ref().filter(|_| !verdict.word.is_structure_right()) {
         line("where", shows(place));
     }
     // Where nothing was found all of it remains, and it is told above where it shows.
-    if let Some(left) = remains(&json["remaining"]).filter(|_| !list(&json["findings"]).is_empty()) {
+    if let Some(left) = verdict.remaining.as_ref().filter(|_| !verdict.findings.is_empty()).and_then(remains) {
         line("remains", left);
     }
-    let held = &json["held_out"];
-    let value = |key: &str| held[key].as_f64().map_or("?".to_string(), number);
-    let on = if found.problem.held_out.is_empty() { "fitted" } else { "held out" };
-    line(
-        on,
-        format!(
-            "nrmse {} as given, {} refitted, {} diagnosed; the sensors' own noise is {}",
-            value("nrmse_before"),
-            value("nrmse_refit"),
-            value("nrmse_after"),
-            value("noise_floor")
-        ),
-    );
-    if let Some(next) = next_experiment(&json["next_experiment"]) {
-        line("next", next);
+    line(if found.problem.held_out.is_empty() { "fitted" } else { "held out" }, held_out(&verdict.held_out));
+    if let Some(next) = &verdict.next_experiment {
+        line("next", next_experiment(next));
     }
     if found.search.cut {
         line(
@@ -77,7 +61,7 @@ pub fn text(found: &Found) -> String {
 }
 
 /// What was recorded, in a line.
-fn recordings(found: &Found) -> String {
+fn recordings(found: &Diagnosis) -> String {
     let problem = &found.problem;
     let all: Vec<_> = problem.fit.iter().chain(&problem.held_out).collect();
     let samples: usize = all.iter().map(|r| r.len).sum();
@@ -104,7 +88,7 @@ fn recordings(found: &Found) -> String {
 }
 
 /// What refitting the parameters alone does.
-fn refit(found: &Found) -> String {
+fn refit(found: &Diagnosis) -> String {
     let search = &found.search;
     let level = |levels: &[f64]| levels.iter().fold(0.0f64, |a, b| a.max(*b));
     let spread = Spread::of(&search.nominal);
@@ -123,18 +107,20 @@ fn refit(found: &Found) -> String {
     )
 }
 
-fn list(value: &Value) -> &[Value] {
-    value.as_array().map_or(&[], Vec::as_slice)
-}
-
-/// `dry friction at the drum`.
-pub fn named(finding: &Value) -> String {
-    format!("{} {}", words::physics(finding["physics"].as_str().unwrap_or("")), words::place(finding))
+/// Errors of prediction before and after.
+fn held_out(held: &HeldOut) -> String {
+    let value = |x: Option<f64>| x.map_or("?".to_string(), number);
+    format!(
+        "nrmse {} as given, {} refitted, {} diagnosed; the sensors' own noise is {}",
+        value(held.nrmse_before),
+        value(held.nrmse_refit),
+        value(held.nrmse_after),
+        value(held.noise_floor)
+    )
 }
 
 /// `well supported (97 %)`, in words and percent.
-pub fn confidence(finding: &Value) -> String {
-    let share = finding["confidence"].as_f64().unwrap_or(0.0);
+pub fn confidence(share: f64) -> String {
     let word = match share {
         s if s > 0.95 => "well supported",
         s if s > 0.8 => "supported",
@@ -145,116 +131,111 @@ pub fn confidence(finding: &Value) -> String {
     format!("{word} ({})", words::share(share))
 }
 
-fn with_confidence(finding: &Value) -> String {
-    format!("{} ({})", named(finding), words::share(finding["confidence"].as_f64().unwrap_or(0.0)))
+/// What could be instead of a finding, the three likeliest: `backlash between motor and drum (3 %)`.
+pub fn alternatives(finding: &Finding) -> Vec<String> {
+    let one = |other: &Alternative| format!("{} ({})", words::named(&other.physics, &other.place), words::share(other.confidence));
+    finding.alternatives.iter().take(3).map(one).collect()
 }
 
 /// A parameter of a verdict: value and interval, or lists of them.
-pub fn parameter(value: &Value) -> String {
-    let unit = value["unit"].as_str().unwrap_or("");
-    let one = |v: &Value, ci: &Value| {
-        let number_of = |x: &Value| x.as_f64().unwrap_or(f64::NAN);
-        format!("{} (95 %: {} to {})", si(number_of(v), unit), si(number_of(&ci[0]), unit), si(number_of(&ci[1]), unit))
+fn parameter(parameter: &Parameter) -> String {
+    let one = |value: f64, ci95: &Interval, unit: &str| {
+        let [low, high] = ci95.map(|end| end.unwrap_or(f64::NAN));
+        format!("{} (95 %: {} to {})", si(value, unit), si(low, unit), si(high, unit))
     };
-    match &value["value"] {
-        Value::Array(values) => {
-            let intervals = list(&value["ci95"]);
-            values.iter().zip(intervals).map(|(v, ci)| one(v, ci)).collect::<Vec<_>>().join("; ")
+    match parameter {
+        Parameter::One(Estimate { value, ci95, unit }) => one(*value, ci95, unit),
+        Parameter::List(list) => {
+            let each = list.value.iter().zip(&list.ci95).map(|(value, ci95)| one(*value, ci95, &list.unit));
+            each.collect::<Vec<_>>().join("; ")
         }
-        v => one(v, &value["ci95"]),
     }
 }
 
-fn described(finding: &Value) -> String {
-    let parameters: Vec<String> = finding["parameters"]
-        .as_object()
-        .map(|all| all.iter().map(|(key, value)| format!("{} {}", key.replace('_', " "), parameter(value))).collect())
-        .unwrap_or_default();
-    let replaced: Vec<&str> = list(&finding["replaces"]).iter().filter_map(Value::as_str).collect();
-    let instead = if replaced.is_empty() { String::new() } else { format!(", in place of {}", replaced.join(" and ")) };
-    format!("{}{instead}: {}; {}", named(finding), parameters.join(", "), confidence(finding))
+/// A finding's parameters, each with its name: `force 101 mN (95 %: 98.0 mN to 104 mN)`.
+pub fn parameters(finding: &Finding) -> Vec<String> {
+    finding.parameters.iter().map(|(key, value)| format!("{} {}", key.replace('_', " "), parameter(value))).collect()
+}
+
+fn described(finding: &Finding) -> String {
+    let instead = if finding.replaces.is_empty() { String::new() } else { format!(", in place of {}", finding.replaces.join(" and ")) };
+    let named = words::named(&finding.physics, &finding.place);
+    format!("{named}{instead}: {}; {}", parameters(finding).join(", "), confidence(finding.confidence))
 }
 
 /// When, at which frequencies and in which state.
-pub fn shows(place: &Value) -> String {
-    let mut parts = Vec::new();
-    if let Some(state) = place["state"].as_str() {
-        parts.push(state.to_string());
-    }
-    if let [low, high] = list(&place["band_hz"])
-        && let (Some(low), Some(high)) = (low.as_f64(), high.as_f64())
-    {
-        parts.push(format!("{} to {}", si(low, "Hz"), si(high, "Hz")));
-    }
-    if let Some(time) = list(&place["time"]).first()
-        && let (Some(from), Some(to)) = (time[0].as_f64(), time[1].as_f64())
-    {
-        parts.push(format!("most at {} to {} s", number(from), number(to)));
+pub fn shows(place: &Where) -> String {
+    let mut parts: Vec<String> = place.state.iter().cloned().collect();
+    let [low, high] = place.band_hz;
+    parts.push(format!("{} to {}", si(low, "Hz"), si(high, "Hz")));
+    if let Some([from, to]) = place.time.first() {
+        parts.push(format!("most at {} to {} s", number(*from), number(*to)));
     }
     parts.join("; ")
 }
 
 /// What the explanation leaves over, beside what was found; `None` where that is the sensors' noise.
-pub fn remains(left: &Value) -> Option<String> {
-    let place = left["where"].is_object().then(|| shows(&left["where"]))?;
-    let share = left["share"].as_f64().map_or(String::new(), |s| {
-        let floor = left["floor_share"].as_f64().map_or(String::new(), |f| format!(" (the sensors' noise would be {})", words::share(f)));
+fn remains(left: &Remaining) -> Option<String> {
+    let place = shows(left.shows.as_ref()?);
+    let share = left.share.map_or(String::new(), |s| {
+        let floor = left.floor_share.map_or(String::new(), |f| format!(" (the sensors' noise would be {})", words::share(f)));
         format!("{} of the residual with the parameters refitted{floor}; ", words::share(s))
     });
-    let like = left["looks_like"].as_str().map_or(String::new(), |like| format!("; looks most like {like}"));
+    let like = left.looks_like.as_ref().map_or(String::new(), |like| format!("; looks most like {like}"));
     Some(format!("{share}{place}{like}"))
 }
 
-/// What to record next, however the verdict says it.
-pub fn next_experiment(value: &Value) -> Option<String> {
-    let text = match value {
-        Value::Null => return None,
-        Value::String(text) => text.clone(),
-        Value::Object(all) => {
-            let say = ["reason", "why", "text", "separates"].iter().find_map(|key| all.get(*key).and_then(Value::as_str));
-            let file = ["file", "excitation"].iter().find_map(|key| all.get(*key).and_then(Value::as_str));
-            match (say, file) {
-                (Some(say), Some(file)) => format!("{say} ({})", file_name(file)),
-                (Some(one), None) | (None, Some(one)) => one.to_string(),
-                (None, None) => value.to_string(),
-            }
-        }
-        other => other.to_string(),
-    };
-    Some(text)
+/// What to record next, and the file that plays it; or why nothing would tell.
+pub fn next_experiment(next: &NextExperiment) -> String {
+    match next.file() {
+        Some(file) => format!("{} ({file})", next.sentence()),
+        None => next.sentence().to_string(),
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use serde_json::json;
+    use backdrive_diagnosis::hypothesis::Place;
+    use backdrive_diagnosis::verdict::{Estimates, Refused};
+    use std::collections::BTreeMap;
 
     #[test]
     fn a_finding_reads_as_a_line() {
-        let finding = json!({
-            "physics": "coulomb", "between": ["drum", "ground"], "confidence": 0.97, "replaces": [],
-            "parameters": { "force": { "value": 0.101, "ci95": [0.098, 0.104], "unit": "N" } },
-        });
+        let force = Parameter::One(Estimate { value: 0.101, ci95: [Some(0.098), Some(0.104)], unit: "N".to_string() });
+        let finding = Finding {
+            physics: "coulomb".to_string(),
+            place: Place::Between("drum".to_string(), "ground".to_string()),
+            parameters: BTreeMap::from([("force".to_string(), force)]),
+            replaces: Vec::new(),
+            confidence: 0.97,
+            alternatives: Vec::new(),
+        };
         assert_eq!(described(&finding), "dry friction at the drum: force 101 mN (95 %: 98.0 mN to 104 mN); well supported (97 %)");
-        let slip = json!({ "value": [1.0, 2.0], "ci95": [[0.5, 1.5], [1.0, 3.0]], "unit": "N" });
+        let ci95 = vec![[Some(0.5), Some(1.5)], [Some(1.0), Some(3.0)]];
+        let slip = Parameter::List(Estimates { value: vec![1.0, 2.0], ci95, unit: "N".to_string() });
         assert_eq!(parameter(&slip), "1.00 N (95 %: 500 mN to 1.50 N); 2.00 N (95 %: 1.00 N to 3.00 N)");
     }
 
     #[test]
     fn what_remains_is_told_only_where_it_is_more_than_noise() {
-        let noise = json!({ "share": 0.03, "floor_share": 0.03, "noise_sd": 1.01, "where": null, "looks_like": null });
-        assert_eq!((remains(&noise), remains(&Value::Null)), (None, None));
-        let left = json!({ "share": 0.31, "floor_share": 0.06, "noise_sd": 5.2, "where": { "time": [[1.0, 1.2]], "band_hz": [20.0, 90.0] },
-            "looks_like": "backlash between motor and drum" });
+        let noise = Remaining { share: Some(0.03), floor_share: Some(0.03), noise_sd: Some(1.01), shows: None, looks_like: None };
+        assert_eq!(remains(&noise), None);
+        let left = Remaining {
+            share: Some(0.31),
+            floor_share: Some(0.06),
+            noise_sd: Some(5.2),
+            shows: Some(Where { time: vec![[1.0, 1.2]], band_hz: [20.0, 90.0], state: None, class: None }),
+            looks_like: Some("backlash between motor and drum".to_string()),
+        };
         let said = "31 % of the residual with the parameters refitted (the sensors' noise would be 6 %); 20.0 Hz to 90.0 Hz; most at 1.00 to 1.20 s; \
                     looks most like backlash between motor and drum";
         assert_eq!(remains(&left).as_deref(), Some(said));
     }
 
     #[test]
-    fn the_next_experiment_may_be_a_sentence_or_a_file() {
-        assert_eq!(next_experiment(&Value::Null), None);
-        let both = json!({ "file": "out/next.toml", "reason": "slower reversals" });
-        assert_eq!(next_experiment(&both).as_deref(), Some("slower reversals (next.toml)"));
+    fn where_no_experiment_would_tell_the_reason_is_told() {
+        let refused = NextExperiment::Refused(Refused { sentence: "No excitation tells them apart.".to_string() });
+        assert_eq!(next_experiment(&refused), "No excitation tells them apart.");
     }
 }

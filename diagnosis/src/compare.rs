@@ -69,20 +69,19 @@ pub fn unseen(problem: &Problem, records: &[Record], structure: &Structure, valu
     Some(Unseen { mean_square, correlation_time: correlation_time(&evaluator, &residuals) })
 }
 
-/// Normalised root mean squared error of a structure with these values, averaged over the recordings and their outputs; each over the
-/// output's own standard deviation. Where records start freely, or a number is free in a file, that is fitted first, and nothing else.
-pub fn nrmse(problem: &Problem, records: &[Record], structure: &Structure, values: &[f64]) -> Option<f64> {
+/// Mean squared error of a structure with these values at every output measured in every record, in the unit squared: record by record, outputs
+/// in the order of [`measured`]. Where records start freely, or a number is free in a file, that is fitted first, and nothing else. `None` where the
+/// structure cannot be simulated.
+pub fn mean_squares(problem: &Problem, records: &[Record], structure: &Structure, values: &[f64]) -> Option<Vec<f64>> {
     let predicted = predictions(problem, records, structure, values)?;
-    let (mut sum, mut count) = (0.0, 0usize);
+    let mut all = Vec::new();
     for (record, predicted) in records.iter().zip(&predicted) {
         for output in measured(record) {
             let (samples, column) = (record.outputs.get(output)?.as_deref()?, predicted.get(output)?.as_deref()?);
-            let error = column.iter().zip(samples).map(|(a, b)| (a - b) * (a - b)).sum::<f64>() / record.len as f64;
-            sum += error.sqrt() / record.spread[output];
-            count += 1;
+            all.push(column.iter().zip(samples).map(|(a, b)| (a - b) * (a - b)).sum::<f64>() / record.len as f64);
         }
     }
-    (count > 0).then(|| sum / count as f64)
+    Some(all)
 }
 
 /// How well an output of a record is predicted.

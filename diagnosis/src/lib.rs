@@ -2,13 +2,14 @@
 //!
 //! [`problem::Problem`] is a nominal model and its recordings; [`fit`] refits a structure by simulation error; a
 //! [`hypothesis::Hypothesis`] is a physics at a place; [`search`] finds which of them the recordings ask for, and
-//! [`verdict`] says what follows, as a file and a model.
+//! [`verdict`] says what follows, as a file and a model. [`diagnose::diagnose`] does all of it.
 
 // Printing panics where the other end is full or gone.
 #![cfg_attr(not(test), warn(clippy::print_stdout, clippy::print_stderr))]
 
 pub mod audit;
 pub mod compare;
+pub mod diagnose;
 pub mod evidence;
 pub mod experiment;
 pub mod fit;

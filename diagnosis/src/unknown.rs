@@ -6,7 +6,8 @@
 
 use crate::problem::{Problem, Record};
 use backdrive_plant::model::{InputKind, OutputKind};
-use serde::Serialize;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
 /// An input that was not recorded.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -77,7 +78,7 @@ impl Unknown {
 }
 
 /// What a fit says of an input that nobody measured.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Estimated {
     /// Name of the input.
     pub input: String,

@@ -1,34 +1,37 @@
 //! Physics and places in words, from one table: what headlines, texts and pages say in place of ids.
 
+use crate::hypothesis::Place;
 use crate::physics::physics_named;
-use serde_json::Value;
+use crate::verdict::types::{Estimate, Finding, Parameter};
 
 /// A physics in words; its name with spaces where the table has none.
 pub fn physics(name: &str) -> String {
     physics_named(name).map_or_else(|| name.replace('_', " "), |p| p.words.to_string())
 }
 
-/// Where a finding of a verdict sits, in words: `at the motor`, `between motor and drum`, `at the input or output force`.
-pub fn place(finding: &Value) -> String {
-    let ends: Vec<&str> = finding["between"].as_array().into_iter().flatten().filter_map(Value::as_str).collect();
-    match (ends.as_slice(), finding["signal"].as_str()) {
-        ([body, "ground"] | ["ground", body], _) => format!("at the {body}"),
-        ([a, b], _) => format!("between {a} and {b}"),
-        (_, Some(signal)) => format!("at the signal {signal}"),
-        _ => String::new(),
+/// Where a physics acts, in words: `at the motor`, `between motor and drum`, `at the signal force`.
+pub fn place(place: &Place) -> String {
+    match place {
+        Place::Between(a, b) if b == "ground" => format!("at the {a}"),
+        Place::Between(a, b) if a == "ground" => format!("at the {b}"),
+        Place::Between(a, b) => format!("between {a} and {b}"),
+        Place::Signal(signal) => format!("at the signal {signal}"),
     }
 }
 
+/// A physics at its place in words: `dry friction at the drum`.
+pub fn named(name: &str, at: &Place) -> String {
+    format!("{} {}", physics(name), place(at))
+}
+
 /// A finding of a verdict in words: `backlash between motor and drum, 0.31 mm`.
-pub fn finding(finding: &Value) -> String {
-    let name = finding["physics"].as_str().unwrap_or("");
-    let size = physics_named(name).and_then(|p| sized(&finding["parameters"][p.size])).map_or(String::new(), |s| format!(", {s}"));
-    format!("{} {}{size}", physics(name), place(finding))
+pub fn finding(finding: &Finding) -> String {
+    let size = physics_named(&finding.physics).and_then(|p| finding.parameters.get(p.size)).and_then(sized);
+    format!("{}{}", named(&finding.physics, &finding.place), size.map_or(String::new(), |size| format!(", {size}")))
 }
 
 /// What explanations that cannot be told apart have in common, and where they differ: `dry friction, at the motor or at the drum`.
-pub fn any_of(all: &[&Value]) -> String {
-    let names: Vec<&str> = all.iter().filter_map(|f| f["physics"].as_str()).collect();
+pub fn any_of(all: &[(&str, &Place)]) -> String {
     let unique = |items: Vec<String>| {
         let mut seen: Vec<String> = Vec::new();
         items.into_iter().for_each(|i| {
@@ -39,17 +42,20 @@ pub fn any_of(all: &[&Value]) -> String {
         seen.join(" or ")
     };
     let family = |name: &str| physics_named(name)?.family.words();
-    let kin = names.first().and_then(|n| family(n)).filter(|first| names.iter().all(|n| family(n) == Some(first)));
+    let kin = all.first().and_then(|first| family(first.0)).filter(|first| all.iter().all(|one| family(one.0) == Some(first)));
     match kin {
-        Some(kin) => format!("{kin}, {}", unique(all.iter().map(|f| place(f)).collect())),
-        None => unique(all.iter().map(|f| format!("{} {}", physics(f["physics"].as_str().unwrap_or("")), place(f))).collect()),
+        Some(kin) => format!("{kin}, {}", unique(all.iter().map(|one| place(one.1)).collect())),
+        None => unique(all.iter().map(|one| named(one.0, one.1)).collect()),
     }
 }
 
 /// A parameter of a verdict with three digits and its unit; `None` for a list.
-fn sized(parameter: &Value) -> Option<String> {
-    let (value, unit) = (parameter["value"].as_f64()?, parameter["unit"].as_str().unwrap_or(""));
-    let prefixed = matches!(unit, "m" | "s" | "N" | "rad");
+fn sized(parameter: &Parameter) -> Option<String> {
+    let Estimate { value, unit, .. } = match parameter {
+        Parameter::One(estimate) => estimate,
+        Parameter::List(_) => return None,
+    };
+    let prefixed = matches!(unit.as_str(), "m" | "s" | "N" | "rad");
     let (scale, prefix) = match value.abs() {
         x if prefixed && x > 0.0 && x < 1e-3 && unit != "N" && x < 1e-4 => (1e6, "µ"),
         x if prefixed && x > 0.0 && x < 0.1 => (1e3, "m"),
@@ -72,18 +78,24 @@ pub fn share(value: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use serde_json::json;
+    use std::collections::BTreeMap;
 
     #[test]
     fn a_finding_reads_in_words() {
-        let gap =
-            json!({ "physics": "backlash", "between": ["motor", "drum"], "parameters": { "gap": { "value": 0.00031, "unit": "m" } } });
-        assert_eq!(finding(&gap), "backlash between motor and drum, 0.31 mm");
-        let at = |body: &str, physics: &str| json!({ "physics": physics, "between": [body, "ground"] });
-        let (motor, drum) = (at("motor", "coulomb"), at("drum", "dahl"));
-        assert_eq!(any_of(&[&motor, &drum]), "dry friction, at the motor or at the drum");
-        let lag = json!({ "physics": "delay", "signal": "force" });
-        assert_eq!(any_of(&[&motor, &lag]), "dry friction at the motor or a delay at the signal force");
+        let between = |a: &str, b: &str| Place::Between(a.to_string(), b.to_string());
+        let gap = Estimate { value: 0.00031, ci95: [Some(0.0003), Some(0.00032)], unit: "m".to_string() };
+        let found = Finding {
+            physics: "backlash".to_string(),
+            place: between("motor", "drum"),
+            parameters: BTreeMap::from([("gap".to_string(), Parameter::One(gap))]),
+            replaces: Vec::new(),
+            confidence: 0.9,
+            alternatives: Vec::new(),
+        };
+        assert_eq!(finding(&found), "backlash between motor and drum, 0.31 mm");
+        let (motor, drum, force) = (between("motor", "ground"), between("drum", "ground"), Place::Signal("force".to_string()));
+        assert_eq!(any_of(&[("coulomb", &motor), ("dahl", &drum)]), "dry friction, at the motor or at the drum");
+        assert_eq!(any_of(&[("coulomb", &motor), ("delay", &force)]), "dry friction at the motor or a delay at the signal force");
     }
 
     #[test]

@@ -1,8 +1,8 @@
 //! The force that gave the physics away, the law over it, and the places that compete.
 
 use super::adds;
-use crate::diagnose::Found;
 use crate::recordings::file_name;
+use backdrive_diagnosis::diagnose::Diagnosis;
 use backdrive_diagnosis::evidence::{Curve, Evidence, Trace, evidence};
 use backdrive_diagnosis::hypothesis::{Against, Place};
 use backdrive_diagnosis::locate::{Candidate as Located, Location, Variable};
@@ -18,7 +18,7 @@ const LOOP: usize = 8;
 /// Places in the ranking that are shown at once.
 const PLACES: usize = 8;
 
-pub(super) fn section(page: &mut Page, found: &Found, best: &Candidate) {
+pub(super) fn section(page: &mut Page, found: &Diagnosis, best: &Candidate) {
     let mut drawn = false;
     if adds(best) {
         for which in 0..best.structure.added.len() {
@@ -46,11 +46,7 @@ pub(super) fn section(page: &mut Page, found: &Found, best: &Candidate) {
 /// A finding's physics and place in words, as a title.
 pub(super) fn in_words(best: &Candidate, which: usize) -> String {
     let Some(own) = best.structure.added.get(which) else { return String::new() };
-    let place = match &own.place {
-        Place::Between(a, b) => serde_json::json!({ "between": [a, b] }),
-        Place::Signal(name) => serde_json::json!({ "signal": name }),
-    };
-    super::capital(&format!("{} {}", words::physics(own.physics.name), words::place(&place))).trim_end_matches('.').to_string()
+    super::capital(&words::named(own.physics.name, &own.place)).trim_end_matches('.').to_string()
 }
 
 /// How a place reads.
@@ -239,7 +235,7 @@ fn fullest(curve: &Curve) -> std::ops::Range<usize> {
 }
 
 /// The force at the place that explains most, where no physics was named.
-fn map(page: &mut Page, found: &Found, place: &Located) {
+fn map(page: &mut Page, found: &Diagnosis, place: &Located) {
     let motion = found.problem.model.motion;
     let unit = if matches!(place.place, Place::Between(..)) { unit_for(motion, "N") } else { String::new() };
     let title = format!("latent force at {}", shown(&place.place));
@@ -284,7 +280,7 @@ fn map(page: &mut Page, found: &Found, place: &Located) {
 }
 
 /// The ranking, and what the sensors cannot tell apart.
-fn places(page: &mut Page, found: &Found, location: &Location) {
+fn places(page: &mut Page, found: &Diagnosis, location: &Location) {
     let mut table =
         Table::new(["place", "explains (log-likelihood)", "behind the best", "force needed, rms", "follows best", "not told apart from"]);
     let top = location.ranking.first().map_or(0.0, |c| c.evidence);

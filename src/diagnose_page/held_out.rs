@@ -1,9 +1,9 @@
 //! Measured beside predicted, and what is left over.
 
 use super::adds;
-use crate::diagnose::Found;
 use crate::recordings::file_name;
 use backdrive_diagnosis::compare::{Predicted, density, predictions, qualities};
+use backdrive_diagnosis::diagnose::Diagnosis;
 use backdrive_diagnosis::numbers::unit_of_output;
 use backdrive_diagnosis::problem::Record;
 use backdrive_diagnosis::search::Candidate;
@@ -23,7 +23,7 @@ struct Three<'a> {
     diagnosed: Option<&'a Predicted>,
 }
 
-pub(super) fn section(page: &mut Page, found: &Found, best: &Candidate) {
+pub(super) fn section(page: &mut Page, found: &Diagnosis, best: &Candidate) {
     let (problem, search) = (&found.problem, &found.search);
     let records = if problem.held_out.is_empty() { &problem.fit } else { &problem.held_out };
     let nominal = &search.nominal.structure;
@@ -77,7 +77,7 @@ pub(super) fn section(page: &mut Page, found: &Found, best: &Candidate) {
 }
 
 /// Whole record, the part where the models differ most, and what is left over in time and frequency.
-fn figures(page: &mut Page, found: &Found, three: &Three, output: usize) {
+fn figures(page: &mut Page, found: &Diagnosis, three: &Three, output: usize) {
     let problem = &found.problem;
     let (Some(Some(measured)), Some(shown)) = (three.record.outputs.get(output), problem.model.outputs.get(output)) else { return };
     let column = |p: Option<&'_ Predicted>| p.and_then(|p| p.get(output)).and_then(|c| c.clone());

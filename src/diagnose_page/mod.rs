@@ -4,20 +4,19 @@ mod force;
 mod held_out;
 mod tables;
 
-use crate::diagnose::{Found, MODEL};
-use crate::diagnose_text::{confidence, named, next_experiment, parameter, shows};
+use crate::diagnose_text::{alternatives, confidence, next_experiment, parameters, shows};
 use crate::page_parts::{command, ending};
 use backdrive_diagnosis::audit::Weight;
+use backdrive_diagnosis::diagnose::Diagnosis;
 use backdrive_diagnosis::search::Candidate;
-use backdrive_diagnosis::verdict::chosen;
+use backdrive_diagnosis::verdict::{MODEL_FILE, Verdict, Word, chosen};
 use backdrive_diagnosis::words;
 use backdrive_report::{Cell, Page, Table, Tone, percent};
-use serde_json::Value;
 
 /// What a report shows.
 pub struct Shown<'a> {
     /// What was found.
-    pub found: &'a Found,
+    pub found: &'a Diagnosis,
     /// The set, for the title.
     pub name: &'a str,
     /// What a reader should know first.
@@ -27,10 +26,9 @@ pub struct Shown<'a> {
 /// The report.
 pub fn page(shown: &Shown) -> Page {
     let found = shown.found;
-    let json = &found.said.json;
     let best = chosen(&found.search);
     let mut page = Page::new(&format!("Diagnosis of {} against {}", shown.name, found.problem.model.name));
-    page.lead(tone(json), &capital(&found.said.sentence));
+    page.lead(tone(found.verdict.word), &capital(&found.verdict.sentence));
     page.text(&summary(found, adds(best)));
     page.todo("What to do now", &to_do(found));
     for note in shown.notes {
@@ -44,7 +42,7 @@ pub fn page(shown: &Shown) -> Page {
     } else if found.search.exhausted {
         page.warning("The search ended before everything was tried.");
     }
-    findings(&mut page, json);
+    findings(&mut page, &found.verdict);
     page.section(if found.problem.held_out.is_empty() { "Recordings, as fitted" } else { "Recordings that no fit has seen" });
     held_out::section(&mut page, found, best);
     page.section("The force that is missing");
@@ -77,43 +75,42 @@ const TERMS: [(&str, &str); 8] = [
 ];
 
 /// What to do now, most useful first, with commands to copy.
-fn to_do(found: &Found) -> Vec<(String, Option<String>)> {
-    let json = &found.said.json;
-    let held = &json["held_out"];
+fn to_do(found: &Diagnosis) -> Vec<(String, Option<String>)> {
+    let held = &found.verdict.held_out;
     let mut items = Vec::new();
     // A canceller takes the model of a master: one that says where it is held, pushed and read.
     let is_master = !found.problem.model.axes.is_empty();
     let use_it = Some(match is_master {
-        true => format!("backdrive run launch/contact.toml --canceller {MODEL}"),
-        false => format!("backdrive simulate {MODEL} RECORDING.csv --out predicted.csv"),
+        true => format!("backdrive run launch/contact.toml --canceller {MODEL_FILE}"),
+        false => format!("backdrive simulate {MODEL_FILE} RECORDING.csv --out predicted.csv"),
     });
     let place = if is_master { ", such as in the canceller" } else { ", such as in a feed-forward or a simulation" };
-    let (before, after) = (held["nrmse_before"].as_f64().unwrap_or(f64::NAN), held["nrmse_after"].as_f64().unwrap_or(f64::NAN));
+    let (before, after) = (held.nrmse_before.unwrap_or(f64::NAN), held.nrmse_after.unwrap_or(f64::NAN));
     let worth = format!("its error is {} of what was measured, that of the model as given {}", percent(after), percent(before));
-    match json["verdict"].as_str() {
-        Some("missing" | "parameters") => {
-            items.push((format!("Use {MODEL}, beside this page, where the motion is predicted{place}: {worth}."), use_it));
+    match found.verdict.word {
+        Word::Missing | Word::Parameters => {
+            items.push((format!("Use {MODEL_FILE}, beside this page, where the motion is predicted{place}: {worth}."), use_it));
             if is_master {
                 items.push((
                     "See what it is worth in the loop: ask for the edge with it, in a bag of your contact task.".to_string(),
-                    Some(format!("backdrive stability RUN.mcap --canceller {MODEL} --html stability.html")),
+                    Some(format!("backdrive stability RUN.mcap --canceller {MODEL_FILE} --html stability.html")),
                 ));
             }
         }
-        Some("ambiguous") => items.push((
-            format!("{MODEL}, beside this page, may be used ({worth}), but hold what is built on it against the rivals below too."),
+        Word::Ambiguous => items.push((
+            format!("{MODEL_FILE}, beside this page, may be used ({worth}), but hold what is built on it against the rivals below too."),
             use_it,
         )),
-        Some("nothing_missing") => items.push(("Keep the model: the recordings ask for nothing more.".to_string(), None)),
-        Some("unexplained") => items.push((
+        Word::NothingMissing => items.push(("Keep the model: the recordings ask for nothing more.".to_string(), None)),
+        Word::Unexplained => items.push((
             "Do not build on a law yet: look below at when and where the residual shows, and check the sensors named there first."
                 .to_string(),
             None,
         )),
-        _ => {}
+        Word::CannotTell => {}
     }
-    if let Some(next) = next_experiment(&json["next_experiment"]) {
-        items.push((format!("Record next: {next}"), None));
+    if let Some(next) = &found.verdict.next_experiment {
+        items.push((format!("Record next: {}", next_experiment(next)), None));
     }
     if let Some(remark) = found.remarks.iter().find(|r| r.weight > Weight::Note && !r.signal.is_empty()) {
         items.push((format!("Check this signal: {remark}"), None));
@@ -134,25 +131,22 @@ fn adds(candidate: &Candidate) -> bool {
     !candidate.structure.added.is_empty()
 }
 
-fn tone(json: &Value) -> Tone {
-    match json["verdict"].as_str() {
-        Some("nothing_missing") => Tone::Good,
-        Some("parameters") => Tone::Limited,
-        Some("missing") => Tone::Warning,
-        Some("ambiguous" | "cannot_tell") => Tone::Unsure,
-        _ => Tone::Bad,
+fn tone(word: Word) -> Tone {
+    match word {
+        Word::NothingMissing => Tone::Good,
+        Word::Parameters => Tone::Limited,
+        Word::Missing => Tone::Warning,
+        Word::Ambiguous | Word::CannotTell => Tone::Unsure,
+        Word::Unexplained => Tone::Bad,
     }
 }
 
 /// How far it is explained, and where it shows.
-fn summary(found: &Found, added: bool) -> String {
-    let json = &found.said.json;
-    let held = &json["held_out"];
-    let of = |key: &str| held[key].as_f64();
+fn summary(found: &Diagnosis, added: bool) -> String {
+    let (verdict, held) = (&found.verdict, &found.verdict.held_out);
     let mut text = String::new();
     let on = if found.problem.held_out.is_empty() { "the fitted recordings" } else { "the held-out recordings" };
-    if let (Some(before), Some(refit), Some(after), Some(floor)) =
-        (of("nrmse_before"), of("nrmse_refit"), of("nrmse_after"), of("noise_floor"))
+    if let (Some(before), Some(refit), Some(after), Some(floor)) = (held.nrmse_before, held.nrmse_refit, held.nrmse_after, held.noise_floor)
     {
         // Where nothing was added, what is written as diagnosed is one of the two others.
         let diagnosed = if added { format!(", {} with the diagnosed model", percent(after)) } else { String::new() };
@@ -171,46 +165,29 @@ fn summary(found: &Found, added: bool) -> String {
             ));
         }
     }
-    let quiet = matches!(json["verdict"].as_str(), Some("nothing_missing" | "parameters"));
-    if !quiet && json["where"].is_object() {
-        text.push_str(&format!(" It shows {}.", shows(&json["where"])));
+    if let Some(place) = verdict.shows.as_ref().filter(|_| !verdict.word.is_structure_right()) {
+        text.push_str(&format!(" It shows {}.", shows(place)));
     }
     text
 }
 
 /// What is claimed.
-fn findings(page: &mut Page, json: &Value) {
-    let all = json["findings"].as_array().map_or(&[][..], Vec::as_slice);
+fn findings(page: &mut Page, verdict: &Verdict) {
+    let all = &verdict.findings;
     if all.is_empty() {
         return;
     }
-    let claimed = matches!(json["verdict"].as_str(), Some("missing" | "ambiguous"));
-    let replacing = all.iter().any(|f| f["replaces"].as_array().is_some_and(|r| !r.is_empty()));
-    let mut headers = vec![if claimed { "missing" } else { "nearest" }, "where", "parameters"];
+    let replacing = all.iter().any(|f| !f.replaces.is_empty());
+    let mut headers = vec![if verdict.word.claims() { "missing" } else { "nearest" }, "where", "parameters"];
     headers.extend(replacing.then_some("in place of"));
     headers.extend(["confidence", "or instead"]);
     let mut table = Table::new(headers);
     for finding in all {
-        let numbers: Vec<String> = finding["parameters"]
-            .as_object()
-            .map(|p| p.iter().map(|(key, value)| format!("{} {}", key.replace('_', " "), parameter(value))).collect())
-            .unwrap_or_default();
-        let replaced: Vec<&str> = finding["replaces"].as_array().into_iter().flatten().filter_map(Value::as_str).collect();
-        let others: Vec<String> = finding["alternatives"]
-            .as_array()
-            .into_iter()
-            .flatten()
-            .take(3)
-            .map(|a| format!("{} ({})", named(a), words::share(a["confidence"].as_f64().unwrap_or(0.0))))
-            .collect();
-        let sure = if finding["confidence"].as_f64().unwrap_or(0.0) > 0.8 { Tone::Good } else { Tone::Unsure };
-        let mut row = vec![
-            Cell::from(words::physics(finding["physics"].as_str().unwrap_or(""))),
-            words::place(finding).into(),
-            numbers.join("; ").into(),
-        ];
-        row.extend(replacing.then(|| Cell::from(replaced.join(", "))));
-        row.extend([Cell::tone(confidence(finding), sure), others.join("; ").into()]);
+        let sure = if finding.confidence > 0.8 { Tone::Good } else { Tone::Unsure };
+        let mut row =
+            vec![Cell::from(words::physics(&finding.physics)), words::place(&finding.place).into(), parameters(finding).join("; ").into()];
+        row.extend(replacing.then(|| Cell::from(finding.replaces.join(", "))));
+        row.extend([Cell::tone(confidence(finding.confidence), sure), alternatives(finding).join("; ").into()]);
         table.push(row);
     }
     page.table(table);

@@ -1,8 +1,8 @@
 //! Tables: hypotheses, numbers, records, the audit.
 
 use super::adds;
-use crate::diagnose::Found;
 use backdrive_diagnosis::audit::Weight;
+use backdrive_diagnosis::diagnose::Diagnosis;
 use backdrive_diagnosis::intervals::Spread;
 use backdrive_diagnosis::numbers::{Row, correlated, rows};
 use backdrive_diagnosis::search::{Candidate, advantage_over};
@@ -23,7 +23,7 @@ fn structure_in_words(candidate: &Candidate) -> String {
     }
 }
 
-pub(super) fn hypotheses(page: &mut Page, found: &Found, best: &Candidate) {
+pub(super) fn hypotheses(page: &mut Page, found: &Diagnosis, best: &Candidate) {
     let search = &found.search;
     page.text(&format!(
         "{} hypotheses were screened, {} structures fitted, in {} simulations of a recording.",
@@ -97,7 +97,7 @@ pub(super) fn hypotheses(page: &mut Page, found: &Found, best: &Candidate) {
     }
 }
 
-pub(super) fn numbers(page: &mut Page, found: &Found, best: &Candidate) {
+pub(super) fn numbers(page: &mut Page, found: &Diagnosis, best: &Candidate) {
     let problem = &found.problem;
     let nominal = &found.search.nominal;
     let (before_spread, after_spread) = (Spread::of(nominal), Spread::of(best));
@@ -155,7 +155,7 @@ pub(super) fn numbers(page: &mut Page, found: &Found, best: &Candidate) {
     }
 }
 
-pub(super) fn per_record(page: &mut Page, found: &Found) {
+pub(super) fn per_record(page: &mut Page, found: &Diagnosis) {
     let fits = &found.per_record;
     page.text(&format!("The nominal structure, refitted to each record alone: {}.", fits.sentence()));
     if fits.records.len() < 2 {
@@ -190,7 +190,7 @@ pub(super) fn per_record(page: &mut Page, found: &Found) {
     ));
 }
 
-pub(super) fn audit(page: &mut Page, found: &Found) {
+pub(super) fn audit(page: &mut Page, found: &Diagnosis) {
     let problem = &found.problem;
     let mut files = Table::new(["recording", "samples", "rate", "length", "used for"]);
     for (records, use_) in [(&problem.fit, "fits"), (&problem.held_out, "held out")] {

@@ -15,6 +15,7 @@ use ask::{Asker, Question, usage};
 use backdrive_bags::Reader;
 use backdrive_diagnosis::audit::{self, Weight};
 use backdrive_diagnosis::floor::step_of;
+use backdrive_diagnosis::verdict::Remark;
 use backdrive_plant::model::Hold;
 use backdrive_plant::recording::{Piece, Recording, Source, read_csv};
 use backdrive_report::number;
@@ -59,7 +60,7 @@ pub fn init(options: &cli::Init) -> Result<u8, Failure> {
         output::json(&json!({
             "model": model, "set": set, "fit": seen.fit, "held_out": seen.held_out,
             "start": { "inertia": seen.numbers.inertia, "damping": seen.numbers.damping, "stiffness": seen.numbers.stiffness, "from": seen.from },
-            "doubt": seen.doubt, "notes": opened.notes, "audit": audit::json(&remarks), "next": next,
+            "doubt": seen.doubt, "notes": opened.notes, "audit": remarks.iter().map(Remark::from).collect::<Vec<_>>(), "next": next,
         }))?;
         return Ok(0);
     }

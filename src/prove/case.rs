@@ -1,8 +1,8 @@
 //! One proof: draw and seal, record, diagnose, raise the gain, and only then look at the truth.
 
-use super::absolute;
 use super::chosen::{Chosen, Task, choose};
 use super::edges::{Canceller, Loop, Moved};
+use super::files::{absolute, ours, read, write};
 use super::hidden::{Hidden, Opened, program};
 use super::live::{self, LiveRun, hide};
 use super::score::{Finding, Handed, Mark, findings, is_nonlinear, mark, name_of};
@@ -11,12 +11,13 @@ use crate::cli;
 use crate::failure::Failure;
 use crate::output;
 use crate::progress::busy;
+use backdrive_diagnosis::verdict::{MODEL_FILE, VERDICT_FILE, Verdict, Word};
 use backdrive_sealed::seal::hash;
 use backdrive_sealed::truth::Truth;
 use serde::Serialize;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::process::Command;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use toml_edit::{Array, DocumentMut, Item, value};
@@ -76,8 +77,9 @@ pub struct Case {
     pub refitted: bool,
     /// SHA-256 of the truth, as printed before anything was recorded.
     pub sealed: String,
-    /// The verdict's word and sentence.
-    pub word: String,
+    /// The verdict in a word.
+    pub word: Word,
+    /// And in a sentence.
     pub sentence: String,
     /// What was found.
     pub findings: Vec<Finding>,
@@ -101,6 +103,60 @@ pub struct Case {
 
 /// Runs one case; its files stay in `folder`.
 pub fn prove(options: &cli::Prove, folder: &Path, drawn: &Draw, stop: &AtomicBool) -> Result<Case, Failure> {
+    let template: DocumentMut =
+        read(&options.session)?.parse().map_err(|e| Failure::input(format!("{}: {e}", options.session.display())))?;
+    let hidden = hidden_plant(options, folder, &template)?;
+    let digest = draw(options, &hidden, drawn)?;
+    let hand = if drawn.shows_hand { "" } else { "; nobody measures the hand" };
+    let masked = if drawn.refitted { "; the nominal numbers were refitted" } else { "" };
+    output::line(format_args!("{}: sealed, SHA-256 {digest}{hand}{masked}", folder.display()))?;
+
+    // From here to the verdict only the hidden plant's process opens the truth.
+    let record = |nominal: &Nominal, name: &str| {
+        let graph = folder.join(format!("{name}.toml"));
+        write(&graph, &graph_of(template.clone(), options, &hidden, nominal, &digest)?)?;
+        let (recorded, session) = (folder.join("recorded"), folder.join(name));
+        busy(&at(folder, "recording the session"), || {
+            ours(folder, &format!("run-{name}"), &[&"run", &graph, &"--out", &recorded, &"--overwrite"])
+        })?;
+        busy(&at(folder, "handing the bags over"), || hand_over(&recorded, &session, drawn.shows_hand, options.hand_bandwidth))?;
+        Ok::<PathBuf, Failure>(session)
+    };
+    let mut nominal = Nominal { model: hidden.model.clone(), grip: hidden.grip.clone() };
+    if drawn.refitted {
+        let before = record(&nominal, "before")?;
+        let model = PathBuf::from(absolute(&folder.join("nominal.toml"))?);
+        busy(&at(folder, "refitting the nominal parameters"), || refit(folder, "fit-before", &before, &model))?;
+        nominal = Nominal { model, grip: None };
+    }
+    let session = record(&nominal, "session")?;
+    let found = folder.join("diagnosis");
+    let effort = (options.effort * if drawn.shows_hand { 1.0 } else { LONGER }).to_string();
+    let patience = options.patience.to_string();
+    let arguments: [&dyn AsRef<std::ffi::OsStr>; 8] =
+        [&"diagnose", &session, &"--out", &found, &"--effort", &effort, &"--patience", &patience];
+    busy(&at(folder, "diagnosing"), || ours(folder, "diagnose", &arguments))?;
+    let path = found.join(VERDICT_FILE);
+    let verdict: Verdict =
+        serde_json::from_str(&read(&path)?).map_err(|e| Failure::input(format!("{}: is no verdict: {e}", path.display())))?;
+
+    let (cancellers, share) = match options.no_gains {
+        true => (Vec::new(), None),
+        false => cancellers(options, folder, &Session { nominal, session, found }, &verdict, stop)?,
+    };
+    // The verdict is written; now the truth is opened.
+    let truth = open_truth(&hidden, &digest)?;
+    let (gains, live) = raise(options, folder, &hidden, &truth, &cancellers, stop)?;
+    Ok(case(folder, drawn, digest, &verdict, &truth, Raised { gains, live, share }))
+}
+
+/// What is being done, for the status line.
+fn at(folder: &Path, doing: &str) -> String {
+    format!("{}: {doing}", folder.display())
+}
+
+/// The hidden plant of a case, with a folder made for its truth.
+fn hidden_plant(options: &cli::Prove, folder: &Path, template: &DocumentMut) -> Result<Hidden, Failure> {
     let sealed = folder.join("sealed");
     if sealed.exists() {
         return Err(Failure::input(format!(
@@ -108,8 +164,6 @@ pub fn prove(options: &cli::Prove, folder: &Path, drawn: &Draw, stop: &AtomicBoo
             sealed.display()
         )));
     }
-    let template: DocumentMut =
-        read(&options.session)?.parse().map_err(|e| Failure::input(format!("{}: {e}", options.session.display())))?;
     let rate_hz = template.get("rate_hz").and_then(|i| i.as_float().or(i.as_integer().map(|n| n as f64))).unwrap_or(5000.0);
     let hidden = Hidden {
         program: options.plant.clone().unwrap_or_else(program),
@@ -119,64 +173,71 @@ pub fn prove(options: &cli::Prove, folder: &Path, drawn: &Draw, stop: &AtomicBoo
         rate_hz,
     };
     std::fs::create_dir_all(&sealed).map_err(|e| Failure::write(&sealed, e))?;
-    let digest = draw(options, &hidden, drawn)?;
-    let hand = if drawn.shows_hand { "" } else { "; nobody measures the hand" };
-    let masked = if drawn.refitted { "; the nominal numbers were refitted" } else { "" };
-    output::line(format_args!("{}: sealed, SHA-256 {digest}{hand}{masked}", folder.display()))?;
+    Ok(hidden)
+}
 
-    let at = |doing: &str| format!("{}: {doing}", folder.display());
-    // From here to the verdict only the hidden plant's process opens the truth.
-    let record = |nominal: &Nominal, name: &str| {
-        let graph = folder.join(format!("{name}.toml"));
-        write(&graph, &graph_of(template.clone(), options, &hidden, nominal, &digest)?)?;
-        let (recorded, session) = (folder.join("recorded"), folder.join(name));
-        busy(&at("recording the session"), || {
-            ours(folder, &format!("run-{name}"), &[&"run", &graph, &"--out", &recorded, &"--overwrite"])
-        })?;
-        busy(&at("handing the bags over"), || hand_over(&recorded, &session, drawn.shows_hand, options.hand_bandwidth))?;
-        Ok::<PathBuf, Failure>(session)
-    };
-    let mut nominal = Nominal { model: hidden.model.clone(), grip: hidden.grip.clone() };
-    if drawn.refitted {
-        let before = record(&nominal, "before")?;
-        let model = PathBuf::from(absolute(&folder.join("nominal.toml"))?);
-        busy(&at("refitting the nominal parameters"), || refit(folder, "fit-before", &before, &model))?;
-        nominal = Nominal { model, grip: None };
-    }
-    let session = record(&nominal, "session")?;
-    let found = folder.join("diagnosis");
-    let effort = (options.effort * if drawn.shows_hand { 1.0 } else { LONGER }).to_string();
-    let patience = options.patience.to_string();
-    busy(&at("diagnosing"), || {
-        ours(folder, "diagnose", &[&"diagnose", &session, &"--out", &found, &"--effort", &effort, &"--patience", &patience])
-    })?;
-    let verdict: Value = serde_json::from_str(&read(&found.join("verdict.json"))?).map_err(Failure::input)?;
+/// What was handed over, and the folder of its diagnosis.
+struct Session {
+    nominal: Nominal,
+    session: PathBuf,
+    found: PathBuf,
+}
 
-    let error = |key: &str| verdict["held_out"][key].as_f64();
-    let floors_left = |key: &str| error(key).zip(error("noise_floor")).map(|(left, floor)| left / floor).filter(|x| x.is_finite());
+/// The cancellers whose gain is raised, and the share of the diagnosed estimate that was chosen.
+fn cancellers(
+    options: &cli::Prove,
+    folder: &Path,
+    of: &Session,
+    verdict: &Verdict,
+    stop: &AtomicBool,
+) -> Result<(Vec<Canceller>, Option<f64>), Failure> {
+    let Session { nominal, session, found } = of;
+    let fit = || all_cancellers(options, folder, nominal, session, found);
+    let mut cancellers = busy(&at(folder, "fitting models to compare with"), fit)?;
+    let (diagnosed, scaled) = (found.join(MODEL_FILE), folder.join("chosen.toml"));
+    let rivals: Vec<PathBuf> = verdict.rival_models.iter().map(|name| found.join(name)).collect();
+    let task = Task { graph: &options.contact, high_pass_hz: options.high_pass };
+    // What is unexplained is in the device and in no model at hand: what it does to the loop nobody can say, so nothing is cancelled. So is what
+    // an explanation leaves over that a proof would count as an effect.
+    let left = floors(verdict.held_out.nrmse_after, verdict);
+    let is_explained = verdict.word != Word::Unexplained && left.is_some_and(|floors| floors < SHOWS);
+    let choose = || choose(&diagnosed, &rivals, &scaled, &task, stop);
+    let chosen = if is_explained { busy(&at(folder, "choosing how much to cancel"), choose)? } else { Chosen::nothing() };
+    cancellers.push(Canceller { name: "chosen", model: (chosen.share > 0.0).then_some(scaled), grip: None });
+    Ok((cancellers, Some(chosen.share)))
+}
 
-    let (mut cancellers, mut share) = (Vec::new(), None);
-    if !options.no_gains {
-        cancellers = busy(&at("fitting models to compare with"), || all_cancellers(options, folder, &nominal, &session, &found))?;
-        let (diagnosed, scaled) = (found.join("model.diagnosed.toml"), folder.join("chosen.toml"));
-        let rivals = verdict["rival_models"].as_array().into_iter().flatten().filter_map(Value::as_str).map(|name| found.join(name));
-        let task = Task { graph: &options.contact, high_pass_hz: options.high_pass };
-        // What is unexplained is in the device and in no model at hand: what it does to the loop nobody can say, so nothing is cancelled. So is what
-        // an explanation leaves over that a proof would count as an effect.
-        let is_explained = verdict["verdict"] != "unexplained" && floors_left("nrmse_after").is_some_and(|floors| floors < SHOWS);
-        let choose = || choose(&diagnosed, &rivals.collect::<Vec<_>>(), &scaled, &task, stop);
-        let chosen = if is_explained { busy(&at("choosing how much to cancel"), choose)? } else { Chosen::nothing() };
-        cancellers.push(Canceller { name: "chosen", model: (chosen.share > 0.0).then_some(scaled), grip: None });
-        share = Some(chosen.share);
-    }
+/// An error on recordings that no fit has seen, over the noise floor.
+fn floors(error: Option<f64>, verdict: &Verdict) -> Option<f64> {
+    error.zip(verdict.held_out.noise_floor).map(|(left, floor)| left / floor).filter(|x| x.is_finite())
+}
 
-    // The verdict is written; now the truth is opened.
+/// The truth, which must be what was sealed.
+fn open_truth(hidden: &Hidden, digest: &str) -> Result<Truth, Failure> {
     let bytes = std::fs::read(&hidden.truth).map_err(|e| Failure::input(format!("{}: {e}", hidden.truth.display())))?;
     if hash(&bytes) != digest {
         return Err(Failure::input(format!("{}: is not what was sealed", hidden.truth.display())));
     }
-    let truth = Truth::from_json(&bytes).map_err(Failure::input)?;
-    let device = Arc::new(Opened::new(&hidden, &truth).map_err(Failure::input)?);
+    Truth::from_json(&bytes).map_err(Failure::input)
+}
+
+/// What the gain was raised to.
+struct Raised {
+    gains: Vec<Gain>,
+    live: Vec<LiveRun>,
+    share: Option<f64>,
+}
+
+/// Raises the gain with every canceller and grip, the hidden plant being the master; runs the live graph about some of the edges.
+fn raise(
+    options: &cli::Prove,
+    folder: &Path,
+    hidden: &Hidden,
+    truth: &Truth,
+    cancellers: &[Canceller],
+    stop: &AtomicBool,
+) -> Result<(Vec<Gain>, Vec<LiveRun>), Failure> {
+    let device = Arc::new(Opened::new(hidden, truth).map_err(Failure::input)?);
     let master = Moved::Hidden(&hidden.model, hidden.grip.as_deref(), device.clone());
     let the_loop = Loop { graph: &options.contact, high_pass_hz: options.high_pass, master };
     let further: &[f64] = if options.same_grip { &[] } else { &options.grips };
@@ -186,39 +247,41 @@ pub fn prove(options: &cli::Prove, folder: &Path, drawn: &Draw, stop: &AtomicBoo
             if stop.load(Ordering::SeqCst) {
                 break;
             }
-            let raising = at(&format!("raising the gain with canceller \"{}\" and {grip} of the grip", canceller.name));
+            let raising = at(folder, &format!("raising the gain with canceller \"{}\" and {grip} of the grip", canceller.name));
             let edge = busy(&raising, || the_loop.edge(canceller, *grip, stop))?;
             if *grip == 1.0 && LIVE.contains(&canceller.name) {
                 let live_folder = folder.join("live");
-                let about = || live::about(&live_folder, &the_loop, canceller, &edge, &hidden, &device);
-                live.extend(busy(&at("running the live graph"), about)?);
+                let about = || live::about(&live_folder, &the_loop, canceller, &edge, hidden, &device);
+                live.extend(busy(&at(folder, "running the live graph"), about)?);
             }
             let whole_range = edge.critical_gain.is_none() && edge.limited_from.is_none() && edge.at_least > 0.0;
             gains.push(Gain { canceller: canceller.name, grip: *grip, stable_to: edge.at_least, because: edge.reason, whole_range });
         }
     }
-    let (word, findings) = (verdict["verdict"].as_str().unwrap_or_default().to_string(), findings(&verdict));
-    Ok(Case {
+    Ok((gains, live))
+}
+
+/// What was found beside what was concealed.
+fn case(folder: &Path, drawn: &Draw, sealed: String, verdict: &Verdict, truth: &Truth, raised: Raised) -> Case {
+    let (held, findings) = (&verdict.held_out, findings(verdict));
+    let handed = Handed { hand_hidden: !drawn.shows_hand, refitted: drawn.refitted };
+    Case {
         name: folder.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned()),
         shows_hand: drawn.shows_hand,
         refitted: drawn.refitted,
-        share,
-        sealed: digest,
-        sentence: verdict["sentence"].as_str().unwrap_or_default().to_string(),
+        share: raised.share,
+        sealed,
+        word: verdict.word,
+        sentence: verdict.sentence.clone(),
         concealed: truth.effects.iter().map(name_of).collect(),
-        marks: truth
-            .effects
-            .iter()
-            .map(|e| mark(e, &word, &findings, Handed { hand_hidden: !drawn.shows_hand, refitted: drawn.refitted }))
-            .collect(),
-        nonlinear: is_nonlinear(&truth),
-        held_out: ["nrmse_before", "nrmse_refit", "nrmse_after"].map(error),
-        refit_floors: floors_left("nrmse_refit"),
-        word,
+        marks: truth.effects.iter().map(|e| mark(e, verdict.word, &findings, handed)).collect(),
+        nonlinear: is_nonlinear(truth),
+        held_out: [held.nrmse_before, held.nrmse_refit, held.nrmse_after],
+        refit_floors: floors(held.nrmse_refit, verdict),
         findings,
-        gains,
-        live,
-    })
+        gains: raised.gains,
+        live: raised.live,
+    }
 }
 
 impl Case {
@@ -269,7 +332,7 @@ impl Case {
             "  concealed   {}\n  found       {} ({})\n  held out    {given} as given, {refitted} refitted{floors}, {diagnosed} diagnosed",
             list(&self.concealed),
             list(&found),
-            self.word,
+            self.word.name(),
         );
         if !gains.is_empty() {
             text += &format!("\n  stable to   {}", gains.join(", "));
@@ -349,7 +412,7 @@ fn all_cancellers(options: &cli::Prove, folder: &Path, nominal: &Nominal, sessio
         Canceller { name: "nominal", model: Some(nominal.model.clone()), grip: nominal.grip.clone() },
         holds("second order", second),
         holds("linear, refitted", refitted),
-        holds("diagnosed", found.join("model.diagnosed.toml")),
+        holds("diagnosed", found.join(MODEL_FILE)),
     ])
 }
 
@@ -374,32 +437,4 @@ fn still(options: &cli::Prove, session: &Path) -> Result<PathBuf, Failure> {
     let still = session.join("still.toml");
     write(&still, &set.to_string())?;
     Ok(still)
-}
-
-/// Runs this program again as a process of its own, its output in a file beside the case; what it said.
-pub(super) fn ours(folder: &Path, name: &str, arguments: &[&dyn AsRef<std::ffi::OsStr>]) -> Result<String, Failure> {
-    let exe = std::env::current_exe().map_err(Failure::machine)?;
-    let log = folder.join(format!("{name}.log"));
-    let file = std::fs::File::create(&log).map_err(|e| Failure::write(&log, e))?;
-    let errors = file.try_clone().map_err(Failure::machine)?;
-    let mut command = Command::new(exe);
-    command.args(arguments).stdin(Stdio::null()).stdout(file).stderr(errors);
-    let status = command.status().map_err(Failure::machine)?;
-    let said = std::fs::read_to_string(&log).unwrap_or_default();
-    // 1 is a negative answer, which is one.
-    match status.code() {
-        Some(0 | 1 | 7) => Ok(said),
-        _ => {
-            let why = said.lines().rev().find_map(|line| line.strip_prefix("error: ")).unwrap_or("its output says why");
-            Err(Failure::input(format!("{name} ended with {status}: {why} ({})", log.display())))
-        }
-    }
-}
-
-fn read(path: &Path) -> Result<String, Failure> {
-    std::fs::read_to_string(path).map_err(|e| Failure::input(format!("{}: cannot be read: {e}", path.display())))
-}
-
-pub(super) fn write(path: &Path, text: &str) -> Result<(), Failure> {
-    crate::output::file(path, text)
 }

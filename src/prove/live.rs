@@ -1,8 +1,7 @@
 //! Whether the live graph agrees: processes over shared memory with the hidden plant in the master's place, just below an edge and just above it.
 
-use super::absolute;
-use super::case::{ours, write};
 use super::edges::{Canceller, Loop};
+use super::files::{absolute, ours, write};
 use super::hidden::{Hidden, Opened};
 use crate::failure::Failure;
 use backdrive_nodes::graph::{Graph, NodeKind, Settings};

@@ -3,6 +3,7 @@
 mod case;
 mod chosen;
 mod edges;
+mod files;
 pub mod hidden;
 mod live;
 mod page;
@@ -15,7 +16,6 @@ use crate::failure::{Failure, code};
 use crate::interrupt;
 use crate::output;
 use case::{Case, Draw};
-use std::path::Path;
 use std::process::ExitCode;
 use std::sync::atomic::Ordering;
 use summary::Summary;
@@ -109,9 +109,4 @@ fn write(options: &cli::Prove, cases: &[Case]) -> Result<(), Failure> {
 /// Joins a run in the place of its master, with a hidden plant's process behind.
 pub fn sealed_master(options: &cli::SealedMaster) -> ExitCode {
     backdrive_launch::join::join(|graph, node| hidden::core(graph, node, &options.word))
-}
-
-/// A path as text that a file of ours can hold wherever it lies.
-fn absolute(path: &Path) -> Result<String, Failure> {
-    std::path::absolute(path).map(|p| p.display().to_string()).map_err(|e| Failure::write(path, e))
 }

@@ -3,6 +3,7 @@
 use super::case::{Case, SHOWS};
 use super::summary::{Summary, Worth};
 use crate::cli;
+use backdrive_diagnosis::hypothesis::Place;
 use backdrive_diagnosis::words;
 use backdrive_report::{Cell, Figure, Page, Plot, Series, Table, Tone, number, percent};
 
@@ -96,15 +97,15 @@ fn concealed(case: &Case) -> String {
 fn in_words(name: &str) -> String {
     let Some((physics, place)) = name.split_once(' ') else { return words::physics(name) };
     let place = match place.split_once('-') {
-        Some((a, b)) => serde_json::json!({ "between": [a, b] }),
-        None => serde_json::json!({ "signal": place }),
+        Some((a, b)) => Place::Between(a.to_string(), b.to_string()),
+        None => Place::Signal(place.to_string()),
     };
-    format!("{} {}", words::physics(physics), words::place(&place)).trim_end().to_string()
+    words::named(physics, &place)
 }
 
 fn found(case: &Case) -> String {
     let names: Vec<String> = case.findings.iter().map(|f| in_words(&format!("{} {}", f.physics, f.place.join("-")))).collect();
-    let word = case.word.replace('_', " ");
+    let word = case.word.spoken();
     if names.is_empty() { format!("nothing ({word})") } else { format!("{} ({word})", names.join(", ")) }
 }
 

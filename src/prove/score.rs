@@ -1,9 +1,10 @@
 //! What was found against what was concealed. Nothing here is read before the verdict is written.
 
+use backdrive_diagnosis::hypothesis::Place;
+use backdrive_diagnosis::verdict::{Verdict, Word};
 use backdrive_sealed::effects::{Effect, Site};
 use backdrive_sealed::truth::Truth;
 use serde::Serialize;
-use serde_json::Value;
 
 /// A finding of a verdict.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -27,20 +28,17 @@ pub struct Mark {
     pub exact: bool,
 }
 
-/// The findings of a verdict file.
-pub fn findings(verdict: &Value) -> Vec<Finding> {
-    let list = verdict["findings"].as_array().map_or(&[][..], Vec::as_slice);
-    list.iter()
-        .map(|f| {
-            let names = |v: &Value| v.as_array().map(|a| a.iter().filter_map(|n| n.as_str().map(str::to_string)).collect());
-            let place = names(&f["between"]).or_else(|| f["signal"].as_str().map(|s| vec![s.to_string()])).unwrap_or_default();
-            Finding {
-                physics: f["physics"].as_str().unwrap_or_default().to_string(),
-                place,
-                confidence: f["confidence"].as_f64().unwrap_or(0.0),
-            }
-        })
-        .collect()
+/// The findings of a verdict.
+pub fn findings(verdict: &Verdict) -> Vec<Finding> {
+    let one = |f: &backdrive_diagnosis::verdict::Finding| Finding {
+        physics: f.physics.clone(),
+        place: match &f.place {
+            Place::Between(a, b) => vec![a.clone(), b.clone()],
+            Place::Signal(name) => vec![name.clone()],
+        },
+        confidence: f.confidence,
+    };
+    verdict.findings.iter().map(one).collect()
 }
 
 fn sits_at(finding: &Finding, site: &Site) -> bool {
@@ -64,9 +62,9 @@ pub struct Handed {
 
 /// Marks a verdict's findings for an effect. Where it can only be told from the model's numbers, or from what an unmeasured hand may do, the
 /// right verdict names nothing; and where those numbers were refitted before, they may be right already.
-pub fn mark(effect: &Effect, word: &str, findings: &[Finding], handed: Handed) -> Mark {
+pub fn mark(effect: &Effect, word: Word, findings: &[Finding], handed: Handed) -> Mark {
     let possible = || effect.accept.iter().filter(|answer| handed.hand_hidden || !answer.hand_hidden);
-    let says = |name: &str| name == word || handed.refitted && (name, word) == ("parameters", "nothing_missing");
+    let says = |name: &str| name == word.name() || handed.refitted && name == Word::Parameters.name() && word == Word::NothingMissing;
     if findings.is_empty() && possible().any(|answer| answer.physics.iter().any(|name| says(name))) {
         return Mark { place: true, family: true, exact: true };
     }
@@ -104,10 +102,10 @@ mod tests {
         let truth = r#"{ "physics": "inertia", "parameters": { "inertia": 0.1 }, "between": ["drum", "ground"], "replaces": [], "family": ["inertia"],
             "nonlinear": false, "in_formats": true, "accept": [{ "between": ["drum", "ground"], "physics": ["inertia", "parameters"] }] }"#;
         let effect: Effect = serde_json::from_str(truth).unwrap();
-        let right = |word: &str, refitted: bool| mark(&effect, word, &[], Handed { hand_hidden: false, refitted }).exact;
-        assert!(right("parameters", false) && right("parameters", true));
-        assert!(!right("nothing_missing", false) && right("nothing_missing", true));
-        assert!(!right("unexplained", true));
+        let right = |word: Word, refitted: bool| mark(&effect, word, &[], Handed { hand_hidden: false, refitted }).exact;
+        assert!(right(Word::Parameters, false) && right(Word::Parameters, true));
+        assert!(!right(Word::NothingMissing, false) && right(Word::NothingMissing, true));
+        assert!(!right(Word::Unexplained, true));
     }
 
     #[test]
@@ -117,7 +115,8 @@ mod tests {
             { "between": ["drum", "handle"], "physics": ["bias"], "hand_hidden": true }] }"#;
         let effect: Effect = serde_json::from_str(truth).unwrap();
         let found = Finding { physics: "bias".to_string(), place: vec!["drum".to_string(), "handle".to_string()], confidence: 1.0 };
-        let marked = |hand_hidden: bool| mark(&effect, "missing", std::slice::from_ref(&found), Handed { hand_hidden, refitted: false });
+        let marked =
+            |hand_hidden: bool| mark(&effect, Word::Missing, std::slice::from_ref(&found), Handed { hand_hidden, refitted: false });
         assert!(marked(true).exact && marked(true).place);
         assert!(!marked(false).exact && !marked(false).place && !marked(false).family);
     }

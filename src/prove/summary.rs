@@ -128,7 +128,7 @@ fn confusion(cases: &[Case]) -> Vec<(String, String, usize)> {
     let mut counts: BTreeMap<(String, String), usize> = BTreeMap::new();
     let kind = |name: &str| name.split(' ').next().unwrap_or_default().to_string();
     for case in cases {
-        let first = case.findings.first().map_or(case.word.clone(), |f| f.physics.clone());
+        let first = case.findings.first().map_or(case.word.name().to_string(), |f| f.physics.clone());
         let none = vec!["nothing".to_string()];
         for concealed in if case.concealed.is_empty() { &none } else { &case.concealed } {
             // With several effects that finding counts which has the effect's own name, if one has.

@@ -1,12 +1,13 @@
 //! The banded rotary friction device: from a stiff linkage and the same friction either way to the play and the friction of each direction.
 
-use crate::run::{Ask, LIKELY, diagnose, diagnosed_model, findings, instead, parameter, refit, refitted, said, write};
+use crate::run::{Ask, LIKELY, diagnose, diagnosed_model, findings, instead, parameter, percent, refit, refitted, said, write};
 use crate::table::Report;
 use crate::{Context, Study, StudyError, csv_columns};
 use backdrive_diagnosis::compare::{predictions, qualities};
 use backdrive_diagnosis::fit::{Effort, Evaluator};
 use backdrive_diagnosis::problem::{Problem, Record};
 use backdrive_diagnosis::structure::{Role, Structure};
+use backdrive_diagnosis::verdict::MODEL_FILE;
 use backdrive_plant::model::Model;
 
 pub(crate) const STUDY: Study = Study {
@@ -73,22 +74,22 @@ fn run(context: &Context) -> Result<Report, StudyError> {
     let effort = if context.quick { 1.05 } else { 6.25 };
     let ask = Ask { name: "", set: "set.toml", model: "model.toml", without: &[], effects: 3, effort };
     let found = diagnose(context, &ask)?;
-    let json = &found.said.json;
+    let verdict = &found.verdict;
     let model = diagnosed_model(context, &ask)?;
 
     let mut report = Report::new("Banded rotary friction device, from a stiff linkage and symmetric friction");
-    let named = findings(json);
-    let verdict = said(json);
-    report.word("verdict", &verdict);
+    let named = findings(verdict);
+    let words = said(verdict);
+    report.word("verdict", &words);
     let has = |physics: &str| named.iter().any(|(p, _)| p == physics);
     let both = has("backlash") && has("asymmetric_coulomb");
-    report.line("verdict", verdict, "play, friction by direction, compliance", "Coble et al. 2022", Some(both));
-    let others = instead(json, LIKELY);
+    report.line("verdict", words, "play, friction by direction, compliance", "Coble et al. 2022", Some(both));
+    let others = instead(verdict, LIKELY);
     report.word("instead", &others.join(" "));
     let text = if others.is_empty() { "nothing".to_string() } else { others.join(", ") };
     report.line("or instead", text, "", "", None);
     let middle = median(&mut dead);
-    if let Some((gap, [low, high])) = parameter(json, "backlash", "gap") {
+    if let Some((gap, [low, high])) = parameter(verdict, "backlash", "gap") {
         report.figure("gap", gap);
         let measured = format!("{:.2} mm ({:.2} to {:.2})", 1e3 * gap, 1e3 * low, 1e3 * high);
         let published = format!("{:.2} mm with the force below {:.0} % of its peak", 1e3 * middle, 100.0 * DEAD);
@@ -115,13 +116,12 @@ fn run(context: &Context) -> Result<Report, StudyError> {
         }
     }
     rival(&mut report, context, middle)?;
-    let held = &json["held_out"];
-    let percent = |key: &str| held[key].as_f64().map_or(f64::NAN, |x| 100.0 * x);
-    report.figure("held out before", percent("nrmse_refit"));
-    report.figure("held out after", percent("nrmse_after"));
-    let measured = format!("{:.1} % (nominal refitted: {:.1} %)", percent("nrmse_after"), percent("nrmse_refit"));
-    report.line("nrmse, held out, mean of six", measured, "", "", Some(percent("nrmse_after") < percent("nrmse_refit")));
-    let problem = Problem::open(&context.out.join("set.toml"), Some(&context.out.join(backdrive::diagnose::MODEL)))
+    let (before, after) = (percent(verdict.held_out.nrmse_refit), percent(verdict.held_out.nrmse_after));
+    report.figure("held out before", before);
+    report.figure("held out after", after);
+    let measured = format!("{after:.1} % (nominal refitted: {before:.1} %)");
+    report.line("nrmse, held out, mean of six", measured, "", "", Some(after < before));
+    let problem = Problem::open(&context.out.join("set.toml"), Some(&context.out.join(MODEL_FILE)))
         .map_err(|e| StudyError::Diagnosis(e.to_string()))?;
     for (records, fitted) in [(&problem.fit, true), (&problem.held_out, false)] {
         for (name, nrmse) in each(&problem, records)? {
@@ -143,7 +143,7 @@ fn rival(report: &mut Report, context: &Context, dead_zone: f64) -> Result<(), S
     let found = refit(context, &ask)?;
     let [gap, forward, backward] =
         ["elements.linkage.gap", "elements.band.positive", "elements.band.negative"].map(|path| refitted(&found, path));
-    let unseen = found.said.json["held_out"]["nrmse_refit"].as_f64().unwrap_or(f64::NAN);
+    let unseen = found.verdict.held_out.nrmse_refit.unwrap_or(f64::NAN);
     for (name, value) in [("rival gap", gap), ("rival forward", forward), ("rival backward", backward), ("rival held out", unseen)] {
         report.figure(name, value);
     }
@@ -234,7 +234,7 @@ fn with_own_friction(context: &Context, model: &Model, file: &str) -> Result<([f
     let fitted: Vec<String> = FILES[..FITTED].iter().map(|f| format!("\"{}\"", f.1)).collect();
     let text = format!(
         "model    = \"{}\"\nfit      = [{}]\nheld_out = [\"{file}\"]\ninitial  = \"rest\"\n\n[files.\"{file}\"]\ncondition = {{ {condition} }}\n",
-        backdrive::diagnose::MODEL,
+        MODEL_FILE,
         fitted.join(", ")
     );
     let set = context.out.join("set-36lb.toml");

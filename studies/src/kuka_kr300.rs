@@ -5,8 +5,8 @@ use crate::filter::LowPass;
 use crate::run::{Ask, diagnose, findings, parameter, said};
 use crate::table::Report;
 use crate::{Context, Study, StudyError, csv_columns};
-use backdrive::diagnose::Found;
 use backdrive_diagnosis::compare::{predictions, qualities};
+use backdrive_diagnosis::diagnose::Diagnosis;
 use backdrive_diagnosis::structure::Structure;
 use backdrive_diagnosis::verdict::chosen;
 
@@ -40,21 +40,20 @@ fn run(context: &Context) -> Result<Report, StudyError> {
         let (name, set, model) = (format!("axis-{axis}"), format!("set-{axis}.toml"), format!("axis-{axis}.toml"));
         let effort = if context.quick { 0.85 } else { 3.75 };
         let found = diagnose(context, &Ask { name: &name, set: &set, model: &model, without: &[], effects: 3, effort })?;
-        let json = &found.said.json;
-        let named = findings(json);
-        let verdict = said(json);
-        report.word(&name, &verdict);
+        let named = findings(&found.verdict);
+        let words = said(&found.verdict);
+        report.word(&name, &words);
         let at_arm = |place: &str| !["rotor-ground", "arm-ground", "ground-arm"].contains(&place);
         let first = named.first().is_some_and(|(p, _)| p == "delay");
         let flexible = named.iter().any(|(p, place)| FLEXIBLE.contains(&p.as_str()) && at_arm(place));
         report.line(
             &format!("axis {axis}"),
-            verdict,
+            words,
             "timing skew, not flexibility",
             "the encoders' difference against speed",
             Some(first && !flexible),
         );
-        let delay = parameter(json, "delay", "delay");
+        let delay = parameter(&found.verdict, "delay", "delay");
         let (value, [low, high]) = delay.unwrap_or((f64::NAN, [f64::NAN; 2]));
         // A late arm and a motor that is ahead are one skew.
         report.figure(&format!("{name} skew"), 1e3 * value.abs());
@@ -89,7 +88,7 @@ fn run(context: &Context) -> Result<Report, StudyError> {
 }
 
 /// Normalised error of each output over the runs that no fit has seen.
-fn unseen(found: &Found, structure: &Structure, values: &[f64]) -> Result<Vec<(String, f64)>, StudyError> {
+fn unseen(found: &Diagnosis, structure: &Structure, values: &[f64]) -> Result<Vec<(String, f64)>, StudyError> {
     let records = &found.problem.held_out;
     let failed = || StudyError::Diagnosis("the model cannot be simulated on the unseen runs".to_string());
     let predicted = predictions(&found.problem, records, structure, values).ok_or_else(failed)?;

@@ -1,8 +1,9 @@
 //! A motor turned slowly: cogging, one harmonic of the turn after the other.
 
-use crate::run::{Ask, diagnose, findings, parameter, said};
+use crate::run::{Ask, diagnose, parameter, percent, said};
 use crate::table::Report;
 use crate::{Context, Study, StudyError, csv_columns};
+use backdrive_diagnosis::verdict::MODEL_FILE;
 use std::f64::consts::TAU;
 
 pub(crate) const STUDY: Study = Study {
@@ -68,21 +69,22 @@ fn run(context: &Context) -> Result<Report, StudyError> {
                 effort: if context.quick { 0.6 } else { 1.25 },
             },
         )?;
-        let json = &found.said.json;
-        report.word(&name, &said(json));
-        report.line(&format!("round {round}"), said(json), "", "", None);
-        let held = |key: &str| json["held_out"][key].as_f64().map_or(f64::NAN, |x| 100.0 * x);
+        let verdict = &found.verdict;
+        report.word(&name, &said(verdict));
+        report.line(&format!("round {round}"), said(verdict), "", "", None);
         if round == 1 {
-            first = held("nrmse_refit");
+            first = percent(verdict.held_out.nrmse_refit);
         }
-        last = held("nrmse_after");
-        if let (Some((period, _)), Some((amplitude, _))) = (parameter(json, "cogging", "period"), parameter(json, "cogging", "amplitude")) {
+        last = percent(verdict.held_out.nrmse_after);
+        if let (Some((period, _)), Some((amplitude, _))) =
+            (parameter(verdict, "cogging", "period"), parameter(verdict, "cogging", "amplitude"))
+        {
             ripples.push(Ripple { harmonic: TAU / period, amplitude: amplitude.abs() / TORQUE });
         }
-        if findings(json).is_empty() {
+        if verdict.findings.is_empty() {
             break;
         }
-        model = format!("{name}/{}", backdrive::diagnose::MODEL);
+        model = format!("{name}/{}", MODEL_FILE);
     }
     // The map's own harmonics, strongest first, and with the other motor taken away.
     let (with, alone) = (harmonics(&maps[0]), harmonics(&maps[1]));

@@ -1,6 +1,6 @@
 //! A piezo stack: from a spring to rate-independent hysteresis, and a lag beside it that no amplitude changes.
 
-use crate::run::{Ask, diagnose, diagnosed_model, findings, said};
+use crate::run::{Ask, diagnose, diagnosed_model, findings, percent, said};
 use crate::table::Report;
 use crate::{Context, Study, StudyError, csv_columns};
 use backdrive_plant::model::Model;
@@ -27,16 +27,16 @@ fn run(context: &Context) -> Result<Report, StudyError> {
     let effort = if context.quick { 1.05 } else { 6.25 };
     let ask = Ask { name: "", set: "set.toml", model: "model.toml", without: &[], effects: 3, effort };
     let found = diagnose(context, &ask)?;
-    let json = &found.said.json;
+    let verdict = &found.verdict;
     let model = diagnosed_model(context, &ask)?;
 
     let mut report = Report::new("Piezo stack P-885.91, from a linear spring");
-    let verdict = said(json);
-    report.word("verdict", &verdict);
-    let named = findings(json);
+    let words = said(verdict);
+    report.word("verdict", &words);
+    let named = findings(verdict);
     let has = |all: &[&str]| named.iter().any(|(p, _)| all.contains(&p.as_str()));
     let both = has(&HYSTERESIS) && has(&LAG);
-    report.line("verdict", verdict, "hysteresis with minor loops, and a delay", "Aye & Ang 2018", Some(both));
+    report.line("verdict", words, "hysteresis with minor loops, and a delay", "Aye & Ang 2018", Some(both));
 
     // A force that depends on the path only turns with its drive: what comes later at the turning points is no hysteresis.
     let small = turning_lags(&ramps[0], &ramps[1], 0.25);
@@ -56,12 +56,11 @@ fn run(context: &Context) -> Result<Report, StudyError> {
     report.figure("delay", transport);
     let shift = format!("{:.0} ms: one sample, by which their script shifts", 1e3 * PERIOD);
     report.line("of that, pure delay", format!("{transport:.1} ms"), shift, "Aye & Ang 2018, Step02_ChkCurves.m", None);
-    let held = &json["held_out"];
-    let percent = |key: &str| held[key].as_f64().map_or(f64::NAN, |x| 100.0 * x);
-    report.figure("held out before", percent("nrmse_refit"));
-    report.figure("held out after", percent("nrmse_after"));
-    let measured = format!("{:.1} % (spring refitted: {:.1} %)", percent("nrmse_after"), percent("nrmse_refit"));
-    report.line("nrmse, ramps of amplitude, unseen", measured, "", "", Some(percent("nrmse_after") < 0.4 * percent("nrmse_refit")));
+    let (before, after) = (percent(verdict.held_out.nrmse_refit), percent(verdict.held_out.nrmse_after));
+    report.figure("held out before", before);
+    report.figure("held out after", after);
+    let measured = format!("{after:.1} % (spring refitted: {before:.1} %)");
+    report.line("nrmse, ramps of amplitude, unseen", measured, "", "", Some(after < 0.4 * before));
     report.notes.push(
         "A delay alone would make the loop of a sine an ellipse whose width grows with the rate and whose relative width does not depend on the \
          amplitude; a path-dependent force turns with its drive. The jump from 0 V at the start of each record tells a delay from a first-order lag."

@@ -1,12 +1,13 @@
 //! A diagnosis as `backdrive diagnose` makes it, from a set whose recordings lie elsewhere.
 
 use crate::{Context, StudyError};
-use backdrive::diagnose::{Diagnosed, Found, MODEL, REPORT, diagnose_into};
+use backdrive::diagnose::{Diagnosed, REPORT, diagnose_into};
 use backdrive::recordings;
+use backdrive_diagnosis::diagnose::Diagnosis;
 use backdrive_diagnosis::physics::PHYSICS;
 use backdrive_diagnosis::search::Settings;
+use backdrive_diagnosis::verdict::{Estimate, Finding, MODEL_FILE, Parameter, Verdict};
 use backdrive_plant::model::Model;
-use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 use toml_edit::{Array, DocumentMut, Item};
@@ -33,7 +34,7 @@ pub struct Ask<'a> {
 ///
 /// # Errors
 /// When a file cannot be read or written, or the diagnosis fails.
-pub fn diagnose(context: &Context, ask: &Ask) -> Result<Found, StudyError> {
+pub fn diagnose(context: &Context, ask: &Ask) -> Result<Diagnosis, StudyError> {
     let out = if ask.name.is_empty() { context.out.to_path_buf() } else { context.out.join(ask.name) };
     std::fs::create_dir_all(&out).map_err(|e| StudyError::Write(format!("{}: cannot be made: {e}", out.display())))?;
     // What the study made itself, a set of what it simulated or a model that it found, lies with its results.
@@ -60,13 +61,13 @@ pub fn diagnose(context: &Context, ask: &Ask) -> Result<Found, StudyError> {
 ///
 /// # Errors
 /// As [`diagnose`].
-pub fn refit(context: &Context, ask: &Ask) -> Result<Found, StudyError> {
+pub fn refit(context: &Context, ask: &Ask) -> Result<Diagnosis, StudyError> {
     let all: Vec<&str> = PHYSICS.iter().map(|p| p.name).collect();
     diagnose(context, &Ask { without: &all, ..ask.clone() })
 }
 
 /// A number of the nominal structure as the refit has it, by its path; NaN where the model states none.
-pub fn refitted(found: &Found, path: &str) -> f64 {
+pub fn refitted(found: &Diagnosis, path: &str) -> f64 {
     let (problem, nominal) = (&found.problem, &found.search.nominal);
     let values = nominal.structure.stated_of(problem, &nominal.fit.values);
     problem.stated.iter().zip(values).find(|(s, _)| s.path == path).map_or(f64::NAN, |(_, v)| v)
@@ -77,7 +78,7 @@ pub fn refitted(found: &Found, path: &str) -> f64 {
 /// # Errors
 /// When it cannot be read.
 pub fn diagnosed_model(context: &Context, ask: &Ask) -> Result<Model, StudyError> {
-    Ok(Model::load(&context.out.join(ask.name).join(MODEL))?)
+    Ok(Model::load(&context.out.join(ask.name).join(MODEL_FILE))?)
 }
 
 /// The text of a set with its model beside it and its recordings where they are: the first folder that holds each. Files under `[files]`
@@ -114,19 +115,14 @@ fn resolve(text: &str, folders: &[&Path]) -> Result<String, String> {
 }
 
 /// Names of the physics of a verdict's findings, most important first, each with its place.
-pub fn findings(verdict: &Value) -> Vec<(String, String)> {
-    let one = |finding: &Value| {
-        let ends = finding["between"].as_array().map(|ends| ends.iter().filter_map(Value::as_str).collect::<Vec<_>>().join("-"));
-        let place = ends.or_else(|| finding["signal"].as_str().map(str::to_string)).unwrap_or_default();
-        (finding["physics"].as_str().unwrap_or("").to_string(), place)
-    };
-    verdict["findings"].as_array().into_iter().flatten().map(one).collect()
+pub fn findings(verdict: &Verdict) -> Vec<(String, String)> {
+    verdict.findings.iter().map(|finding| (finding.physics.clone(), finding.place.to_string())).collect()
 }
 
 /// What a verdict says, in one line: its word and the physics it names.
-pub fn said(verdict: &Value) -> String {
+pub fn said(verdict: &Verdict) -> String {
     let named: Vec<String> = findings(verdict).into_iter().map(|(physics, place)| format!("{physics} at {place}")).collect();
-    let word = verdict["verdict"].as_str().unwrap_or("").replace('_', " ");
+    let word = verdict.word.spoken();
     if named.is_empty() { word } else { format!("{word}: {}", named.join(", ")) }
 }
 
@@ -134,14 +130,12 @@ pub fn said(verdict: &Value) -> String {
 pub const LIKELY: f64 = 0.05;
 
 /// What could be instead of each finding, as the verdict says, with a confidence above this.
-pub fn instead(verdict: &Value, least: f64) -> Vec<String> {
+pub fn instead(verdict: &Verdict, least: f64) -> Vec<String> {
     let mut all = Vec::new();
-    for finding in verdict["findings"].as_array().into_iter().flatten() {
-        let own = finding["physics"].as_str().unwrap_or("");
-        for other in finding["alternatives"].as_array().into_iter().flatten() {
-            let confidence = other["confidence"].as_f64().unwrap_or(0.0);
-            let text = format!("{} for {own} ({confidence:.2})", other["physics"].as_str().unwrap_or(""));
-            if confidence > least && !all.contains(&text) {
+    for finding in &verdict.findings {
+        for other in finding.alternatives.iter().filter(|other| other.confidence > least) {
+            let text = format!("{} for {} ({:.2})", other.physics, finding.physics, other.confidence);
+            if !all.contains(&text) {
                 all.push(text);
             }
         }
@@ -150,10 +144,17 @@ pub fn instead(verdict: &Value, least: f64) -> Vec<String> {
 }
 
 /// Value and 95 % interval of a finding's parameter; `None` where it is a list or not there.
-pub fn parameter(verdict: &Value, physics: &str, key: &str) -> Option<(f64, [f64; 2])> {
-    let finding = verdict["findings"].as_array()?.iter().find(|f| f["physics"] == physics)?;
-    let p = &finding["parameters"][key];
-    Some((p["value"].as_f64()?, [p["ci95"][0].as_f64()?, p["ci95"][1].as_f64()?]))
+pub fn parameter(verdict: &Verdict, physics: &str, key: &str) -> Option<(f64, [f64; 2])> {
+    let named = |finding: &&Finding| finding.physics == physics;
+    match verdict.findings.iter().find(named)?.parameters.get(key)? {
+        Parameter::One(Estimate { value, ci95: [Some(low), Some(high)], .. }) => Some((*value, [*low, *high])),
+        Parameter::One(_) | Parameter::List(_) => None,
+    }
+}
+
+/// An error of a verdict in percent; NaN where there is none.
+pub fn percent(error: Option<f64>) -> f64 {
+    error.map_or(f64::NAN, |x| 100.0 * x)
 }
 
 /// Reads a text file.

@@ -47,14 +47,14 @@ fn run(context: &Context) -> Result<Report, StudyError> {
     let ask =
         Ask { name: "", set: "set.toml", model: "model.toml", without: &[], effects: 3, effort: if context.quick { 0.85 } else { 2.5 } };
     let found = diagnose(context, &ask)?;
-    let json = &found.said.json;
+    let verdict = &found.verdict;
     let model = diagnosed_model(context, &ask)?;
 
     let mut report = Report::new("Silverbox, from the linear model");
-    let verdict = said(json);
-    report.word("verdict", &verdict);
-    let named = parameter(json, "cubic_spring", "cubic");
-    report.line("verdict", verdict, "cubic stiffness, hardening", "Wigren & Schoukens 2013", Some(named.is_some_and(|(k, _)| k > 0.0)));
+    let words = said(verdict);
+    report.word("verdict", &words);
+    let named = parameter(verdict, "cubic_spring", "cubic");
+    report.line("verdict", words, "cubic stiffness, hardening", "Wigren & Schoukens 2013", Some(named.is_some_and(|(k, _)| k > 0.0)));
     for (what, path, published) in [
         ("mass", "bodies.mass", 5.375e-6),
         ("stiffness", "elements.spring.stiffness", 0.9903),

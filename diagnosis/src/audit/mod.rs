@@ -9,12 +9,12 @@ pub use rates::rates;
 use crate::problem::{Problem, Record};
 use backdrive_plant::model::{InputKind, OutputKind};
 use backdrive_plant::set::Initial;
-use serde::Serialize;
-use serde_json::{Value, json};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 use signals::{answers, clipped_share, is_constant, off_grid, quiet_top};
 
 /// How much a finding matters.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Weight {
     /// Good to know.
@@ -62,12 +62,6 @@ impl std::fmt::Display for Remark {
     fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
         write!(f, "{}: {}", self.place(), self.text)
     }
-}
-
-/// The remarks as a verdict file has them under `audit`: what was looked at, where, what was seen, and how much it matters.
-pub fn json(remarks: &[Remark]) -> Value {
-    let one = |r: &Remark| json!({ "what": r.about, "where": r.place(), "message": r.text, "weight": r.weight });
-    Value::Array(remarks.iter().map(one).collect())
 }
 
 /// Distance from the even grid, in sample periods, above which a clock is called uneven.

@@ -25,7 +25,6 @@ use backdrive_plant::write::round_significant;
 use menu::{Stand, plays};
 use rayon::prelude::*;
 use rivals::{Rival, Scene, Sensors, Trial};
-use serde_json::{Value as Json, json};
 use words::short;
 
 /// An experiment that was not made yet.
@@ -53,25 +52,6 @@ pub struct Experiment {
     pub duration: f64,
     /// Sampling rate that it was planned for, Hz.
     pub rate_hz: f64,
-}
-
-impl Experiment {
-    /// The entry of a verdict file; `file` is where [`Experiment::text`] is written.
-    pub fn json(&self, file: &str) -> Json {
-        json!({
-            "file": file,
-            "input": self.input,
-            "excitation": self.excitation,
-            "sentence": self.sentence,
-            "between": self.between,
-            "separation_sd": round_significant(self.separation, 3),
-            "level_floors": round_significant(self.level, 3),
-            "output": self.output,
-            "repeats": self.repeats,
-            "duration_s": round_significant(self.duration, 6),
-            "rate_hz": self.rate_hz,
-        })
-    }
 }
 
 /// Why there is no experiment, in one sentence that says what would help.

@@ -1,10 +1,11 @@
 //! The class of a force: odd or even, with memory or without, dependent on rate or not, and what energy it takes.
 
 use super::law::{Law, Samples, Variable};
-use serde::Serialize;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
 /// What kind of force it is, whatever its name.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Character {
     /// Share of the force's mean over velocity and displacement that turns its sign with the motion; 1 is odd, 0 even.
     pub odd_share: f64,
@@ -14,7 +15,7 @@ pub struct Character {
     pub rate_dependent: bool,
     /// Energy that it takes from the device in a cycle, J: the median over cycles.
     pub dissipated_per_cycle: f64,
-    /// Exponent of that energy over the amplitude of the cycle: 1 is dry friction, 2 viscous or hysteretic; `None` where amplitudes hardly differ.
+    /// Exponent of that energy over the amplitude of the cycle: 1 is dry friction, 2 viscous or hysteretic; none (in files null) where amplitudes hardly differ.
     pub energy_exponent: Option<f64>,
     /// Cycles that it was taken from.
     pub cycles: usize,

@@ -1,13 +1,15 @@
 //! What was found: each physics with its place, its numbers, and what else could stand there.
 
 use super::choice::{contains, evidence};
-use crate::hypothesis::{Hypothesis, Place};
+use super::rounded::rounded;
+use super::types::{Alternative, Detectable, Estimate, Estimates, Finding, Moved, Parameter};
+use crate::hypothesis::Hypothesis;
 use crate::intervals::Spread;
 use crate::problem::Problem;
 use crate::search::{Candidate, Search};
 use crate::structure::Role;
 use backdrive_plant::write::round_significant;
-use serde_json::{Value as Json, json};
+use std::collections::BTreeMap;
 
 /// Level and correlation time (samples) up to which what is left over is measuring error beyond doubt.
 const NOISE_LEVEL: f64 = 1.05;
@@ -23,51 +25,48 @@ pub(super) fn adequacy(best: &Candidate) -> f64 {
     (size * whiteness).max(0.05)
 }
 
-pub(super) fn findings(search: &Search, best: &Candidate, spread: &Spread, adequacy: f64) -> Vec<Json> {
-    let total = best.structure.added.len();
-    let mut all: Vec<(f64, Json)> = Vec::new();
-    for (h, hypothesis) in best.structure.added.iter().enumerate() {
-        let rivals = rivals(search, best, h);
-        // The weight of each, softened: a simulator is never the device.
-        // A richer law at the same place that fits no better is the same law.
-        let nested = |rival: &Hypothesis| rival.place.same(&hypothesis.place) && contains(rival.physics, hypothesis);
-        let weight = |(rival, behind): &(Hypothesis, f64)| (-behind.max(0.0) / 20.0).exp() * if nested(rival) { 0.1 } else { 1.0 };
-        let weights: Vec<f64> = rivals.iter().map(weight).collect();
-        // And of those that promised as much, but were not fitted: little, for they did not win their race.
-        let own = search.tried.iter().find(|t| t.id == hypothesis.id).map_or(1.0, |t| t.promised);
-        let unfitted = search.tried.iter().filter(|t| t.taken.is_none() && t.promised > 0.9 * own).count() as f64;
-        let sum = 1.0 + weights.iter().sum::<f64>() + 0.02 * unfitted.min(10.0);
-        let alternatives: Vec<Json> = rivals
-            .iter()
-            .zip(&weights)
-            .take(6)
-            .map(|((rival, _), weight)| {
-                let mut entry = place(&rival.place);
-                entry["physics"] = json!(rival.physics.name);
-                entry["confidence"] = json!(round_significant(weight / sum, 3));
-                entry
-            })
-            .collect();
-        let mut entry = place(&hypothesis.place);
-        entry["physics"] = json!(hypothesis.physics.name);
-        entry["parameters"] = parameters_of(best, spread, h);
-        entry["replaces"] = json!(hypothesis.replaces);
-        entry["confidence"] = json!(round_significant(adequacy / sum, 3));
-        entry["alternatives"] = json!(alternatives);
-        // What the cost would be without it tells how important it is.
-        let without = search
-            .found
-            .iter()
-            .filter(|c| {
-                c.structure.added.len() + 1 == total
-                    && c.structure.added.iter().all(|o| o.id != hypothesis.id && best.structure.added.iter().any(|b| b.id == o.id))
-            })
-            .map(|c| c.fit.cost)
-            .fold(search.nominal.fit.cost, f64::min);
-        all.push((without, entry));
-    }
+/// Each physics of a structure with its rivals, most important first.
+pub(super) fn findings(search: &Search, best: &Candidate, spread: &Spread, adequacy: f64) -> Vec<Finding> {
+    let one = |which| (cost_without(search, best, which), finding(search, best, spread, adequacy, which));
+    let mut all: Vec<(f64, Finding)> = (0..best.structure.added.len()).map(one).collect();
     all.sort_by(|a, b| b.0.total_cmp(&a.0));
-    all.into_iter().map(|(_, entry)| entry).collect()
+    all.into_iter().map(|(_, finding)| finding).collect()
+}
+
+fn finding(search: &Search, best: &Candidate, spread: &Spread, adequacy: f64, which: usize) -> Finding {
+    let hypothesis = &best.structure.added[which];
+    let rivals = rivals(search, best, which);
+    // The weight of each, softened: a simulator is never the device.
+    // A richer law at the same place that fits no better is the same law.
+    let nested = |rival: &Hypothesis| rival.place.same(&hypothesis.place) && contains(rival.physics, hypothesis);
+    let weight = |(rival, behind): &(Hypothesis, f64)| (-behind.max(0.0) / 20.0).exp() * if nested(rival) { 0.1 } else { 1.0 };
+    let weights: Vec<f64> = rivals.iter().map(weight).collect();
+    // And of those that promised as much, but were not fitted: little, for they did not win their race.
+    let own = search.tried.iter().find(|t| t.id == hypothesis.id).map_or(1.0, |t| t.promised);
+    let unfitted = search.tried.iter().filter(|t| t.taken.is_none() && t.promised > 0.9 * own).count() as f64;
+    let sum = 1.0 + weights.iter().sum::<f64>() + 0.02 * unfitted.min(10.0);
+    let alternative = |((rival, _), weight): (&(Hypothesis, f64), &f64)| Alternative {
+        physics: rival.physics.name.to_string(),
+        place: rival.place.clone(),
+        confidence: round_significant(weight / sum, 3),
+    };
+    Finding {
+        physics: hypothesis.physics.name.to_string(),
+        place: hypothesis.place.clone(),
+        parameters: parameters_of(best, spread, which),
+        replaces: hypothesis.replaces.clone(),
+        confidence: round_significant(adequacy / sum, 3),
+        alternatives: rivals.iter().zip(&weights).take(6).map(alternative).collect(),
+    }
+}
+
+/// What the cost would be without one of the physics: that tells how important it is.
+fn cost_without(search: &Search, best: &Candidate, which: usize) -> f64 {
+    let (added, id) = (&best.structure.added, &best.structure.added[which].id);
+    let is_rest = |c: &&Candidate| {
+        c.structure.added.len() + 1 == added.len() && c.structure.added.iter().all(|o| o.id != *id && added.iter().any(|b| b.id == o.id))
+    };
+    search.found.iter().filter(is_rest).map(|c| c.fit.cost).fold(search.nominal.fit.cost, f64::min)
 }
 
 /// What stands in the place of one hypothesis in structures that are else the same, and how far it is behind.
@@ -95,61 +94,55 @@ fn rivals(search: &Search, best: &Candidate, which: usize) -> Vec<(Hypothesis, f
     each
 }
 
-pub(super) fn place(place: &Place) -> Json {
-    match place {
-        Place::Between(a, b) => json!({ "between": [a, b] }),
-        Place::Signal(name) => json!({ "signal": name }),
-    }
-}
-
-fn parameters_of(best: &Candidate, spread: &Spread, which: usize) -> Json {
+fn parameters_of(best: &Candidate, spread: &Spread, which: usize) -> BTreeMap<String, Parameter> {
     let hypothesis = &best.structure.added[which];
-    let mut all = serde_json::Map::new();
+    let mut all = BTreeMap::new();
     for (index, number) in best.structure.numbers.iter().enumerate() {
         let Role::Added(h, p) = number.role else { continue };
         let Some(parameter) = hypothesis.parameters.get(p).filter(|_| h == which) else { continue };
-        let (value, [low, high]) = (best.fit.values[index], spread.interval(best, index));
-        let r = |x: f64| json!(round_significant(x, 5));
+        let value = round_significant(best.fit.values[index], 5);
+        let ci95 = spread.interval(best, index).map(|end| rounded(end, 5));
+        let unit = parameter.unit.clone();
         if parameter.index.is_some() {
-            let entry = all.entry(parameter.key.clone()).or_insert_with(|| json!({ "value": [], "ci95": [], "unit": parameter.unit }));
-            for (key, x) in [("value", r(value)), ("ci95", json!([r(low), r(high)]))] {
-                if let Some(list) = entry.get_mut(key).and_then(Json::as_array_mut) {
-                    list.push(x);
-                }
+            let none = || Parameter::List(Estimates { value: Vec::new(), ci95: Vec::new(), unit });
+            if let Parameter::List(list) = all.entry(parameter.key.clone()).or_insert_with(none) {
+                list.value.push(value);
+                list.ci95.push(ci95);
             }
         } else {
-            all.insert(parameter.key.clone(), json!({ "value": r(value), "ci95": [r(low), r(high)], "unit": parameter.unit }));
+            all.insert(parameter.key.clone(), Parameter::One(Estimate { value, ci95, unit }));
         }
     }
-    Json::Object(all)
+    all
 }
 
-pub(super) fn moved(problem: &Problem, best: &Candidate, spread: &Spread) -> Json {
-    let mut all = serde_json::Map::new();
+/// Numbers of the nominal model as the fit has them, by their path.
+pub(super) fn moved(problem: &Problem, best: &Candidate, spread: &Spread) -> BTreeMap<String, Moved> {
+    let mut all = BTreeMap::new();
     for (index, number) in best.structure.numbers.iter().enumerate() {
         let Role::Stated(i) = number.role else { continue };
-        let (stated, value, [low, high]) = (&problem.stated[i], best.fit.values[index], spread.interval(best, index));
-        let r = |x: f64| json!(round_significant(x, 5));
+        let (stated, value) = (&problem.stated[i], best.fit.values[index]);
         let list = problem.stated.iter().filter(|s| s.path == stated.path).count() > 1;
         let key = if list { format!("{}[{}]", stated.path, stated.index) } else { stated.path.clone() };
-        let deviation = spread.deviation[index];
-        let away = (number.inward(value) - number.inward(stated.given)) / deviation;
-        all.insert(
-            key,
-            json!({ "value": r(value), "ci95": [r(low), r(high)], "nominal": stated.given, "moved_sd": round_significant(away, 3) }),
-        );
+        let away = (number.inward(value) - number.inward(stated.given)) / spread.deviation[index];
+        let moved = Moved {
+            value: round_significant(value, 5),
+            ci95: spread.interval(best, index).map(|end| rounded(end, 5)),
+            nominal: stated.given,
+            moved_sd: rounded(away, 3),
+        };
+        all.insert(key, moved);
     }
-    Json::Object(all)
+    all
 }
 
 /// What would have been seen: for each physics the smallest size at the place where it shows best.
-pub(super) fn detectable(search: &Search) -> Json {
-    let one = |d: &crate::search::Detectable| {
-        let mut entry = place(&d.place);
-        entry["physics"] = json!(d.physics);
-        entry[&d.key] = json!(round_significant(d.size, 3));
-        entry["unit"] = json!(d.unit);
-        entry
+pub(super) fn detectable(search: &Search) -> Vec<Detectable> {
+    let one = |d: &crate::search::Detectable| Detectable {
+        physics: d.physics.to_string(),
+        place: d.place.clone(),
+        unit: d.unit.to_string(),
+        size: BTreeMap::from([(d.key.clone(), round_significant(d.size, 3))]),
     };
-    json!(search.detectable.iter().map(one).collect::<Vec<Json>>())
+    search.detectable.iter().map(one).collect()
 }

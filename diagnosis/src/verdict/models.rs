@@ -1,14 +1,25 @@
-//! Models as they are after the diagnosis, and how they predict what no fit has seen.
+//! Models as they are after the diagnosis.
 
-use super::VerdictError;
-use crate::compare::nrmse;
 use crate::hypothesis::apply_edits;
 use crate::intervals::Spread;
 use crate::numbers::stated_edits;
 use crate::problem::Problem;
 use crate::search::{Candidate, Search};
 use backdrive_plant::write::{patch, round_significant};
-use serde_json::{Value as Json, json};
+
+/// Why a verdict cannot be written.
+#[derive(Debug, thiserror::Error)]
+pub enum VerdictError {
+    /// The model's text cannot be edited.
+    #[error(transparent)]
+    Patch(#[from] backdrive_plant::write::PatchError),
+    /// Refitted numbers cannot be put into the model.
+    #[error("the refitted numbers do not fit into the model: {0}")]
+    Refitted(String),
+    /// A physics that was found cannot be put into the model.
+    #[error(transparent)]
+    Hypothesis(#[from] crate::hypothesis::HypothesisError),
+}
 
 /// Rivals whose models are written, at most.
 const RIVALS: usize = 3;
@@ -45,22 +56,4 @@ pub(super) fn rival_models(problem: &Problem, search: &Search, best: &Candidate)
     rivals.sort_by(|a, b| a.fit.cost.total_cmp(&b.fit.cost));
     let models = rivals.into_iter().filter_map(|c| c.structure.model(problem, &c.fit.values));
     models.take(RIVALS).map(|model| model.to_toml()).collect()
-}
-
-pub(super) fn held_out(problem: &Problem, search: &Search, best: &Candidate, use_best: bool) -> Json {
-    let records = if problem.held_out.is_empty() { &problem.fit } else { &problem.held_out };
-    let structure = &search.nominal.structure;
-    let given: Vec<f64> = problem.stated.iter().map(|s| s.given).collect();
-    let before = nrmse(problem, records, structure, &structure.values(problem, &given, &[], &[]));
-    let refit = nrmse(problem, records, structure, &search.nominal.fit.values);
-    let after = if use_best { nrmse(problem, records, &best.structure, &best.fit.values) } else { before };
-    let (mut sum, mut count) = (0.0, 0usize);
-    for record in records {
-        for output in crate::fit::measured(record) {
-            sum += search.floor[output] / record.spread[output];
-            count += 1;
-        }
-    }
-    let r = |x: Option<f64>| x.map_or(Json::Null, |x| json!(round_significant(x, 6)));
-    json!({ "nrmse_before": r(before), "nrmse_refit": r(refit), "nrmse_after": r(after), "noise_floor": r(Some(sum / count.max(1) as f64)) })
 }

@@ -1,11 +1,11 @@
 //! When and at which frequencies something is left over, glitches, and inputs that nobody measured.
 
+use super::types::Where;
 use crate::fit::Evaluator;
 use crate::problem::Problem;
 use crate::search::Candidate;
 use crate::unknown::{Estimated, Unknown, estimated};
 use backdrive_plant::write::round_significant;
-use serde_json::{Value as Json, json};
 
 /// Samples a burst may span, and how many spreads away it starts.
 const BURST: (usize, f64) = (40, 8.0);
@@ -44,7 +44,7 @@ pub(super) fn bursts(problem: &Problem, best: &Candidate) -> Vec<[f64; 2]> {
 }
 
 /// When and at which frequencies residuals, in the order of an evaluator, are largest.
-pub(super) fn place_in_signals(problem: &Problem, residuals: &[f64], bursts: &[[f64; 2]]) -> Json {
+pub(super) fn place_in_signals(problem: &Problem, residuals: &[f64], bursts: &[[f64; 2]]) -> Option<Where> {
     let evaluator = Evaluator::new(problem);
     let mut strongest: Option<(f64, [f64; 2], [f64; 2])> = None;
     for (r, _, range) in evaluator.layout() {
@@ -58,11 +58,11 @@ pub(super) fn place_in_signals(problem: &Problem, residuals: &[f64], bursts: &[[
             strongest = Some((*most, time, band(part, period)));
         }
     }
-    let Some((_, time, band)) = strongest else { return Json::Null };
+    let (_, time, band) = strongest?;
     let r = |x: f64| round_significant(x, 4);
     let times: Vec<[f64; 2]> = if bursts.is_empty() { vec![time] } else { bursts.to_vec() };
     let times: Vec<[f64; 2]> = times.iter().take(20).map(|t| [r(t[0]), r(t[1])]).collect();
-    json!({ "time": times, "band_hz": [r(band[0]), r(band[1])], "state": Json::Null })
+    Some(Where { time: times, band_hz: band.map(r), state: None, class: None })
 }
 
 /// Frequencies between which the middle eight tenths of a signal's energy lie, Hz.

@@ -7,10 +7,10 @@ mod prepare;
 use crate::run::{Ask, LIKELY, diagnose, diagnosed_model, findings, instead, parameter, refit, refitted, said};
 use crate::table::Report;
 use crate::{Context, Study, StudyError};
+use backdrive_diagnosis::verdict::Verdict;
 use backdrive_plant::model::Model;
 use pipeline::{Error, Form};
 use prepare::Record;
-use serde_json::Value;
 
 pub(crate) const STUDY: Study = Study {
     name: "emps",
@@ -94,13 +94,13 @@ fn numbers(report: &mut Report, context: &Context) -> Result<(), StudyError> {
 /// A diagnosis from one of the models, and the error of what it found.
 fn told(report: &mut Report, context: &Context, ask: &Ask, train: &Record, pulses: &Record) -> Result<(), StudyError> {
     let found = diagnose(context, ask)?;
-    let json = &found.said.json;
+    let verdict = &found.verdict;
     let from = ask.name;
-    report.word(&format!("{from} verdict"), json["verdict"].as_str().unwrap_or(""));
-    let names: Vec<String> = findings(json).into_iter().map(|(physics, _)| physics).collect();
+    report.word(&format!("{from} verdict"), verdict.word.name());
+    let names: Vec<String> = findings(verdict).into_iter().map(|(physics, _)| physics).collect();
     report.word(&format!("{from} found"), &names.join(" "));
-    report.line(&format!("verdict, from the {from} model"), said(json), "", "", None);
-    physics(report, from, json);
+    report.line(&format!("verdict, from the {from} model"), said(verdict), "", "", None);
+    physics(report, from, verdict);
     let model = diagnosed_model(context, ask)?;
     let Error { here, there } = errors(&model, train, pulses)?;
     report.figure(&format!("{from} error"), there);
@@ -139,8 +139,8 @@ fn errors(model: &Model, train: &Record, pulses: &Record) -> Result<Error, Study
 }
 
 /// What was named, each beside what is known of it.
-fn physics(report: &mut Report, from: &str, json: &Value) {
-    let value = |physics: &[&str], key: &str| physics.iter().find_map(|p| parameter(json, p, key)).map(|(value, _)| value);
+fn physics(report: &mut Report, from: &str, verdict: &Verdict) {
+    let value = |physics: &[&str], key: &str| physics.iter().find_map(|p| parameter(verdict, p, key)).map(|(value, _)| value);
     let shown = |value: Option<f64>, scale: f64, unit: &str| value.map_or("not named".to_string(), |v| format!("{:.3} {unit}", scale * v));
     let mut line = |what: &str, measured: String, published: &str, source: &str, within: Option<bool>| {
         report.line(&format!("{what}, from the {from} model"), measured, published, source, within);
@@ -173,7 +173,7 @@ fn physics(report: &mut Report, from: &str, json: &Value) {
     };
     line("friction lost near rest", shown(lost, 1.0, "N"), "9 to 12 N", recomputed, Some(lost.is_some()));
     line("below a speed of", shown(speed, 1e3, "mm/s"), "10 to 14 mm/s, by the form of the law", recomputed, None);
-    let rivals = instead(json, LIKELY);
+    let rivals = instead(verdict, LIKELY);
     let text = if rivals.is_empty() { "nothing".to_string() } else { rivals.join(", ") };
     line("hard to tell apart", text, "exponential or power law at low speed", recomputed, None);
 }

@@ -5,6 +5,7 @@ use super::prepare::{GTAU, RATE, Record};
 use crate::run::{Ask, diagnose, said, write};
 use crate::table::Report;
 use crate::{Context, StudyError};
+use backdrive_diagnosis::verdict::Word;
 use backdrive_plant::model::{Hold, InputKind, Model, OutputKind};
 use backdrive_plant::stepper::{Options, Plant, Segment};
 
@@ -24,10 +25,15 @@ pub(super) fn run(report: &mut Report, context: &Context, model: &Model, train: 
     write(&context.out.join("null-set.toml"), &format!("model = \"model.toml\"\nfit = {fit:?}\nheld_out = {held_out:?}\n"))?;
     let ask = Ask { name: "null", set: "null-set.toml", model: "found.toml", without: &[], effects: 3, effort: 2.5 };
     let found = diagnose(context, &ask)?;
-    let json = &found.said.json;
-    let word = json["verdict"].as_str().unwrap_or("");
-    report.word("null verdict", word);
-    report.line("its own model, simulated with its controller", said(json), "nothing missing", "", Some(word == "nothing_missing"));
+    let word = found.verdict.word;
+    report.word("null verdict", word.name());
+    report.line(
+        "its own model, simulated with its controller",
+        said(&found.verdict),
+        "nothing missing",
+        "",
+        Some(word == Word::NothingMissing),
+    );
     Ok(())
 }
 

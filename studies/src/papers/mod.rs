@@ -12,7 +12,7 @@ pub(crate) mod steering_compensator;
 use crate::run::{Ask, diagnose, findings, read, said, write};
 use crate::table::Report;
 use crate::{Context, StudyError, csv_columns};
-use backdrive::diagnose::MODEL;
+use backdrive_diagnosis::verdict::{MODEL_FILE, Verdict};
 use backdrive_plant::excitation::Excitation;
 use backdrive_plant::model::{Hold, InputKind, Model};
 use backdrive_plant::stepper::{Options, simulate};
@@ -167,27 +167,26 @@ pub(super) fn walk(report: &mut Report, outer: &Context, walk: &Walk) -> Result<
     let out = outer.out;
     let set = out.join(SET);
     let context = Context { folder: &set, data: &set, out, quick: false, longer: outer.longer };
-    let mut stage = |name: &str, model: &str, effects: usize| -> Result<Value, StudyError> {
+    let mut stage = |name: &str, model: &str, effects: usize| -> Result<Verdict, StudyError> {
         let ask = Ask { name, set: "set.toml", model, without: &[], effects, effort: walk.effort };
-        let json = diagnose(&context, &ask)?.said.json;
-        told(report, name, &json);
-        Ok(json)
+        let verdict = diagnose(&context, &ask)?.verdict;
+        told(report, name, &verdict);
+        Ok(verdict)
     };
-    let mut best: Option<(f64, String, usize, Value)> = None;
+    let mut best: Option<(f64, String, usize, Verdict)> = None;
     for effects in walk.effects {
         let name = format!("effects-{effects}");
-        let json = stage(&name, "model.toml", *effects)?;
-        let error = held_out(&json, "nrmse_after");
+        let verdict = stage(&name, "model.toml", *effects)?;
+        let error = verdict.held_out.nrmse_after.unwrap_or(f64::NAN);
         if best.as_ref().is_none_or(|(least, ..)| error < *least) {
-            best = Some((error, name, *effects, json));
+            best = Some((error, name, *effects, verdict));
         }
     }
-    let Some((_, best, effects, mut json)) = best else { return Err(failed("a walk without a diagnosis")) };
+    let Some((_, best, effects, mut verdict)) = best else { return Err(failed("a walk without a diagnosis")) };
     let (mut named, mut by) = (Vec::new(), best.clone());
     for round in 1..=walk.again + 1 {
-        let word = json["verdict"].as_str().unwrap_or("");
-        let claimed = matches!(word, "missing" | "ambiguous");
-        let new = findings(&json);
+        let claimed = verdict.word.claims();
+        let new = findings(&verdict);
         if new.is_empty() {
             break;
         }
@@ -196,27 +195,25 @@ pub(super) fn walk(report: &mut Report, outer: &Context, walk: &Walk) -> Result<
             break;
         }
         let model = format!("found-{round}.toml");
-        write(&set.join(&model), &read(&out.join(&by).join(MODEL))?)?;
+        write(&set.join(&model), &read(&out.join(&by).join(MODEL_FILE))?)?;
         by = format!("again-{round}");
-        json = stage(&by, &model, effects)?;
+        verdict = stage(&by, &model, effects)?;
     }
     Ok(Walked { named, best })
 }
 
-fn held_out(json: &Value, key: &str) -> f64 {
-    json["held_out"][key].as_f64().unwrap_or(f64::NAN)
-}
-
 /// A line of a diagnosis: what it says, the held-out error as given and as diagnosed.
-fn told(report: &mut Report, name: &str, json: &Value) {
-    let error = |key: &str| held_out(json, key);
-    let text = format!("held-out error {:.4} -> {:.4}", error("nrmse_before"), error("nrmse_after"));
-    let beside = format!("refitted alone {:.4}, noise floor {:.4}", error("nrmse_refit"), error("noise_floor"));
-    report.line(name, said(json), text, &beside, None);
-    report.figure(&format!("{name} before"), error("nrmse_before"));
-    report.figure(&format!("{name} after"), error("nrmse_after"));
-    report.figure(&format!("{name} floor"), error("noise_floor"));
-    report.word(name, &said(json));
+fn told(report: &mut Report, name: &str, verdict: &Verdict) {
+    let held = &verdict.held_out;
+    let [before, refit, after, floor] =
+        [held.nrmse_before, held.nrmse_refit, held.nrmse_after, held.noise_floor].map(|error| error.unwrap_or(f64::NAN));
+    let text = format!("held-out error {before:.4} -> {after:.4}");
+    let beside = format!("refitted alone {refit:.4}, noise floor {floor:.4}");
+    report.line(name, said(verdict), text, &beside, None);
+    report.figure(&format!("{name} before"), before);
+    report.figure(&format!("{name} after"), after);
+    report.figure(&format!("{name} floor"), floor);
+    report.word(name, &said(verdict));
 }
 
 /// Holds what was named against what is true: how many of the paper's steps were found.

@@ -5,7 +5,7 @@ use super::{Drive, SET, Step, Story, Walk, device, score, told, walk};
 use crate::run::{Ask, diagnose, parameter, refit, refitted, write};
 use crate::table::Report;
 use crate::{Context, Study, StudyError};
-use backdrive::diagnose::MODEL;
+use backdrive_diagnosis::verdict::MODEL_FILE;
 use backdrive_plant::model::Model;
 use std::path::Path;
 
@@ -79,8 +79,8 @@ fn run(context: &Context) -> Result<Report, StudyError> {
     let mut report = Report::new("Paper 001, told blind: the linear design of the compensator");
     let (effects, effort): (&[usize], _) = if context.quick { (&[3], 2.5) } else { (&[1, 3], 10.0) };
     let walked = walk(&mut report, context, &Walk { effects, again: if context.quick { 0 } else { 1 }, effort })?;
-    parasitic(&mut report, &context.out.join(&walked.best).join(MODEL))?;
-    let found = Model::load(&context.out.join(&walked.best).join(MODEL))?;
+    parasitic(&mut report, &context.out.join(&walked.best).join(MODEL_FILE))?;
+    let found = Model::load(&context.out.join(&walked.best).join(MODEL_FILE))?;
     bias(&mut report, &first, &found, context, "4, 2 and 1 mm")?;
     bias(&mut report, &first, &found, &Context { out: &shorter, ..*context }, "2, 1 and 0.5 mm")?;
     between(&mut report, &Context { out: &shorter, ..*context })?;
@@ -119,10 +119,10 @@ fn between(report: &mut Report, outer: &Context) -> Result<(), StudyError> {
     let set = out.join(SET);
     let here = Context { folder: &set, data: &set, out, quick: false, longer: outer.longer };
     let ask = Ask { name: "from-friction", set: "set.toml", model: "friction.toml", without: &[], effects: 1, effort: 2.5 };
-    let json = diagnose(&here, &ask)?.said.json;
-    told(report, "from-friction", &json);
+    let verdict = diagnose(&here, &ask)?.verdict;
+    told(report, "from-friction", &verdict);
     for (what, key, published) in [("gap", "gap", "3.36e-4 m"), ("stiffness", "stiffness", "861000 N/m")] {
-        if let Some((value, [low, high])) = parameter(&json, "backlash", key) {
+        if let Some((value, [low, high])) = parameter(&verdict, "backlash", key) {
             let measured = format!("{value:.4e} (95 %: {low:.4e} to {high:.4e})");
             report.line(&format!("from-friction, {what}"), measured, published, PAPER, None);
             report.figure(&format!("from-friction {what}"), value);

@@ -1,0 +1,79 @@
+//! The verdict in one sentence.
+
+use super::decision::{Decision, LEFT_OVER};
+use super::types::{Finding, Word};
+use crate::hypothesis::Place;
+use crate::words;
+use backdrive_plant::write::round_significant;
+
+/// `planned`: whether there is a next experiment.
+pub(super) fn sentence(decision: &Decision, planned: bool) -> String {
+    let (best, findings) = (decision.best, decision.findings.as_slice());
+    let level = best.levels.iter().fold(0.0f64, |a, b| a.max(*b));
+    let times = round_significant(level, 2);
+    // Below this the residual is the sensor's noise up to chance and rounding.
+    let end = if level < LEFT_OVER { "down to the sensor noise".to_string() } else { format!("to {times} times the sensor noise") };
+    let still = if level < LEFT_OVER { String::new() } else { format!("; the residual is still {times} times the sensor noise") };
+    let all = findings.iter().map(asserted).collect::<Vec<_>>().join(", and ");
+    match decision.word {
+        Word::Ambiguous => {
+            let others = match findings.get(1..) {
+                Some(others) if !others.is_empty() => {
+                    format!(", beside {}", others.iter().map(asserted).collect::<Vec<_>>().join(", and "))
+                }
+                _ => String::new(),
+            };
+            let next = if planned { ", the next experiment would" } else { "" };
+            let what = findings.first().map_or_else(|| "something".to_string(), known);
+            format!("the model leaves out {what}{others}: the recordings cannot tell which{next}{still}")
+        }
+        Word::CannotTell => "the recordings hardly move the device: they cannot tell what is missing".to_string(),
+        Word::Missing if still.is_empty() => format!("the model leaves out {all}; with it the recordings are explained {end}"),
+        Word::Missing => format!("the model leaves out {all}{still}"),
+        Word::Unexplained if best.structure.added.is_empty() => {
+            format!("something is missing that none of the laws tried explains; refitted, the model comes {end}")
+        }
+        Word::Unexplained => format!("something is missing that no known physics explains; the nearest is {all}{still}"),
+        Word::Parameters => format!("nothing is missing, but the model's parameters are off; refitted they explain the recordings {end}"),
+        Word::NothingMissing => format!("the model explains the recordings {end}"),
+    }
+}
+
+/// A finding in words; where a rival is more likely, what is known of both.
+fn asserted(finding: &Finding) -> String {
+    if finding.has_likelier_rival() { known(finding) } else { words::finding(finding) }
+}
+
+/// What is known where the explanations cannot be told apart: the finding and its rivals that are at least half as likely, at most three.
+fn known(finding: &Finding) -> String {
+    let near = finding.alternatives.iter().filter(|rival| rival.confidence >= 0.5 * finding.confidence).take(3);
+    let all: Vec<(&str, &Place)> = std::iter::once((finding.physics.as_str(), &finding.place))
+        .chain(near.map(|rival| (rival.physics.as_str(), &rival.place)))
+        .collect();
+    words::any_of(&all)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::verdict::types::Alternative;
+    use std::collections::BTreeMap;
+
+    #[test]
+    fn a_finding_that_is_less_likely_than_its_rival_is_not_asserted() {
+        let at = |body: &str| Place::Between(body.to_string(), "ground".to_string());
+        let first = |confidence: f64, rival: f64| Finding {
+            physics: "coulomb".to_string(),
+            place: at("motor"),
+            parameters: BTreeMap::new(),
+            replaces: Vec::new(),
+            confidence,
+            alternatives: vec![Alternative { physics: "coulomb".to_string(), place: at("drum"), confidence: rival }],
+        };
+        assert!(first(0.04, 0.10).has_likelier_rival() && !first(0.97, 0.03).has_likelier_rival());
+        assert_eq!(asserted(&first(0.04, 0.10)), "dry friction, at the motor or at the drum");
+        assert_eq!(asserted(&first(0.97, 0.03)), "dry friction at the motor");
+        assert_eq!(known(&first(0.04, 0.10)), "dry friction, at the motor or at the drum");
+        assert_eq!(known(&first(0.97, 0.03)), "dry friction, at the motor");
+    }
+}

@@ -1,0 +1,117 @@
+//! Physics at places: what was found, what could be instead, what would have been seen, and their numbers.
+
+use super::place::PlaceInFile;
+use crate::hypothesis::Place;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// A physics that was left out. It has `between` (two bodies, or a body and `ground`) or `signal` (an input or an output).
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Finding {
+    /// Its name: an element kind of model files, a key of an input or output (`delay`, `bandwidth`, `saturation`, `gain`, `back_emf`, `offset`),
+    /// `inertia`, or `series_compliance`.
+    pub physics: String,
+    /// Where it acts.
+    #[serde(flatten, with = "PlaceInFile")]
+    pub place: Place,
+    /// Its parameters by name, as model files call them.
+    #[serde(default)]
+    pub parameters: BTreeMap<String, Parameter>,
+    /// Elements of the nominal model that it takes the place of.
+    #[serde(default)]
+    pub replaces: Vec<String>,
+    /// How sure it is, 0 to 1, its rivals and what remains taken into account.
+    #[serde(default)]
+    pub confidence: f64,
+    /// What could stand in its place, the likeliest first.
+    #[serde(default)]
+    pub alternatives: Vec<Alternative>,
+}
+
+impl Finding {
+    /// Whether one of its alternatives is at least as likely as itself: then it is not asserted.
+    pub fn has_likelier_rival(&self) -> bool {
+        self.alternatives.iter().any(|rival| rival.confidence >= self.confidence)
+    }
+}
+
+/// Another explanation in the place of a finding. It has `between` or `signal`, as a finding.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Alternative {
+    /// Its name, as that of a finding.
+    pub physics: String,
+    /// Where it acts.
+    #[serde(flatten, with = "PlaceInFile")]
+    pub place: Place,
+    /// How likely it is, 0 to 1.
+    #[serde(default)]
+    pub confidence: f64,
+}
+
+/// 95 % interval, lower and upper end, in the unit of its number. An end is null where there is none.
+pub type Interval = [Option<f64>; 2];
+
+/// A parameter of a finding: a number, or a list of them.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(untagged)]
+pub enum Parameter {
+    /// A number.
+    One(Estimate),
+    /// A list.
+    List(Estimates),
+}
+
+/// A number with its 95 % interval.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Estimate {
+    /// As fitted, in `unit`.
+    pub value: f64,
+    /// 95 % interval, in `unit`.
+    pub ci95: Interval,
+    /// Unit; empty for a number without one.
+    #[serde(default)]
+    pub unit: String,
+}
+
+/// A list of numbers, each with its 95 % interval.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Estimates {
+    /// As fitted, in `unit`.
+    pub value: Vec<f64>,
+    /// 95 % interval of each, in `unit`.
+    pub ci95: Vec<Interval>,
+    /// Unit of all; empty for numbers without one.
+    #[serde(default)]
+    pub unit: String,
+}
+
+/// A number of the nominal model as the fit has it, in the unit of the model file.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Moved {
+    /// As fitted.
+    pub value: f64,
+    /// 95 % interval.
+    pub ci95: Interval,
+    /// As the nominal file has it.
+    pub nominal: f64,
+    /// How far it moved, in its own standard deviations, on the scale of the fit (logarithmic for what cannot change its sign).
+    pub moved_sd: Option<f64>,
+}
+
+/// The smallest size of a physics that the recordings would have shown. Beside `physics`, `between` or `signal` and `unit` it has one more key:
+/// the parameter that says how large the physics is, with that size in `unit`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Detectable {
+    /// Its name, as that of a finding.
+    pub physics: String,
+    /// The place where it shows best.
+    #[serde(flatten, with = "PlaceInFile")]
+    pub place: Place,
+    /// Unit of the size.
+    #[serde(default)]
+    pub unit: String,
+    /// The size by the parameter's name, in `unit`.
+    #[serde(flatten)]
+    pub size: BTreeMap<String, f64>,
+}

@@ -1,0 +1,219 @@
+//! The verdict file as a value: what a diagnosis says, in SI units. Reading takes files of earlier versions, which lack newer keys.
+
+mod finding;
+mod next_experiment;
+mod place;
+
+pub use finding::{Alternative, Detectable, Estimate, Estimates, Finding, Interval, Moved, Parameter};
+pub use next_experiment::{NextExperiment, Planned, Refused};
+
+use crate::audit::{self, Weight};
+use crate::locate::Character;
+use crate::unknown::Estimated;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// Version of the verdict file that is written. It changes when a key changes its meaning, not when one is added.
+pub const SCHEMA: u32 = 1;
+
+/// What a diagnosis says about a model and its recordings: one JSON file. SI units throughout.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Verdict {
+    /// Version of the format, 1. It changes when a key changes its meaning, not when one is added.
+    pub schema: u32,
+    /// The verdict in one word.
+    #[serde(rename = "verdict")]
+    pub word: Word,
+    /// The verdict in one sentence.
+    #[serde(default)]
+    pub sentence: String,
+    /// The physics that was left out, most important first. With `unexplained` the nearest explanation, which is not claimed.
+    #[serde(default)]
+    pub findings: Vec<Finding>,
+    /// When, at which frequencies and in which state the refitted nominal model and the recordings part; null where nothing was compared.
+    #[serde(rename = "where")]
+    pub shows: Option<Where>,
+    /// The nominal model's numbers that the fit moved, by their path in the model (`bodies.drum`, `elements.cable.stiffness`,
+    /// `inputs.feedback_force.gain`; of a list with the index, `elements.slip.force[0]`). Empty where the nominal file is kept.
+    #[serde(default)]
+    pub parameters: BTreeMap<String, Moved>,
+    /// What the claimed explanation leaves over; null where nothing was held against anything.
+    pub remaining: Option<Remaining>,
+    /// Errors on the recordings that no fit has seen; of a set that holds none out, on the fitted ones.
+    #[serde(default)]
+    pub held_out: HeldOut,
+    /// What the recordings say of themselves before any physics: clock, sensors, units, loops. What matters most comes first.
+    #[serde(default)]
+    pub audit: Vec<Remark>,
+    /// What was found of the inputs that nobody measured.
+    #[serde(default)]
+    pub unknown_inputs: Vec<Estimated>,
+    /// File of the diagnosed model, beside the verdict; of a kept model a copy of the nominal one.
+    #[serde(default)]
+    pub model_after: String,
+    /// Files of models of other explanations that leave over little more, beside the verdict, the nearest first.
+    #[serde(default)]
+    pub rival_models: Vec<String>,
+    /// With `ambiguous` and `cannot_tell` what to record next, or why no recording would tell; otherwise null.
+    pub next_experiment: Option<NextExperiment>,
+    /// Where nothing was added to the model: for each physics the smallest size that the recordings would have shown, at the place where it
+    /// shows best. Otherwise null.
+    pub detectable: Option<Vec<Detectable>>,
+}
+
+/// A verdict in one word.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Word {
+    /// Physics was left out, and `findings` names it.
+    Missing,
+    /// Nothing is missing, but the model's numbers are off; `model_after` has the better ones.
+    Parameters,
+    /// The model explains the recordings down to the sensors' noise.
+    NothingMissing,
+    /// Something is missing and no known physics explains it; `where` still says where it shows.
+    Unexplained,
+    /// Two or more explanations fit alike; `findings[0].alternatives` lists them, `next_experiment` says what would tell them apart.
+    Ambiguous,
+    /// The recordings do not excite what would be needed to say; `next_experiment` says what would.
+    CannotTell,
+}
+
+impl Word {
+    /// As the file has it, such as `nothing_missing`.
+    pub fn name(self) -> &'static str {
+        match self {
+            Word::Missing => "missing",
+            Word::Parameters => "parameters",
+            Word::NothingMissing => "nothing_missing",
+            Word::Unexplained => "unexplained",
+            Word::Ambiguous => "ambiguous",
+            Word::CannotTell => "cannot_tell",
+        }
+    }
+
+    /// For a reader, such as `nothing missing`.
+    pub fn spoken(self) -> String {
+        self.name().replace('_', " ")
+    }
+
+    /// Whether the findings are claimed: that physics is missing, whichever of some it is.
+    pub fn claims(self) -> bool {
+        match self {
+            Word::Missing | Word::Ambiguous => true,
+            Word::Parameters | Word::NothingMissing | Word::Unexplained | Word::CannotTell => false,
+        }
+    }
+
+    /// Whether the model's structure is right: nothing is missing, its numbers may be off.
+    pub fn is_structure_right(self) -> bool {
+        match self {
+            Word::Parameters | Word::NothingMissing => true,
+            Word::Missing | Word::Unexplained | Word::Ambiguous | Word::CannotTell => false,
+        }
+    }
+}
+
+/// When, at which frequencies and in which state a residual is largest.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Where {
+    /// Spans of time in the recording in which it is largest, s from its first sample; of a sensor fault every one, at most 20.
+    #[serde(default)]
+    pub time: Vec<[f64; 2]>,
+    /// Frequencies between which the middle eight tenths of its energy lie, Hz.
+    pub band_hz: [f64; 2],
+    /// The state of the device in which it shows, in words, such as `reversals of the velocity across drum-ground`; null where none is known.
+    pub state: Option<String>,
+    /// Of an unexplained residual the kind of force it is, at the place that explains most; null where nothing moves there. Not in other files.
+    #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "stated")]
+    #[schemars(with = "Option<Character>")]
+    pub class: Option<Option<Character>>,
+}
+
+/// A key that is there, be its value null.
+fn stated<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<Option<Option<Character>>, D::Error> {
+    Option::deserialize(deserializer).map(Some)
+}
+
+/// What the claimed explanation leaves over: a statement of its own, which does not take the claim back.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Remaining {
+    /// Share of the residual of the refitted nominal model on recordings that no fit has seen, at least 0; null where that is nothing.
+    pub share: Option<f64>,
+    /// What the sensors' noise alone would be of that residual, at least 0.
+    pub floor_share: Option<f64>,
+    /// What is left over on the fitted recordings, in standard deviations of the sensor noise: 1 cannot be improved on.
+    pub noise_sd: Option<f64>,
+    /// Where it shows; null where it is the sensors' noise.
+    #[serde(rename = "where")]
+    pub shows: Option<Where>,
+    /// The effect that would take most of it, in words, such as `backlash between motor and drum`; null where none would.
+    pub looks_like: Option<String>,
+}
+
+/// Errors on recordings that no fit has seen. `nrmse` is the root mean square of the error over the standard deviation of the measured signal,
+/// averaged over all pairs of recording and output. Null where a model cannot be simulated.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct HeldOut {
+    /// Of the nominal model as it was given.
+    pub nrmse_before: Option<f64>,
+    /// Of the nominal structure with its numbers refitted.
+    pub nrmse_refit: Option<f64>,
+    /// Of the diagnosed model.
+    pub nrmse_after: Option<f64>,
+    /// What the sensors' noise alone would leave.
+    pub noise_floor: Option<f64>,
+    /// The same of the nominal model as it was given, by output: the root of the summed squared errors over that of the summed squared deviations
+    /// from each recording's mean, all recordings together.
+    pub pooled_before: Option<BTreeMap<String, f64>>,
+    /// As `pooled_before`, of the nominal structure with its numbers refitted.
+    pub pooled_refit: Option<BTreeMap<String, f64>>,
+    /// As `pooled_before`, of the diagnosed model.
+    pub pooled_after: Option<BTreeMap<String, f64>>,
+    /// As `pooled_before`, of the sensors' noise alone.
+    pub pooled_floor: Option<BTreeMap<String, f64>>,
+    /// Every pair of recording and output by itself.
+    #[serde(default)]
+    pub per_record: Vec<RecordErrors>,
+}
+
+/// Errors at one output in one recording, over the standard deviation of the measured signal. Null where a model cannot be simulated.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct RecordErrors {
+    /// The recording's file, without its folder.
+    pub record: String,
+    /// The output.
+    pub output: String,
+    /// Of the nominal model as it was given.
+    pub nrmse_before: Option<f64>,
+    /// Of the nominal structure with its numbers refitted.
+    pub nrmse_refit: Option<f64>,
+    /// Of the diagnosed model.
+    pub nrmse_after: Option<f64>,
+    /// What the sensors' noise alone would leave.
+    pub noise_floor: Option<f64>,
+}
+
+/// What was seen in the recordings before any physics.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Remark {
+    /// What was looked at: `clock`, `gaps`, `missing`, `constant`, `encoder`, `filtered`, `saturated`, `sign`, `unit`, `loop`, `repeats`, `noise`.
+    pub what: String,
+    /// Recordings, signal, or both.
+    #[serde(rename = "where")]
+    pub place: String,
+    /// What was seen, in one clause.
+    pub message: String,
+    /// How much it matters.
+    pub weight: Weight,
+}
+
+impl From<&audit::Remark> for Remark {
+    fn from(seen: &audit::Remark) -> Remark {
+        Remark { what: seen.about.to_string(), place: seen.place(), message: seen.text.clone(), weight: seen.weight }
+    }
+}
+
+#[cfg(test)]
+mod tests;

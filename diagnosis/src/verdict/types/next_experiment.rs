@@ -1,0 +1,66 @@
+//! What to record next.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// What to record next, or why no recording would tell.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(untagged)]
+pub enum NextExperiment {
+    /// An excitation that would tell.
+    Planned(Planned),
+    /// None would.
+    Refused(Refused),
+}
+
+impl NextExperiment {
+    /// In one sentence.
+    pub fn sentence(&self) -> &str {
+        match self {
+            NextExperiment::Planned(planned) => &planned.sentence,
+            NextExperiment::Refused(refused) => &refused.sentence,
+        }
+    }
+
+    /// Name of its excitation file; `None` where there is no excitation.
+    pub fn file(&self) -> Option<&str> {
+        match self {
+            NextExperiment::Planned(planned) => Some(&planned.file),
+            NextExperiment::Refused(_) => None,
+        }
+    }
+}
+
+/// An excitation that would tell explanations apart, or determine numbers.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Planned {
+    /// The excitation file, beside the verdict.
+    pub file: String,
+    /// The input that it drives.
+    pub input: String,
+    /// The excitation on one line, as command lines and graphs have it.
+    pub excitation: String,
+    /// What to play, and what would be seen.
+    pub sentence: String,
+    /// What it tells apart, or the numbers that it determines.
+    pub between: Vec<String>,
+    /// How far apart it brings the two explanations that it separates least, each refitted to it, in standard deviations.
+    pub separation_sd: Option<f64>,
+    /// Root mean square of that difference, in standard deviations of the sensor noise.
+    pub level_floors: Option<f64>,
+    /// The output in which most of it shows.
+    pub output: String,
+    /// How often it has to be played.
+    pub repeats: u32,
+    /// Length of one playing, s.
+    pub duration_s: Option<f64>,
+    /// Sampling rate that it was planned for, Hz.
+    pub rate_hz: f64,
+}
+
+/// Why no excitation would tell.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Refused {
+    /// Why, and what would help.
+    pub sentence: String,
+}
