@@ -10,7 +10,7 @@ use crate::master_run::{Wanted, run_master};
 use crate::phases::{contacts, holds};
 use crate::session::{AxisSignals, Session};
 use backdrive_nodes::graph::{Graph, NodeKind, Settings};
-use backdrive_plant::elements::{Mechanics, Role};
+use backdrive_plant::elements::{Role, Side};
 use backdrive_plant::linear::{Friction, LinearModel, Operating};
 use backdrive_plant::model::{InputKind, Model, OutputKind, Place};
 use serde::Serialize;
@@ -496,7 +496,7 @@ struct ToGround {
 fn linear_damping(law: &backdrive_plant::elements::Law) -> f64 {
     match law.role() {
         Role::Linear(linear) => linear.damping,
-        _ => 0.0,
+        Role::Friction | Role::Path => 0.0,
     }
 }
 
@@ -527,7 +527,11 @@ fn to_ground(model: &Model, user: usize, notes: &mut Vec<String>) -> ToGround {
         }
         match element.law.role() {
             Role::Linear(linear) => sum.damping += linear.damping,
-            Role::Friction(levels) => sum.coulomb += levels.kinetic[0].min(levels.kinetic[1]),
+            Role::Friction => {
+                // At speed, without load.
+                let level = |side| element.law.unloaded_level(side, Some(f64::INFINITY));
+                sum.coulomb += level(Side::Forwards).min(level(Side::Backwards));
+            }
             Role::Path => {
                 notes.push(format!("what {} ({}) adds to b and f_c is not counted", element.name, element.law.kind().name));
             }
@@ -611,7 +615,7 @@ pub(crate) fn contact_slope(axis: &AxisSignals, touching: &[Range<usize>]) -> Op
 #[cfg(test)]
 mod tests {
     use super::*;
-    use backdrive_plant::elements::HystereticSpring;
+    use backdrive_plant::elements::{HystereticSpring, PathLaw};
 
     /// A wall of stiffness k, sampled every T and held, and a hand that moves by x(t): over closed cycles the wall gives exactly
     /// k/2 sum (dx)^2, which is k T/2 times the integral of v^2 but for terms of order T^2.

@@ -4,7 +4,7 @@ use crate::session::Session;
 use backdrive_control::device::{Device, DeviceOptions, Role};
 use backdrive_msgs::MAX_AXES;
 use backdrive_nodes::graph::{Graph, NodeKind, Settings};
-use backdrive_plant::elements::{Mechanics, Role as ElementRole};
+use backdrive_plant::elements::Role as ElementRole;
 
 /// What the master did.
 #[derive(Debug, Clone, Default)]

@@ -351,7 +351,7 @@ fn many_contacts_begin_where_one_bristle_ends() {
 
 #[test]
 fn a_play_with_round_edges_begins_where_the_sharp_one_ends() {
-    use backdrive_plant::elements::{Backlash, Mechanics};
+    use backdrive_plant::elements::{Backlash, PathLaw};
     let mut pairs = 0;
     for (name, _, model) in devices() {
         let (hypotheses, _) = hypotheses(&model);

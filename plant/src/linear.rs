@@ -4,22 +4,12 @@
 //! ([`Operating`]), so one model gives a stiff linkage at small amplitude and a soft one at large. A delay
 //! acts on frequency responses and not on poles.
 
-mod harmonic;
+pub use crate::elements::DryFriction as Friction;
 
-use crate::elements::Linear;
+use crate::elements::{Linear, Sine};
 use crate::model::{InputKind, Model, OutputKind, Place};
 use nalgebra::{Complex, DMatrix, DVector, Schur, SymmetricEigen};
 use std::f64::consts::TAU;
-
-/// How dry (set-valued) friction enters.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Friction {
-    /// Not at all: everything slides freely.
-    #[default]
-    Ignored,
-    /// As the damper that takes as much energy per cycle at the operating amplitude and frequency.
-    Viscous,
-}
 
 /// The sine at which elements that are not linear are looked at.
 #[derive(Debug, Clone, PartialEq)]
@@ -148,8 +138,9 @@ impl<'a> LinearModel<'a> {
         let mut stiffness = DMatrix::zeros(n, n);
         let mut elements = Vec::with_capacity(model.elements.len());
         for (index, element) in model.elements.iter().enumerate() {
-            let x0 = at.about.iter().find(|a| a.0 == index).map_or(0.0, |a| a.1);
-            let linear = harmonic::coefficients(&element.law, x0, at);
+            let about = at.about.iter().find(|a| a.0 == index).map_or(0.0, |a| a.1);
+            let sine = Sine { about, amplitude: at.amplitude, frequency_hz: at.frequency_hz, friction: at.friction };
+            let linear = element.law.linearised(&sine);
             join(&mut inertia, element.between, linear.inertance);
             join(&mut damping, element.between, linear.damping);
             join(&mut stiffness, element.between, linear.stiffness);
