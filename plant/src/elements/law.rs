@@ -114,6 +114,11 @@ pub trait PathLaw {
         self.force(memory, 0.5 * (from + to), v)
     }
 
+    /// Whether its force is in proportion to the path that led to it, so that [`PathLaw::linearised`] is exact and depends on frequency alone.
+    fn is_viscoelastic(&self) -> bool {
+        false
+    }
+
     /// Its bristles at speed `v`; `None` for a law without.
     fn bristles(&self, _memory: &[f64], _v: f64) -> Option<Bristles> {
         None

@@ -134,6 +134,11 @@ macro_rules! register {
                 match self { $(Law::$law(_law) => where_it_is!(path, $role, _law.creates_energy(amplitude, unit), None)),* }
             }
 
+            /// Whether a [`Role::Path`] answers in proportion, by frequency alone.
+            pub fn is_viscoelastic(&self) -> bool {
+                match self { $(Law::$law(_law) => where_it_is!(path, $role, _law.is_viscoelastic(), false)),* }
+            }
+
             /// The bristles of a [`Role::Path`] at speed `v`, m/s; `None` for a law without.
             pub fn bristles(&self, memory: &[f64], v: f64) -> Option<Bristles> {
                 match self { $(Law::$law(_law) => where_it_is!(path, $role, _law.bristles(memory, v), None)),* }
