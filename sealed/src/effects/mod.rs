@@ -11,7 +11,7 @@ pub use error::EffectError;
 pub use physics::Physics;
 pub use site::Site;
 
-use crate::laws::{Damper, Law, Spring};
+use crate::laws::{Damper, Law, Load, Spring};
 use crate::network::{Body, Element, InputKind, Network, Place};
 use serde::{Deserialize, Serialize};
 
@@ -102,7 +102,9 @@ impl Effect {
         if between[0] == between[1] {
             return Err(EffectError::WrongSite { effect: self.physics.name(), needed: "two bodies" });
         }
-        if let Some(joint) = law.to_force().loaded_by().filter(|name| network.element(name).is_none()) {
+        if let Load::Element(joint) = law.to_force().load()
+            && network.element(joint).is_none()
+        {
             return Err(self.missing("element", joint));
         }
         for name in &self.replaces {

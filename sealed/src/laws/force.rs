@@ -13,6 +13,18 @@ pub struct Path {
     pub duration: f64,
 }
 
+/// What presses the surfaces of dry friction together.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Load<'a> {
+    /// Nothing that changes.
+    None,
+    /// The force of the element of this name, whichever way round it lies.
+    Element(&'a str),
+    /// The force that is passed on: of friction between two bodies what else is between them, of a body's friction against ground the springs
+    /// between it and the first other body that elements join it with; where they join it with none, its springs to ground.
+    Joint,
+}
+
 /// The three parts of a law that the integrator treats apart: what hangs on the path, what hangs on the speed and
 /// is smooth, and dry friction, which is set-valued at rest.
 pub trait ForceLaw: Send {
@@ -31,8 +43,8 @@ pub trait ForceLaw: Send {
         0.0
     }
 
-    /// N, the levels of dry friction against motion forwards and backwards at speed `v` (m/s) under the magnitude `load` (N) of
-    /// the force of the element named by [`ForceLaw::loaded_by`].
+    /// N, the levels of dry friction against motion forwards and backwards at speed `v` (m/s) under the force `load` (N) of what
+    /// [`ForceLaw::load`] says; of a joint it is positive where it resists motion forwards.
     fn dry(&self, _v: f64, _load: f64, _memory: &[f64]) -> [f64; 2] {
         [0.0, 0.0]
     }
@@ -55,8 +67,8 @@ pub trait ForceLaw: Send {
         0.0
     }
 
-    /// Name of the element whose force presses the friction surfaces together.
-    fn loaded_by(&self) -> Option<&str> {
-        None
+    /// What presses the friction surfaces together.
+    fn load(&self) -> Load<'_> {
+        Load::None
     }
 }

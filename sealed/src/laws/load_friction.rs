@@ -3,7 +3,7 @@
 use super::described::{Checked, Described, Facts, Read};
 use super::draw::{Draw, Here};
 use super::families::FRICTION;
-use super::force::ForceLaw;
+use super::force::{ForceLaw, Load};
 use crate::draw::sizing::{between, rounded};
 use crate::network::allowed::Allowed::NotNegative;
 use rand_chacha::ChaCha8Rng;
@@ -23,7 +23,7 @@ pub struct LoadFriction {
 
 impl ForceLaw for LoadFriction {
     fn dry(&self, _: f64, load: f64, _: &[f64]) -> [f64; 2] {
-        let level = self.force + self.coefficient * load;
+        let level = self.force + self.coefficient * load.abs();
         [level, level]
     }
 
@@ -31,8 +31,8 @@ impl ForceLaw for LoadFriction {
         true
     }
 
-    fn loaded_by(&self) -> Option<&str> {
-        Some(&self.joint)
+    fn load(&self) -> Load<'_> {
+        Load::Element(&self.joint)
     }
 }
 

@@ -12,7 +12,7 @@ mod force;
 mod gaussian;
 
 pub use bristle_field::LaidField;
-pub use force::{ForceLaw, Path};
+pub use force::{ForceLaw, Load, Path};
 
 use crate::effects::answer::Answer;
 use crate::network::section::{NetworkError, Section};
