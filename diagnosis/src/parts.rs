@@ -8,7 +8,6 @@ use crate::guide::Guide;
 use crate::problem::Record;
 use crate::simulate::{Conditions, motion_at};
 use crate::structure::Structure;
-use backdrive_plant::elements::Mechanics;
 use backdrive_plant::set::Initial;
 use rayon::prelude::*;
 use std::ops::Range;

@@ -13,6 +13,7 @@ pub mod excitation;
 pub mod fragment;
 pub mod isolate;
 pub mod linear;
+pub mod load;
 pub mod model;
 pub mod parse;
 pub mod preisach;

@@ -20,7 +20,7 @@ fn laws() -> Vec<Law> {
         Law::Stribeck(Stribeck { coulomb: c, at_rest: 1.5 * c, velocity: vs }),
         Law::FrictionDeficit(FrictionDeficit { coulomb: c, rest: 0.5 * c, velocity: vs }),
         Law::Dahl(Dahl { stiffness: k, coulomb: c }),
-        Law::MaxwellSlip(SpringSliders { stiffness: vec![1000.0, 3000.0], force: vec![1.5, 0.5] }),
+        Law::MaxwellSlip(MaxwellSlip { stiffness: vec![1000.0, 3000.0], force: vec![1.5, 0.5] }),
         Law::HystereticSpring(HystereticSpring {
             stiffness_positive: k,
             stiffness_negative: k,

@@ -4,7 +4,7 @@ use crate::session::Session;
 use backdrive_control::device::{Device, DeviceOptions, DeviceRole};
 use backdrive_msgs::MAX_AXES;
 use backdrive_nodes::graph::{Graph, NodeKind, Settings};
-use backdrive_plant::elements::{Mechanics, Role};
+use backdrive_plant::elements::Role;
 
 /// What the master did.
 #[derive(Debug, Clone, Default)]

@@ -1,7 +1,8 @@
 //! What a controller knows of its axis: inertia, viscous friction, and friction with a memory, from a model.
 
 use super::ControllerError;
-use backdrive_plant::elements::{Law, Mechanics, Role};
+pub use backdrive_plant::elements::Bristles;
+use backdrive_plant::elements::{Law, Role, Rubbing, Side};
 use backdrive_plant::model::{InputKind, Model};
 
 /// One body under a force, `J q'' = u - viscous q' - f`, as a model has it.
@@ -27,19 +28,6 @@ struct Copied {
     /// +1 where the body is the element's first end.
     sign: f64,
     memory: Vec<f64>,
-}
-
-/// σ0 h, and what the bristles creep: `dz/dt = q' - leak σ0 h`.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Bristles {
-    /// σ0 h, N or N m.
-    pub force: f64,
-    /// σ0, N/m or N m/rad.
-    pub stiffness: f64,
-    /// σ1, N s/m or N m s/rad.
-    pub damping: f64,
-    /// f/σ0 with the f(q') of eq (18), so that `h f = leak σ0 h`, 1/(N s/m).
-    pub leak: f64,
 }
 
 impl AxisModel {
@@ -80,7 +68,7 @@ impl AxisModel {
                     known.viscous += linear.damping;
                     known.inertia += linear.inertance;
                 }
-                Role::Friction(_) | Role::Path => {
+                Role::Friction | Role::Path => {
                     let memory = vec![0.0; element.law.memory_len()];
                     known.friction.push(Copied { law: element.law.clone(), sign, memory });
                 }
@@ -98,39 +86,37 @@ impl AxisModel {
     /// Carries the friction's memory along a straight path, m or rad, that takes `period_s`.
     pub fn advance(&mut self, from: f64, to: f64, period_s: f64) {
         for Copied { law, sign, memory } in &mut self.friction {
-            law.advance(memory, *sign * from, *sign * to, period_s);
+            match law.role() {
+                Role::Friction => {
+                    let way = *sign * (to - from);
+                    let level = law.level(&Rubbing { side: Side::of(way), speed: Some(way / period_s), load: 0.0, memory });
+                    law.rubbed(memory, level * way.abs(), period_s);
+                }
+                Role::Path => law.advance(memory, *sign * from, *sign * to, period_s),
+                Role::Linear(_) => {}
+            }
         }
     }
 
     /// Friction at speed `v`, viscous friction included, N or N m. Dry friction that sticks at 0 is 0 there.
     pub fn friction(&self, v: f64) -> f64 {
         let one = |c: &Copied| match c.law.role() {
-            Role::Friction(levels) if v != 0.0 => levels.sliding(usize::from(c.sign * v < 0.0), c.sign * v).copysign(v),
-            Role::Friction(_) => 0.0,
-            _ => c.sign * c.law.force(&c.memory, 0.0, c.sign * v),
+            Role::Friction if v != 0.0 => {
+                let speed = c.sign * v;
+                c.law.level(&Rubbing { side: Side::of(speed), speed: Some(speed), load: 0.0, memory: &c.memory }).copysign(v)
+            }
+            Role::Friction | Role::Linear(_) => 0.0,
+            Role::Path => c.sign * c.law.force(&c.memory, 0.0, c.sign * v),
         };
         self.viscous * v + self.friction.iter().map(one).sum::<f64>()
     }
 
-    /// The bristles of a `lugre` or `preisach_lugre`, at speed `v`, m/s or rad/s; `None` where the model has none.
+    /// The bristles of friction that has some, such as `lugre` and `preisach_lugre`, at speed `v`, m/s or rad/s; `None` where the model has none.
+    /// With the f(q') of eq (18), `leak` is f/σ0.
     pub fn bristles(&self, v: f64) -> Option<Bristles> {
         self.friction.iter().find_map(|c| {
-            let sv = c.sign * v;
-            match &c.law {
-                Law::PreisachLugre(l) => Some(Bristles {
-                    force: c.sign * l.bristle_force(&c.memory, sv),
-                    stiffness: l.stiffness,
-                    damping: l.damping,
-                    leak: l.leak(&c.memory, sv),
-                }),
-                Law::Lugre(l) => Some(Bristles {
-                    force: c.sign * l.stiffness * c.memory.first().copied().unwrap_or(0.0),
-                    stiffness: l.stiffness,
-                    damping: l.damping,
-                    leak: sv.abs() / l.level(sv),
-                }),
-                _ => None,
-            }
+            let own = c.law.bristles(&c.memory, c.sign * v)?;
+            Some(Bristles { force: c.sign * own.force, ..own })
         })
     }
 }

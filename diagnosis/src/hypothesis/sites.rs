@@ -1,7 +1,7 @@
 //! The places of a device where physics may have been left out.
 
 use super::scales::Scales;
-use backdrive_plant::elements::{Law, Mechanics, Role};
+use backdrive_plant::elements::{Law, Role};
 use backdrive_plant::model::{Element, InputKind, Model, OutputKind, Place};
 
 /// How two places belong together.
@@ -134,7 +134,7 @@ impl<'a> Sites<'a> {
 
     /// Whether a friction there jumps with the sign of the velocity.
     pub fn has_set_valued(&self, site: &Site) -> bool {
-        self.elements_at(site).any(|(_, e)| matches!(e.law.role(), Role::Friction(_)))
+        self.elements_at(site).any(|(_, e)| matches!(e.law.role(), Role::Friction))
     }
 
     /// The first element that holds the joint, as a spring does.

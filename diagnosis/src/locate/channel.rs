@@ -66,7 +66,7 @@ pub(super) struct Split<'a> {
 impl<'a> Split<'a> {
     /// `amplitude` (m) is that of the displacements across the nonlinear elements.
     pub fn of(model: &'a Model, amplitude: f64) -> Option<Split<'a>> {
-        use backdrive_plant::elements::{Mechanics, Role};
+        use backdrive_plant::elements::Role;
         let at = Operating::amplitude(if amplitude > 0.0 && amplitude.is_finite() { amplitude } else { 1e-3 });
         let linear = LinearModel::new(model, &at).ok()?;
         let nonlinear = (0..model.elements.len()).filter(|e| !matches!(model.elements[*e].law.role(), Role::Linear(_))).collect();

@@ -2,7 +2,7 @@
 
 use super::channel::Split;
 use super::trajectory::Trajectory;
-use backdrive_plant::elements::{Law, Mechanics, Role};
+use backdrive_plant::elements::{Law, Role, Rubbing, Side};
 
 /// Forces of the nonlinear elements along the simulated motion with the deviation added, less those along the simulated motion, less what
 /// the linear part already says: one column for each element of [`Split::nonlinear`].
@@ -48,22 +48,17 @@ pub(crate) fn force_along(law: &Law, x: &[f64], v: &[f64], period: f64) -> Vec<f
 fn along(law: &Law, x: &[f64], v: &[f64], period: f64, slip: f64) -> Vec<f64> {
     let mut memory = vec![0.0; law.memory_len()];
     let (mut last, mut force) = (x.first().copied().unwrap_or(0.0), 0.0_f64);
-    let levels = match law.role() {
-        Role::Friction(levels) => Some(levels),
-        _ => None,
-    };
+    let is_friction = law.role() == Role::Friction;
     let step = |(x, v): (&f64, &f64)| {
-        match &levels {
-            Some(levels) => {
-                let (up, down) = (levels.sliding(0, *v), levels.sliding(1, *v));
-                let slope = if slip > 0.0 { up.max(down) / slip } else { f64::INFINITY };
-                let change = x - last;
-                force = if change == 0.0 { force } else { (force + slope * change).min(up).max(-down) };
-            }
-            None => {
-                law.advance(&mut memory, last, *x, period);
-                force = law.force(&memory, *x, *v);
-            }
+        if is_friction {
+            let level = |side| law.level(&Rubbing { side, speed: Some(*v), load: 0.0, memory: &memory });
+            let (up, down) = (level(Side::Forwards), level(Side::Backwards));
+            let slope = if slip > 0.0 { up.max(down) / slip } else { f64::INFINITY };
+            let change = x - last;
+            force = if change == 0.0 { force } else { (force + slope * change).min(up).max(-down) };
+        } else {
+            law.advance(&mut memory, last, *x, period);
+            force = law.force(&memory, *x, *v);
         }
         last = *x;
         force

@@ -1,7 +1,7 @@
 //! Viscous friction of another slope in each direction: a valve that opens one way.
 
-use crate::hypothesis::{Against, Family, Mark, Physics, State};
 use crate::hypothesis::builder::{ElementBuilder, even, first_value};
+use crate::hypothesis::{Against, Family, Mark, Physics, State};
 
 pub(super) const PHYSICS: Physics = Physics {
     name: "asymmetric_damper",

@@ -1,8 +1,8 @@
 //! The voltage that a motor generates against its drive: force lost in proportion to speed.
 
-use crate::hypothesis::{Against, Family, Mark, Physics, State};
 use crate::hypothesis::builder::{even, key, stated};
 use crate::hypothesis::sites::Reach;
+use crate::hypothesis::{Against, Family, Mark, Physics, State};
 use backdrive_plant::model::InputKind;
 
 pub(super) const PHYSICS: Physics = Physics {
@@ -14,7 +14,9 @@ pub(super) const PHYSICS: Physics = Physics {
     against: Against::Velocity,
     state: State::WithItsVariable,
     mark: Mark::Viscous,
-    twin: Some("back-EMF and a damper to ground on the driven body are the same force: the motor's current would tell, or letting the device coast with the winding open"),
+    twin: Some(
+        "back-EMF and a damper to ground on the driven body are the same force: the motor's current would tell, or letting the device coast with the winding open",
+    ),
     sliding: &[],
     from_level: &[],
     memory: false,

@@ -1,7 +1,7 @@
 //! A joint with play: it stands in the place of the joint's spring and damper.
 
-use crate::hypothesis::{Against, Family, Hypothesis, Parameter, Mark, Physics, State};
 use crate::hypothesis::builder::{ElementBuilder, even, first_value};
+use crate::hypothesis::{Against, Family, Hypothesis, Mark, Parameter, Physics, State};
 
 /// The word that sets a play with round edges apart.
 const ROUND: &str = "round";

@@ -1,7 +1,7 @@
 //! An actuator that follows its command with a first-order lag.
 
-use crate::hypothesis::{Against, Family, Mark, Physics, State};
 use crate::hypothesis::builder::{Freedom, key};
+use crate::hypothesis::{Against, Family, Mark, Physics, State};
 use backdrive_plant::model::InputKind;
 
 pub(super) const PHYSICS: Physics = Physics {

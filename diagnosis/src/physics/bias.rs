@@ -1,8 +1,8 @@
 //! A constant force: gravity, a preload, the mean pull of a cable.
 
-use crate::hypothesis::{Against, Family, Mark, Physics, State};
 use crate::hypothesis::builder::{ElementBuilder, even};
 use crate::hypothesis::sites::{Reach, Site};
+use crate::hypothesis::{Against, Family, Mark, Physics, State};
 use backdrive_plant::model::{InputKind, Place};
 
 pub(super) const PHYSICS: Physics = Physics {

@@ -1,7 +1,7 @@
 //! Smooth hysteresis: part of the stiffness yields.
 
-use crate::hypothesis::{Against, Family, Mark, Physics, State};
 use crate::hypothesis::builder::{ElementBuilder, any, even, first_value, log};
+use crate::hypothesis::{Against, Family, Mark, Physics, State};
 
 pub(super) const PHYSICS: Physics = Physics {
     name: "bouc_wen",

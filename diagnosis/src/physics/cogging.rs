@@ -1,7 +1,7 @@
 //! A force that repeats with position: the poles of a motor, a screw's turn, gear teeth.
 
-use crate::hypothesis::{Against, Family, Mark, Physics, State};
 use crate::hypothesis::builder::{ElementBuilder, any, even, log};
+use crate::hypothesis::{Against, Family, Mark, Physics, State};
 
 /// Periods that fits start from, in a peak-to-peak travel, longest first; a ripple has to be seen to come again.
 const PERIODS: [f64; 13] = [0.71, 0.5, 0.35, 0.25, 0.18, 0.125, 0.088, 0.0625, 0.044, 0.031, 0.022, 0.016, 0.011];

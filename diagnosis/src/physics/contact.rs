@@ -1,8 +1,8 @@
 //! A stop or a wall: it pushes on one side only.
 
-use crate::hypothesis::{Against, Family, Hypothesis, Mark, Physics, State};
 use crate::hypothesis::builder::{ElementBuilder, any, even, first_value};
 use crate::hypothesis::sites::{Site, Sites};
+use crate::hypothesis::{Against, Family, Hypothesis, Mark, Physics, State};
 
 pub(super) const PHYSICS: Physics = Physics {
     name: "contact",

@@ -1,7 +1,7 @@
 //! An actuator or a sensor of another scale than 1.
 
-use crate::hypothesis::{Against, Family, Mark, Physics, State};
 use crate::hypothesis::builder::{even, key};
+use crate::hypothesis::{Against, Family, Mark, Physics, State};
 
 pub(super) const PHYSICS: Physics = Physics {
     name: "gain",

@@ -1,8 +1,8 @@
 //! A stop that hardens and whose damping grows with how deep it is pressed.
 
-use crate::hypothesis::{Against, Family, Mark, Physics, State};
 use crate::hypothesis::builder::{ElementBuilder, any, even};
 use crate::hypothesis::sites::Site;
+use crate::hypothesis::{Against, Family, Mark, Physics, State};
 
 pub(super) const PHYSICS: Physics = Physics {
     name: "hunt_crossley",

@@ -1,7 +1,7 @@
 //! A spring whose force runs on one line when it is stretched and on another when it is let go.
 
-use crate::hypothesis::{Against, Family, Mark, Physics, State};
 use crate::hypothesis::builder::{ElementBuilder, even, first_value, log};
+use crate::hypothesis::{Against, Family, Mark, Physics, State};
 
 pub(super) const PHYSICS: Physics = Physics {
     name: "hysteretic_spring",

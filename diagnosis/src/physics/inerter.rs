@@ -1,8 +1,8 @@
 //! Force from relative acceleration: a flywheel behind a gear, fluid that is moved between two chambers.
 
-use crate::hypothesis::{Against, Family, Mark, Physics, State};
 use crate::hypothesis::builder::{ElementBuilder, even};
 use crate::hypothesis::sites::{Reach, Site};
+use crate::hypothesis::{Against, Family, Mark, Physics, State};
 
 pub(super) const PHYSICS: Physics = Physics {
     name: "inerter",

@@ -1,8 +1,8 @@
 //! Inertia that a body has beyond what the model says.
 
-use crate::hypothesis::{Against, Family, Mark, Physics, State};
 use crate::hypothesis::builder::{even, inertia, stated};
 use crate::hypothesis::sites::{Reach, Site};
+use crate::hypothesis::{Against, Family, Mark, Physics, State};
 
 pub(super) const PHYSICS: Physics = Physics {
     name: "inertia",

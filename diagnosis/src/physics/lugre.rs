@@ -1,7 +1,7 @@
 //! Bristle friction: presliding, a level that falls with speed, and lag between them.
 
-use crate::hypothesis::{Against, Family, Hypothesis, Parameter, Mark, Physics, State};
 use crate::hypothesis::builder::{ElementBuilder, Freedom, any, log};
+use crate::hypothesis::{Against, Family, Hypothesis, Mark, Parameter, Physics, State};
 
 pub(super) const PHYSICS: Physics = Physics {
     name: "lugre",

@@ -1,7 +1,7 @@
 //! Friction of many contacts that slip one after the other: presliding hysteresis with non-local memory.
 
-use crate::hypothesis::{Against, Family, Hypothesis, Parameter, Mark, Physics, State};
 use crate::hypothesis::builder::{ElementBuilder, log};
+use crate::hypothesis::{Against, Family, Hypothesis, Mark, Parameter, Physics, State};
 
 /// Sliders that are fitted, and the word that sets the hypothesis apart: few enough to be tried at every place, then many enough for the shape of a loop.
 const SLIDERS: [(usize, &str); 2] = [(3, ""), (5, "fine")];

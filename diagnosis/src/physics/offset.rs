@@ -1,7 +1,7 @@
 //! A sensor that does not read 0 at 0.
 
-use crate::hypothesis::{Against, Family, Mark, Physics, State};
 use crate::hypothesis::builder::{even, key};
+use crate::hypothesis::{Against, Family, Mark, Physics, State};
 use backdrive_plant::model::OutputKind;
 
 pub(super) const PHYSICS: Physics = Physics {

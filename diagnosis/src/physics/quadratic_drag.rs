@@ -1,7 +1,7 @@
 //! Drag that rises with the square of speed: a fluid through an orifice.
 
-use crate::hypothesis::{Against, Family, Mark, Physics, State};
 use crate::hypothesis::builder::{ElementBuilder, even};
+use crate::hypothesis::{Against, Family, Mark, Physics, State};
 
 pub(super) const PHYSICS: Physics = Physics {
     name: "quadratic_drag",

@@ -1,7 +1,7 @@
 //! The largest force that an actuator gives.
 
-use crate::hypothesis::{Against, Family, Mark, Physics, State};
 use crate::hypothesis::builder::{even, key};
+use crate::hypothesis::{Against, Family, Mark, Physics, State};
 use backdrive_plant::model::InputKind;
 
 pub(super) const PHYSICS: Physics = Physics {

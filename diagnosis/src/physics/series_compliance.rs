@@ -1,8 +1,8 @@
 //! A compliance left out: another body in a joint, behind a spring and a damper.
 
-use crate::hypothesis::{Against, Family, Mark, Physics, State};
 use crate::hypothesis::builder::{Freedom, log, series};
 use crate::hypothesis::sites::Site;
+use crate::hypothesis::{Against, Family, Mark, Physics, State};
 use backdrive_plant::model::{Element, InputKind, Model};
 
 pub(super) const PHYSICS: Physics = Physics {

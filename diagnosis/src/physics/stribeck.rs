@@ -1,7 +1,7 @@
 //! Dry friction that falls with speed.
 
-use crate::hypothesis::{Against, Family, Mark, Physics, State};
 use crate::hypothesis::builder::{ElementBuilder, Freedom, log};
+use crate::hypothesis::{Against, Family, Mark, Physics, State};
 
 pub(super) const PHYSICS: Physics = Physics {
     name: "stribeck",

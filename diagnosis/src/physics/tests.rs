@@ -356,7 +356,7 @@ fn many_contacts_begin_where_one_bristle_ends() {
 
 #[test]
 fn a_play_with_round_edges_begins_where_the_sharp_one_ends() {
-    use backdrive_plant::elements::{Backlash, Mechanics};
+    use backdrive_plant::elements::{Backlash, PathLaw};
     let mut pairs = 0;
     for (name, _, model) in devices() {
         let (hypotheses, _) = hypotheses(&model);
@@ -449,7 +449,6 @@ fn what_remembers_its_path_is_what_the_stepper_gives_a_memory() {
             (kind.build)(&kind.parameters.iter().enumerate().map(value).collect::<Vec<_>>())
         };
         let law = with(1.0).or_else(|_| with(0.5)).or_else(|_| with(2.0)).unwrap_or_else(|e| panic!("{}: {e}", kind.name));
-        use backdrive_plant::elements::Mechanics;
         assert_eq!(physics_named(kind.name).map(|p| p.memory), Some(law.memory_len() > 0), "{}", kind.name);
     }
 }

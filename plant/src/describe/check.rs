@@ -1,6 +1,6 @@
 //! What is odd about a model.
 
-use crate::elements::{Law, Mechanics, Role};
+use crate::elements::{Law, Role};
 use crate::linear::{LinearModel, Operating};
 use crate::model::Model;
 use crate::stepper::{Options, Plant};
@@ -43,7 +43,7 @@ pub fn check(model: &Model, at: &Operating) -> Vec<Remark> {
         }
     }
     for element in &model.elements {
-        if let Some(message) = active(&element.law, at, &crate::describe::unit_for(model.motion, "m")) {
+        if let Some(message) = active(&element.law, at, &super::units::unit_for(model.motion, "m")) {
             add(Severity::Warning, format!("elements.{}", element.name), message);
         }
     }
@@ -83,21 +83,10 @@ pub fn check(model: &Model, at: &Operating) -> Vec<Remark> {
 
 /// Why an element may create energy, if it may.
 fn active(law: &Law, at: &Operating, unit: &str) -> Option<String> {
-    if let Law::HystereticSpring(spring) = law {
-        // The lines cross where the falling one is the steeper: cycles beyond create energy.
-        let slopes = spring.stiffness_positive - spring.stiffness_negative;
-        let crossing = (spring.offset_negative - spring.offset_positive) / slopes;
-        if slopes < 0.0 && crossing > at.amplitude {
-            return Some(format!("creates energy in cycles beyond {crossing:.4} {unit}, where its two lines cross"));
-        }
-        if slopes != 0.0 && crossing.abs() <= at.amplitude {
-            return Some(format!("creates energy in cycles about 0 already: its two lines cross at {crossing:.4} {unit}"));
-        }
-        return None;
-    }
     match law.role() {
         Role::Linear(linear) if linear.damping < 0.0 => Some(format!("creates energy: its damping is {}", linear.damping)),
         Role::Linear(linear) if linear.stiffness < 0.0 => Some(format!("drives away from rest: its stiffness is {}", linear.stiffness)),
-        _ => None,
+        Role::Linear(_) | Role::Friction => None,
+        Role::Path => law.creates_energy(at.amplitude, unit),
     }
 }

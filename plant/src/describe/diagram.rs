@@ -32,7 +32,7 @@ struct Drawing<'a> {
 impl Drawing<'_> {
     fn body(&mut self, body: usize, indent: &str) {
         self.drawn[body] = true;
-        let unit = super::unit_for(self.model.motion, "kg");
+        let unit = super::units::unit_for(self.model.motion, "kg");
         let b = &self.model.bodies[body];
         self.lines.push(format!("{indent}[{}] {} {unit}{}", b.name, b.inertia, self.notes(body)));
         let to_ground = self.between(Some(body), None);

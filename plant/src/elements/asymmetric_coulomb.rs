@@ -1,6 +1,9 @@
 //! Coulomb friction that depends on the direction.
 
-use super::{FrictionLevels, Kind, Law, Mechanics, Parameter, Range, Role};
+use super::harmonic;
+use super::kind::{KindOf, Parameter, Range};
+use super::law::{FrictionLaw, Linear, Rubbing, Side};
+use super::sine::Sine;
 
 /// `f = positive` for `v > 0`, `-negative` for `v < 0`, anything between at rest.
 #[derive(Debug, Clone, PartialEq)]
@@ -12,7 +15,7 @@ pub struct AsymmetricCoulomb {
 }
 
 impl AsymmetricCoulomb {
-    pub(super) const KIND: Kind = Kind {
+    pub(super) const KIND: KindOf<AsymmetricCoulomb> = KindOf {
         name: "asymmetric_coulomb",
         equation: "f = c+ for v > 0, -c- for v < 0, set-valued at rest",
         source: "Coulomb",
@@ -21,7 +24,7 @@ impl AsymmetricCoulomb {
             Parameter::number("positive", "N", Range::NonNegative, "c+"),
             Parameter::number("negative", "N", Range::NonNegative, "c-"),
         ],
-        build: |v| Ok(Law::AsymmetricCoulomb(AsymmetricCoulomb { positive: v[0][0], negative: v[1][0] })),
+        build: |v| Ok(AsymmetricCoulomb { positive: v[0][0], negative: v[1][0] }),
     };
 
     pub(super) fn values(&self) -> Vec<Vec<f64>> {
@@ -29,8 +32,16 @@ impl AsymmetricCoulomb {
     }
 }
 
-impl Mechanics for AsymmetricCoulomb {
-    fn role(&self) -> Role {
-        Role::Friction(FrictionLevels::constant(self.positive, self.negative))
+impl FrictionLaw for AsymmetricCoulomb {
+    #[inline]
+    fn level(&self, at: &Rubbing) -> f64 {
+        match at.side {
+            Side::Forwards => self.positive,
+            Side::Backwards => self.negative,
+        }
+    }
+
+    fn linearised(&self, at: &Sine) -> Linear {
+        harmonic::of_friction(self, at)
     }
 }

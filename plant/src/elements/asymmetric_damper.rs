@@ -1,6 +1,9 @@
 //! Damper that depends on the direction.
 
-use super::{Kind, Law, Mechanics, Parameter, Range, Slopes};
+use super::harmonic;
+use super::kind::{KindOf, Parameter, Range};
+use super::law::{Linear, PathLaw, Slopes};
+use super::sine::Sine;
 
 /// `f = positive v` for `v > 0`, `negative v` for `v < 0`.
 #[derive(Debug, Clone, PartialEq)]
@@ -12,7 +15,7 @@ pub struct AsymmetricDamper {
 }
 
 impl AsymmetricDamper {
-    pub(super) const KIND: Kind = Kind {
+    pub(super) const KIND: KindOf<AsymmetricDamper> = KindOf {
         name: "asymmetric_damper",
         equation: "f = b+ v for v > 0, b- v for v < 0",
         source: "shock absorbers",
@@ -21,7 +24,7 @@ impl AsymmetricDamper {
             Parameter::number("positive", "N s/m", Range::NonNegative, "b+"),
             Parameter::number("negative", "N s/m", Range::NonNegative, "b-"),
         ],
-        build: |v| Ok(Law::AsymmetricDamper(AsymmetricDamper { positive: v[0][0], negative: v[1][0] })),
+        build: |v| Ok(AsymmetricDamper { positive: v[0][0], negative: v[1][0] }),
     };
 
     pub(super) fn values(&self) -> Vec<Vec<f64>> {
@@ -29,7 +32,7 @@ impl AsymmetricDamper {
     }
 }
 
-impl Mechanics for AsymmetricDamper {
+impl PathLaw for AsymmetricDamper {
     fn slopes(&self) -> Slopes {
         Slopes { stiffness: 0.0, damping: self.positive.max(self.negative), bounded: true }
     }
@@ -37,6 +40,18 @@ impl Mechanics for AsymmetricDamper {
     #[inline]
     fn force(&self, _memory: &[f64], _x: f64, v: f64) -> f64 {
         v * if v > 0.0 { self.positive } else { self.negative }
+    }
+
+    fn stored(&self, _memory: &[f64], _x: f64) -> f64 {
+        0.0
+    }
+
+    fn linearised(&self, at: &Sine) -> Linear {
+        harmonic::of_path(self, at)
+    }
+
+    fn creates_energy(&self, _amplitude: f64, _unit: &str) -> Option<String> {
+        None
     }
 }
 

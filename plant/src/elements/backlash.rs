@@ -1,7 +1,10 @@
 //! Backlash: a damped shaft behind a gap.
 
 use super::decay::decay;
-use super::{Kind, Law, Mechanics, Parameter, Range, Slopes};
+use super::harmonic;
+use super::kind::{KindOf, Parameter, Range};
+use super::law::{Linear, PathLaw, Slopes};
+use super::sine::Sine;
 
 /// Shaft with a total gap: `f = k (x - xb) + c (v - dxb/dt)`, xb the position inside the gap, `|xb| <= gap/2`.
 /// Memory: xb, m.
@@ -21,7 +24,7 @@ pub struct Backlash {
 }
 
 impl Backlash {
-    pub(super) const KIND: Kind = Kind {
+    pub(super) const KIND: KindOf<Backlash> = KindOf {
         name: "backlash",
         equation: "f = k (x - xb) + c (v - dxb/dt); dxb/dt = v + (k/c)(x - xb) inside |xb| < α, held at ±α while it pushes; \
                    with rounding w, f = k s + c v ds/dx, s = x + (√((x - α)² + w²) - √((x + α)² + w²))/2",
@@ -33,7 +36,7 @@ impl Backlash {
             Parameter::number("damping", "N s/m", Range::NonNegative, "c").or(0.0),
             Parameter::number("rounding", "m", Range::NonNegative, "w, over which touch sets in").or(0.0),
         ],
-        build: |v| Ok(Law::Backlash(Backlash { gap: v[0][0], stiffness: v[1][0], damping: v[2][0], rounding: v[3][0] })),
+        build: |v| Ok(Backlash { gap: v[0][0], stiffness: v[1][0], damping: v[2][0], rounding: v[3][0] }),
     };
 
     pub(super) fn values(&self) -> Vec<Vec<f64>> {
@@ -50,7 +53,7 @@ impl Backlash {
     }
 }
 
-impl Mechanics for Backlash {
+impl PathLaw for Backlash {
     fn memory_len(&self) -> usize {
         1
     }
@@ -111,6 +114,14 @@ impl Mechanics for Backlash {
         }
         let shaft_twist = x - memory.first().copied().unwrap_or(0.0);
         0.5 * self.stiffness * shaft_twist * shaft_twist
+    }
+
+    fn linearised(&self, at: &Sine) -> Linear {
+        harmonic::of_path(self, at)
+    }
+
+    fn creates_energy(&self, _amplitude: f64, _unit: &str) -> Option<String> {
+        None
     }
 }
 

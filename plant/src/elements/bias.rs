@@ -1,6 +1,7 @@
 //! Constant force.
 
-use super::{Kind, Law, Linear, Mechanics, Parameter, Range, Role};
+use super::kind::{KindOf, Parameter, Range};
+use super::law::{Linear, LinearLaw};
 
 /// `f = force`.
 #[derive(Debug, Clone, PartialEq)]
@@ -10,13 +11,13 @@ pub struct Bias {
 }
 
 impl Bias {
-    pub(super) const KIND: Kind = Kind {
+    pub(super) const KIND: KindOf<Bias> = KindOf {
         name: "bias",
         equation: "f = constant",
         source: "weight, preload",
         energy: "stores without bound (as weight does), creates none over a closed path",
         parameters: &[Parameter::number("force", "N", Range::Any, "positive pushes the first body backwards")],
-        build: |v| Ok(Law::Bias(Bias { force: v[0][0] })),
+        build: |v| Ok(Bias { force: v[0][0] }),
     };
 
     pub(super) fn values(&self) -> Vec<Vec<f64>> {
@@ -24,8 +25,8 @@ impl Bias {
     }
 }
 
-impl Mechanics for Bias {
-    fn role(&self) -> Role {
-        Role::Linear(Linear { force: self.force, ..Linear::default() })
+impl LinearLaw for Bias {
+    fn coefficients(&self) -> Linear {
+        Linear { force: self.force, ..Linear::default() }
     }
 }

@@ -1,6 +1,9 @@
 //! Bouc-Wen hysteresis.
 
-use super::{Kind, Law, Mechanics, Parameter, Range, Slopes};
+use super::harmonic;
+use super::kind::{KindOf, Parameter, Range};
+use super::law::{Linear, PathLaw, Slopes};
+use super::sine::Sine;
 
 /// `f = a k x + (1 - a) k z`, `dz/dt = A v - β |v| |z|^(n-1) z - γ v |z|^n`. Memory: z, m.
 #[derive(Debug, Clone, PartialEq)]
@@ -31,7 +34,7 @@ const STAGES_AT_MOST: f64 = 100.0;
 const NEAR: f64 = 0.01;
 
 impl BoucWen {
-    pub(super) const KIND: Kind = Kind {
+    pub(super) const KIND: KindOf<BoucWen> = KindOf {
         name: "bouc_wen",
         equation: "f = a k x + (1 - a) k z, dz/dt = A v - β |v| |z|^(n-1) z - γ v |z|^n",
         source: "Bouc 1967, Wen 1976",
@@ -46,7 +49,7 @@ impl BoucWen {
         ],
         build: |v| {
             let [stiffness, ratio, amplitude, beta, gamma, exponent] = [v[0][0], v[1][0], v[2][0], v[3][0], v[4][0], v[5][0]];
-            Ok(Law::BoucWen(BoucWen::new(stiffness, ratio, amplitude, beta, gamma, exponent)?))
+            BoucWen::new(stiffness, ratio, amplitude, beta, gamma, exponent)
         },
     };
 
@@ -103,7 +106,7 @@ impl BoucWen {
     }
 }
 
-impl Mechanics for BoucWen {
+impl PathLaw for BoucWen {
     fn memory_len(&self) -> usize {
         1
     }
@@ -152,6 +155,14 @@ impl Mechanics for BoucWen {
         // Unloading from z with slope between A and A (1 + |...|) gives back about z²/(2 A).
         0.5 * self.stiffness
             * (self.ratio * x * x + (1.0 - self.ratio) * hysteretic_displacement * hysteretic_displacement / self.amplitude)
+    }
+
+    fn linearised(&self, at: &Sine) -> Linear {
+        harmonic::of_path(self, at)
+    }
+
+    fn creates_energy(&self, _amplitude: f64, _unit: &str) -> Option<String> {
+        None
     }
 }
 

@@ -1,6 +1,9 @@
 //! Cogging: a force that repeats with position.
 
-use super::{Kind, Law, Mechanics, Parameter, Range, Slopes};
+use super::harmonic;
+use super::kind::{KindOf, Parameter, Range};
+use super::law::{Linear, PathLaw, Slopes};
+use super::sine::Sine;
 use std::f64::consts::TAU;
 
 /// `f = amplitude sin(2π x/period + phase)`.
@@ -15,7 +18,7 @@ pub struct Cogging {
 }
 
 impl Cogging {
-    pub(super) const KIND: Kind = Kind {
+    pub(super) const KIND: KindOf<Cogging> = KindOf {
         name: "cogging",
         equation: "f = a sin(2π x/period + phase)",
         source: "slots and magnets of a motor, teeth of a gear",
@@ -25,7 +28,7 @@ impl Cogging {
             Parameter::number("period", "m", Range::Positive, "distance after which it repeats"),
             Parameter::number("phase", "rad", Range::Any, "at x = 0").or(0.0),
         ],
-        build: |v| Ok(Law::Cogging(Cogging { amplitude: v[0][0], period: v[1][0], phase: v[2][0] })),
+        build: |v| Ok(Cogging { amplitude: v[0][0], period: v[1][0], phase: v[2][0] }),
     };
 
     pub(super) fn values(&self) -> Vec<Vec<f64>> {
@@ -33,7 +36,7 @@ impl Cogging {
     }
 }
 
-impl Mechanics for Cogging {
+impl PathLaw for Cogging {
     fn slopes(&self) -> Slopes {
         Slopes { stiffness: TAU * self.amplitude.abs() / self.period, damping: 0.0, bounded: true }
     }
@@ -45,6 +48,14 @@ impl Mechanics for Cogging {
 
     fn stored(&self, _memory: &[f64], x: f64) -> f64 {
         self.amplitude * self.period / TAU * (self.phase.cos() - (TAU * x / self.period + self.phase).cos())
+    }
+
+    fn linearised(&self, at: &Sine) -> Linear {
+        harmonic::of_path(self, at)
+    }
+
+    fn creates_energy(&self, _amplitude: f64, _unit: &str) -> Option<String> {
+        None
     }
 }
 

@@ -1,6 +1,9 @@
 //! Contact with a wall.
 
-use super::{Kind, Law, Mechanics, Parameter, Range, Slopes};
+use super::harmonic;
+use super::kind::{KindOf, Parameter, Range};
+use super::law::{Linear, PathLaw, Slopes};
+use super::sine::Sine;
 
 /// `f = max(0, stiffness q + damping v)` where `q = x - gap > 0`: pushes only.
 #[derive(Debug, Clone, PartialEq)]
@@ -14,7 +17,7 @@ pub struct Contact {
 }
 
 impl Contact {
-    pub(super) const KIND: Kind = Kind {
+    pub(super) const KIND: KindOf<Contact> = KindOf {
         name: "contact",
         equation: "f = max(0, k q + b v) where q = x - gap > 0",
         source: "Kelvin-Voigt, one-sided",
@@ -24,7 +27,7 @@ impl Contact {
             Parameter::number("damping", "N s/m", Range::NonNegative, "b").or(0.0),
             Parameter::number("gap", "m", Range::Any, "displacement at which it touches").or(0.0),
         ],
-        build: |v| Ok(Law::Contact(Contact { stiffness: v[0][0], damping: v[1][0], gap: v[2][0] })),
+        build: |v| Ok(Contact { stiffness: v[0][0], damping: v[1][0], gap: v[2][0] }),
     };
 
     pub(super) fn values(&self) -> Vec<Vec<f64>> {
@@ -32,7 +35,7 @@ impl Contact {
     }
 }
 
-impl Mechanics for Contact {
+impl PathLaw for Contact {
     fn slopes(&self) -> Slopes {
         Slopes { stiffness: self.stiffness, damping: self.damping, bounded: true }
     }
@@ -66,6 +69,14 @@ impl Mechanics for Contact {
     fn stored(&self, _memory: &[f64], x: f64) -> f64 {
         let depth = (x - self.gap).max(0.0);
         0.5 * self.stiffness * depth * depth
+    }
+
+    fn linearised(&self, at: &Sine) -> Linear {
+        harmonic::of_path(self, at)
+    }
+
+    fn creates_energy(&self, _amplitude: f64, _unit: &str) -> Option<String> {
+        None
     }
 }
 

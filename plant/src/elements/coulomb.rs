@@ -1,6 +1,9 @@
 //! Coulomb friction.
 
-use super::{FrictionLevels, Kind, Law, Mechanics, Parameter, Range, Role};
+use super::harmonic;
+use super::kind::{KindOf, Parameter, Range};
+use super::law::{FrictionLaw, Linear, Rubbing};
+use super::sine::Sine;
 
 /// `f = force sign(v)`, any value between `-force` and `force` at rest.
 #[derive(Debug, Clone, PartialEq)]
@@ -10,13 +13,13 @@ pub struct Coulomb {
 }
 
 impl Coulomb {
-    pub(super) const KIND: Kind = Kind {
+    pub(super) const KIND: KindOf<Coulomb> = KindOf {
         name: "coulomb",
         equation: "f = c sign(v), set-valued at rest",
         source: "Coulomb; as a box-constrained multiplier Moreau 1988, Jean 1999",
         energy: "takes, creates none",
         parameters: &[Parameter::number("force", "N", Range::NonNegative, "c")],
-        build: |v| Ok(Law::Coulomb(Coulomb { force: v[0][0] })),
+        build: |v| Ok(Coulomb { force: v[0][0] }),
     };
 
     pub(super) fn values(&self) -> Vec<Vec<f64>> {
@@ -24,8 +27,13 @@ impl Coulomb {
     }
 }
 
-impl Mechanics for Coulomb {
-    fn role(&self) -> Role {
-        Role::Friction(FrictionLevels::constant(self.force, self.force))
+impl FrictionLaw for Coulomb {
+    #[inline]
+    fn level(&self, _at: &Rubbing) -> f64 {
+        self.force
+    }
+
+    fn linearised(&self, at: &Sine) -> Linear {
+        harmonic::of_friction(self, at)
     }
 }

@@ -1,6 +1,9 @@
 //! Hardening or softening spring.
 
-use super::{Kind, Law, Mechanics, Parameter, Range, Slopes};
+use super::harmonic;
+use super::kind::{KindOf, Parameter, Range};
+use super::law::{Linear, PathLaw, Slopes};
+use super::sine::Sine;
 
 /// `f = stiffness x + cubic x³`.
 #[derive(Debug, Clone, PartialEq)]
@@ -12,7 +15,7 @@ pub struct CubicSpring {
 }
 
 impl CubicSpring {
-    pub(super) const KIND: Kind = Kind {
+    pub(super) const KIND: KindOf<CubicSpring> = KindOf {
         name: "cubic_spring",
         equation: "f = k x + k3 x³",
         source: "Duffing 1918",
@@ -21,7 +24,7 @@ impl CubicSpring {
             Parameter::number("stiffness", "N/m", Range::Any, "k").or(0.0),
             Parameter::number("cubic", "N/m³", Range::Any, "k3; negative softens"),
         ],
-        build: |v| Ok(Law::CubicSpring(CubicSpring { stiffness: v[0][0], cubic: v[1][0] })),
+        build: |v| Ok(CubicSpring { stiffness: v[0][0], cubic: v[1][0] }),
     };
 
     pub(super) fn values(&self) -> Vec<Vec<f64>> {
@@ -29,7 +32,7 @@ impl CubicSpring {
     }
 }
 
-impl Mechanics for CubicSpring {
+impl PathLaw for CubicSpring {
     fn slopes(&self) -> Slopes {
         // Where the cubic part has brought the slope to three times the initial one; without a linear part, at 10 mm.
         let stiffness = if self.stiffness > 0.0 { 3.0 * self.stiffness } else { 3.0 * self.cubic.abs() * 1e-4 };
@@ -44,6 +47,14 @@ impl Mechanics for CubicSpring {
     fn stored(&self, _memory: &[f64], x: f64) -> f64 {
         let square = x * x;
         square * (0.5 * self.stiffness + 0.25 * self.cubic * square)
+    }
+
+    fn linearised(&self, at: &Sine) -> Linear {
+        harmonic::of_path(self, at)
+    }
+
+    fn creates_energy(&self, _amplitude: f64, _unit: &str) -> Option<String> {
+        None
     }
 }
 

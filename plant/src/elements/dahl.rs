@@ -1,7 +1,10 @@
 //! Dahl friction.
 
 use super::decay::decay;
-use super::{Kind, Law, Mechanics, Parameter, Range, Slopes};
+use super::harmonic;
+use super::kind::{KindOf, Parameter, Range};
+use super::law::{Linear, PathLaw, Slopes};
+use super::sine::Sine;
 
 /// `dz/dt = v (1 - stiffness z / coulomb sign v)`, `f = stiffness z`. Memory: the bristle deflection z, m.
 #[derive(Debug, Clone, PartialEq)]
@@ -13,13 +16,13 @@ pub struct Dahl {
 }
 
 impl Dahl {
-    pub(super) const KIND: Kind = Kind {
+    pub(super) const KIND: KindOf<Dahl> = KindOf {
         name: "dahl",
         equation: "dz/dt = v (1 - σ z/c sign v), f = σ z",
         source: "Dahl 1968",
         energy: "takes, creates none; its memory is local, so a loop inside a loop does not close",
         parameters: &[Parameter::number("stiffness", "N/m", Range::Positive, "σ"), Parameter::number("coulomb", "N", Range::Positive, "c")],
-        build: |v| Ok(Law::Dahl(Dahl { stiffness: v[0][0], coulomb: v[1][0] })),
+        build: |v| Ok(Dahl { stiffness: v[0][0], coulomb: v[1][0] }),
     };
 
     pub(super) fn values(&self) -> Vec<Vec<f64>> {
@@ -27,7 +30,7 @@ impl Dahl {
     }
 }
 
-impl Mechanics for Dahl {
+impl PathLaw for Dahl {
     fn memory_len(&self) -> usize {
         1
     }
@@ -56,6 +59,14 @@ impl Mechanics for Dahl {
     fn stored(&self, memory: &[f64], _x: f64) -> f64 {
         let bristle_deflection = memory.first().copied().unwrap_or(0.0);
         0.5 * self.stiffness * bristle_deflection * bristle_deflection
+    }
+
+    fn linearised(&self, at: &Sine) -> Linear {
+        harmonic::of_path(self, at)
+    }
+
+    fn creates_energy(&self, _amplitude: f64, _unit: &str) -> Option<String> {
+        None
     }
 }
 

@@ -1,6 +1,7 @@
 //! Linear damper.
 
-use super::{Kind, Law, Linear, Mechanics, Parameter, Range, Role};
+use super::kind::{KindOf, Parameter, Range};
+use super::law::{Linear, LinearLaw};
 
 /// `f = damping v`.
 #[derive(Debug, Clone, PartialEq)]
@@ -10,13 +11,13 @@ pub struct Damper {
 }
 
 impl Damper {
-    pub(super) const KIND: Kind = Kind {
+    pub(super) const KIND: KindOf<Damper> = KindOf {
         name: "damper",
         equation: "f = b v",
         source: "Newton",
         energy: "takes, creates none while b >= 0",
         parameters: &[Parameter::number("damping", "N s/m", Range::Any, "b")],
-        build: |v| Ok(Law::Damper(Damper { damping: v[0][0] })),
+        build: |v| Ok(Damper { damping: v[0][0] }),
     };
 
     pub(super) fn values(&self) -> Vec<Vec<f64>> {
@@ -24,8 +25,8 @@ impl Damper {
     }
 }
 
-impl Mechanics for Damper {
-    fn role(&self) -> Role {
-        Role::Linear(Linear { damping: self.damping, ..Linear::default() })
+impl LinearLaw for Damper {
+    fn coefficients(&self) -> Linear {
+        Linear { damping: self.damping, ..Linear::default() }
     }
 }

@@ -1,6 +1,10 @@
 //! Dry friction that is lower near rest.
 
-use super::{FrictionLevels, Kind, Law, Mechanics, Parameter, Range, Role};
+use super::gaussian::between_rest_and_speed;
+use super::harmonic;
+use super::kind::{KindOf, Parameter, Range};
+use super::law::{FrictionLaw, Linear, Rubbing};
+use super::sine::Sine;
 
 /// `f = (coulomb - (coulomb - rest) exp(-(v/velocity)²)) sign(v)`, set-valued at rest.
 #[derive(Debug, Clone, PartialEq)]
@@ -14,7 +18,7 @@ pub struct FrictionDeficit {
 }
 
 impl FrictionDeficit {
-    pub(super) const KIND: Kind = Kind {
+    pub(super) const KIND: KindOf<FrictionDeficit> = KindOf {
         name: "friction_deficit",
         equation: "f = (c - (c - r) exp(-(v/vs)²)) sign(v), r < c, set-valued at rest",
         source: "the counterpart of stribeck",
@@ -29,7 +33,7 @@ impl FrictionDeficit {
             if rest >= coulomb {
                 return Err(format!("rest ({rest}) must be less than coulomb ({coulomb}); friction that is higher at rest is a stribeck"));
             }
-            Ok(Law::FrictionDeficit(FrictionDeficit { coulomb, rest, velocity: v[2][0] }))
+            Ok(FrictionDeficit { coulomb, rest, velocity: v[2][0] })
         },
     };
 
@@ -38,9 +42,17 @@ impl FrictionDeficit {
     }
 }
 
-impl Mechanics for FrictionDeficit {
-    fn role(&self) -> Role {
-        Role::Friction(FrictionLevels { kinetic: [self.coulomb; 2], at_rest: [self.rest; 2], velocity: self.velocity })
+impl FrictionLaw for FrictionDeficit {
+    #[inline]
+    fn level(&self, at: &Rubbing) -> f64 {
+        match at.speed {
+            None => self.rest,
+            Some(v) => between_rest_and_speed(self.rest, self.coulomb, v / self.velocity),
+        }
+    }
+
+    fn linearised(&self, at: &Sine) -> Linear {
+        harmonic::of_friction(self, at)
     }
 }
 

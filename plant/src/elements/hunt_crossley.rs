@@ -1,6 +1,9 @@
 //! Contact after Hunt and Crossley.
 
-use super::{Kind, Law, Mechanics, Parameter, Range, Slopes};
+use super::harmonic;
+use super::kind::{KindOf, Parameter, Range};
+use super::law::{Linear, PathLaw, Slopes};
+use super::sine::Sine;
 
 /// `f = max(0, stiffness qⁿ + damping qⁿ v)` where `q = x - gap > 0`.
 #[derive(Debug, Clone, PartialEq)]
@@ -19,7 +22,7 @@ pub struct HuntCrossley {
 const ORDINARY_DEPTH_M: f64 = 1e-3;
 
 impl HuntCrossley {
-    pub(super) const KIND: Kind = Kind {
+    pub(super) const KIND: KindOf<HuntCrossley> = KindOf {
         name: "hunt_crossley",
         equation: "f = max(0, k qⁿ + λ qⁿ v) where q = x - gap > 0",
         source: "Hunt & Crossley 1975",
@@ -30,7 +33,7 @@ impl HuntCrossley {
             Parameter::number("exponent", "-", Range::Between(1.0, 10.0), "n").or(1.5),
             Parameter::number("gap", "m", Range::Any, "displacement at which it touches").or(0.0),
         ],
-        build: |v| Ok(Law::HuntCrossley(HuntCrossley { stiffness: v[0][0], damping: v[1][0], exponent: v[2][0], gap: v[3][0] })),
+        build: |v| Ok(HuntCrossley { stiffness: v[0][0], damping: v[1][0], exponent: v[2][0], gap: v[3][0] }),
     };
 
     pub(super) fn values(&self) -> Vec<Vec<f64>> {
@@ -43,7 +46,7 @@ impl HuntCrossley {
     }
 }
 
-impl Mechanics for HuntCrossley {
+impl PathLaw for HuntCrossley {
     fn slopes(&self) -> Slopes {
         let power = self.power(ORDINARY_DEPTH_M);
         Slopes { stiffness: self.stiffness * self.exponent * power / ORDINARY_DEPTH_M, damping: self.damping * power, bounded: false }
@@ -73,6 +76,14 @@ impl Mechanics for HuntCrossley {
     fn stored(&self, _memory: &[f64], x: f64) -> f64 {
         let depth = (x - self.gap).max(0.0);
         self.stiffness * self.power(depth) * depth / (self.exponent + 1.0)
+    }
+
+    fn linearised(&self, at: &Sine) -> Linear {
+        harmonic::of_path(self, at)
+    }
+
+    fn creates_energy(&self, _amplitude: f64, _unit: &str) -> Option<String> {
+        None
     }
 }
 

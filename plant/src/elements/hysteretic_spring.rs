@@ -1,7 +1,10 @@
 //! Hysteretic spring after Kuchenbecker and Niemeyer.
 
 use super::decay::decay;
-use super::{Kind, Law, Mechanics, Parameter, Range, Slopes};
+use super::harmonic;
+use super::kind::{KindOf, Parameter, Range};
+use super::law::{Linear, PathLaw, Slopes};
+use super::sine::Sine;
 
 /// Force that follows one of two lines, one for each direction, through a first-order filter along the path:
 /// `dF/d|x| = bandwidth (line - F)` with `line = offset± + stiffness± x ± stiffness±/bandwidth`. Memory: F, N.
@@ -23,7 +26,7 @@ pub struct HystereticSpring {
 }
 
 impl HystereticSpring {
-    pub(super) const KIND: Kind = Kind {
+    pub(super) const KIND: KindOf<HystereticSpring> = KindOf {
         name: "hysteretic_spring",
         equation: "dF/d|x| = γ (line - F), line = f+ + k+ x + k+/γ rising, f- + k- x - k-/γ falling",
         source: "Kuchenbecker & Niemeyer 2005, eqs (2)-(3) in the limit of small steps",
@@ -36,13 +39,13 @@ impl HystereticSpring {
             Parameter::number("bandwidth", "rad/m", Range::Positive, "γ"),
         ],
         build: |v| {
-            Ok(Law::HystereticSpring(HystereticSpring {
+            Ok(HystereticSpring {
                 stiffness_positive: v[0][0],
                 stiffness_negative: v[1][0],
                 offset_positive: v[2][0],
                 offset_negative: v[3][0],
                 bandwidth: v[4][0],
-            }))
+            })
         },
     };
 
@@ -59,7 +62,7 @@ impl HystereticSpring {
     }
 }
 
-impl Mechanics for HystereticSpring {
+impl PathLaw for HystereticSpring {
     fn memory_len(&self) -> usize {
         1
     }
@@ -93,6 +96,20 @@ impl Mechanics for HystereticSpring {
         let force = memory.first().copied().unwrap_or(0.0);
         let stiffness = 0.5 * (self.stiffness_positive + self.stiffness_negative);
         if stiffness > 0.0 { 0.5 * force * force / stiffness } else { 0.0 }
+    }
+
+    fn linearised(&self, at: &Sine) -> Linear {
+        harmonic::of_path(self, at)
+    }
+
+    fn creates_energy(&self, amplitude: f64, unit: &str) -> Option<String> {
+        // The lines cross where the falling one is the steeper: cycles beyond create energy.
+        let crossing = self.crossing()?;
+        if self.stiffness_positive < self.stiffness_negative && crossing > amplitude {
+            return Some(format!("creates energy in cycles beyond {crossing:.4} {unit}, where its two lines cross"));
+        }
+        (crossing.abs() <= amplitude)
+            .then(|| format!("creates energy in cycles about 0 already: its two lines cross at {crossing:.4} {unit}"))
     }
 }
 

@@ -1,6 +1,7 @@
 //! Inerter.
 
-use super::{Kind, Law, Linear, Mechanics, Parameter, Range, Role};
+use super::kind::{KindOf, Parameter, Range};
+use super::law::{Linear, LinearLaw};
 
 /// `f = inertance dv/dt`.
 #[derive(Debug, Clone, PartialEq)]
@@ -10,13 +11,13 @@ pub struct Inerter {
 }
 
 impl Inerter {
-    pub(super) const KIND: Kind = Kind {
+    pub(super) const KIND: KindOf<Inerter> = KindOf {
         name: "inerter",
         equation: "f = b dv/dt",
         source: "Smith 2002; Papageorgiou, Lockwood, Houghton & Smith 2007, eq (1)",
         energy: "stores, creates none",
         parameters: &[Parameter::number("inertance", "kg", Range::NonNegative, "b")],
-        build: |v| Ok(Law::Inerter(Inerter { inertance: v[0][0] })),
+        build: |v| Ok(Inerter { inertance: v[0][0] }),
     };
 
     pub(super) fn values(&self) -> Vec<Vec<f64>> {
@@ -24,8 +25,8 @@ impl Inerter {
     }
 }
 
-impl Mechanics for Inerter {
-    fn role(&self) -> Role {
-        Role::Linear(Linear { inertance: self.inertance, ..Linear::default() })
+impl LinearLaw for Inerter {
+    fn coefficients(&self) -> Linear {
+        Linear { inertance: self.inertance, ..Linear::default() }
     }
 }

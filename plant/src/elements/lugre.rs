@@ -1,7 +1,11 @@
 //! LuGre friction.
 
 use super::decay::decay;
-use super::{Kind, Law, Mechanics, Parameter, Range, Slopes};
+use super::gaussian::between_rest_and_speed;
+use super::harmonic;
+use super::kind::{KindOf, Parameter, Range};
+use super::law::{Bristles, Linear, PathLaw, Slopes};
+use super::sine::Sine;
 
 /// `dz/dt = v - σ0 |v| z / g(v)`, `g(v) = coulomb + (static - coulomb) exp(-(v/velocity)²)`,
 /// `f = σ0 z + σ1 dz/dt`. Memory: the bristle deflection z, m.
@@ -22,7 +26,7 @@ pub struct Lugre {
 }
 
 impl Lugre {
-    pub(super) const KIND: Kind = Kind {
+    pub(super) const KIND: KindOf<Lugre> = KindOf {
         name: "lugre",
         equation: "dz/dt = v - σ0 |v| z/g(v), f = σ0 z + σ1 dz/dt, g = c + (s - c) exp(-(v/vs)²)",
         source: "Canudas de Wit, Olsson, Astrom & Lischinsky 1995, without the viscous term",
@@ -39,7 +43,7 @@ impl Lugre {
             if at_rest < coulomb {
                 return Err(format!("static ({at_rest}) must be at least coulomb ({coulomb})"));
             }
-            Ok(Law::Lugre(Lugre { stiffness: v[0][0], damping: v[1][0], coulomb, at_rest, velocity: v[4][0] }))
+            Ok(Lugre { stiffness: v[0][0], damping: v[1][0], coulomb, at_rest, velocity: v[4][0] })
         },
     };
 
@@ -50,12 +54,11 @@ impl Lugre {
     /// Steady friction level g at speed `v`, N.
     #[inline]
     pub fn level(&self, v: f64) -> f64 {
-        let ratio = v / self.velocity;
-        self.coulomb + (self.at_rest - self.coulomb) * (-ratio * ratio).exp()
+        between_rest_and_speed(self.at_rest, self.coulomb, v / self.velocity)
     }
 }
 
-impl Mechanics for Lugre {
+impl PathLaw for Lugre {
     fn memory_len(&self) -> usize {
         1
     }
@@ -82,9 +85,22 @@ impl Mechanics for Lugre {
         bristle_force + self.damping * (v - v.abs() * bristle_force / self.level(v))
     }
 
+    fn bristles(&self, memory: &[f64], v: f64) -> Option<Bristles> {
+        let force = self.stiffness * memory.first().copied().unwrap_or(0.0);
+        Some(Bristles { force, stiffness: self.stiffness, damping: self.damping, leak: v.abs() / self.level(v) })
+    }
+
     fn stored(&self, memory: &[f64], _x: f64) -> f64 {
         let bristle_deflection = memory.first().copied().unwrap_or(0.0);
         0.5 * self.stiffness * bristle_deflection * bristle_deflection
+    }
+
+    fn linearised(&self, at: &Sine) -> Linear {
+        harmonic::of_path(self, at)
+    }
+
+    fn creates_energy(&self, _amplitude: f64, _unit: &str) -> Option<String> {
+        None
     }
 }
 

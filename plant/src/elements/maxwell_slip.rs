@@ -1,6 +1,9 @@
 //! Maxwell slip: spring-sliders in parallel.
 
-use super::{Kind, Law, Mechanics, Parameter, Range, Slopes};
+use super::harmonic;
+use super::kind::{KindOf, Parameter, Range};
+use super::law::{Linear, PathLaw, Slopes};
+use super::sine::Sine;
 
 /// `f = Σ k_i z_i`, each spring deflection z_i following x and slipping at `|k_i z_i| = force_i`. Memory: every z_i, m.
 #[derive(Debug, Clone, PartialEq)]
@@ -14,7 +17,7 @@ pub struct MaxwellSlip {
 }
 
 impl MaxwellSlip {
-    pub(super) const KIND: Kind = Kind {
+    pub(super) const KIND: KindOf<MaxwellSlip> = KindOf {
         name: "maxwell_slip",
         equation: "f = Σ k_i z_i, dz_i = dx within |z_i| <= f_i/k_i",
         source: "Iwan 1966; Lampaert, Swevers & Al-Bender 2002; presliding hysteresis with non-local memory",
@@ -23,7 +26,7 @@ impl MaxwellSlip {
             Parameter::numbers("stiffness", "N/m", Range::Positive, "k_i, one for each spring"),
             Parameter::numbers("force", "N", Range::NonNegative, "f_i, one for each slider"),
         ],
-        build: |v| Ok(Law::MaxwellSlip(MaxwellSlip::new(v[0].clone(), v[1].clone())?)),
+        build: |v| MaxwellSlip::new(v[0].clone(), v[1].clone()),
     };
 
     /// From stiffnesses, N/m, above 0, and slip forces, N, at least 0.
@@ -52,7 +55,7 @@ impl MaxwellSlip {
     }
 }
 
-impl Mechanics for MaxwellSlip {
+impl PathLaw for MaxwellSlip {
     fn memory_len(&self) -> usize {
         self.stiffness.len()
     }
@@ -88,6 +91,14 @@ impl Mechanics for MaxwellSlip {
 
     fn stored(&self, memory: &[f64], _x: f64) -> f64 {
         self.stiffness.iter().zip(memory).map(|(k, z)| 0.5 * k * z * z).sum()
+    }
+
+    fn linearised(&self, at: &Sine) -> Linear {
+        harmonic::of_path(self, at)
+    }
+
+    fn creates_energy(&self, _amplitude: f64, _unit: &str) -> Option<String> {
+        None
     }
 }
 

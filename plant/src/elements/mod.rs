@@ -1,274 +1,193 @@
 //! Element kinds: one file each, and one line of registration here.
 //!
-//! A kind says three things: what its parameters are ([`Kind`]), what they are in one element (its
-//! struct, gathered in [`Law`]), and how it moves ([`Mechanics`]).
+//! A kind's file says what its parameters are ([`KindOf`]), what they are in one element (its struct, gathered in [`Law`]), and how it
+//! acts: it is a [`LinearLaw`], a [`FrictionLaw`] (dry, set-valued at rest) or a [`PathLaw`] (any other force).
+//!
+//! The modules are declared by the registration, where `cargo fmt` does not see them: format a kind's file with
+//! `rustfmt --edition 2024 --config-path . plant/src/elements/KIND.rs`.
 
-mod asymmetric_coulomb;
-mod asymmetric_damper;
-mod backlash;
-mod bias;
-mod bouc_wen;
-mod cogging;
-mod contact;
-mod coulomb;
-mod cubic_spring;
-mod dahl;
-mod damper;
 mod decay;
-mod friction_deficit;
-mod hunt_crossley;
-mod hysteretic_spring;
-mod inerter;
-mod levels;
-mod lugre;
-mod maxwell_slip;
-mod preisach_lugre;
-mod quadratic_drag;
-mod spring;
-mod stribeck;
+mod gaussian;
+mod harmonic;
+mod kind;
+mod law;
+mod sine;
 
-pub use asymmetric_coulomb::AsymmetricCoulomb;
-pub use asymmetric_damper::AsymmetricDamper;
-pub use backlash::Backlash;
-pub use bias::Bias;
-pub use bouc_wen::BoucWen;
-pub use cogging::Cogging;
-pub use contact::Contact;
-pub use coulomb::Coulomb;
-pub use cubic_spring::CubicSpring;
-pub use dahl::Dahl;
-pub use damper::Damper;
-pub use friction_deficit::FrictionDeficit;
-pub use hunt_crossley::HuntCrossley;
-pub use hysteretic_spring::HystereticSpring;
-pub use inerter::Inerter;
-pub use levels::FrictionLevels;
-pub use lugre::Lugre;
-pub use maxwell_slip::MaxwellSlip;
-pub use preisach_lugre::PreisachLugre;
-pub use quadratic_drag::QuadraticDrag;
-pub use spring::Spring;
-pub use stribeck::Stribeck;
+pub use kind::{KindOf, Parameter, Range};
+pub use law::{Bristles, FrictionLaw, Linear, LinearLaw, PathLaw, Rubbing, Side, Slopes};
+pub use sine::{DryFriction, Sine};
 
-/// What a parameter may be.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Range {
-    /// Any finite number.
-    Any,
-    /// At least 0.
-    NonNegative,
-    /// Above 0.
-    Positive,
-    /// From the first to the second, both allowed.
-    Between(f64, f64),
-}
-
-/// A parameter of an element kind.
-#[derive(Debug, Clone, Copy)]
-pub struct Parameter {
-    /// Key in the model file.
-    pub key: &'static str,
-    /// Unit for a translation, such as `N/m`.
-    pub unit: &'static str,
-    /// What it may be.
-    pub range: Range,
-    /// Its value where the file has none; `None` when the file must have it. Of a list that a file may leave out any number: it is then empty.
-    pub default: Option<f64>,
-    /// Whether it is a list of numbers.
-    pub list: bool,
-    /// One line.
-    pub doc: &'static str,
-}
-
-impl Parameter {
-    /// A number that the file must have.
-    const fn number(key: &'static str, unit: &'static str, range: Range, doc: &'static str) -> Parameter {
-        Parameter { key, unit, range, default: None, list: false, doc }
-    }
-
-    /// A list of numbers that the file must have.
-    const fn numbers(key: &'static str, unit: &'static str, range: Range, doc: &'static str) -> Parameter {
-        Parameter { key, unit, range, default: None, list: true, doc }
-    }
-
-    /// The same, with a value for files that have none.
-    const fn or(self, default: f64) -> Parameter {
-        Parameter { key: self.key, unit: self.unit, range: self.range, default: Some(default), list: self.list, doc: self.doc }
-    }
-}
-
-impl Parameter {
-    /// Its values where a file has none, as [`Kind::build`] takes them; `None` when the file must have them.
-    pub fn default_values(&self) -> Option<Vec<f64>> {
-        self.default.map(|value| if self.list { Vec::new() } else { vec![value] })
-    }
-}
-
-/// What the registry knows of an element kind.
-#[derive(Debug)]
-pub struct Kind {
-    /// Name in model files.
-    pub name: &'static str,
-    /// Equation in one line.
-    pub equation: &'static str,
-    /// Where it comes from.
-    pub source: &'static str,
-    /// What energy it may create, and when.
-    pub energy: &'static str,
-    /// Its parameters, in the order of the file format.
-    pub parameters: &'static [Parameter],
-    /// Builds the law from values in the order of `parameters` (a number is a list of one), each
-    /// within its range. Errors say in one sentence which relation between parameters is broken.
-    pub build: fn(&[Vec<f64>]) -> Result<Law, String>,
-}
+/// An element kind.
+pub type Kind = KindOf<Law>;
 
 /// How a stepper has to treat an element.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Role {
     /// `f = stiffness x + damping v + inertance dv/dt + force`: part of the constant matrices.
     Linear(Linear),
-    /// Set-valued at rest: a bounded multiplier on the relative velocity.
-    Friction(FrictionLevels),
-    /// A force that depends on `x`, `v` and a memory of the path: [`Mechanics::advance`] and [`Mechanics::force`].
+    /// Set-valued at rest: a bounded multiplier on the relative velocity, whose bounds are [`Law::level`].
+    Friction,
+    /// A force that depends on `x`, `v` and a memory of the path: [`Law::advance`] and [`Law::force`].
     Path,
 }
 
-/// Coefficients of a linear element.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Linear {
-    /// N/m.
-    pub stiffness: f64,
-    /// N s/m.
-    pub damping: f64,
-    /// kg.
-    pub inertance: f64,
-    /// Force at `x = v = dv/dt = 0`, N.
-    pub force: f64,
-}
-
-/// Largest slopes that an element shows, for the choice of step and of the solution method.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Slopes {
-    /// Of force over displacement, N/m.
-    pub stiffness: f64,
-    /// Of force over velocity, N s/m.
-    pub damping: f64,
-    /// Whether these are bounds; else they are estimates for ordinary deflections and speeds.
-    pub bounded: bool,
-}
-
-/// How an element moves. `x` in m and `v` in m/s are taken across it; forces in N, positive when it is stretched.
-///
-/// The memory holds what the element remembers of its path; at rest all of it is zero.
-pub trait Mechanics {
-    /// How a stepper has to treat it.
-    fn role(&self) -> Role {
-        Role::Path
-    }
-
-    /// Length of its memory, numbers.
-    fn memory_len(&self) -> usize {
-        0
-    }
-
-    /// Largest slopes of its force. Only asked of a [`Role::Path`].
-    fn slopes(&self) -> Slopes {
-        Slopes::default()
-    }
-
-    /// Advances the memory along the straight path from `from` to `to`, which takes `dt` seconds.
-    fn advance(&self, _memory: &mut [f64], _from: f64, _to: f64, _dt: f64) {}
-
-    /// Force at `x` and `v` with the memory as it is.
-    fn force(&self, _memory: &[f64], _x: f64, _v: f64) -> f64 {
-        0.0
-    }
-
-    /// Mean force over the straight path from `from` to `to` at speed `v`, with the memory of its middle. Worth its own
-    /// form where the force jumps on the way.
-    fn mean_force(&self, memory: &[f64], from: f64, to: f64, v: f64) -> f64 {
-        self.force(memory, 0.5 * (from + to), v)
-    }
-
-    /// Energy that can be had back, J.
-    fn stored(&self, _memory: &[f64], _x: f64) -> f64 {
-        0.0
-    }
+/// The second expression where a kind's role is the first word, else the third.
+macro_rules! where_it_is {
+    (linear, linear, $then:expr, $otherwise:expr) => {
+        $then
+    };
+    (friction, friction, $then:expr, $otherwise:expr) => {
+        $then
+    };
+    (path, path, $then:expr, $otherwise:expr) => {
+        $then
+    };
+    ($asked:ident, $is:ident, $then:expr, $otherwise:expr) => {
+        $otherwise
+    };
 }
 
 macro_rules! register {
-    ($($law:ident),* $(,)?) => {
+    ($($role:ident $file:ident::$law:ident),* $(,)?) => {
+        $(mod $file;)*
+        $(pub use $file::$law;)*
+
         /// Kind and parameters of an element.
         #[derive(Debug, Clone, PartialEq)]
         pub enum Law { $(#[doc = concat!("See [`", stringify!($law), "`].")] $law($law)),* }
 
         /// Every element kind.
-        pub const KINDS: &[&Kind] = &[$(&$law::KIND),*];
+        pub const KINDS: &[&Kind] = &[$(&$law::KIND.built_by(|values| ($law::KIND.build)(values).map(Law::$law))),*];
 
         impl Law {
             /// The kind's description.
             pub fn kind(&self) -> &'static Kind {
-                match self { $(Law::$law(_) => &$law::KIND),* }
+                match self { $(Law::$law(_) => const { &$law::KIND.built_by(|values| ($law::KIND.build)(values).map(Law::$law)) }),* }
             }
 
-            /// Parameter values in the order of [`Kind::parameters`].
+            /// Parameter values in the order of [`KindOf::parameters`].
             pub fn values(&self) -> Vec<Vec<f64>> {
                 match self { $(Law::$law(law) => law.values()),* }
             }
-        }
 
-        impl Mechanics for Law {
-            fn role(&self) -> Role {
-                match self { $(Law::$law(law) => law.role()),* }
+            /// How a stepper has to treat it.
+            pub fn role(&self) -> Role {
+                match self {
+                    $(Law::$law(_law) => where_it_is!(linear, $role, Role::Linear(_law.coefficients()),
+                        where_it_is!(friction, $role, Role::Friction, Role::Path))),*
+                }
             }
-            fn memory_len(&self) -> usize {
-                match self { $(Law::$law(law) => law.memory_len()),* }
+
+            /// What it looks like to a sine: for a linear element its own coefficients, at any amplitude.
+            pub fn linearised(&self, at: &Sine) -> Linear {
+                match self {
+                    $(Law::$law(law) => where_it_is!(linear, $role, { let _ = at; Linear { force: 0.0, ..law.coefficients() } }, law.linearised(at))),*
+                }
             }
-            fn slopes(&self) -> Slopes {
-                match self { $(Law::$law(law) => law.slopes()),* }
+
+            /// Length of its memory, numbers.
+            pub fn memory_len(&self) -> usize {
+                match self { $(Law::$law(_law) => where_it_is!(linear, $role, 0, _law.memory_len())),* }
             }
+
+            /// Level of dry friction, N; 0 of other laws.
             #[inline]
-            fn advance(&self, memory: &mut [f64], from: f64, to: f64, dt: f64) {
-                match self { $(Law::$law(law) => law.advance(memory, from, to, dt)),* }
+            pub fn level(&self, at: &Rubbing) -> f64 {
+                match self { $(Law::$law(_law) => where_it_is!(friction, $role, _law.level(at), 0.0)),* }
             }
+
+            /// Carries dry friction's memory on over `dt` seconds in which it took `work`, J.
+            pub fn rubbed(&self, memory: &mut [f64], work: f64, dt: f64) {
+                match self { $(Law::$law(_law) => where_it_is!(friction, $role, _law.rubbed(memory, work, dt), {})),* }
+            }
+
+            /// Largest slopes of the force of a [`Role::Path`].
+            pub fn slopes(&self) -> Slopes {
+                match self { $(Law::$law(_law) => where_it_is!(path, $role, _law.slopes(), Slopes::default())),* }
+            }
+
+            /// Advances the memory of a [`Role::Path`] along the straight path from `from` to `to`, m, which takes `dt` seconds.
             #[inline]
-            fn force(&self, memory: &[f64], x: f64, v: f64) -> f64 {
-                match self { $(Law::$law(law) => law.force(memory, x, v)),* }
+            pub fn advance(&self, memory: &mut [f64], from: f64, to: f64, dt: f64) {
+                match self { $(Law::$law(_law) => where_it_is!(path, $role, _law.advance(memory, from, to, dt), {})),* }
             }
+
+            /// Force of a [`Role::Path`] at `x`, m, and `v`, m/s, with the memory as it is, N; 0 of other laws.
             #[inline]
-            fn mean_force(&self, memory: &[f64], from: f64, to: f64, v: f64) -> f64 {
-                match self { $(Law::$law(law) => law.mean_force(memory, from, to, v)),* }
+            pub fn force(&self, memory: &[f64], x: f64, v: f64) -> f64 {
+                match self { $(Law::$law(_law) => where_it_is!(path, $role, _law.force(memory, x, v), 0.0)),* }
             }
-            fn stored(&self, memory: &[f64], x: f64) -> f64 {
-                match self { $(Law::$law(law) => law.stored(memory, x)),* }
+
+            /// See [`PathLaw::mean_force`]; 0 of other laws.
+            #[inline]
+            pub fn mean_force(&self, memory: &[f64], from: f64, to: f64, v: f64) -> f64 {
+                match self { $(Law::$law(_law) => where_it_is!(path, $role, _law.mean_force(memory, from, to, v), 0.0)),* }
+            }
+
+            /// Energy in a [`Role::Path`] that can be had back, J.
+            pub fn stored(&self, memory: &[f64], x: f64) -> f64 {
+                match self { $(Law::$law(_law) => where_it_is!(path, $role, _law.stored(memory, x), 0.0)),* }
+            }
+
+            /// One sentence where a [`Role::Path`] creates energy in cycles of this amplitude (in `unit`).
+            pub fn creates_energy(&self, amplitude: f64, unit: &str) -> Option<String> {
+                match self { $(Law::$law(_law) => where_it_is!(path, $role, _law.creates_energy(amplitude, unit), None)),* }
+            }
+
+            /// Whether a [`Role::Path`] answers in proportion, by frequency alone.
+            pub fn is_viscoelastic(&self) -> bool {
+                match self { $(Law::$law(_law) => where_it_is!(path, $role, _law.is_viscoelastic(), false)),* }
+            }
+
+            /// The bristles of a [`Role::Path`] at speed `v`, m/s; `None` for a law without.
+            pub fn bristles(&self, memory: &[f64], v: f64) -> Option<Bristles> {
+                match self { $(Law::$law(_law) => where_it_is!(path, $role, _law.bristles(memory, v), None)),* }
             }
         }
     };
 }
 
 register!(
-    Spring,
-    Damper,
-    Inerter,
-    Coulomb,
-    AsymmetricCoulomb,
-    Stribeck,
-    AsymmetricDamper,
-    FrictionDeficit,
-    QuadraticDrag,
-    Dahl,
-    Lugre,
-    MaxwellSlip,
-    PreisachLugre,
-    HystereticSpring,
-    BoucWen,
-    Backlash,
-    Contact,
-    HuntCrossley,
-    CubicSpring,
-    Cogging,
-    Bias,
+    linear spring::Spring,
+    linear damper::Damper,
+    linear inerter::Inerter,
+    friction coulomb::Coulomb,
+    friction asymmetric_coulomb::AsymmetricCoulomb,
+    friction stribeck::Stribeck,
+    path asymmetric_damper::AsymmetricDamper,
+    friction friction_deficit::FrictionDeficit,
+    path quadratic_drag::QuadraticDrag,
+    path dahl::Dahl,
+    path lugre::Lugre,
+    path maxwell_slip::MaxwellSlip,
+    path preisach_lugre::PreisachLugre,
+    path hysteretic_spring::HystereticSpring,
+    path bouc_wen::BoucWen,
+    path backlash::Backlash,
+    path contact::Contact,
+    path hunt_crossley::HuntCrossley,
+    path cubic_spring::CubicSpring,
+    path cogging::Cogging,
+    linear bias::Bias,
 );
+
+impl Law {
+    /// Level of dry friction without load and with the memory of rest, N; 0 of other laws. `speed` is `None` while it sticks.
+    pub fn unloaded_level(&self, side: Side, speed: Option<f64>) -> f64 {
+        self.level(&Rubbing { side, speed, load: 0.0, memory: &vec![0.0; self.memory_len()] })
+    }
+
+    /// The same with every force `factor` times as large at every motion; as it is where the kind refuses such numbers.
+    #[must_use]
+    pub fn scaled(&self, factor: f64) -> Law {
+        let kind = self.kind();
+        let mut values = self.values();
+        for (parameter, values) in kind.parameters.iter().zip(&mut values) {
+            parameter.scale_force(values, factor);
+        }
+        (kind.build)(&values).unwrap_or_else(|_| self.clone())
+    }
+}
 
 /// The kind with this name in model files.
 pub fn kind_named(name: &str) -> Option<&'static Kind> {
@@ -279,20 +198,21 @@ pub fn kind_named(name: &str) -> Option<&'static Kind> {
 mod tests {
     use super::*;
 
+    /// One law of every kind that builds with its defaults and ones for the rest.
+    fn laws() -> Vec<Law> {
+        let ones = |p: &Parameter| p.default_values().unwrap_or(vec![1.0; if p.list { 2 } else { 1 }]);
+        KINDS.iter().filter_map(|kind| (kind.build)(&kind.parameters.iter().map(ones).collect::<Vec<_>>()).ok()).collect()
+    }
+
     #[test]
     fn names_are_unique_and_values_round_trip() {
         for (i, kind) in KINDS.iter().enumerate() {
             assert!(KINDS[..i].iter().all(|other| other.name != kind.name), "{}", kind.name);
-            let one = |p: &Parameter| match (p.list, p.default) {
-                (true, Some(_)) => vec![],
-                (true, None) => vec![1.0, 1.0],
-                (false, _) => vec![1.0],
-            };
-            let values: Vec<Vec<f64>> = kind.parameters.iter().map(one).collect();
-            if let Ok(law) = (kind.build)(&values) {
-                assert_eq!(law.values(), values, "{}", kind.name);
-                assert_eq!(law.kind().name, kind.name);
-            }
+        }
+        for law in laws() {
+            let again = (law.kind().build)(&law.values()).unwrap();
+            assert_eq!(again, law);
+            assert_eq!(again.kind().name, law.kind().name);
         }
     }
 
@@ -314,11 +234,29 @@ mod tests {
 
     #[test]
     fn at_rest_only_a_bias_or_a_phase_pushes() {
-        for kind in KINDS {
-            let values: Vec<Vec<f64>> = kind.parameters.iter().map(|p| p.default_values().unwrap_or(vec![1.0])).collect();
-            let Ok(law) = (kind.build)(&values) else { continue };
-            if law.role() == Role::Path && kind.name != "cogging" && kind.name != "bias" {
-                assert_eq!(law.force(&vec![0.0; law.memory_len()], 0.0, 0.0), 0.0, "{}", kind.name);
+        for law in laws() {
+            let name = law.kind().name;
+            if law.role() == Role::Path && name != "cogging" && name != "bias" {
+                assert_eq!(law.force(&vec![0.0; law.memory_len()], 0.0, 0.0), 0.0, "{name}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_scaled_law_pushes_as_much_more() {
+        for law in laws().iter().filter(|law| law.role() == Role::Path) {
+            let more = law.scaled(1.5);
+            let mut memory = vec![0.0; law.memory_len()];
+            let mut memory_of_more = memory.clone();
+            let mut x = 0.0;
+            for i in 1..200 {
+                let next = 1.7 * (0.1 * f64::from(i)).sin();
+                law.advance(&mut memory, x, next, 1e-3);
+                more.advance(&mut memory_of_more, x, next, 1e-3);
+                let v = (next - x) / 1e-3;
+                x = next;
+                let (force, larger) = (law.force(&memory, x, v), more.force(&memory_of_more, x, v));
+                assert!((larger - 1.5 * force).abs() <= 1e-9 * force.abs(), "{}: {force} {larger}", law.kind().name);
             }
         }
     }

@@ -1,6 +1,10 @@
 //! LuGre friction with a Preisach operator for its bristles.
 
-use super::{Kind, Law, Mechanics, Parameter, Range, Slopes};
+use super::gaussian::between_rest_and_speed;
+use super::harmonic;
+use super::kind::{KindOf, Parameter, Range};
+use super::law::{Bristles, Linear, PathLaw, Slopes};
+use super::sine::Sine;
 use crate::preisach::{self, DahlLoop, MEMORY, Transition};
 
 /// Parts of a step in which the bristles creep, at most.
@@ -40,7 +44,7 @@ pub struct PreisachLugre {
 }
 
 impl PreisachLugre {
-    pub(super) const KIND: Kind = Kind {
+    pub(super) const KIND: KindOf<PreisachLugre> = KindOf {
         name: "preisach_lugre",
         equation: "f = σ0 h(z) + σ1 dz/dt, dz/dt = v - h(z)/g(v) |v|, h = f_p(z)/σ0 to break-away, f_p a Preisach operator",
         source: "Choi, Han & Kim 2006, eqs (4)-(13); gate: Dupont, Hayward, Armstrong & Altpeter 2002",
@@ -64,7 +68,7 @@ impl PreisachLugre {
             )
             .or(0.0),
         ],
-        build: |v| PreisachLugre::new(v).map(Law::PreisachLugre),
+        build: PreisachLugre::new,
     };
 
     fn new(v: &[Vec<f64>]) -> Result<PreisachLugre, String> {
@@ -98,8 +102,7 @@ impl PreisachLugre {
     /// Steady friction level σ0 g at speed `v`, N.
     #[inline]
     pub fn level(&self, v: f64) -> f64 {
-        let ratio = v / self.velocity;
-        self.coulomb + (self.at_rest - self.coulomb) * (-ratio * ratio).exp()
+        between_rest_and_speed(self.at_rest, self.coulomb, v / self.velocity)
     }
 
     /// σ0 h, N, at speed `v`, m/s.
@@ -141,7 +144,7 @@ impl PreisachLugre {
     }
 }
 
-impl Mechanics for PreisachLugre {
+impl PathLaw for PreisachLugre {
     fn memory_len(&self) -> usize {
         MEMORY
     }
@@ -186,6 +189,11 @@ impl Mechanics for PreisachLugre {
         bristle_force + self.damping * (v - self.leak(memory, v) * bristle_force)
     }
 
+    fn bristles(&self, memory: &[f64], v: f64) -> Option<Bristles> {
+        let force = self.bristle_force(memory, v);
+        Some(Bristles { force, stiffness: self.stiffness, damping: self.damping, leak: self.leak(memory, v) })
+    }
+
     /// What comes back on the way to no force, along a curve that nothing interrupts.
     fn stored(&self, memory: &[f64], _x: f64) -> f64 {
         let force = preisach::force(&self.curves, memory).abs();
@@ -197,6 +205,14 @@ impl Mechanics for PreisachLugre {
         }
         let way = a * force / (slope * (a - force));
         (force - a) * way + a * a / slope * (slope * way / a).ln_1p()
+    }
+
+    fn linearised(&self, at: &Sine) -> Linear {
+        harmonic::of_path(self, at)
+    }
+
+    fn creates_energy(&self, _amplitude: f64, _unit: &str) -> Option<String> {
+        None
     }
 }
 

@@ -1,6 +1,9 @@
 //! Quadratic drag.
 
-use super::{Kind, Law, Mechanics, Parameter, Range, Slopes};
+use super::harmonic;
+use super::kind::{KindOf, Parameter, Range};
+use super::law::{Linear, PathLaw, Slopes};
+use super::sine::Sine;
 
 /// `f = coefficient v |v|`.
 #[derive(Debug, Clone, PartialEq)]
@@ -10,13 +13,13 @@ pub struct QuadraticDrag {
 }
 
 impl QuadraticDrag {
-    pub(super) const KIND: Kind = Kind {
+    pub(super) const KIND: KindOf<QuadraticDrag> = KindOf {
         name: "quadratic_drag",
         equation: "f = q v |v|",
         source: "Rayleigh; turbulent flow through an orifice",
         energy: "takes, creates none",
         parameters: &[Parameter::number("coefficient", "N s²/m²", Range::NonNegative, "q")],
-        build: |v| Ok(Law::QuadraticDrag(QuadraticDrag { coefficient: v[0][0] })),
+        build: |v| Ok(QuadraticDrag { coefficient: v[0][0] }),
     };
 
     pub(super) fn values(&self) -> Vec<Vec<f64>> {
@@ -24,7 +27,7 @@ impl QuadraticDrag {
     }
 }
 
-impl Mechanics for QuadraticDrag {
+impl PathLaw for QuadraticDrag {
     fn slopes(&self) -> Slopes {
         // At 1 m/s, a quick hand.
         Slopes { stiffness: 0.0, damping: 2.0 * self.coefficient, bounded: false }
@@ -33,6 +36,18 @@ impl Mechanics for QuadraticDrag {
     #[inline]
     fn force(&self, _memory: &[f64], _x: f64, v: f64) -> f64 {
         self.coefficient * v * v.abs()
+    }
+
+    fn stored(&self, _memory: &[f64], _x: f64) -> f64 {
+        0.0
+    }
+
+    fn linearised(&self, at: &Sine) -> Linear {
+        harmonic::of_path(self, at)
+    }
+
+    fn creates_energy(&self, _amplitude: f64, _unit: &str) -> Option<String> {
+        None
     }
 }
 

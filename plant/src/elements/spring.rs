@@ -1,6 +1,7 @@
 //! Linear spring.
 
-use super::{Kind, Law, Linear, Mechanics, Parameter, Range, Role};
+use super::kind::{KindOf, Parameter, Range};
+use super::law::{Linear, LinearLaw};
 
 /// `f = stiffness (x - rest)`.
 #[derive(Debug, Clone, PartialEq)]
@@ -12,7 +13,7 @@ pub struct Spring {
 }
 
 impl Spring {
-    pub(super) const KIND: Kind = Kind {
+    pub(super) const KIND: KindOf<Spring> = KindOf {
         name: "spring",
         equation: "f = k (x - rest)",
         source: "Hooke",
@@ -21,7 +22,7 @@ impl Spring {
             Parameter::number("stiffness", "N/m", Range::Any, "k; negative for an over-centre mechanism"),
             Parameter::number("rest", "m", Range::Any, "displacement without force").or(0.0),
         ],
-        build: |v| Ok(Law::Spring(Spring { stiffness: v[0][0], rest: v[1][0] })),
+        build: |v| Ok(Spring { stiffness: v[0][0], rest: v[1][0] }),
     };
 
     pub(super) fn values(&self) -> Vec<Vec<f64>> {
@@ -29,8 +30,8 @@ impl Spring {
     }
 }
 
-impl Mechanics for Spring {
-    fn role(&self) -> Role {
-        Role::Linear(Linear { stiffness: self.stiffness, force: -self.stiffness * self.rest, ..Linear::default() })
+impl LinearLaw for Spring {
+    fn coefficients(&self) -> Linear {
+        Linear { stiffness: self.stiffness, force: -self.stiffness * self.rest, ..Linear::default() }
     }
 }

@@ -1,6 +1,10 @@
 //! Dry friction that falls with speed.
 
-use super::{FrictionLevels, Kind, Law, Mechanics, Parameter, Range, Role};
+use super::gaussian::between_rest_and_speed;
+use super::harmonic;
+use super::kind::{KindOf, Parameter, Range};
+use super::law::{FrictionLaw, Linear, Rubbing};
+use super::sine::Sine;
 
 /// `f = (coulomb + (static - coulomb) exp(-(v/velocity)²)) sign(v)`, set-valued at rest.
 #[derive(Debug, Clone, PartialEq)]
@@ -14,7 +18,7 @@ pub struct Stribeck {
 }
 
 impl Stribeck {
-    pub(super) const KIND: Kind = Kind {
+    pub(super) const KIND: KindOf<Stribeck> = KindOf {
         name: "stribeck",
         equation: "f = (c + (s - c) exp(-(v/vs)²)) sign(v), set-valued at rest",
         source: "Stribeck 1902; Gaussian form of Armstrong-Helouvry 1991",
@@ -31,7 +35,7 @@ impl Stribeck {
                     "static ({at_rest}) must be at least coulomb ({coulomb}); friction that is lower at rest is a friction_deficit"
                 ));
             }
-            Ok(Law::Stribeck(Stribeck { coulomb, at_rest, velocity: v[2][0] }))
+            Ok(Stribeck { coulomb, at_rest, velocity: v[2][0] })
         },
     };
 
@@ -40,14 +44,23 @@ impl Stribeck {
     }
 }
 
-impl Mechanics for Stribeck {
-    fn role(&self) -> Role {
-        Role::Friction(FrictionLevels { kinetic: [self.coulomb; 2], at_rest: [self.at_rest; 2], velocity: self.velocity })
+impl FrictionLaw for Stribeck {
+    #[inline]
+    fn level(&self, at: &Rubbing) -> f64 {
+        match at.speed {
+            None => self.at_rest,
+            Some(v) => between_rest_and_speed(self.at_rest, self.coulomb, v / self.velocity),
+        }
+    }
+
+    fn linearised(&self, at: &Sine) -> Linear {
+        harmonic::of_friction(self, at)
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::law::Side;
     use super::*;
 
     #[test]
@@ -57,8 +70,9 @@ mod tests {
 
     #[test]
     fn level_falls_to_one_part_in_e_at_the_stribeck_velocity() {
-        let Role::Friction(levels) = (Stribeck { coulomb: 1.0, at_rest: 3.0, velocity: 0.02 }).role() else { panic!("friction") };
-        assert!((levels.sliding(0, 0.02) - (1.0 + 2.0 * (-1.0f64).exp())).abs() < 1e-15);
-        assert_eq!(levels.sliding(1, 0.0), 3.0);
+        let law = Stribeck { coulomb: 1.0, at_rest: 3.0, velocity: 0.02 };
+        let level = |speed| law.level(&Rubbing { side: Side::Forwards, speed, load: 0.0, memory: &[] });
+        assert!((level(Some(0.02)) - (1.0 + 2.0 * (-1.0f64).exp())).abs() < 1e-15);
+        assert_eq!((level(Some(0.0)), level(None)), (3.0, 3.0));
     }
 }

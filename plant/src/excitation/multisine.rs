@@ -1,6 +1,6 @@
 //! Random-phase multisines.
 
-use super::Grid;
+use super::shape::Grid;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rustfft::{FftPlanner, num_complex::Complex};
@@ -23,6 +23,12 @@ pub(super) fn lines_in(band: [f64; 2], period: f64, grid: Grid) -> Vec<usize> {
     (first..=last).filter(|k| grid == Grid::Full || k % 2 == 1).collect()
 }
 
+/// A number of samples, where it is whole.
+pub(super) fn whole(samples: f64) -> Option<usize> {
+    let nearest = samples.round();
+    ((samples - nearest).abs() <= 1e-9 * nearest.max(1.0)).then_some(nearest as usize)
+}
+
 impl Lines {
     pub(super) fn new(band: [f64; 2], period: f64, grid: Grid, seed: u64, crest_rounds: u32, rms: Option<f64>, peak: Option<f64>) -> Lines {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
@@ -42,7 +48,7 @@ impl Lines {
 
     /// Samples of one period, where a whole number of them fills it: one transform instead of a sum for each.
     pub(super) fn one_period(&self, rate_hz: f64) -> Option<Vec<f64>> {
-        let size = super::whole(self.period * rate_hz).filter(|n| 2 * self.lines.last().map_or(0, |l| l.0) < *n)?;
+        let size = whole(self.period * rate_hz).filter(|n| 2 * self.lines.last().map_or(0, |l| l.0) < *n)?;
         let mut spectrum = vec![Complex::new(0.0, 0.0); size];
         for (k, phase) in &self.lines {
             spectrum[*k] = Complex::from_polar(self.amplitude, *phase);

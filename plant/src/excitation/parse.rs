@@ -1,7 +1,9 @@
 //! Excitations from a command line and from a file.
 
+use super::error::ExcitationError;
 use super::multisine::lines_in;
-use super::{Excitation, ExcitationError, Grid, Shape, Spacing};
+use super::shape::{Grid, Shape, Spacing};
+use super::signal::Excitation;
 use crate::elements::Range;
 use crate::model::Model;
 use crate::tomlfile::{FileError, Table, unknown};

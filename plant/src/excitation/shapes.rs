@@ -1,27 +1,7 @@
 //! Sweeps, and the shapes that are laid out piece by piece.
 
-use super::Shape;
+use super::shape::{Shape, Spacing};
 use std::f64::consts::{PI, TAU};
-
-/// How the frequency of a sweep runs.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Spacing {
-    /// As many seconds for each octave.
-    #[default]
-    Log,
-    /// As many seconds for each hertz.
-    Linear,
-}
-
-/// Which multiples of the inverse period a multisine has.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Grid {
-    /// All of them.
-    #[default]
-    Full,
-    /// The odd ones: what appears on the even ones is an even nonlinearity of the device.
-    Odd,
-}
 
 impl Spacing {
     /// Phase, rad, and frequency, Hz, at `t` of a sweep.

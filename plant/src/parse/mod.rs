@@ -3,7 +3,7 @@
 mod paths;
 mod signals;
 
-use crate::elements::{KINDS, Kind, Law, Range};
+use crate::elements::{KINDS, Kind, Law, Range, Role};
 use crate::model::{Body, Element, Fragment, InputKind, Model, Motion, Place};
 use crate::tomlfile::{self, FileError, Table};
 use std::path::Path;
@@ -146,7 +146,10 @@ fn refuse_free_bodies_without_inertia(
     for (index, body) in model.bodies.iter().enumerate() {
         let stands_for_another = is_fragment && index == 0 || hand == Some(index);
         let moved = model.inputs.iter().any(|i| i.kind == InputKind::Motion && i.on == index);
-        let inerter = model.elements.iter().any(|e| e.law.kind().name == "inerter" && e.between.contains(&Some(index)));
+        let inerter = model
+            .elements
+            .iter()
+            .any(|e| matches!(e.law.role(), Role::Linear(linear) if linear.inertance > 0.0) && e.between.contains(&Some(index)));
         if body.inertia == 0.0 && !stands_for_another && !moved && !inerter {
             let message = "a free body without inertia; give it some, or an inerter, or prescribe it with a motion input";
             return Err(bodies.map_or_else(|| top.error(message), |t| t.error_at(&body.name, message)));

@@ -1,6 +1,6 @@
 //! Transition curves from measured loops.
 
-use super::DahlLoop;
+use super::dahl_loop::DahlLoop;
 use nalgebra::{Matrix2, Vector2};
 
 /// A measured closed loop, moved to the middle and made the same in both directions.

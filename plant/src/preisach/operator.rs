@@ -1,6 +1,6 @@
 //! The operator itself: what it remembers, and its force.
 
-use super::Transition;
+use super::transition::Transition;
 
 /// Most turning points that are remembered. Each new one lies within the last two; where there would be more, the innermost
 /// two, between which hardly anything is left, are forgotten.

@@ -1,8 +1,8 @@
 //! The operator as the double integral that defines it: a grid of relays.
 
-use super::Transition;
+use super::transition::Transition;
 
-/// Relays on a grid of thresholds: eq (7) by brute force, slow, and all that [`super::Operator`] has to agree with.
+/// Relays on a grid of thresholds: eq (7) by brute force, slow, and all that [`super::operator::Operator`] has to agree with.
 #[derive(Debug, Clone)]
 pub struct Relays {
     /// (α up, β down, weight N, state ±1).

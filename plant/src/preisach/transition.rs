@@ -1,6 +1,6 @@
 //! Transition curves: how much force a way from a turning point gains.
 
-use super::DahlLoop;
+use super::dahl_loop::DahlLoop;
 
 /// Force gained on a way, and how it grows.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]

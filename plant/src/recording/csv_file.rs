@@ -1,7 +1,8 @@
 //! CSV recordings.
 
+use super::columns::{Columns, Piece, Source};
+use super::record::{Recording, RecordingError, signals_of};
 use super::units::{self, Kind, Unit};
-use super::{Columns, Piece, Recording, RecordingError, Source, signals_of};
 use crate::model::Model;
 use crate::tomlfile::{self, FileError};
 use csv::{ReaderBuilder, StringRecord, Trim};

@@ -1,10 +1,11 @@
 //! One substep.
 
-use super::compile::Compiled;
-use super::constraints::{Bounds, Work};
-use super::energy::Done;
-use super::{FrictionContact, Plant, SLOTS, Slots, prescribed_slot};
-use crate::elements::Mechanics;
+use super::account::Done;
+use super::compiled::Compiled;
+use super::constraints::Work;
+use super::contact::{Bounds, FrictionContact};
+use super::slots::{SLOTS, Slots, prescribed_slot};
+use super::state::Plant;
 
 /// Stands for a number of free bodies that is not known when the code is compiled.
 const ANY: usize = 0;
@@ -122,7 +123,7 @@ impl Plant {
             for (c, contact) in self.frictions.iter_mut().enumerate() {
                 work.base[c] = 0.5 * fixed.constraints.across(c, &end_velocity);
                 let v0 = self.v[contact.first] - self.v[contact.second];
-                work.bounds[c] = contact.bounds(v0);
+                work.bounds[c] = contact.bounds(v0, &middle, &self.paths);
                 work.force[c] = contact.force.min(work.bounds[c].high).max(work.bounds[c].low);
                 contact.velocity_before = v0;
             }
@@ -176,6 +177,10 @@ impl Plant {
                 }
             }
             settle(&self.frictions, n, &mut end_velocity);
+            for contact in self.frictions.iter_mut().filter(|contact| !contact.memory.is_empty()) {
+                let work = contact.force * (mean_velocity[contact.first] - mean_velocity[contact.second]) * h;
+                contact.law.rubbed(&mut contact.memory, work, h);
+            }
         }
 
         if let Some(account) = &mut self.energy {
@@ -281,21 +286,5 @@ impl FrictionContact {
             1 => work.force[c] != work.bounds[c].high,
             _ => work.force[c] != work.bounds[c].low,
         }
-    }
-
-    /// Between what its force may be over a substep that begins with relative velocity `v0`.
-    #[inline]
-    fn bounds(&self, v0: f64) -> Bounds {
-        let (mut high, mut low) = (self.levels.at_rest[0], -self.levels.at_rest[1]);
-        if self.mode != 0 {
-            let middle = 1.5 * v0 - 0.5 * self.velocity_before;
-            let v = if middle * f64::from(self.mode) < 0.0 { 0.0 } else { middle };
-            if self.mode > 0 {
-                high = self.levels.sliding(0, v);
-            } else {
-                low = -self.levels.sliding(1, v);
-            }
-        }
-        Bounds { low, high }
     }
 }

@@ -1,6 +1,7 @@
 //! Motions whose recording comes late: whole recordings know what is to come, a step at a time does not.
 
-use super::{Segment, segments};
+use super::segment::Segment;
+use super::spline::segments;
 use crate::model::{InputKind, Model};
 
 /// A model without the negative delays of its motion inputs, and the samples of all inputs with those motions taken as much earlier from their

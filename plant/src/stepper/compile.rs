@@ -1,57 +1,22 @@
 //! From a model to the numbers that a substep needs.
 
+use super::compiled::{Compiled, Share};
 use super::constraints::{Constraints, Work};
+use super::contact::{FrictionContact, Joint};
 use super::dense;
 use super::drive::Drive;
-use super::endpoint::Endpoint;
-use super::exact::Propagator;
-use super::sense::Sense;
-use super::{CompileError, FrictionContact, GROUND, MAX_BODIES, MAX_ELEMENTS, Options, PathElement, Plant, SLOTS, Slots, prescribed_slot};
-use crate::elements::{Law, Linear, Mechanics, Range, Role};
-use crate::model::{InputKind, Model, OutputKind, Place};
+use super::error::CompileError;
+use super::instant::Endpoint;
+use super::options::Options;
+use super::path::PathElement;
+use super::propagator::Propagator;
+use super::sensor::Sense;
+use super::slots::{Columns, GROUND, MAX_BODIES, MAX_ELEMENTS, SLOTS, Slots, Square, prescribed_slot};
+use super::state::Plant;
+use crate::elements::{Range, Role};
+use crate::load;
+use crate::model::{Element, InputKind, Model, OutputKind, Place};
 use nalgebra::DMatrix;
-
-/// A symmetric matrix over the places.
-pub(super) type Square = Box<[Slots; SLOTS]>;
-/// `columns[j][i]`: what a unit at free body j does to free body i.
-pub(super) type Columns = [Slots; SLOTS];
-
-/// What an element has become.
-#[derive(Debug, Clone, Copy)]
-pub(super) enum Share {
-    /// Part of the matrices, between two places.
-    Linear(Linear, usize, usize),
-    /// Index among the friction contacts.
-    Friction(usize),
-    /// Index among the path elements.
-    Path(usize),
-}
-
-/// Everything that does not change while a model moves.
-#[derive(Debug, Clone)]
-pub(super) struct Compiled {
-    /// Place of each body of the model.
-    pub(super) slots: Vec<usize>,
-    pub(super) free: usize,
-    pub(super) prescribed: usize,
-    pub(super) mass: Square,
-    pub(super) damping: Square,
-    pub(super) stiffness: Square,
-    /// Constant force onto each place, N.
-    pub(super) constant: Slots,
-    /// Inverse of the free bodies' inertia, 1/kg.
-    pub(super) inverse_mass: Columns,
-    /// Share θ of the implicit rule in the position.
-    pub(super) theta: f64,
-    /// Half the velocity change from: force, position, velocity of the free bodies.
-    pub(super) from_force: Columns,
-    pub(super) from_position: Columns,
-    pub(super) from_velocity: Columns,
-    /// The same from mean position, mean velocity and mean acceleration of the prescribed bodies.
-    pub(super) from_prescribed: [[Slots; SLOTS]; 3],
-    pub(super) elements: Vec<Share>,
-    pub(super) constraints: Constraints,
-}
 
 /// The constant matrices of a network.
 struct Network {
@@ -266,8 +231,62 @@ fn choose_substeps(network: &Network, model: &Model, factor: &DMatrix<f64>, peri
     if count.is_finite() { count.clamp(1.0, 100_000.0) as usize } else { 1 }
 }
 
+/// Every element by what a stepper makes of it.
+fn parts(model: &Model, slots: &[usize]) -> (Vec<Share>, Vec<FrictionContact>, Vec<PathElement>) {
+    let ends = |element: &Element| element.between.map(|place| place.map_or(GROUND, |body| slots[body]));
+    let (mut elements, mut frictions, mut paths) = (Vec::new(), Vec::new(), Vec::new());
+    for element in &model.elements {
+        let [first, second] = ends(element);
+        elements.push(match element.law.role() {
+            Role::Linear(linear) => Share::Linear(linear, first, second),
+            Role::Friction => {
+                frictions.push(FrictionContact::new(first, second, &element.law));
+                Share::Friction(frictions.len() - 1)
+            }
+            Role::Path => {
+                paths.push(PathElement::new(first, second, &element.law));
+                Share::Path(paths.len() - 1)
+            }
+        });
+    }
+    for (index, share) in elements.iter().enumerate() {
+        if let Share::Friction(contact) = share {
+            frictions[*contact].joint = joint(model, index, &elements, ends);
+        }
+    }
+    (elements, frictions, paths)
+}
+
+/// The joint that loads the friction contact that is this element of the model.
+fn joint(model: &Model, element: usize, shares: &[Share], ends: impl Fn(&Element) -> [usize; 2]) -> Joint {
+    let mut joint = Joint::default();
+    for (index, sign) in load::joint(model, element) {
+        let [first, second] = ends(&model.elements[index]);
+        (joint.first, joint.second) = if sign > 0.0 { (first, second) } else { (second, first) };
+        match shares[index] {
+            Share::Linear(linear, ..) => {
+                joint.stiffness += linear.stiffness;
+                joint.force += sign * linear.force;
+            }
+            Share::Path(path) => joint.paths.push((path, sign)),
+            Share::Friction(_) => {}
+        }
+    }
+    joint
+}
+
+impl Plant {
+    /// Compiles a model for samples `period_s` seconds apart.
+    ///
+    /// # Errors
+    /// When the model cannot be stepped; the error names what is wrong with it.
+    pub fn new(model: &Model, period_s: f64, options: &Options) -> Result<Plant, CompileError> {
+        plant(model, period_s, options)
+    }
+}
+
 /// See [`Plant::new`].
-pub(super) fn plant(model: &Model, period: f64, options: &Options) -> Result<Plant, CompileError> {
+fn plant(model: &Model, period: f64, options: &Options) -> Result<Plant, CompileError> {
     check_sizes(model, period, options)?;
     check(model)?;
     let network = assemble(model)?;
@@ -290,21 +309,7 @@ pub(super) fn plant(model: &Model, period: f64, options: &Options) -> Result<Pla
     let substep = period / substeps as f64;
     let drives: Vec<Drive> = model.inputs.iter().map(|input| Drive::new(input, network.slots[input.on], period, substep)).collect();
 
-    let (mut frictions, mut paths, mut elements) = (Vec::new(), Vec::new(), Vec::new());
-    for element in &model.elements {
-        let [first, second] = element.between.map(|place| place.map_or(GROUND, |body| network.slots[body]));
-        elements.push(match element.law.role() {
-            Role::Linear(linear) => Share::Linear(linear, first, second),
-            Role::Friction(levels) => {
-                frictions.push(FrictionContact { first, second, levels, mode: 0, force: 0.0, velocity_before: 0.0 });
-                Share::Friction(frictions.len() - 1)
-            }
-            Role::Path => {
-                paths.push(path_element(first, second, &element.law));
-                Share::Path(paths.len() - 1)
-            }
-        });
-    }
+    let (elements, frictions, mut paths) = parts(model, &network.slots);
 
     let stiffness = block(&network.stiffness, free);
     let damping = block(&network.damping, free);
@@ -360,22 +365,4 @@ pub(super) fn plant(model: &Model, period: f64, options: &Options) -> Result<Pla
     };
     plant.reset();
     Ok(plant)
-}
-
-fn path_element(first: usize, second: usize, law: &Law) -> PathElement {
-    let memory = vec![0.0; law.memory_len()];
-    PathElement {
-        first,
-        second,
-        law: law.clone(),
-        trial: memory.clone(),
-        memory,
-        reached: 0.0,
-        force: 0.0,
-        velocity_before: 0.0,
-        constraint: None,
-        ahead: 0.0,
-        unresolved: false,
-        absorbed: 0.0,
-    }
 }

@@ -5,9 +5,9 @@
 //! Gauss-Seidel solves one law at a time exactly. Where friction contacts share their load so closely that it
 //! converges slowly, those that stick are solved directly.
 
-use super::compile::Columns;
-use super::{FrictionContact, MAX_ELEMENTS, PathElement, SLOTS, Slots};
-use crate::elements::Mechanics;
+use super::contact::{Bounds, FrictionContact};
+use super::path::PathElement;
+use super::slots::{Columns, MAX_ELEMENTS, SLOTS, Slots};
 
 /// Sweeps before the sticking contacts are solved directly.
 const SWEEPS: usize = 25;
@@ -43,13 +43,6 @@ pub(super) struct Constraints {
     compliance: Vec<f64>,
     /// A⁻¹ Gᵀ: change of the mean velocity of each free body per unit of each force, m/s per N.
     pub(super) response: Vec<Slots>,
-}
-
-/// Bounds and start of a friction force during a solution.
-#[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Bounds {
-    pub(super) low: f64,
-    pub(super) high: f64,
 }
 
 /// Space for a solution.

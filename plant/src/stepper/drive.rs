@@ -1,6 +1,6 @@
 //! What happens to an input before it reaches its body: gain, saturation, delay, lag.
 
-use super::Segment;
+use super::segment::Segment;
 use crate::model::{Input, InputKind};
 use std::f64::consts::TAU;
 

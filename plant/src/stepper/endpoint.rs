@@ -2,29 +2,14 @@
 //!
 //! A substep knows forces as means over it; outputs want them at the sample.
 
-use super::compile::Share;
-use super::{GROUND, MAX_ELEMENTS, Plant, SLOTS, Slots};
-use crate::elements::Mechanics;
+use super::compiled::Share;
+use super::contact::Bounds;
+use super::instant::Endpoint;
+use super::slots::{GROUND, SLOTS, Slots};
+use super::state::Plant;
 
 /// Sweeps over the friction contacts: accelerations need no more digits than an output has.
 const SWEEPS: usize = 200;
-
-/// An instant.
-#[derive(Debug, Clone)]
-pub(super) struct Endpoint {
-    /// m/s².
-    pub(super) acceleration: Slots,
-    /// Of each friction contact, N.
-    pub(super) friction: [f64; MAX_ELEMENTS],
-    /// Of each path element, N.
-    pub(super) path: [f64; MAX_ELEMENTS],
-}
-
-impl Endpoint {
-    pub(super) fn new() -> Endpoint {
-        Endpoint { acceleration: [0.0; SLOTS], friction: [0.0; MAX_ELEMENTS], path: [0.0; MAX_ELEMENTS] }
-    }
-}
 
 impl Plant {
     /// The balance of forces now. Sliding contacts have the level of their speed; those that stick what keeps their
@@ -59,12 +44,8 @@ impl Plant {
             force[second] += *f;
         }
         for (contact, f) in self.frictions.iter().zip(&mut now.friction) {
-            let v = self.v[contact.first] - self.v[contact.second];
-            *f = match contact.mode {
-                1 => contact.levels.sliding(0, v),
-                -1 => -contact.levels.sliding(1, v),
-                _ => contact.force,
-            };
+            let load = contact.joint.load(&self.x, |path| now.path[path]);
+            *f = contact.force_at(self.v[contact.first] - self.v[contact.second], load);
             force[contact.first] -= *f;
             force[contact.second] += *f;
         }
@@ -91,9 +72,10 @@ impl Plant {
                     continue;
                 }
                 let relative = now.acceleration[a] - now.acceleration[b];
-                let wanted = (*f + relative / own).min(contact.levels.at_rest[0]).max(-contact.levels.at_rest[1]);
+                let Bounds { low, high } = contact.bounds_at_rest(contact.joint.load(&self.x, |path| now.path[path]));
+                let wanted = (*f + relative / own).min(high).max(low);
                 let change = wanted - *f;
-                if change.abs() > 1e-13 * (contact.levels.at_rest[0] + contact.levels.at_rest[1]) {
+                if change.abs() > 1e-13 * (high - low) {
                     settled = false;
                 }
                 *f = wanted;

@@ -1,6 +1,11 @@
 //! A model driven by whole recordings.
 
-use super::{CompileError, Options, Plant, Segment, ahead, segments};
+use super::ahead::ahead;
+use super::error::CompileError;
+use super::options::Options;
+use super::segment::Segment;
+use super::spline::segments;
+use super::state::Plant;
 use crate::model::Model;
 
 /// Outputs of a model, one column of N samples each, driven by `inputs`: one column of samples for each input of the

@@ -1,6 +1,6 @@
 //! How an input runs between its samples.
 
-use super::Segment;
+use super::segment::Segment;
 use crate::model::Hold;
 
 /// The N - 1 segments between N samples `period` seconds apart.

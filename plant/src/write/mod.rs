@@ -1,11 +1,14 @@
 //! Model files written: a whole [`Model`] as TOML, or edits to a file that keep its comments and order.
 
 mod patch;
+mod text;
 
 pub use patch::{Edit, ElementSpec, PatchError, Value, patch, round_significant};
+pub use text::{key, number, string};
 
 use crate::model::{Fragment, Hold, InputKind, Model, Motion, OutputKind, Place};
 use std::fmt::Write;
+use text::{list, parameter_text, strings};
 
 impl Model {
     /// The model as TOML that reads back as an equal model.
@@ -24,30 +27,6 @@ impl Fragment {
     pub fn to_toml(&self) -> String {
         write_model(&self.network, true)
     }
-}
-
-/// A number as TOML that reads back as the same number: `39500.0`, `2e-6`.
-pub fn number(value: f64) -> String {
-    format!("{value:?}")
-}
-
-/// A text as TOML, in quotes.
-pub fn string(text: &str) -> String {
-    toml_edit::Value::from(text).to_string()
-}
-
-/// A name as a key of TOML, in quotes where it needs them.
-pub fn key(name: &str) -> String {
-    let bare = !name.is_empty() && name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_' || c == '-');
-    if bare { name.to_string() } else { string(name) }
-}
-
-fn list(values: &[f64]) -> String {
-    format!("[{}]", values.iter().map(|v| number(*v)).collect::<Vec<_>>().join(", "))
-}
-
-fn strings<'a>(values: impl IntoIterator<Item = &'a str>) -> String {
-    format!("[{}]", values.into_iter().map(string).collect::<Vec<_>>().join(", "))
 }
 
 fn write_model(model: &Model, is_fragment: bool) -> String {
@@ -107,18 +86,6 @@ fn element_keys(name: &str, kind: &str, between: &str, law: &crate::elements::La
         }
     }
     text
-}
-
-/// A parameter's value as TOML; `None` where it is the default, which files leave out.
-pub(super) fn parameter_text(parameter: &crate::elements::Parameter, value: &[f64]) -> Option<String> {
-    match (parameter.list, value) {
-        (true, []) => None,
-        (true, values) => Some(list(values)),
-        (false, [one]) if parameter.default == Some(*one) => None,
-        (false, [one]) => Some(number(*one)),
-        // A law that has no such value: its default builds it again.
-        (false, _) => None,
-    }
 }
 
 fn input_keys(model: &Model, input: &crate::model::Input) -> String {

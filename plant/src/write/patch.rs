@@ -1,5 +1,6 @@
 //! Edits to a model file that keep its comments, its order and everything that they do not name.
 
+use super::text::{number, parameter_text};
 use crate::elements::{Law, Parameter};
 use crate::model::Model;
 use toml_edit::{Array, ArrayOfTables, DocumentMut, Item, Table, Value as TomlValue, value};
@@ -118,7 +119,7 @@ impl Model {
 
 fn number_value(x: f64) -> TomlValue {
     // Parsed from our own writing of numbers, so that 39500 is written 39500.0 and 0.000002 is 2e-6.
-    super::number(x).parse().unwrap_or_else(|_| TomlValue::from(x))
+    number(x).parse().unwrap_or_else(|_| TomlValue::from(x))
 }
 
 fn to_toml(v: &Value) -> TomlValue {
@@ -252,7 +253,7 @@ fn fill(table: &mut Table, element: &ElementSpec, same_kind: bool) {
         if same_kind && stands(table, parameter, &v) {
             continue;
         }
-        match super::parameter_text(parameter, &v) {
+        match parameter_text(parameter, &v) {
             None if table.contains_key(parameter.key) && v.len() == 1 => put(table, parameter.key, number_value(v[0]), None),
             None => {}
             Some(_) if parameter.list => put(table, parameter.key, to_toml(&Value::Numbers(v)), None),

@@ -1,35 +1,18 @@
 //! Which effects have a place in a device.
 
 use crate::effects::{Effect, Site};
-use crate::laws::Law;
+use crate::laws::draw::{Draw, InJoint, StatedDamper};
+use crate::laws::{KINDS, Kind, Law};
 use crate::network::{Element, GROUND, InputKind, Network, Place};
 
-/// Effects that are drawn: of what model files name, what a joint of a hand-held device can have, and the forms that are not in
+/// An effect that is drawn: of what model files name, what a joint of a hand-held device can have, and the forms that are not in
 /// model files. Not drawn are stops (no device is driven into them), laws that differ from a drawn one only in detail
 /// (Bouc-Wen, Preisach) and faults of sensors.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Kind {
-    Coulomb,
-    AsymmetricCoulomb,
-    Stribeck,
-    FrictionDeficit,
-    Dahl,
-    Lugre,
-    MaxwellSlip,
-    BristleField,
-    WarmFriction,
-    LoadFriction,
-    Damper,
-    AsymmetricDamper,
-    QuadraticDrag,
-    Cogging,
-    Bias,
+#[derive(Clone, Copy)]
+pub(super) enum What {
+    /// A law at a sort of place.
+    Law(&'static Kind, Draw),
     Inertia,
-    CubicSpring,
-    HystereticSpring,
-    Backlash,
-    RoundedGap,
-    JointBristles,
     SeriesCompliance,
     Delay,
     Bandwidth,
@@ -37,37 +20,41 @@ pub(super) enum Kind {
     Saturation,
 }
 
-impl Kind {
+impl What {
+    /// Whether a linear model can imitate it; of a law, whether its kind is linear whatever its numbers.
     pub fn is_linear(self) -> bool {
-        let constant = matches!(self, Kind::Damper | Kind::Bias | Kind::Inertia | Kind::SeriesCompliance);
-        constant || matches!(self, Kind::Delay | Kind::Bandwidth | Kind::BackEmf)
+        match self {
+            What::Law(kind, _) => kind.is_linear,
+            What::Inertia | What::SeriesCompliance | What::Delay | What::Bandwidth | What::BackEmf => true,
+            What::Saturation => false,
+        }
+    }
+
+    fn name(self) -> (&'static str, Option<Draw>) {
+        match self {
+            What::Law(kind, draw) => (kind.name, Some(draw)),
+            What::Inertia => ("inertia", None),
+            What::SeriesCompliance => ("series_compliance", None),
+            What::Delay => ("delay", None),
+            What::Bandwidth => ("bandwidth", None),
+            What::BackEmf => ("back_emf", None),
+            What::Saturation => ("saturation", None),
+        }
     }
 }
 
-const FRICTION: [Kind; 10] = [
-    Kind::Coulomb,
-    Kind::AsymmetricCoulomb,
-    Kind::Stribeck,
-    Kind::FrictionDeficit,
-    Kind::Dahl,
-    Kind::Lugre,
-    Kind::MaxwellSlip,
-    Kind::BristleField,
-    Kind::WarmFriction,
-    Kind::LoadFriction,
-];
+impl PartialEq for What {
+    fn eq(&self, other: &What) -> bool {
+        self.name() == other.name()
+    }
+}
 
-const AT_BODIES: [Kind; 6] = [Kind::Damper, Kind::AsymmetricDamper, Kind::QuadraticDrag, Kind::Cogging, Kind::Bias, Kind::Inertia];
-
-const AT_JOINTS: [Kind; 6] =
-    [Kind::CubicSpring, Kind::HystereticSpring, Kind::Backlash, Kind::RoundedGap, Kind::JointBristles, Kind::SeriesCompliance];
-
-const AT_INPUTS: [Kind; 4] = [Kind::Delay, Kind::Bandwidth, Kind::BackEmf, Kind::Saturation];
+const AT_INPUTS: [What; 4] = [What::Delay, What::Bandwidth, What::BackEmf, What::Saturation];
 
 /// An effect without its numbers.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Clone, PartialEq)]
 pub(super) struct Candidate {
-    pub kind: Kind,
+    pub what: What,
     pub site: Site,
     pub replaces: Vec<String>,
     /// The element that it is sized by: the joint's spring, or the spring that presses.
@@ -83,21 +70,31 @@ impl Candidate {
     }
 }
 
-/// Every candidate, kind after kind.
+/// Every candidate, kind after kind: friction, what else a body has, joints, inputs.
 pub(super) fn all(network: &Network) -> Vec<Candidate> {
+    let draws = || KINDS.iter().flat_map(|kind| kind.draws.iter().map(move |draw| (kind, *draw)));
     let mut all = Vec::new();
-    for kind in FRICTION {
-        bodies(network).for_each(|body| all.extend(friction(kind, body, network)));
+    for (kind, draw) in draws() {
+        if let Draw::Friction { loaded } = draw {
+            all.extend(bodies(network).filter_map(|body| friction(kind, loaded, body, network)));
+        }
     }
-    for kind in AT_BODIES {
-        bodies(network).for_each(|body| all.extend(at_body(kind, body, network)));
+    for (kind, draw) in draws() {
+        if let Draw::Body(stated) = draw {
+            all.extend(bodies(network).filter_map(|body| at_body(kind, stated, body, network)));
+        }
     }
-    for kind in AT_JOINTS {
-        all.extend(joints(network).map(|index| joint(kind, index, network)));
+    let site = |body| to_ground(network, body);
+    all.extend(bodies(network).map(|body| Candidate { what: What::Inertia, site: site(body), replaces: Vec::new(), joint: None }));
+    for (kind, draw) in draws() {
+        if let Draw::Joint(own) = draw {
+            all.extend(joints(network).map(|index| joint(What::Law(kind, draw), own, index, network)));
+        }
     }
-    for kind in AT_INPUTS {
+    all.extend(joints(network).map(|index| joint(What::SeriesCompliance, InJoint::Beside, index, network)));
+    for what in AT_INPUTS {
         for input in network.inputs.iter().filter(|input| input.kind == InputKind::Force) {
-            all.push(Candidate { kind, site: Site::Signal(input.name.clone()), replaces: Vec::new(), joint: None });
+            all.push(Candidate { what, site: Site::Signal(input.name.clone()), replaces: Vec::new(), joint: None });
         }
     }
     all
@@ -121,32 +118,31 @@ fn at(network: &Network, between: [Place; 2]) -> impl Iterator<Item = (usize, &E
 
 /// Dry friction of a body against ground. It takes the place of Coulomb friction that the model states; beside another law it would be that law
 /// with other numbers.
-fn friction(kind: Kind, body: usize, network: &Network) -> Option<Candidate> {
+fn friction(kind: &'static Kind, loaded: bool, body: usize, network: &Network) -> Option<Candidate> {
     let stated: Vec<&Element> =
         at(network, [Some(body), None]).map(|(_, element)| element).filter(|element| element.law.is_friction()).collect();
     let replaces = match stated.as_slice() {
         [] => Vec::new(),
-        [one] if matches!(one.law, Law::Coulomb(_)) && kind != Kind::Coulomb => vec![one.name.clone()],
+        [one] if matches!(one.law, Law::Coulomb(_)) && one.law.kind() != kind.name => vec![one.name.clone()],
         _ => return None,
     };
-    let joint = if kind == Kind::LoadFriction {
-        Some(joints(network).find(|index| network.elements[*index].between.contains(&Some(body)))?)
-    } else {
-        None
-    };
-    Some(Candidate { kind, site: to_ground(network, body), replaces, joint })
+    let joint = if loaded { Some(joints(network).find(|index| network.elements[*index].between.contains(&Some(body)))?) } else { None };
+    Some(Candidate { what: What::Law(kind, Draw::Friction { loaded }), site: to_ground(network, body), replaces, joint })
 }
 
 /// What a body has beside friction. A damper that the model states would only be that damper with another number; one that is
 /// lopsided takes its place.
-fn at_body(kind: Kind, body: usize, network: &Network) -> Option<Candidate> {
+fn at_body(kind: &'static Kind, damper: StatedDamper, body: usize, network: &Network) -> Option<Candidate> {
     let stated = at(network, [Some(body), None]).find(|(_, element)| matches!(element.law, Law::Damper(_)));
-    if kind == Kind::Damper && stated.is_some() {
-        return None;
-    }
-    let replaced = stated.filter(|_| kind == Kind::AsymmetricDamper);
+    let replaced = match damper {
+        StatedDamper::Stays => None,
+        StatedDamper::Refuses if stated.is_some() => return None,
+        StatedDamper::Refuses => None,
+        StatedDamper::IsReplaced => stated,
+    };
     let replaces = replaced.iter().map(|(_, element)| element.name.clone()).collect();
-    Some(Candidate { kind, site: to_ground(network, body), replaces, joint: replaced.map(|(index, _)| index) })
+    let what = What::Law(kind, Draw::Body(damper));
+    Some(Candidate { what, site: to_ground(network, body), replaces, joint: replaced.map(|(index, _)| index) })
 }
 
 /// Linear springs of the device between two bodies, at least one of which moves freely.
@@ -161,16 +157,15 @@ fn joints(network: &Network) -> impl Iterator<Item = usize> {
     })
 }
 
-fn joint(kind: Kind, index: usize, network: &Network) -> Candidate {
+fn joint(what: What, own: InJoint, index: usize, network: &Network) -> Candidate {
     let element = &network.elements[index];
-    let mut replaces = match kind {
-        Kind::CubicSpring | Kind::HystereticSpring | Kind::Backlash | Kind::RoundedGap => vec![element.name.clone()],
-        _ => Vec::new(),
+    let mut replaces = match own {
+        InJoint::Beside => Vec::new(),
+        InJoint::ForSpring | InJoint::ForSpringAndDampers => vec![element.name.clone()],
     };
-    if matches!(kind, Kind::Backlash | Kind::RoundedGap) {
-        // A gap stands in the place of the joint's dampers too.
+    if own == InJoint::ForSpringAndDampers {
         replaces.extend(at(network, element.between).filter(|(_, e)| matches!(e.law, Law::Damper(_))).map(|(_, e)| e.name.clone()));
     }
     let site = Site::Between(element.between.map(|place| network.place_name(place).to_string()));
-    Candidate { kind, site, replaces, joint: Some(index) }
+    Candidate { what, site, replaces, joint: Some(index) }
 }

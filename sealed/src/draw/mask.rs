@@ -1,11 +1,15 @@
 //! Nominal numbers that hide what is hidden.
 
-use super::{Numbers, rounded};
+use super::sizing::rounded;
 use crate::effects::{Effect, Physics, Site};
 use crate::laws::Law;
 use crate::network::{InputKind, Network};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
+use std::collections::BTreeMap;
+
+/// The numbers of the nominal model that are wrong, by path.
+type Numbers = BTreeMap<String, f64>;
 
 /// The true value over the nominal one of every number that is wrong, by path.
 ///
@@ -55,7 +59,7 @@ fn absorbing(network: &Network, effect: &Effect) -> Vec<(String, f64)> {
         Physics::BackEmf { .. } => dampers(-1.0).collect(),
         // In a joint, bristles that hold are a spring too.
         Physics::Law(law) if law.takes_energy() => dampers(-1.0).chain(springs(-1.0)).collect(),
-        _ => Vec::new(),
+        Physics::Law(_) | Physics::Saturation { .. } => Vec::new(),
     }
 }
 

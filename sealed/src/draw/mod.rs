@@ -4,8 +4,12 @@
 
 mod candidates;
 mod mask;
+mod options;
 mod ranges;
 mod sizes;
+pub(crate) mod sizing;
+
+pub use options::DrawOptions;
 
 use crate::effects::Effect;
 use crate::network::Network;
@@ -15,55 +19,13 @@ use candidates::Candidate;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use ranges::Probe;
-use std::collections::BTreeMap;
+use sizing::rounded;
 
 /// Sizes of one candidate that are tried before another one is.
 const TRIES_OF_SIZE: usize = 3;
 
 /// Candidates that are tried for one effect.
 const TRIES_OF_PLACE: usize = 40;
-
-/// What is to be drawn.
-#[derive(Debug, Clone, PartialEq)]
-pub struct DrawOptions {
-    /// How many effects, 0 to 3.
-    pub effects: usize,
-    /// Whether only effects that no linear model can imitate are drawn.
-    pub nonlinear_only: bool,
-    /// Per cent, 0 to 50, by which nominal numbers are wrong at most. With effects, those near one are wrong in the direction in
-    /// which a fit without it would have moved them; without effects, any of them in any direction.
-    pub masked_percent: f64,
-    /// Per cent, 0 to 50, by which the grip's stiffness and damping differ from the nominal ones at most.
-    pub grip_percent: f64,
-    /// Encoder step of every output as a share of its range under the working force, at most; 0 leaves the model's own.
-    pub encoder_share: f64,
-    /// Standard deviation of the noise of every output as a share of its range under the working force, at most.
-    pub noise_share: f64,
-    /// N, amplitude of the force in use.
-    pub working_force_n: f64,
-    /// m, amplitude of a moved body in use.
-    pub working_motion_m: f64,
-    /// s, sampling period of the graph.
-    pub period_s: f64,
-}
-
-impl Default for DrawOptions {
-    /// One effect of any kind; numbers wrong by up to 15 %, a grip by up to 20 %; encoder steps of up to 1/5000 and noise of up to
-    /// 1/1000 of the range; a contact task of 3 N and 5 mm at 5 kHz.
-    fn default() -> DrawOptions {
-        DrawOptions {
-            effects: 1,
-            nonlinear_only: false,
-            masked_percent: 15.0,
-            grip_percent: 20.0,
-            encoder_share: 2e-4,
-            noise_share: 1e-3,
-            working_force_n: 3.0,
-            working_motion_m: 5e-3,
-            period_s: 2e-4,
-        }
-    }
-}
 
 /// A truth that cannot be drawn.
 #[derive(Debug, thiserror::Error)]
@@ -138,16 +100,16 @@ fn check(options: &DrawOptions) -> Result<(), DrawError> {
 
 fn next_effect(nominal: &Network, probe: &Probe, chosen: &[Effect], options: &DrawOptions, random: &mut ChaCha8Rng) -> Option<Effect> {
     let mut candidates = candidates::all(nominal);
-    candidates.retain(|candidate| !(options.nonlinear_only && candidate.kind.is_linear()) && candidate.goes_with(chosen));
+    candidates.retain(|candidate| !(options.nonlinear_only && candidate.what.is_linear()) && candidate.goes_with(chosen));
     for _ in 0..TRIES_OF_PLACE {
         // Every kind is equally likely, then every place of it.
-        let mut kinds: Vec<_> = candidates.iter().map(|candidate| candidate.kind).collect();
+        let mut kinds: Vec<_> = candidates.iter().map(|candidate| candidate.what).collect();
         kinds.dedup();
         if kinds.is_empty() {
             return None;
         }
         let kind = kinds[random.random_range(0..kinds.len())];
-        let places: Vec<&Candidate> = candidates.iter().filter(|candidate| candidate.kind == kind).collect();
+        let places: Vec<&Candidate> = candidates.iter().filter(|candidate| candidate.what == kind).collect();
         let candidate = places[random.random_range(0..places.len())].clone();
         for _ in 0..TRIES_OF_SIZE {
             let Some(physics) = sizes::physics(&candidate, nominal, probe, options, random) else { break };
@@ -178,16 +140,3 @@ fn sensors(nominal: &Network, probe: &Probe, options: &DrawOptions, random: &mut
     };
     nominal.outputs.iter().enumerate().map(sensor).collect()
 }
-
-/// Log-uniform between the two.
-fn between(low: f64, high: f64, random: &mut ChaCha8Rng) -> f64 {
-    (low.ln() + (high / low).ln() * random.random_range(0.0..=1.0)).exp()
-}
-
-/// To four digits: a truth is read by people, and a short decimal comes back from its file as the same number.
-fn rounded(value: f64) -> f64 {
-    format!("{value:.3e}").parse().unwrap_or(value)
-}
-
-/// The numbers of the nominal model that are wrong, by path.
-type Numbers = BTreeMap<String, f64>;

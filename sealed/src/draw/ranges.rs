@@ -1,6 +1,6 @@
 //! What the nominal device does under its working force: the measure of every size.
 
-use super::DrawOptions;
+use super::options::DrawOptions;
 use crate::effects::Effect;
 use crate::network::{InputKind, Network, Place};
 use crate::plant::{PlantError, SealedPlant};

@@ -1,112 +1,19 @@
 //! Hidden effects: physics at a place, how it changes a device, and which names for it are right.
 
+pub(crate) mod answer;
 mod answers;
-mod sound;
+mod error;
+mod physics;
+pub(crate) mod site;
 
-pub use answers::Answer;
+pub use answer::Answer;
+pub use error::EffectError;
+pub use physics::Physics;
+pub use site::Site;
 
-use crate::laws::{Damper, Law, Spring};
-use crate::network::{Body, Element, GROUND, InputKind, Network, Place};
+use crate::laws::{Damper, Law, Load, Spring};
+use crate::network::{Body, Element, InputKind, Network, Place};
 use serde::{Deserialize, Serialize};
-
-/// Physics that is hidden. In a truth file it is `physics`, its name, and `parameters`, its true numbers.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(tag = "physics", content = "parameters", rename_all = "snake_case")]
-pub enum Physics {
-    /// More inertia on a body.
-    Inertia {
-        /// kg.
-        inertia: f64,
-    },
-    /// A body in between that gives a joint a second spring: what joined the two before stays on the first one's side.
-    SeriesCompliance {
-        /// N/m, of the second spring.
-        stiffness: f64,
-        /// N s/m, beside it.
-        damping: f64,
-        /// kg, of the body in between.
-        inertia: f64,
-    },
-    /// Dead time of an actuator.
-    Delay {
-        /// s.
-        delay: f64,
-    },
-    /// First-order lag of an actuator.
-    Bandwidth {
-        /// Hz.
-        bandwidth: f64,
-    },
-    /// Force that a motor loses to its speed.
-    BackEmf {
-        /// N per m/s.
-        back_emf: f64,
-    },
-    /// Limit of an actuator's force.
-    Saturation {
-        /// N.
-        saturation: f64,
-    },
-    /// A law of force between two places.
-    #[serde(untagged)]
-    Law(Law),
-}
-
-impl Physics {
-    /// Its name, which for a law is the law's kind.
-    pub fn name(&self) -> &'static str {
-        match self {
-            Physics::Law(law) => law.kind(),
-            Physics::Inertia { .. } => "inertia",
-            Physics::SeriesCompliance { .. } => "series_compliance",
-            Physics::Delay { .. } => "delay",
-            Physics::Bandwidth { .. } => "bandwidth",
-            Physics::BackEmf { .. } => "back_emf",
-            Physics::Saturation { .. } => "saturation",
-        }
-    }
-
-    /// Whether a linear model can imitate it exactly, from wherever it rests.
-    pub fn is_linear(&self) -> bool {
-        match self {
-            Physics::Law(law) => matches!(law, Law::Spring(_) | Law::Damper(_) | Law::Inerter(_) | Law::Bias(_)),
-            Physics::Saturation { .. } => false,
-            _ => true,
-        }
-    }
-
-    /// Whether model files have exactly this form. The others are the hidden plant's own.
-    pub fn is_in_formats(&self) -> bool {
-        let own = matches!(self, Physics::Law(Law::BristleField(_) | Law::RoundedGap(_) | Law::WarmFriction(_) | Law::LoadFriction(_)));
-        !own
-    }
-}
-
-/// Where an effect sits.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Site {
-    /// Between two bodies, or a body and `ground`.
-    Between([String; 2]),
-    /// At an input or an output.
-    Signal(String),
-}
-
-impl Site {
-    /// Whether one end is ground.
-    fn is_at_ground(&self) -> bool {
-        matches!(self, Site::Between(ends) if ends.iter().any(|end| end == GROUND))
-    }
-
-    /// Whether both are the same place, whichever end is named first.
-    pub(crate) fn is_same_place(&self, other: &Site) -> bool {
-        match (self, other) {
-            (Site::Between([a, b]), Site::Between([c, d])) => (a == c && b == d) || (a == d && b == c),
-            (Site::Signal(a), Site::Signal(b)) => a == b,
-            _ => false,
-        }
-    }
-}
 
 /// A hidden effect.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -129,48 +36,12 @@ pub struct Effect {
     pub family: Vec<String>,
 }
 
-/// An effect that does not fit the device.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum EffectError {
-    /// The place or an element that the effect names is not there.
-    #[error("effect \"{effect}\": the device has no {what} \"{name}\"; is this the truth of another device?")]
-    Missing {
-        /// Name of the physics.
-        effect: &'static str,
-        /// `body`, `element`, `force input` or `joint`.
-        what: &'static str,
-        /// The name.
-        name: String,
-    },
-    /// The physics needs another sort of place.
-    #[error("effect \"{effect}\" cannot sit there: it needs {needed}")]
-    WrongSite {
-        /// Name of the physics.
-        effect: &'static str,
-        /// `two bodies`, `a body and ground` or `a force input`.
-        needed: &'static str,
-    },
-    /// A number is out of range.
-    #[error("effect \"{effect}\": {key} = {value} is out of range, expected {expected}")]
-    Number {
-        /// Name of the physics.
-        effect: &'static str,
-        /// The number's name.
-        key: &'static str,
-        /// Its value.
-        value: f64,
-        /// What it must be.
-        expected: &'static str,
-    },
-}
-
 impl Effect {
     /// The effect with the answers that are right for it on this device.
     pub fn new(physics: Physics, site: Site, replaces: Vec<String>, network: &Network) -> Effect {
         let (nonlinear, in_formats, family) = (!physics.is_linear(), physics.is_in_formats(), answers::family(&physics));
-        let mut effect = Effect { physics, site, replaces, nonlinear, in_formats, accept: Vec::new(), family };
-        effect.accept = answers::answers(&effect, network);
-        effect
+        let accept = answers::answers(&physics, &site, !replaces.is_empty(), network);
+        Effect { physics, site, replaces, nonlinear, in_formats, accept, family }
     }
 
     /// Puts the effect into a device. `number` sets apart the names of what it adds.
@@ -180,7 +51,7 @@ impl Effect {
     /// [`EffectError`] where the device has no such place or the effect's numbers are out of range. The device is then half changed.
     pub fn apply(&self, network: &mut Network, number: usize) -> Result<(), EffectError> {
         let effect = self.physics.name();
-        if let Some((key, value, expected)) = sound::unsound(&self.physics) {
+        if let Some((key, value, expected)) = self.physics.unsound() {
             return Err(EffectError::Number { effect, key, value, expected });
         }
         match &self.physics {
@@ -231,10 +102,10 @@ impl Effect {
         if between[0] == between[1] {
             return Err(EffectError::WrongSite { effect: self.physics.name(), needed: "two bodies" });
         }
-        if let Law::LoadFriction(friction) = law
-            && network.element(&friction.joint).is_none()
+        if let Load::Element(joint) = law.to_force().load()
+            && network.element(joint).is_none()
         {
-            return Err(self.missing("element", &friction.joint));
+            return Err(self.missing("element", joint));
         }
         for name in &self.replaces {
             network.element(name).ok_or_else(|| self.missing("element", name))?;

@@ -1,32 +1,19 @@
-//! Elasto-plastic bristles: each a spring that lets go at its own force.
+//! Elasto-plastic bristles, spread widely: a form of the hidden plant's own.
 
-use super::friction::between_rest_and_speed;
-use super::{ForceLaw, Path};
+use super::described::{Checked, Described, Facts, Read};
+use super::draw::{Draw, Here, InJoint};
+use super::families::{FRICTION, LOOPS, PRESLIDING};
+use super::force::{ForceLaw, Path};
+use super::gaussian::between_rest_and_speed;
+use super::maxwell_slip::{MaxwellSlip, slide};
+use crate::draw::sizing::{between, presliding, rounded, share};
+use crate::network::allowed::Allowed::{NotNegative, One, Positive};
+use rand::RngExt;
+use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 
-/// Parallel spring-sliders (Iwan 1966): `f = sum k_i z_i`, each z_i follows the displacement and stays within `±f_i/k_i`.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct SpringSliders {
-    /// N/m, k_i.
-    pub stiffness: Vec<f64>,
-    /// N, f_i; as many.
-    pub force: Vec<f64>,
-}
-
-impl ForceLaw for SpringSliders {
-    fn memory(&self) -> usize {
-        self.stiffness.len()
-    }
-
-    fn path_force(&self, path: &Path, memory: &mut [f64]) -> f64 {
-        slide(&self.stiffness, &self.force, 1.0, path, memory)
-    }
-
-    fn stiffness(&self) -> f64 {
-        self.stiffness.iter().sum()
-    }
-}
+/// More bristles than this only cost time.
+const BRISTLES_AT_MOST: usize = 1024;
 
 /// A field of bristles whose stiffness and break-away force are spread widely and independently of each other.
 ///
@@ -55,7 +42,7 @@ pub struct BristleField {
 
 impl BristleField {
     /// Stiffness (N/m) and break-away force (N) of every bristle.
-    pub fn bristles(&self) -> SpringSliders {
+    pub fn bristles(&self) -> MaxwellSlip {
         // Quantiles of the two at places that never line up: evenly spaced, and spaced by the golden ratio.
         const GOLDEN: f64 = 0.618_033_988_749_894_9;
         let n = self.count.max(1);
@@ -68,7 +55,7 @@ impl BristleField {
             let sum: f64 = shares.iter().sum();
             shares.into_iter().map(|share| share * total / sum).collect()
         };
-        SpringSliders { stiffness: scaled(stiffness, self.stiffness), force: scaled(force, self.force) }
+        MaxwellSlip { stiffness: scaled(stiffness, self.stiffness), force: scaled(force, self.force) }
     }
 
     /// The field with its bristles laid out, ready to step.
@@ -77,10 +64,61 @@ impl BristleField {
     }
 }
 
+impl Described for BristleField {
+    const NAME: &'static str = "bristle_field";
+    const FACTS: Facts = Facts { takes_energy: true, is_friction: true, is_linear: false, family: &[FRICTION, LOOPS] };
+    const READ: Read<BristleField> = None;
+    const DRAWS: &'static [Draw] = &[Draw::Friction { loaded: false }, Draw::Joint(InJoint::Beside)];
+
+    fn to_force(&self) -> Box<dyn ForceLaw> {
+        Box::new(self.laid_out())
+    }
+
+    fn numbers(&self) -> Vec<Checked> {
+        vec![
+            ("stiffness", self.stiffness, Positive),
+            ("force", self.force, Positive),
+            ("stiffness_spread", self.stiffness_spread, NotNegative),
+            ("force_spread", self.force_spread, NotNegative),
+            ("static_ratio", self.static_ratio, One),
+            ("velocity", self.velocity, Positive),
+            ("count", if self.count <= BRISTLES_AT_MOST { self.count as f64 } else { f64::INFINITY }, One),
+        ]
+    }
+
+    fn draw(here: &Here, random: &mut ChaCha8Rng) -> Option<BristleField> {
+        let (friction, stiffness, speed) = match here {
+            Here::Body(at) => (at.friction, at.friction / presliding(at.travel, random), at.speed),
+            Here::Joint(at) => {
+                // Rubbing flanks: 5 to 20 % of the working force, let go within 3 to 30 % of the working stretch.
+                let friction = rounded(share([0.05, 0.2], random) * at.force);
+                (friction, friction / (at.stretch * between(0.03, 0.3, random)), at.speed)
+            }
+        };
+        Some(BristleField {
+            stiffness: rounded(stiffness),
+            force: friction,
+            // Logistic scales: the middle four fifths of the bristles span a factor of 4 to 20.
+            stiffness_spread: rounded(random.random_range(0.3..0.7)),
+            force_spread: rounded(random.random_range(0.3..0.7)),
+            count: random.random_range(40..=80),
+            // Half of the fields hold tighter at rest.
+            static_ratio: if random.random_bool(0.5) { 1.0 } else { rounded(between(1.2, 1.8, random)) },
+            velocity: rounded(speed * between(0.05, 0.3, random)),
+        })
+    }
+
+    /// Friction whose force first rises with displacement: every law with presliding. Beside a joint's spring the same field
+    /// is a spring with a loop.
+    fn names(at_ground: bool) -> Vec<&'static str> {
+        if at_ground { PRESLIDING.to_vec() } else { [PRESLIDING, LOOPS].concat() }
+    }
+}
+
 /// A [`BristleField`] with every bristle's numbers at hand.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LaidField {
-    bristles: SpringSliders,
+    bristles: MaxwellSlip,
     static_ratio: f64,
     velocity: f64,
 }
@@ -98,16 +136,4 @@ impl ForceLaw for LaidField {
     fn stiffness(&self) -> f64 {
         self.bristles.stiffness()
     }
-}
-
-/// Carries the deflections (m) along the path and adds their forces; break-away forces are multiplied by `level`.
-fn slide(stiffness: &[f64], force: &[f64], level: f64, path: &Path, deflection: &mut [f64]) -> f64 {
-    let moved = path.to - path.from;
-    let mut total = 0.0;
-    for ((k, f), z) in stiffness.iter().zip(force).zip(deflection) {
-        let most = level * f / k;
-        *z = (*z + moved).clamp(-most, most);
-        total += k * *z;
-    }
-    total
 }

@@ -1,6 +1,12 @@
-//! Dry friction under the force of a joint.
+//! Dry friction under the force of a joint: a form of the hidden plant's own.
 
-use super::ForceLaw;
+use super::described::{Checked, Described, Facts, Read};
+use super::draw::{Draw, Here};
+use super::families::FRICTION;
+use super::force::{ForceLaw, Load};
+use crate::draw::sizing::{between, rounded};
+use crate::network::allowed::Allowed::NotNegative;
+use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 
 /// Coulomb friction of surfaces that a joint's spring presses together: `c = c0 + mu abs(f_joint)`.
@@ -17,7 +23,7 @@ pub struct LoadFriction {
 
 impl ForceLaw for LoadFriction {
     fn dry(&self, _: f64, load: f64, _: &[f64]) -> [f64; 2] {
-        let level = self.force + self.coefficient * load;
+        let level = self.force + self.coefficient * load.abs();
         [level, level]
     }
 
@@ -25,7 +31,39 @@ impl ForceLaw for LoadFriction {
         true
     }
 
-    fn loaded_by(&self) -> Option<&str> {
-        Some(&self.joint)
+    fn load(&self) -> Load<'_> {
+        Load::Element(&self.joint)
+    }
+}
+
+impl Described for LoadFriction {
+    const NAME: &'static str = "load_friction";
+    const FACTS: Facts = Facts { takes_energy: true, is_friction: true, is_linear: false, family: &[FRICTION] };
+    const READ: Read<LoadFriction> = None;
+    const DRAWS: &'static [Draw] = &[Draw::Friction { loaded: true }];
+
+    fn to_force(&self) -> Box<dyn ForceLaw> {
+        Box::new(self.clone())
+    }
+
+    fn numbers(&self) -> Vec<Checked> {
+        vec![("force", self.force, NotNegative), ("coefficient", self.coefficient, NotNegative)]
+    }
+
+    fn draw(here: &Here, random: &mut ChaCha8Rng) -> Option<LoadFriction> {
+        let Here::Body(at) = here else { return None };
+        // At the joint's working force the load's part is one to three times the part without load.
+        let joint = at.joint.as_ref()?;
+        let load = joint.force?;
+        let part = between(1.0, 3.0, random);
+        Some(LoadFriction {
+            force: rounded(at.friction / (1.0 + part)),
+            coefficient: rounded(at.friction * part / (1.0 + part) / load),
+            joint: joint.name.clone(),
+        })
+    }
+
+    fn names(_at_ground: bool) -> Vec<&'static str> {
+        vec!["coulomb"]
     }
 }

@@ -1,226 +1,169 @@
 //! The laws of force between two bodies: those that model files name and those that only a hidden plant has.
+//!
+//! A law is one file, which holds everything that is said of it ([`described::Described`]), and one line here. The modules are declared by
+//! that line, where `cargo fmt` does not see them: format a law's file with `rustfmt --edition 2024 --config-path . sealed/src/laws/LAW.rs`.
 
+pub(crate) mod around;
 mod bristle;
-mod bristle_field;
-mod damping;
-mod friction;
-mod gap;
-mod hysteresis;
-mod load_friction;
-mod stiffness;
-mod warm_friction;
+pub(crate) mod described;
+pub(crate) mod draw;
+pub(crate) mod families;
+mod force;
+mod gaussian;
 
-pub use bristle::{Dahl, Lugre};
-pub use bristle_field::{BristleField, LaidField, SpringSliders};
-pub use damping::{AsymmetricDamper, Damper, QuadraticDrag};
-pub use friction::{AsymmetricCoulomb, Coulomb, FrictionDeficit, Stribeck};
-pub use gap::{Backlash, RoundedGap};
-pub use hysteresis::HystereticSpring;
-pub use load_friction::LoadFriction;
-pub use stiffness::{Bias, Cogging, CubicSpring, Inerter, Spring};
-pub use warm_friction::WarmFriction;
+pub use bristle_field::LaidField;
+pub use force::{ForceLaw, Load, Path};
 
+use crate::effects::answer::Answer;
+use crate::network::section::{NetworkError, Section};
+use around::Around;
+use described::{Checked, Described, Facts, Read};
+use draw::{Draw, Here};
+use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 
-/// One substep of an element's displacement, which laws with a memory follow.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Path {
-    /// m, where the element stood when its memory was last carried on.
-    pub from: f64,
-    /// m, where it stands now.
-    pub to: f64,
-    /// m/s, its speed.
-    pub speed: f64,
-    /// s, the time in between.
-    pub duration: f64,
+/// A law's kind.
+pub(crate) struct Kind {
+    /// Its name.
+    pub name: &'static str,
+    /// See [`Facts::is_linear`].
+    pub is_linear: bool,
+    /// See [`Described::READ`].
+    pub read: Option<fn(&mut Section) -> Result<Law, NetworkError>>,
+    /// See [`Described::DRAWS`].
+    pub draws: &'static [Draw],
+    /// See [`Described::draw`].
+    pub draw: fn(&Here, &mut ChaCha8Rng) -> Option<Law>,
 }
 
-/// The three parts of a law that the integrator treats apart: what hangs on the path, what hangs on the speed and
-/// is smooth, and dry friction, which is set-valued at rest.
-pub trait ForceLaw: Send {
-    /// How many numbers the law remembers. All are 0 in a device at rest that was never moved.
-    fn memory(&self) -> usize {
-        0
-    }
-
-    /// N, the part of the force that the path up to now sets. Carries the memory on to the end of the path.
-    fn path_force(&self, _path: &Path, _memory: &mut [f64]) -> f64 {
-        0.0
-    }
-
-    /// N s/m, the damping at displacement `x` (m) and speed `v` (m/s): the smooth force is this times `v`.
-    fn damping(&self, _x: f64, _v: f64, _memory: &[f64]) -> f64 {
-        0.0
-    }
-
-    /// N, the levels of dry friction against motion forwards and backwards at speed `v` (m/s) under the magnitude `load` (N) of
-    /// the force of the element named by [`ForceLaw::loaded_by`].
-    fn dry(&self, _v: f64, _load: f64, _memory: &[f64]) -> [f64; 2] {
-        [0.0, 0.0]
-    }
-
-    /// Whether the law has dry friction at all.
-    fn is_dry(&self) -> bool {
-        false
-    }
-
-    /// Carries on what friction itself changes (heat): `friction` (N) acted at speed `v` (m/s) for `duration` (s).
-    fn after(&self, _friction: f64, _v: f64, _duration: f64, _memory: &mut [f64]) {}
-
-    /// N/m, a bound of the slope of force over displacement, from which the substep is chosen.
-    fn stiffness(&self) -> f64 {
-        0.0
-    }
-
-    /// kg, the force per relative acceleration.
-    fn inertance(&self) -> f64 {
-        0.0
-    }
-
-    /// Name of the element whose force presses the friction surfaces together.
-    fn loaded_by(&self) -> Option<&str> {
-        None
+/// Reads a law of type `L` as what `wrap` makes of it.
+fn read_as<L: Described>(section: &mut Section, wrap: fn(L) -> Law) -> Result<Law, NetworkError> {
+    match L::READ {
+        Some(read) => read(section).map(wrap),
+        None => Err(section.error("kind", format!("no model file has a {}", L::NAME))),
     }
 }
 
-/// A law of force with its numbers.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(tag = "physics", content = "parameters", rename_all = "snake_case")]
-pub enum Law {
-    /// `k (x - rest)`.
-    Spring(Spring),
-    /// `b v`.
-    Damper(Damper),
-    /// `m dv/dt`.
-    Inerter(Inerter),
-    /// A constant.
-    Bias(Bias),
-    /// `k x + k3 x^3`.
-    CubicSpring(CubicSpring),
-    /// `a sin(2 pi x/period + phase)`.
-    Cogging(Cogging),
-    /// `b± v`.
-    AsymmetricDamper(AsymmetricDamper),
-    /// `q v abs(v)`.
-    QuadraticDrag(QuadraticDrag),
-    /// Dry friction of one level.
-    Coulomb(Coulomb),
-    /// Dry friction of a level for each direction.
-    AsymmetricCoulomb(AsymmetricCoulomb),
-    /// Dry friction that falls with speed.
-    Stribeck(Stribeck),
-    /// Dry friction that rises with speed.
-    FrictionDeficit(FrictionDeficit),
-    /// Dry friction of one bristle that bends.
-    Dahl(Dahl),
-    /// The same with a level that falls with speed, and damping.
-    Lugre(Lugre),
-    /// Parallel spring-sliders, each with its own numbers.
-    MaxwellSlip(SpringSliders),
-    /// A spring that follows one of two lines.
-    HystereticSpring(HystereticSpring),
-    /// A shaft behind a gap with sharp edges.
-    Backlash(Backlash),
-    /// Hidden only: a field of bristles.
-    BristleField(BristleField),
-    /// Hidden only: a shaft behind a gap with rounded edges.
-    RoundedGap(RoundedGap),
-    /// Hidden only: dry friction that its own heat lowers.
-    WarmFriction(WarmFriction),
-    /// Hidden only: dry friction under the force of a joint.
-    LoadFriction(LoadFriction),
+macro_rules! register {
+    ($($file:ident::$law:ident),* $(,)?) => {
+        $(mod $file;)*
+        $(pub use $file::$law;)*
+
+        /// A law of force with its numbers.
+        #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+        #[serde(tag = "physics", content = "parameters", rename_all = "snake_case")]
+        pub enum Law { $(#[doc = concat!("See [`", stringify!($law), "`].")] $law($law)),* }
+
+        /// Every kind of law. Effects are drawn in this order.
+        pub(crate) const KINDS: &[Kind] = &[$(Kind {
+            name: <$law as Described>::NAME,
+            is_linear: <$law as Described>::FACTS.is_linear,
+            read: if <$law as Described>::READ.is_some() { Some(|section| read_as(section, Law::$law)) } else { None },
+            draws: <$law as Described>::DRAWS,
+            draw: |here, random| <$law as Described>::draw(here, random).map(Law::$law),
+        }),*];
+
+        impl Law {
+            /// Its equations, ready to step.
+            pub fn to_force(&self) -> Box<dyn ForceLaw> {
+                match self { $(Law::$law(law) => law.to_force()),* }
+            }
+
+            /// Its name, as model files and truths write it.
+            pub fn kind(&self) -> &'static str {
+                match self { $(Law::$law(_) => <$law as Described>::NAME),* }
+            }
+
+            /// Whether model files have exactly this form. The others are the hidden plant's own.
+            pub fn is_in_formats(&self) -> bool {
+                match self { $(Law::$law(_) => { const READ: Read<$law> = <$law as Described>::READ; READ.is_some() }),* }
+            }
+
+            pub(crate) fn facts(&self) -> Facts {
+                match self { $(Law::$law(_) => <$law as Described>::FACTS),* }
+            }
+
+            /// Its numbers, and what its equations take.
+            pub(crate) fn numbers(&self) -> Vec<Checked> {
+                match self { $(Law::$law(law) => law.numbers()),* }
+            }
+
+            /// The names that verdicts have for it: its own, or for a form of the hidden plant's own the nearest ones.
+            pub(crate) fn names(&self, at_ground: bool) -> Vec<&'static str> {
+                match self { $(Law::$law(_) => <$law as Described>::names(at_ground)),* }
+            }
+
+            /// Answers that are right beside its own names at its own place.
+            pub(crate) fn same_as(&self, around: &Around) -> Vec<Answer> {
+                match self { $(Law::$law(law) => law.same_as(around)),* }
+            }
+
+            /// The keys that [`Law::number_mut`] knows for this law.
+            pub fn number_keys(&self) -> &'static [&'static str] {
+                match self { $(Law::$law(_) => <$law as Described>::NUMBER_KEYS),* }
+            }
+
+            /// The number under a key of a model file, for the kinds whose numbers a nominal model may have wrong.
+            pub fn number_mut(&mut self, key: &str) -> Option<&mut f64> {
+                if !self.number_keys().contains(&key) {
+                    return None;
+                }
+                match self { $(Law::$law(law) => law.number_mut(key)),* }
+            }
+        }
+    };
 }
+
+register!(
+    coulomb::Coulomb,
+    asymmetric_coulomb::AsymmetricCoulomb,
+    stribeck::Stribeck,
+    friction_deficit::FrictionDeficit,
+    dahl::Dahl,
+    lugre::Lugre,
+    maxwell_slip::MaxwellSlip,
+    damper::Damper,
+    asymmetric_damper::AsymmetricDamper,
+    quadratic_drag::QuadraticDrag,
+    cogging::Cogging,
+    bias::Bias,
+    cubic_spring::CubicSpring,
+    hysteretic_spring::HystereticSpring,
+    backlash::Backlash,
+    rounded_gap::RoundedGap,
+    bristle_field::BristleField,
+    warm_friction::WarmFriction,
+    load_friction::LoadFriction,
+    spring::Spring,
+    inerter::Inerter,
+);
 
 impl Law {
+    /// Reads a law of this kind from an element of a model file.
+    pub(crate) fn read(section: &mut Section) -> Result<Law, NetworkError> {
+        let name = section.need_text("kind")?;
+        match KINDS.iter().find(|kind| kind.name == name).and_then(|kind| kind.read) {
+            Some(read) => read(section),
+            None => {
+                let known: Vec<&str> = KINDS.iter().filter(|kind| kind.read.is_some()).map(|kind| kind.name).collect();
+                let message = format!("the hidden plant does not know \"{name}\"; it knows {}", known.join(", "));
+                Err(section.error("kind", message))
+            }
+        }
+    }
+
     /// Whether it takes energy out of what moves.
     pub fn takes_energy(&self) -> bool {
-        let conserves = matches!(self, Law::Spring(_) | Law::Inerter(_) | Law::Bias(_) | Law::CubicSpring(_) | Law::Cogging(_));
-        !conserves && !matches!(self, Law::Backlash(_) | Law::RoundedGap(_))
+        self.facts().takes_energy
     }
 
     /// Whether it is dry friction, or friction that bends before it slides.
     pub fn is_friction(&self) -> bool {
-        matches!(self, Law::Dahl(_) | Law::Lugre(_) | Law::MaxwellSlip(_) | Law::BristleField(_)) || self.to_force().is_dry()
+        self.facts().is_friction
     }
 
-    /// Its equations, ready to step.
-    pub fn to_force(&self) -> Box<dyn ForceLaw> {
-        match self {
-            Law::Spring(law) => Box::new(law.clone()),
-            Law::Damper(law) => Box::new(law.clone()),
-            Law::Inerter(law) => Box::new(law.clone()),
-            Law::Bias(law) => Box::new(law.clone()),
-            Law::CubicSpring(law) => Box::new(law.clone()),
-            Law::Cogging(law) => Box::new(law.clone()),
-            Law::AsymmetricDamper(law) => Box::new(law.clone()),
-            Law::QuadraticDrag(law) => Box::new(law.clone()),
-            Law::Coulomb(law) => Box::new(law.clone()),
-            Law::AsymmetricCoulomb(law) => Box::new(law.clone()),
-            Law::Stribeck(law) => Box::new(law.clone()),
-            Law::FrictionDeficit(law) => Box::new(law.clone()),
-            Law::Dahl(law) => Box::new(law.clone()),
-            Law::Lugre(law) => Box::new(law.clone()),
-            Law::MaxwellSlip(law) => Box::new(law.clone()),
-            Law::HystereticSpring(law) => Box::new(law.clone()),
-            Law::Backlash(law) => Box::new(law.clone()),
-            Law::BristleField(law) => Box::new(law.laid_out()),
-            Law::RoundedGap(law) => Box::new(law.clone()),
-            Law::WarmFriction(law) => Box::new(law.clone()),
-            Law::LoadFriction(law) => Box::new(law.clone()),
-        }
-    }
-
-    /// Its name, as model files and truths write it.
-    pub fn kind(&self) -> &'static str {
-        match self {
-            Law::Spring(_) => "spring",
-            Law::Damper(_) => "damper",
-            Law::Inerter(_) => "inerter",
-            Law::Bias(_) => "bias",
-            Law::CubicSpring(_) => "cubic_spring",
-            Law::Cogging(_) => "cogging",
-            Law::AsymmetricDamper(_) => "asymmetric_damper",
-            Law::QuadraticDrag(_) => "quadratic_drag",
-            Law::Coulomb(_) => "coulomb",
-            Law::AsymmetricCoulomb(_) => "asymmetric_coulomb",
-            Law::Stribeck(_) => "stribeck",
-            Law::FrictionDeficit(_) => "friction_deficit",
-            Law::Dahl(_) => "dahl",
-            Law::Lugre(_) => "lugre",
-            Law::MaxwellSlip(_) => "maxwell_slip",
-            Law::HystereticSpring(_) => "hysteretic_spring",
-            Law::Backlash(_) => "backlash",
-            Law::BristleField(_) => "bristle_field",
-            Law::RoundedGap(_) => "rounded_gap",
-            Law::WarmFriction(_) => "warm_friction",
-            Law::LoadFriction(_) => "load_friction",
-        }
-    }
-
-    /// The number under a key of a model file, for the kinds whose numbers a nominal model may have wrong: `stiffness` of a
-    /// spring, `damping`, `inertance`, `force` of Coulomb friction, and both slopes of a hysteretic spring under `stiffness`'s two keys.
-    pub fn number_mut(&mut self, key: &str) -> Option<&mut f64> {
-        match (self, key) {
-            (Law::Spring(law), "stiffness") => Some(&mut law.stiffness),
-            (Law::CubicSpring(law), "stiffness") => Some(&mut law.stiffness),
-            (Law::Damper(law), "damping") => Some(&mut law.damping),
-            (Law::Inerter(law), "inertance") => Some(&mut law.inertance),
-            (Law::Coulomb(law), "force") => Some(&mut law.force),
-            (Law::HystereticSpring(law), "stiffness_positive") => Some(&mut law.stiffness_positive),
-            (Law::HystereticSpring(law), "stiffness_negative") => Some(&mut law.stiffness_negative),
-            _ => None,
-        }
-    }
-
-    /// The keys that [`Law::number_mut`] knows for this law.
-    pub fn number_keys(&self) -> &'static [&'static str] {
-        match self {
-            Law::Spring(_) | Law::CubicSpring(_) => &["stiffness"],
-            Law::Damper(_) => &["damping"],
-            Law::Inerter(_) => &["inertance"],
-            Law::Coulomb(_) => &["force"],
-            Law::HystereticSpring(_) => &["stiffness_positive", "stiffness_negative"],
-            _ => &[],
-        }
+    /// Whether a linear model can imitate it exactly, from wherever it rests.
+    pub fn is_linear(&self) -> bool {
+        self.facts().is_linear
     }
 }

@@ -1,7 +1,14 @@
-//! Dry friction that its own heat lowers.
+//! Dry friction that its own heat lowers: a form of the hidden plant's own.
 
-use super::ForceLaw;
+use super::described::{Checked, Described, Facts, Read};
+use super::draw::{Draw, Here};
+use super::families::FRICTION;
+use super::force::ForceLaw;
+use crate::draw::sizing::{between, rounded};
+use crate::network::allowed::Allowed::{NotNegative, Positive};
+use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
+use std::f64::consts::PI;
 
 /// Coulomb friction that falls as the rubbing parts warm: `c(T) = c0/(1 + T/T_half)`, with the warming T above the surroundings fed by
 /// the friction's own power and cooling with a time constant: `dT/dt = c abs(v)/C - T/tau`.
@@ -46,5 +53,45 @@ impl ForceLaw for WarmFriction {
     fn after(&self, friction: f64, v: f64, duration: f64, memory: &mut [f64]) {
         let steady = (friction * v).max(0.0) * self.cooling_time / self.heat_capacity;
         memory[0] = steady + (memory[0] - steady) * (-duration / self.cooling_time).exp();
+    }
+}
+
+impl Described for WarmFriction {
+    const NAME: &'static str = "warm_friction";
+    const FACTS: Facts = Facts { takes_energy: true, is_friction: true, is_linear: false, family: &[FRICTION] };
+    const READ: Read<WarmFriction> = None;
+    const DRAWS: &'static [Draw] = &[Draw::Friction { loaded: false }];
+
+    fn to_force(&self) -> Box<dyn ForceLaw> {
+        Box::new(self.clone())
+    }
+
+    fn numbers(&self) -> Vec<Checked> {
+        vec![
+            ("force", self.force, NotNegative),
+            ("half_warming", self.half_warming, Positive),
+            ("heat_capacity", self.heat_capacity, Positive),
+            ("cooling_time", self.cooling_time, Positive),
+        ]
+    }
+
+    fn draw(here: &Here, random: &mut ChaCha8Rng) -> Option<WarmFriction> {
+        let Here::Body(at) = here else { return None };
+        // The power of steady work warms the joint by 0.5 to 2 of the half-warming within 2 to 20 s: a session of a minute sees it change.
+        let cooling_time = between(2.0, 20.0, random);
+        let half_warming = between(10.0, 40.0, random);
+        let power = at.friction * at.speed * 2.0 / PI;
+        let heat_capacity = power * cooling_time / (half_warming * between(0.5, 2.0, random));
+        Some(WarmFriction {
+            force: at.friction,
+            half_warming: rounded(half_warming),
+            heat_capacity: rounded(heat_capacity),
+            cooling_time: rounded(cooling_time),
+        })
+    }
+
+    /// Heat lowers friction where it is fast: over a recording that is dry friction, falling with speed where it shows.
+    fn names(_at_ground: bool) -> Vec<&'static str> {
+        vec!["coulomb", "stribeck"]
     }
 }

@@ -1,9 +1,11 @@
 //! Nominal models as data: what a `model.toml` and a grip say, names resolved, nothing computed.
 
+pub(crate) mod allowed;
 mod grip;
 mod read;
-mod section;
+pub(crate) mod section;
 
+pub use crate::effects::site::GROUND;
 pub use grip::Grip;
 pub use section::NetworkError;
 
@@ -12,9 +14,6 @@ use serde::{Deserialize, Serialize};
 
 /// Index of a body; `None` is ground.
 pub type Place = Option<usize>;
-
-/// Name of the body that does not move.
-pub const GROUND: &str = "ground";
 
 /// What a device is said to be: bodies, what joins them, and the signals that drive it and are read.
 #[derive(Debug, Clone, PartialEq, Default)]

@@ -1,11 +1,9 @@
 //! Model files and grips in.
 
-use super::section::{Allowed, NetworkError, Section, Source};
+use super::allowed::Allowed;
+use super::section::{NetworkError, Section, Source};
 use super::{Axis, Body, Element, GROUND, Grip, Hold, Input, InputKind, Named, Network, Output, OutputKind, Place};
-use crate::laws::{
-    AsymmetricCoulomb, AsymmetricDamper, Backlash, Bias, Cogging, Coulomb, CubicSpring, Dahl, Damper, FrictionDeficit, HystereticSpring,
-    Inerter, Law, Lugre, QuadraticDrag, Spring, SpringSliders, Stribeck,
-};
+use crate::laws::Law;
 use crate::seal::hash;
 use toml_edit::Document;
 
@@ -14,9 +12,6 @@ const PORT: &str = "port";
 
 /// Body of a grip whose motion is the operator's intent.
 const HAND: &str = "hand";
-
-const KINDS: &str = "spring, damper, inerter, bias, cubic_spring, cogging, asymmetric_damper, quadratic_drag, coulomb, \
-                     asymmetric_coulomb, stribeck, friction_deficit, dahl, lugre, maxwell_slip, hysteretic_spring, backlash";
 
 impl Network {
     /// The device that a model file's text describes; `file` is its name in errors.
@@ -62,10 +57,7 @@ impl Network {
             network.axes.push(axis);
         }
         for (index, body) in network.bodies.iter().enumerate() {
-            let inerter = network
-                .elements
-                .iter()
-                .any(|e| matches!(e.law, Law::Inerter(_)) && e.between.contains(&Some(index)) && e.law.to_force().inertance() > 0.0);
+            let inerter = network.elements.iter().any(|e| e.between.contains(&Some(index)) && e.law.to_force().inertance() > 0.0);
             if body.inertia == 0.0 && !inerter && !network.is_moved(index) {
                 let message = format!("\"{}\" moves freely without inertia; give it some, an inerter, or a motion input", body.name);
                 return Err(top.error("bodies", message));
@@ -141,79 +133,7 @@ fn element(section: &mut Section, before: &[Element], place: impl Fn(&str) -> Op
     if between[0] == between[1] {
         return Err(section.error("between", "expected two different places"));
     }
-    Ok(Element { name: name.to_string(), between, law: law(section)?, of_grip: false })
-}
-
-fn law(section: &mut Section) -> Result<Law, NetworkError> {
-    use Allowed::{Any, NotNegative, Positive};
-    let kind = section.need_text("kind")?;
-    let mut number = |key: &str, allowed| section.need_number(key, allowed);
-    Ok(match kind {
-        "spring" => Law::Spring(Spring { stiffness: number("stiffness", NotNegative)?, rest: section.number("rest", Any)?.unwrap_or(0.0) }),
-        "damper" => Law::Damper(Damper { damping: number("damping", NotNegative)? }),
-        "inerter" => Law::Inerter(Inerter { inertance: number("inertance", NotNegative)? }),
-        "bias" => Law::Bias(Bias { force: number("force", Any)? }),
-        "cubic_spring" => Law::CubicSpring(CubicSpring { stiffness: number("stiffness", NotNegative)?, cubic: number("cubic", Any)? }),
-        "cogging" => Law::Cogging(Cogging {
-            amplitude: number("amplitude", Any)?,
-            period: number("period", Positive)?,
-            phase: number("phase", Any)?,
-        }),
-        "asymmetric_damper" => Law::AsymmetricDamper(AsymmetricDamper {
-            positive: number("positive", NotNegative)?,
-            negative: number("negative", NotNegative)?,
-        }),
-        "quadratic_drag" => Law::QuadraticDrag(QuadraticDrag { coefficient: number("coefficient", NotNegative)? }),
-        "coulomb" => Law::Coulomb(Coulomb { force: number("force", NotNegative)? }),
-        "asymmetric_coulomb" => Law::AsymmetricCoulomb(AsymmetricCoulomb {
-            positive: number("positive", NotNegative)?,
-            negative: number("negative", NotNegative)?,
-        }),
-        "stribeck" => Law::Stribeck(Stribeck {
-            coulomb: number("coulomb", NotNegative)?,
-            at_rest: number("static", NotNegative)?,
-            velocity: number("velocity", Positive)?,
-        }),
-        "friction_deficit" => Law::FrictionDeficit(FrictionDeficit {
-            coulomb: number("coulomb", NotNegative)?,
-            rest: number("rest", NotNegative)?,
-            velocity: number("velocity", Positive)?,
-        }),
-        "dahl" => Law::Dahl(Dahl { stiffness: number("stiffness", Positive)?, coulomb: number("coulomb", Positive)? }),
-        "lugre" => {
-            let (coulomb, at_rest) = (number("coulomb", Positive)?, number("static", Positive)?);
-            let (stiffness, damping) = (number("stiffness", Positive)?, number("damping", NotNegative)?);
-            let velocity = number("velocity", Positive)?;
-            if at_rest < coulomb {
-                return Err(section.error("static", format!("expected at least coulomb, {coulomb}")));
-            }
-            Law::Lugre(Lugre { stiffness, damping, coulomb, at_rest, velocity })
-        }
-        "maxwell_slip" => {
-            let mut list = |key: &str| {
-                let list = section.numbers(key, Positive)?;
-                list.filter(|list| !list.is_empty()).ok_or_else(|| section.error(key, "missing or empty; add a list of numbers"))
-            };
-            let sliders = SpringSliders { stiffness: list("stiffness")?, force: list("force")? };
-            if sliders.stiffness.len() != sliders.force.len() {
-                return Err(section.error("force", "expected as many numbers as in stiffness"));
-            }
-            Law::MaxwellSlip(sliders)
-        }
-        "hysteretic_spring" => Law::HystereticSpring(HystereticSpring {
-            stiffness_positive: number("stiffness_positive", NotNegative)?,
-            stiffness_negative: number("stiffness_negative", NotNegative)?,
-            offset_positive: number("offset_positive", Any)?,
-            offset_negative: number("offset_negative", Any)?,
-            bandwidth: number("bandwidth", Positive)?,
-        }),
-        "backlash" => Law::Backlash(Backlash {
-            gap: number("gap", NotNegative)?,
-            stiffness: number("stiffness", Positive)?,
-            damping: number("damping", NotNegative)?,
-        }),
-        other => return Err(section.error("kind", format!("the hidden plant does not know \"{other}\"; it knows {KINDS}"))),
-    })
+    Ok(Element { name: name.to_string(), between, law: Law::read(section)?, of_grip: false })
 }
 
 fn input(section: &mut Section, network: &Network) -> Result<Input, NetworkError> {

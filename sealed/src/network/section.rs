@@ -1,5 +1,6 @@
 //! A table of a TOML file that is read key by key: what is missing, wrong or left over is said with its file and line.
 
+use super::allowed::Allowed;
 use std::collections::BTreeSet;
 use std::fmt;
 use std::ops::Range;
@@ -37,7 +38,7 @@ impl std::error::Error for NetworkError {}
 
 /// The text that a table stands in.
 #[derive(Clone, Copy)]
-pub(super) struct Source<'a> {
+pub(crate) struct Source<'a> {
     pub file: &'a str,
     pub text: &'a str,
 }
@@ -50,35 +51,8 @@ impl Source<'_> {
     }
 }
 
-/// What a number may be.
-#[derive(Clone, Copy, PartialEq, Eq)]
-pub(super) enum Allowed {
-    Any,
-    NotNegative,
-    Positive,
-}
-
-impl Allowed {
-    fn holds(self, value: f64) -> bool {
-        value.is_finite()
-            && match self {
-                Allowed::Any => true,
-                Allowed::NotNegative => value >= 0.0,
-                Allowed::Positive => value > 0.0,
-            }
-    }
-
-    fn words(self) -> &'static str {
-        match self {
-            Allowed::Any => "a finite number",
-            Allowed::NotNegative => "a finite number of at least 0",
-            Allowed::Positive => "a finite number above 0",
-        }
-    }
-}
-
 /// A table whose keys are taken one by one.
-pub(super) struct Section<'a> {
+pub(crate) struct Section<'a> {
     source: Source<'a>,
     table: &'a dyn TableLike,
     span: Option<Range<usize>>,

@@ -2,6 +2,7 @@
 
 use super::drive::Drive;
 use super::kick::Kick;
+use super::loading;
 use super::sense::Sensor;
 use super::{Joint, Names, PlantError, SUBSTEPS_AT_MOST, SealedPlant, dense};
 use crate::laws::{Damper, Law};
@@ -33,7 +34,7 @@ pub(super) fn assemble(device: &Network, truth: &Truth, period_s: f64, (phase, l
         joints.push(Joint {
             between,
             memory: memory..memory + remembered,
-            loaded_by: force.loaded_by().and_then(|name| device.element(name)),
+            loaded_by: loading::loading(device, between, force.load()),
             last: 0.0,
             path_force: 0.0,
             damping: 0.0,

@@ -111,7 +111,7 @@ impl Kick {
     fn take_speeds(&mut self, joints: &mut [Joint], memory: &[f64], positions: &[f64]) -> bool {
         let mut changed = false;
         for index in 0..joints.len() {
-            let load = joints[index].loaded_by.map_or(0.0, |loading| joints[loading].path_force.abs());
+            let load: f64 = joints[index].loaded_by.iter().map(|(loading, sign)| sign * joints[*loading].path_force).sum();
             let joint = &mut joints[index];
             let (v, remembered) = (joint.relative(&self.mean), &memory[joint.memory.clone()]);
             joint.damping = joint.force.damping(joint.relative(positions), v, remembered);

@@ -11,6 +11,7 @@ mod assemble;
 mod dense;
 mod drive;
 mod kick;
+mod loading;
 mod sense;
 
 use crate::laws::{ForceLaw, Path};
@@ -95,8 +96,8 @@ struct Joint {
     between: [Place; 2],
     force: Box<dyn ForceLaw>,
     memory: Range<usize>,
-    /// Element whose force loads its friction.
-    loaded_by: Option<usize>,
+    /// Elements whose forces load its friction, each with its sign.
+    loaded_by: Vec<(usize, f64)>,
     /// m, where its memory stands.
     last: f64,
     /// N, what its path sets in this substep.

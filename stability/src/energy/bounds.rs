@@ -6,8 +6,8 @@ use super::types::Bounds;
 use crate::phases::contacts;
 use crate::session::{AxisSignals, Session};
 use backdrive_nodes::graph::{Graph, NodeKind};
-use backdrive_plant::elements::Mechanics;
 use backdrive_plant::elements::Role;
+use backdrive_plant::elements::Side;
 use backdrive_plant::model::{Model, Place};
 
 pub(super) fn bounds(
@@ -95,7 +95,7 @@ struct ToGround {
 fn linear_damping(law: &backdrive_plant::elements::Law) -> f64 {
     match law.role() {
         Role::Linear(linear) => linear.damping,
-        _ => 0.0,
+        Role::Friction | Role::Path => 0.0,
     }
 }
 
@@ -126,7 +126,11 @@ fn to_ground(model: &Model, user: usize, notes: &mut Vec<String>) -> ToGround {
         }
         match element.law.role() {
             Role::Linear(linear) => sum.damping += linear.damping,
-            Role::Friction(levels) => sum.coulomb += levels.kinetic[0].min(levels.kinetic[1]),
+            Role::Friction => {
+                // At speed, without load.
+                let level = |side| element.law.unloaded_level(side, Some(f64::INFINITY));
+                sum.coulomb += level(Side::Forwards).min(level(Side::Backwards));
+            }
             Role::Path => {
                 notes.push(format!("what {} ({}) adds to b and f_c is not counted", element.name, element.law.kind().name));
             }

@@ -94,7 +94,7 @@ pub(super) fn decimate(series: &[f64]) -> Vec<f64> {
 mod tests {
     use super::*;
     use backdrive_plant::elements::HystereticSpring;
-    use backdrive_plant::elements::Mechanics;
+    use backdrive_plant::elements::PathLaw;
 
     /// A wall of stiffness k, sampled every T and held, and a hand that moves by x(t): over closed cycles the wall gives exactly
     /// k/2 sum (dx)^2, which is k T/2 times the integral of v^2 but for terms of order T^2.

@@ -21,18 +21,7 @@ pub fn scale(fragment: &mut Fragment, factor: f64) {
 
 /// The same for one element.
 pub fn scale_element(element: &mut Element, factor: f64) {
-    let kind = element.law.kind();
-    let mut values = element.law.values();
-    for (parameter, values) in kind.parameters.iter().zip(&mut values) {
-        // Forces per anything: N, N/m, N s/m, N/m^1.5; lengths, rates, exponents and masses are no forces.
-        if parameter.unit == "N" || parameter.unit.starts_with("N ") || parameter.unit.starts_with("N/") {
-            values.iter_mut().for_each(|v| *v *= factor);
-        }
-    }
-    // Relations between forces hold at any scale, so this cannot fail; where it did, the element would stay as it is.
-    if let Ok(law) = (kind.build)(&values) {
-        element.law = law;
-    }
+    element.law = element.law.scaled(factor);
 }
 
 #[cfg(test)]

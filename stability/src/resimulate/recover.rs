@@ -10,7 +10,7 @@ use crate::session::Session;
 use backdrive_control::device::{self, Device, DeviceOptions};
 use backdrive_control::operator::Intent;
 use backdrive_nodes::graph::{DeviceFiles, Graph, NodeKind, Settings};
-use backdrive_plant::elements::{Law, Mechanics, Role};
+use backdrive_plant::elements::{Law, Side};
 use backdrive_plant::linear::{LinearModel, Operating};
 use realfft::num_complex::Complex;
 use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
@@ -168,10 +168,7 @@ pub fn recorded_intents(session: &Session) -> Option<Vec<Intent>> {
 /// How far the hand can move while dry friction holds the device, m or rad: all its friction at rest, against the grip.
 fn held_by_friction(files: &DeviceFiles, axis: usize) -> Result<f64, ResimulateError> {
     let Some(model) = &files.model else { return Ok(0.0) };
-    let at_rest = |law: &Law| match law.role() {
-        Role::Friction(levels) => levels.sliding(0, 0.0).abs().max(levels.sliding(1, 0.0).abs()),
-        _ => 0.0,
-    };
+    let at_rest = |law: &Law| [Side::Forwards, Side::Backwards].map(|side| law.unloaded_level(side, None)).into_iter().fold(0.0, f64::max);
     let friction: f64 = model.elements.iter().map(|e| at_rest(&e.law)).sum();
     let compliance =
         super::over_cancelling::compliance(files, axis, LOOK_AT).map_err(|error| ResimulateError::Linear { what: "the master", error })?;

@@ -7,7 +7,7 @@ use crate::StudyError;
 use crate::papers::device;
 use crate::run::read;
 use crate::table::Report;
-use backdrive_plant::elements::{Law, Mechanics};
+use backdrive_plant::elements::Law;
 use backdrive_plant::model::Model;
 use backdrive_plant::preisach::{DahlLoop, MeasuredLoop, Transition, fit};
 use backdrive_report::{Colour, Figure, Page, Plot, Series};

@@ -1,7 +1,7 @@
 //! What an element looks like to one sine: the stiffness and damping of its first harmonic.
 
-use super::{Friction, Operating};
-use crate::elements::{FrictionLevels, Law, Linear, Mechanics, Role};
+use super::law::{FrictionLaw, Linear, PathLaw, Rubbing, Side};
+use super::sine::{DryFriction, Sine};
 use std::f64::consts::{PI, TAU};
 
 /// Steps in a cycle. Errors of a law with corners fall with its square: about 1e-5 here.
@@ -9,36 +9,27 @@ const STEPS: usize = 512;
 /// Most cycles before the one that is measured, for hysteresis to close its loop.
 const SETTLE: usize = 100;
 
-/// Coefficients of an element about `x0` (m across it), for the amplitude and frequency of `at`.
-///
-/// With `x = x0 + A sin(wt)` and `f` the element's force, the stiffness is `(1/pi A) ∮ f sin` and the
-/// damping `(1/pi A w) ∮ f cos`, the describing function of Krylov & Bogoliubov. For a linear element these are
-/// its own coefficients at any amplitude.
-pub(super) fn coefficients(law: &Law, x0: f64, at: &Operating) -> Linear {
-    match law.role() {
-        Role::Linear(linear) => Linear { force: 0.0, ..linear },
-        Role::Friction(levels) => match at.friction {
-            Friction::Ignored => Linear::default(),
-            Friction::Viscous => Linear { damping: viscous_equivalent(&levels, at), ..Linear::default() },
-        },
-        Role::Path => path(law, x0, at),
+/// Dry friction: nothing where it is ignored, else the damping that takes as much energy per cycle, `4 c/(pi A w)` for Coulomb friction.
+/// It is looked at without load and with the memory of rest.
+pub fn of_friction(law: &impl FrictionLaw, at: &Sine) -> Linear {
+    if at.friction == DryFriction::Ignored {
+        return Linear::default();
     }
-}
-
-/// Damping that takes as much energy per cycle: `4 c/(pi A w)` for Coulomb friction.
-fn viscous_equivalent(levels: &FrictionLevels, at: &Operating) -> f64 {
     let speed = at.amplitude * TAU * at.frequency_hz;
+    let memory = vec![0.0; law.memory_len()];
     let sum: f64 = (0..STEPS)
         .map(|i| {
             let cos = (TAU * (i as f64 + 0.5) / STEPS as f64).cos();
-            let side = usize::from(cos < 0.0);
-            levels.sliding(side, speed * cos) * cos.abs()
+            law.level(&Rubbing { side: Side::of(cos), speed: Some(speed * cos), load: 0.0, memory: &memory }) * cos.abs()
         })
         .sum();
-    2.0 * sum / STEPS as f64 / speed
+    Linear { damping: 2.0 * sum / STEPS as f64 / speed, ..Linear::default() }
 }
 
-fn path(law: &Law, x0: f64, at: &Operating) -> Linear {
+/// Any other law, by its first harmonic: with `x = x0 + A sin(wt)` and `f` the element's force, the stiffness is `(1/pi A) ∮ f sin` and the
+/// damping `(1/pi A w) ∮ f cos`, the describing function of Krylov & Bogoliubov.
+pub fn of_path(law: &impl PathLaw, at: &Sine) -> Linear {
+    let x0 = at.about;
     let (amplitude, omega) = (at.amplitude, TAU * at.frequency_hz);
     let dt = TAU / omega / STEPS as f64;
     let mut memory = vec![0.0; law.memory_len()];

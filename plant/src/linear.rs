@@ -4,29 +4,21 @@
 //! ([`Operating`]), so one model gives a stiff linkage at small amplitude and a soft one at large. A delay
 //! acts on frequency responses and not on poles.
 
-mod harmonic;
+pub use crate::elements::DryFriction as Friction;
 
-use crate::elements::Linear;
+use crate::elements::{Linear, Sine};
 use crate::model::{InputKind, Model, OutputKind, Place};
 use nalgebra::{Complex, DMatrix, DVector, Schur, SymmetricEigen};
+use std::borrow::Cow;
 use std::f64::consts::TAU;
-
-/// How dry (set-valued) friction enters.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Friction {
-    /// Not at all: everything slides freely.
-    #[default]
-    Ignored,
-    /// As the damper that takes as much energy per cycle at the operating amplitude and frequency.
-    Viscous,
-}
 
 /// The sine at which elements that are not linear are looked at.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Operating {
     /// Amplitude of the displacement across each such element, m or rad, above 0.
     pub amplitude: f64,
-    /// Its frequency, Hz, above 0; matters only to elements whose force depends on velocity, and to [`Friction::Viscous`].
+    /// Its frequency, Hz, above 0; matters only to elements whose force depends on velocity, to viscoelastic ones (in modes and poles; responses have
+    /// them at each frequency), and to [`Friction::Viscous`].
     pub frequency_hz: f64,
     /// How dry friction enters.
     pub friction: Friction,
@@ -87,6 +79,7 @@ pub enum LinearError {
 #[derive(Debug, Clone, PartialEq)]
 pub struct LinearModel<'a> {
     model: &'a Model,
+    at: Operating,
     /// Inertia with inerters, kg, all bodies.
     pub inertia: DMatrix<f64>,
     /// Damping with back-EMF, N s/m, all bodies.
@@ -148,8 +141,7 @@ impl<'a> LinearModel<'a> {
         let mut stiffness = DMatrix::zeros(n, n);
         let mut elements = Vec::with_capacity(model.elements.len());
         for (index, element) in model.elements.iter().enumerate() {
-            let x0 = at.about.iter().find(|a| a.0 == index).map_or(0.0, |a| a.1);
-            let linear = harmonic::coefficients(&element.law, x0, at);
+            let linear = element.law.linearised(&sine_across(index, at, at.frequency_hz));
             join(&mut inertia, element.between, linear.inertance);
             join(&mut damping, element.between, linear.damping);
             join(&mut stiffness, element.between, linear.stiffness);
@@ -163,7 +155,7 @@ impl<'a> LinearModel<'a> {
             }
         }
         let free = (0..n).filter(|body| !prescribed(*body)).collect();
-        Ok(LinearModel { model, inertia, damping, stiffness, free, elements })
+        Ok(LinearModel { model, at: at.clone(), inertia, damping, stiffness, free, elements })
     }
 
     fn of_free(&self, all: &DMatrix<f64>) -> DMatrix<f64> {
@@ -257,7 +249,20 @@ impl<'a> LinearModel<'a> {
     pub fn response(&self, input: usize, output: usize, frequencies_hz: &[f64]) -> Result<Vec<Complex<f64>>, LinearError> {
         self.model.inputs.get(input).ok_or(LinearError::NoSuch { what: "input", index: input })?;
         self.model.outputs.get(output).ok_or(LinearError::NoSuch { what: "output", index: output })?;
-        frequencies_hz.iter().map(|f| self.response_at(input, output, *f)).collect()
+        frequencies_hz.iter().map(|f| self.at_frequency(*f).response_at(input, output, *f)).collect()
+    }
+
+    /// With the stiffness and damping that viscoelastic elements have at a frequency, Hz.
+    fn at_frequency(&self, frequency_hz: f64) -> Cow<'_, LinearModel<'a>> {
+        let mut there = Cow::Borrowed(self);
+        for (index, element) in self.model.elements.iter().enumerate().filter(|(_, element)| element.law.is_viscoelastic()) {
+            let (before, now) = (self.elements[index], element.law.linearised(&sine_across(index, &self.at, frequency_hz)));
+            let there = there.to_mut();
+            join(&mut there.stiffness, element.between, now.stiffness - before.stiffness);
+            join(&mut there.damping, element.between, now.damping - before.damping);
+            there.elements[index] = now;
+        }
+        there
     }
 
     fn response_at(&self, input: usize, output: usize, frequency_hz: f64) -> Result<Complex<f64>, LinearError> {
@@ -303,6 +308,12 @@ impl<'a> LinearModel<'a> {
         };
         Ok(read * output.gain * (-s * output.delay).exp())
     }
+}
+
+/// The sine that an element sees, by its index.
+fn sine_across(element: usize, at: &Operating, frequency_hz: f64) -> Sine {
+    let about = at.about.iter().find(|a| a.0 == element).map_or(0.0, |a| a.1);
+    Sine { about, amplitude: at.amplitude, frequency_hz, friction: at.friction }
 }
 
 /// Adds a coefficient between two places to a matrix over the bodies.

@@ -1,0 +1,20 @@
+//! Forces and accelerations at an instant.
+
+use super::slots::{MAX_ELEMENTS, SLOTS, Slots};
+
+/// An instant.
+#[derive(Debug, Clone)]
+pub(super) struct Endpoint {
+    /// m/s².
+    pub(super) acceleration: Slots,
+    /// Of each friction contact, N.
+    pub(super) friction: [f64; MAX_ELEMENTS],
+    /// Of each path element, N.
+    pub(super) path: [f64; MAX_ELEMENTS],
+}
+
+impl Endpoint {
+    pub(super) fn new() -> Endpoint {
+        Endpoint { acceleration: [0.0; SLOTS], friction: [0.0; MAX_ELEMENTS], path: [0.0; MAX_ELEMENTS] }
+    }
+}

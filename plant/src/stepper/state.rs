@@ -1,0 +1,150 @@
+//! A model at work: its state, and what can be asked of it.
+
+use super::account::Account;
+use super::compiled::Compiled;
+use super::constraints::Work;
+use super::contact::FrictionContact;
+use super::drive::Drive;
+use super::instant::Endpoint;
+use super::path::PathElement;
+use super::propagator::Propagator;
+use super::segment::Segment;
+use super::sensor::Sense;
+use super::slots::{SLOTS, Slots};
+
+/// Evaluations of a law that a substep takes where it is solved implicitly, beyond one.
+const IMPLICIT: usize = 6;
+
+/// A model at work. A clone goes on from the same state.
+#[derive(Debug, Clone)]
+pub struct Plant {
+    pub(super) fixed: Compiled,
+    pub(super) period: f64,
+    pub(super) substep: f64,
+    pub(super) substeps: usize,
+    pub(super) periods: u64,
+    pub(super) x: Slots,
+    pub(super) v: Slots,
+    /// Acceleration of prescribed bodies at this instant, m/s².
+    pub(super) prescribed_acceleration: Slots,
+    /// Force inputs on each place at the end of the last substep, N.
+    pub(super) pushed: Slots,
+    pub(super) drives: Vec<Drive>,
+    pub(super) frictions: Vec<FrictionContact>,
+    pub(super) paths: Vec<PathElement>,
+    pub(super) work: Box<Work>,
+    /// Space for the balance of forces at a sample; always there between calls.
+    pub(super) instant: Option<Box<Endpoint>>,
+    pub(super) sense: Sense,
+    pub(super) energy: Option<Account>,
+    pub(super) exact: Option<Propagator>,
+}
+
+impl Plant {
+    /// At rest: every position, velocity and memory is zero, and motion inputs are at 0.
+    pub fn reset(&mut self) {
+        self.start_at(&[]);
+    }
+
+    /// At rest, with the bodies on motion inputs where these put them first. `first` holds the first value of each
+    /// input in the order of the model (m; those of force inputs are not used); what is missing is 0.
+    pub fn start_at(&mut self, first: &[f64]) {
+        self.periods = 0;
+        self.x = [0.0; SLOTS];
+        self.v = [0.0; SLOTS];
+        self.prescribed_acceleration = [0.0; SLOTS];
+        self.pushed = [0.0; SLOTS];
+        for (index, drive) in self.drives.iter_mut().enumerate() {
+            drive.reset();
+            if drive.moves {
+                self.x[drive.slot] = drive.gain * first.get(index).copied().unwrap_or(0.0) + drive.offset;
+            }
+        }
+        for contact in &mut self.frictions {
+            contact.reset();
+        }
+        for path in &mut self.paths {
+            path.memory.fill(0.0);
+            path.reached = self.x[path.first] - self.x[path.second];
+            path.force = 0.0;
+            path.velocity_before = 0.0;
+            path.absorbed = 0.0;
+        }
+        self.restart_energy();
+        self.restart_sense();
+    }
+
+    /// Sets a free body moving, with the elements' memories as they are; a body on a motion input, or one that is not there, is left
+    /// alone. Meant for the start of a record that did not begin at rest. Position in m, velocity in m/s.
+    pub fn set_motion(&mut self, body: usize, position: f64, velocity: f64) {
+        let Some(slot) = self.fixed.slots.get(body).copied().filter(|slot| *slot < self.fixed.free) else { return };
+        self.x[slot] = position;
+        self.v[slot] = velocity;
+        for path in self.paths.iter_mut().filter(|path| path.first == slot || path.second == slot) {
+            path.reached = self.x[path.first] - self.x[path.second];
+        }
+        self.restart_energy();
+        self.restart_sense();
+    }
+
+    /// Advances by one period. `inputs` are in the order of the model; a missing one stays at 0.
+    pub fn step(&mut self, inputs: &[Segment]) {
+        for (index, drive) in self.drives.iter_mut().enumerate() {
+            drive.push(inputs.get(index).copied().unwrap_or_default());
+        }
+        if self.exact.is_some() && self.energy.is_none() {
+            self.step_exactly();
+        } else {
+            self.step_by_substeps();
+        }
+        self.periods += 1;
+    }
+
+    /// Position of a body of the model, m; not a number when there is no such body.
+    pub fn position(&self, body: usize) -> f64 {
+        self.fixed.slots.get(body).map_or(f64::NAN, |slot| self.x[*slot])
+    }
+
+    /// Velocity of a body of the model, m/s; not a number when there is no such body.
+    pub fn velocity(&self, body: usize) -> f64 {
+        self.fixed.slots.get(body).map_or(f64::NAN, |slot| self.v[*slot])
+    }
+
+    /// Acceleration of a body of the model under the forces of the period that has just ended, m/s².
+    pub fn acceleration(&self, body: usize) -> f64 {
+        self.fixed.slots.get(body).map_or(f64::NAN, |slot| self.endpoint().acceleration[*slot])
+    }
+
+    /// Force of an element of the model, N, positive when it is stretched.
+    pub fn element_force(&self, element: usize) -> f64 {
+        self.force_at(element, &self.endpoint())
+    }
+
+    /// Force that the mover exerts on a body with a motion input, N, that body's own inertia included;
+    /// 0 for a free body.
+    pub fn reaction(&self, body: usize) -> f64 {
+        self.fixed.slots.get(body).map_or(f64::NAN, |slot| self.reaction_at(*slot, &self.endpoint()))
+    }
+
+    /// Time since the start, s.
+    pub fn time(&self) -> f64 {
+        self.periods as f64 * self.period
+    }
+
+    /// Whether every position and velocity is a finite number.
+    pub fn is_finite(&self) -> bool {
+        self.x.iter().chain(&self.v).all(|q| q.is_finite())
+    }
+
+    /// About how much a step of one period computes, in steps of a linear network: contacts and paths add to each substep, those that are solved
+    /// implicitly several evaluations of their law.
+    pub fn cost(&self) -> u64 {
+        let implicit = self.paths.iter().filter(|p| p.constraint.is_some()).count();
+        (self.substeps * (1 + self.frictions.len() + self.paths.len() + IMPLICIT * implicit)) as u64
+    }
+
+    /// Substeps in each period.
+    pub fn substeps(&self) -> usize {
+        self.substeps
+    }
+}
