@@ -1,5 +1,5 @@
 //! The command line: its doc comments are the help. One file per verb holds that verb's options, examples and exit codes;
-//! what several verbs take is in `changes.rs` and `network.rs`.
+//! what several verbs take is in `changes.rs`, `network.rs` and `run_result.rs`.
 
 mod bag;
 mod bridge;
@@ -15,6 +15,7 @@ mod node;
 mod prove;
 mod replay;
 mod run;
+mod run_result;
 mod shell;
 mod simulate;
 mod stability;

@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 /// Runs every experiment of a graph and writes one set of recordings, or one per step of a protocol: a folder with a
 /// bag per experiment, `set.toml` and the model of the device that was recorded.
 pub fn run(options: &cli::Run, way: &Way, graph: &Graph, changes: &Overrides) -> Result<u8, Failure> {
-    if options.html.is_some() {
+    if options.result.html.is_some() {
         return Err(Failure::input(format!("{}: has several experiments, and --html is the page of one run", options.graph.display())));
     }
     if options.changes.bag.is_some() {
@@ -66,7 +66,7 @@ pub fn run(options: &cli::Run, way: &Way, graph: &Graph, changes: &Overrides) ->
     for set in &sets {
         set.write()?;
     }
-    if options.json {
+    if options.result.json {
         let sets: Vec<_> = sets.iter().map(|s| json!({ "set": s.folder, "fit": s.fit, "held_out": s.held_out })).collect();
         output::line(json!({ "sets": sets }))?;
     } else {

@@ -68,11 +68,11 @@ pub fn replay(options: &cli::Replay) -> Result<u8, Failure> {
     graph.timing.steps = Some(options.changes.duration.map_or(steps, |d| ((d * graph.timing.rate_hz).round() as u64).max(1)));
     graph.nodes[operator].settings = settings;
 
-    if let Some(html) = &options.html {
+    if let Some(html) = &options.result.html {
         output::writable(html)?;
     }
     let mut heard = Heard::of(&graph);
-    let drawn = options.html.is_some();
+    let drawn = options.result.html.is_some();
     let mut done = run_here(&graph, &mut |topic, message| {
         if drawn {
             heard.take(topic, message);
@@ -84,8 +84,8 @@ pub fn replay(options: &cli::Replay) -> Result<u8, Failure> {
         let lost = reader.completeness().map_or(0, |c| c.lost());
         summary.hold_back(cut_short(&reader, planned as usize, rows).or((lost > 0).then_some(Unjudged::Lost { messages: lost })));
     }
-    let page = options.html.as_deref().map(|html| (html, page(&done, &graph, &heard, Some(path))));
-    done.tell(page, options.json)
+    let page = options.result.html.as_deref().map(|html| (html, page(&done, &graph, &heard, Some(path))));
+    done.tell(page, options.result.json)
 }
 
 /// Two numbers per step, per axis.

@@ -10,7 +10,7 @@ use backdrive_msgs::{Message, flag, measured};
 use nix::sys::signal::Signal;
 use skipped::skipped;
 use std::path::Path;
-use system::{Place, alone, events, file, graph_text, kill, messages, samples, until_recorded};
+use system::{Ended, Place, Running, alone, events, file, graph_text, kill, messages, samples, until_recorded};
 
 /// Sample topics of the contact graph.
 const SAMPLES: [&str; 9] = [
@@ -94,25 +94,31 @@ fn two_graphs_side_by_side_do_not_touch() {
     place.assert_clean(&runs);
 }
 
-#[test]
-fn ctrl_c_ends_it_in_order() {
-    let (_alone, place) = (alone(), Place::new());
-    let graph = file("launch/contact.toml");
-    let options = ["--clock", "realtime", "--rate", "1000", "--duration", "60", "--bag", "run.mcap", "--json"];
-    let run = place.start(&[&["run", graph.as_str()], &options[..]].concat());
+/// Interrupts a run that records run.mcap: it ends, leaves a whole bag and nothing else.
+fn interrupted(place: &Place, run: Running) -> Ended {
     let bag = place.path("run.mcap");
     until_recorded(&bag, "/master/measured_js", 500);
     let runs = place.runs();
     kill(run.pid(), Signal::SIGINT);
     let done = run.end();
     assert_eq!(done.code, Some(130), "{done:?}");
+    let found = info(&bag).unwrap();
+    assert!(found.complete == Some(true) && found.ended_cleanly, "{found}");
+    place.assert_clean(&runs);
+    done
+}
+
+#[test]
+fn ctrl_c_ends_it_in_order() {
+    let (_alone, place) = (alone(), Place::new());
+    let graph = file("launch/contact.toml");
+    let options = ["--clock", "realtime", "--rate", "1000", "--duration", "60", "--bag", "run.mcap", "--json"];
+    let run = place.start(&[&["run", graph.as_str()], &options[..]].concat());
+    let done = interrupted(&place, run);
     let report = done.json();
     assert_eq!(report["run"]["cause"]["by"], "SIGINT");
     assert_eq!((&report["lost"], &report["complete"]), (&0.into(), &true.into()), "{done:?}");
-    let found = info(&bag).unwrap();
-    assert!(found.complete == Some(true) && found.ended_cleanly, "{found}");
-    assert!(samples(&bag, "/master/measured_js").len() >= 500);
-    place.assert_clean(&runs);
+    assert!(samples(&place.path("run.mcap"), "/master/measured_js").len() >= 500);
     // Such a bag is as good as any.
     assert_eq!(place.backdrive(&["replay", "run.mcap"]).code, Some(7), "too short to say more");
 }
@@ -122,15 +128,7 @@ fn ctrl_c_in_lockstep_too() {
     let (_alone, place) = (alone(), Place::new());
     let graph = file("launch/contact.toml");
     let run = place.start(&["run", &graph, "--duration", "3000", "--bag", "run.mcap", "--json"]);
-    let bag = place.path("run.mcap");
-    until_recorded(&bag, "/master/measured_js", 500);
-    let runs = place.runs();
-    kill(run.pid(), Signal::SIGINT);
-    let done = run.end();
-    assert_eq!(done.code, Some(130), "{done:?}");
-    let found = info(&bag).unwrap();
-    assert!(found.complete == Some(true) && found.ended_cleanly, "{found}");
-    place.assert_clean(&runs);
+    interrupted(&place, run);
 }
 
 #[test]

@@ -1,6 +1,7 @@
 //! Options of `backdrive replay`.
 
 use super::changes::Changes;
+use super::run_result::RunResult;
 use clap::Args;
 use std::path::PathBuf;
 
@@ -15,12 +16,9 @@ Exit codes: 0 stable, or no loop to judge; 1 not stable; 7 it cannot be told, as
 pub struct Replay {
     /// The bag of a run.
     pub recording: PathBuf,
-    /// Write a page about the run as one HTML file: what happened, signals, contact, timing, losses, events.
-    #[arg(long, value_name = "FILE")]
-    pub html: Option<PathBuf>,
-    /// Print the result as JSON.
-    #[arg(long)]
-    pub json: bool,
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub result: RunResult,
     #[command(flatten)]
     #[allow(missing_docs)]
     pub changes: Changes,

@@ -2,6 +2,7 @@
 
 use super::changes::{Changes, Clock};
 use super::network::{Network, Transport};
+use super::run_result::RunResult;
 use clap::Args;
 use std::path::PathBuf;
 
@@ -31,12 +32,9 @@ pub struct Run {
     /// Folder for the recordings of a graph with experiments.
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
-    /// Write a page about the run as one HTML file: what happened, signals, contact, timing, losses, events.
-    #[arg(long, value_name = "FILE")]
-    pub html: Option<PathBuf>,
-    /// Print the result as JSON.
-    #[arg(long)]
-    pub json: bool,
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub result: RunResult,
     #[command(flatten)]
     #[allow(missing_docs)]
     pub changes: Changes,

@@ -28,20 +28,20 @@ pub fn run(options: &cli::Run) -> Result<u8, Failure> {
     if options.out.is_some() {
         return Err(Failure::input(format!("{}: has no [[experiments]], so --out means nothing here; use --bag", options.graph.display())));
     }
-    if let Some(html) = &options.html {
+    if let Some(html) = &options.result.html {
         output::writable(html)?;
     }
     let mut heard = Heard::of(&graph);
     let done = match &way {
         // What goes by is all there is where no bag is recorded.
-        Way::Here if options.html.is_some() => run_here(&graph, &mut |topic, message| heard.take(topic, message))?,
-        _ => run_graph(&graph, &way)?,
+        Way::Here if options.result.html.is_some() => run_here(&graph, &mut |topic, message| heard.take(topic, message))?,
+        Way::Here | Way::Processes(_) => run_graph(&graph, &way)?,
     };
-    if let (Way::Processes(_), Some(bag), true) = (&way, &done.bag, options.html.is_some()) {
+    if let (Way::Processes(_), Some(bag), true) = (&way, &done.bag, options.result.html.is_some()) {
         heard = Heard::from_bag(&graph, bag)?;
     }
-    let page = options.html.as_deref().map(|html| (html, page(&done, &graph, &heard, None)));
-    done.tell(page, options.json)
+    let page = options.result.html.as_deref().map(|html| (html, page(&done, &graph, &heard, None)));
+    done.tell(page, options.result.json)
 }
 
 /// Removes what dead runs left.

@@ -1,7 +1,7 @@
 //! Nodes that have ended.
 
-use super::seconds_since;
 use super::state::Supervisor;
+use super::times::seconds_since;
 use crate::child::End;
 use crate::error::LaunchError;
 use crate::options::OnDeath;

@@ -5,6 +5,10 @@ mod start;
 mod state;
 mod stop;
 mod timers;
+mod times;
+
+pub(crate) use state::{MOST_EVENTS, Supervisor};
+pub(crate) use times::seconds_since;
 
 use crate::child::{Heard, Notice};
 use crate::error::LaunchError;
@@ -14,8 +18,6 @@ use crate::report::{Cause, RunEvent, RunReport};
 use crate::signals::Signals;
 use crate::slot::{Phase, Slot};
 use backdrive_nodes::protocol::{FromNode, ToNode};
-use nix::time::{ClockId, clock_gettime};
-pub(crate) use state::{MOST_EVENTS, Supervisor};
 use std::time::{Duration, Instant};
 use tokio::sync::mpsc;
 
@@ -157,13 +159,4 @@ impl Supervisor {
             }
         }
     }
-}
-
-fn nanoseconds(clock: ClockId) -> i64 {
-    clock_gettime(clock).map_or(Duration::ZERO, Duration::from).as_nanos() as i64
-}
-
-/// Negative if `at` is in the future.
-pub(crate) fn seconds_since(now: Instant, at: Instant) -> f64 {
-    now.saturating_duration_since(at).as_secs_f64() - at.saturating_duration_since(now).as_secs_f64()
 }

@@ -1,7 +1,7 @@
 //! From the first process to step 0.
 
-use super::nanoseconds;
 use super::state::{Start, Supervisor};
+use super::times::nanoseconds;
 use crate::child::{Child, Spawn};
 use crate::error::LaunchError;
 use crate::hosts::{Begun, There};

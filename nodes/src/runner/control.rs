@@ -23,6 +23,9 @@ impl Default for Options {
     }
 }
 
+/// Longest time without a look at [`Control`], ns.
+pub(super) const SLICE_NS: i64 = 20_000_000;
+
 /// How other threads reach a node that runs.
 #[derive(Debug, Default)]
 pub struct Control {

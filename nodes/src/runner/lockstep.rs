@@ -1,7 +1,6 @@
 //! All steps in lockstep: none without its inputs.
 
-use super::SLICE_NS;
-use super::control::{Control, Told};
+use super::control::{Control, SLICE_NS, Told};
 use super::error::RunError;
 use super::state::Runner;
 use crate::clock::now_ns;

@@ -24,9 +24,6 @@ use crate::protocol::NodeStatus;
 use crate::stage::Clock;
 use std::sync::Arc;
 
-/// Longest time without a look at [`Control`], ns.
-const SLICE_NS: i64 = 20_000_000;
-
 impl Runner {
     /// Runs until all steps are done or `control` stops it; tells events and reports on the way, and
     /// returns the figures of the whole run.

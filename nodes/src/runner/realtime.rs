@@ -1,7 +1,6 @@
 //! All steps in real time: none later than the next one is due.
 
-use super::SLICE_NS;
-use super::control::{Control, Told};
+use super::control::{Control, SLICE_NS, Told};
 use super::error::RunError;
 use super::state::Runner;
 use crate::clock::{Start, now_ns, sleep_until_ns};

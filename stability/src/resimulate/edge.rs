@@ -4,7 +4,7 @@ use super::sweep::{log_grid, sweep};
 use super::{ResimulateError, Run, RunOptions, Scenario};
 use crate::outcome::Outcome;
 use rayon::prelude::*;
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::atomic::AtomicBool;
 
 /// Over which gains an edge is looked for, and how exactly.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -103,42 +103,11 @@ pub fn edge(
     done: &(dyn Fn(usize, usize) + Sync),
     cancel: &AtomicBool,
 ) -> Result<Edge, ResimulateError> {
-    let options = RunOptions { keep_signals: false, ..*options };
-    let gains = search.grid()?;
-    let mut grid: Vec<(f64, Run)> = Vec::new();
-    let at_once = if search.whole_grid { gains.len() } else { AT_ONCE };
-    for some in gains.chunks(at_once) {
-        let before = grid.len();
-        for run in sweep(scenario, some, &options, &|n| done(before + n, gains.len()), cancel)? {
-            grid.push(run.ok_or(ResimulateError::Cancelled)?);
-        }
-        if grid.iter().any(|(_, run)| !run.outcome.is_stable()) {
-            break;
-        }
-    }
-    // Nothing more is learned below where nothing is judged.
-    let lost = |grid: &[(f64, Run)]| grid.first().is_some_and(|(_, run)| !run.outcome.is_stable() && !is_unjudged(&run.outcome));
-    if lost(&grid) {
-        for some in search.below().chunks(AT_ONCE) {
-            let before = grid.len();
-            let mut below = Vec::new();
-            for run in sweep(scenario, some, &options, &|n| done(before + n, gains.len().max(before + some.len())), cancel)? {
-                below.push(run.ok_or(ResimulateError::Cancelled)?);
-            }
-            below.reverse();
-            below.append(&mut grid);
-            grid = below;
-            if !lost(&grid) {
-                break;
-            }
-        }
-    }
-    let evaluations = AtomicUsize::new(grid.len());
+    let options = &RunOptions { keep_signals: false, ..*options };
+    let grid = grid(scenario, search, options, done, cancel)?;
     let verdicts: Vec<(f64, Outcome)> = grid.iter().map(|(gain, run)| (*gain, run.outcome)).collect();
     let limited = verdicts.iter().find(|(_, o)| matches!(o, Outcome::Limited { .. })).map(|(gain, _)| *gain);
-
     let Some(first) = grid.iter().position(|(_, run)| !run.outcome.is_stable()) else {
-        let reason = format!("stable at every gain up to {}", search.highest);
         return Ok(Edge {
             critical_gain: None,
             at_least: search.highest,
@@ -148,88 +117,170 @@ pub fn edge(
             limited_from: None,
             returns_to_stable: None,
             evaluations: grid.len(),
-            reason,
+            reason: format!("stable at every gain up to {}", search.highest),
             grid: verdicts,
         });
     };
     let returns_to_stable = verdicts[first..].iter().find(|(_, o)| o.is_stable()).map(|(gain, _)| *gain);
-    let (mut high, mut beyond) = (grid[first].0, grid[first].1.clone());
-    let mut low = if first > 0 { grid[first - 1].0 } else { 0.0 };
-    let lowest = grid[0].0;
-    while low > 0.0 && high > (1.0 + search.tolerance) * low {
-        // Two gains at a time: one for each core at least.
-        let third = (high / low).powf(1.0 / 3.0);
-        let between = [low * third, low * third * third];
-        let runs = between.par_iter().map(|gain| scenario.run(scenario.gain(*gain), &options, cancel)).collect::<Result<Vec<_>, _>>()?;
-        evaluations.fetch_add(runs.len(), Ordering::Relaxed);
-        for (gain, run) in between.into_iter().zip(runs) {
-            if !run.outcome.is_stable() {
-                (high, beyond) = (gain, run);
-                break;
-            }
-            low = gain;
-        }
-    }
-    let mut flickers = None;
-    if search.around && low > 0.0 && beyond.is_unstable() {
-        let middle = (low * high).sqrt();
-        let probe = |factor: &f64| Ok((middle * factor, scenario.run(scenario.gain(middle * factor), &options, cancel)?));
-        let probes = AROUND.par_iter().map(probe).collect::<Result<Vec<(f64, Run)>, ResimulateError>>()?;
-        evaluations.fetch_add(probes.len(), Ordering::Relaxed);
-        let highest_stable = probes.iter().filter(|(_, run)| run.outcome.is_stable()).map(|(gain, _)| *gain).fold(low, f64::max);
-        let lowest = probes.iter().find(|(gain, run)| *gain < middle && run.is_unstable());
-        if lowest.is_some() || highest_stable > middle {
-            let first = lowest.map_or(middle, |(gain, _)| *gain);
-            flickers = Some([first, highest_stable]);
-        }
-        if let Some((gain, run)) = lowest {
-            let below = probes.iter().filter(|(g, run)| g < gain && run.outcome.is_stable()).map(|(g, _)| *g);
-            low = below.fold(grid.get(first.wrapping_sub(1)).map_or(low, |(g, _)| *g), f64::max).min(*gain);
-            (high, beyond) = (*gain, run.clone());
-        }
-    }
-    let below = match flickers {
-        Some([lowest, _]) => lowest,
-        None if low > 0.0 => (low * high).sqrt(),
-        None => high,
+    let below = if first > 0 { grid[first - 1].0 } else { 0.0 };
+    let mut bracket = Bracket { low: below, high: grid[first].0, beyond: grid[first].1.clone(), evaluations: grid.len() };
+    bracket.narrow(scenario, search, options, cancel)?;
+    let flickers = match search.around && bracket.low > 0.0 && bracket.beyond.is_unstable() {
+        true => bracket.look_around(below, scenario, options, cancel)?,
+        false => None,
     };
-    let (mut critical_gain, mut limited_from) = (None, limited);
-    let reason = if let Outcome::NotJudged { why } = beyond.outcome {
-        match low > 0.0 {
-            true => format!("stable up to {low:.4}; beyond it cannot be told: {why}"),
-            false => format!("it cannot be told at any gain from {high} on: {why}"),
-        }
-    } else if low == 0.0 {
-        if !beyond.is_unstable() {
-            limited_from = Some(high);
-        }
-        format!("{} already at {lowest:.3e}, the lowest gain searched", beyond.outcome)
-    } else if beyond.is_unstable() {
-        critical_gain = Some(below);
-        match beyond.outcome {
-            Outcome::Limited { .. } => format!("{} beyond {below:.4}, so large that a clamp or the travel ends it", beyond.beneath),
-            other => format!("{other} beyond {below:.4}"),
-        }
-    } else {
-        limited_from = Some(below);
-        let later = grid[first..].iter().find(|(_, run)| run.is_unstable()).map(|(gain, _)| *gain);
-        let later = match later {
-            Some(gain) => format!("; it oscillates from {gain:.3} on"),
-            None if search.whole_grid => "; no oscillation was seen up to the highest gain".to_string(),
-            None => String::new(),
-        };
-        format!("a clamp or the travel comes first, from {below:.4} on{later}")
-    };
+    let (critical_gain, limited_from, reason) = bracket.says(&grid[first..], flickers, limited, search);
     Ok(Edge {
         critical_gain,
-        at_least: low,
+        at_least: bracket.low,
         flickers,
-        frequency_hz: beyond.frequency_hz.filter(|_| critical_gain.is_some()),
-        outcome_beyond: Some(beyond.outcome),
+        frequency_hz: bracket.beyond.frequency_hz.filter(|_| critical_gain.is_some()),
+        outcome_beyond: Some(bracket.beyond.outcome),
         limited_from,
         returns_to_stable,
-        evaluations: evaluations.into_inner(),
+        evaluations: bracket.evaluations,
         reason,
         grid: verdicts,
     })
+}
+
+/// Runs at the gains of the grid, up to where they are not stable any more unless all of it is wanted, and below it where its lowest gain is
+/// not stable; in the order of the gains.
+fn grid(
+    scenario: &Scenario,
+    search: &Search,
+    options: &RunOptions,
+    done: &(dyn Fn(usize, usize) + Sync),
+    cancel: &AtomicBool,
+) -> Result<Vec<(f64, Run)>, ResimulateError> {
+    let gains = search.grid()?;
+    let mut grid: Vec<(f64, Run)> = Vec::new();
+    let at_once = if search.whole_grid { gains.len() } else { AT_ONCE };
+    for some in gains.chunks(at_once) {
+        let before = grid.len();
+        for run in sweep(scenario, some, options, &|n| done(before + n, gains.len()), cancel)? {
+            grid.push(run.ok_or(ResimulateError::Cancelled)?);
+        }
+        if grid.iter().any(|(_, run)| !run.outcome.is_stable()) {
+            break;
+        }
+    }
+    // Nothing more is learned below where nothing is judged.
+    let lost = |grid: &[(f64, Run)]| grid.first().is_some_and(|(_, run)| !run.outcome.is_stable() && !is_unjudged(&run.outcome));
+    if !lost(&grid) {
+        return Ok(grid);
+    }
+    for some in search.below().chunks(AT_ONCE) {
+        let before = grid.len();
+        let mut below = Vec::new();
+        for run in sweep(scenario, some, options, &|n| done(before + n, gains.len().max(before + some.len())), cancel)? {
+            below.push(run.ok_or(ResimulateError::Cancelled)?);
+        }
+        below.reverse();
+        below.append(&mut grid);
+        grid = below;
+        if !lost(&grid) {
+            break;
+        }
+    }
+    Ok(grid)
+}
+
+/// Between which gains (mu*lambda) the loop stops being stable.
+struct Bracket {
+    /// The highest known to be stable; 0 where none is.
+    low: f64,
+    /// The lowest known not to be.
+    high: f64,
+    /// What it does there.
+    beyond: Run,
+    /// Runs that were needed.
+    evaluations: usize,
+}
+
+impl Bracket {
+    /// Narrows it to the tolerance.
+    fn narrow(&mut self, scenario: &Scenario, search: &Search, options: &RunOptions, cancel: &AtomicBool) -> Result<(), ResimulateError> {
+        while self.low > 0.0 && self.high > (1.0 + search.tolerance) * self.low {
+            // Two gains at a time: one for each core at least.
+            let third = (self.high / self.low).powf(1.0 / 3.0);
+            let between = [self.low * third, self.low * third * third];
+            let runs = between.par_iter().map(|gain| scenario.run(scenario.gain(*gain), options, cancel)).collect::<Result<Vec<_>, _>>()?;
+            self.evaluations += runs.len();
+            for (gain, run) in between.into_iter().zip(runs) {
+                if !run.outcome.is_stable() {
+                    (self.high, self.beyond) = (gain, run);
+                    break;
+                }
+                self.low = gain;
+            }
+        }
+        Ok(())
+    }
+
+    /// Looks at gains about it, above `below`, the gain of the grid under it. Where the verdict flickers there it goes to the lowest gain that
+    /// is not stable, and the answer is this one and the highest that is.
+    fn look_around(
+        &mut self,
+        below: f64,
+        scenario: &Scenario,
+        options: &RunOptions,
+        cancel: &AtomicBool,
+    ) -> Result<Option<[f64; 2]>, ResimulateError> {
+        let middle = (self.low * self.high).sqrt();
+        let probe = |factor: &f64| Ok((middle * factor, scenario.run(scenario.gain(middle * factor), options, cancel)?));
+        let probes = AROUND.par_iter().map(probe).collect::<Result<Vec<(f64, Run)>, ResimulateError>>()?;
+        self.evaluations += probes.len();
+        let stable = || probes.iter().filter(|(_, run)| run.outcome.is_stable()).map(|(gain, _)| *gain);
+        let highest_stable = stable().fold(self.low, f64::max);
+        let lowest = probes.iter().find(|(gain, run)| *gain < middle && run.is_unstable());
+        let first = lowest.map_or(middle, |(gain, _)| *gain);
+        let flickers = (lowest.is_some() || highest_stable > middle).then_some([first, highest_stable]);
+        if let Some((gain, run)) = lowest {
+            self.low = stable().filter(|g| g < gain).fold(below, f64::max).min(*gain);
+            (self.high, self.beyond) = (*gain, run.clone());
+        }
+        Ok(flickers)
+    }
+
+    /// The critical gain, from where on a clamp or the travel limits it, and why, in a sentence. `from` is the grid from the first gain on that
+    /// is not stable, `limited` the lowest in it at which something limits.
+    fn says(
+        &self,
+        from: &[(f64, Run)],
+        flickers: Option<[f64; 2]>,
+        limited: Option<f64>,
+        search: &Search,
+    ) -> (Option<f64>, Option<f64>, String) {
+        let Bracket { low, high, beyond, .. } = self;
+        let edge = match flickers {
+            Some([lowest, _]) => lowest,
+            None if *low > 0.0 => (low * high).sqrt(),
+            None => *high,
+        };
+        if let Outcome::NotJudged { why } = beyond.outcome {
+            let reason = match *low > 0.0 {
+                true => format!("stable up to {low:.4}; beyond it cannot be told: {why}"),
+                false => format!("it cannot be told at any gain from {high} on: {why}"),
+            };
+            return (None, limited, reason);
+        }
+        if *low == 0.0 {
+            let limited = if beyond.is_unstable() { limited } else { Some(*high) };
+            return (None, limited, format!("{} already at {:.3e}, the lowest gain searched", beyond.outcome, from[0].0));
+        }
+        if beyond.is_unstable() {
+            let reason = match beyond.outcome {
+                Outcome::Limited { .. } => format!("{} beyond {edge:.4}, so large that a clamp or the travel ends it", beyond.beneath),
+                other => format!("{other} beyond {edge:.4}"),
+            };
+            return (Some(edge), limited, reason);
+        }
+        let later = match from.iter().find(|(_, run)| run.is_unstable()) {
+            Some((gain, _)) => format!("; it oscillates from {gain:.3} on"),
+            None if search.whole_grid => "; no oscillation was seen up to the highest gain".to_string(),
+            None => String::new(),
+        };
+        (None, Some(edge), format!("a clamp or the travel comes first, from {edge:.4} on{later}"))
+    }
 }
