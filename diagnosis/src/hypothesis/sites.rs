@@ -137,6 +137,12 @@ impl<'a> Sites<'a> {
         self.elements_at(site).any(|(_, e)| matches!(e.law.role(), Role::Friction))
     }
 
+    /// Whether something that holds a joint is tied to a body of the site, so that a friction there is loaded.
+    pub fn is_loaded(&self, site: &Site) -> bool {
+        let tied = |e: &Element| e.between.iter().flatten().any(|body| site.ends.contains(&Some(*body)));
+        self.model.elements.iter().zip(&self.kin).any(|(e, kin)| kin.holds && tied(e))
+    }
+
     /// The first element that holds the joint, as a spring does.
     pub fn holding(&self, site: &Site) -> Option<(usize, &'a Element)> {
         self.elements_at(site).find(|(index, _)| self.kin[*index].holds)

@@ -61,7 +61,7 @@ fn level(physics: &Physics, law: &Law) -> f64 {
 pub fn all(model: &Model, scales: &Scales) -> Vec<Hypothesis> {
     let kin = |law: &Law| {
         let physics = physics_named(law.kind().name);
-        Kin { level: physics.filter(|p| p.family == Family::Friction).map(|p| level(p, law)), holds: physics.is_some_and(|p| p.holds) }
+        Kin { level: physics.filter(|p| !p.sliding.is_empty()).map(|p| level(p, law)), holds: physics.is_some_and(|p| p.holds) }
     };
     let sites = Sites::of(model, scales, kin);
     PHYSICS.iter().flat_map(|physics| (physics.propose)(&sites)).collect()
