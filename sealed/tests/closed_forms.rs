@@ -186,7 +186,7 @@ kind = "position"
 of = "block"
 "#;
     let network = device(text);
-    let law = LoadFriction { force: 0.4, coefficient: 0.6, joint: "rope".into() };
+    let law = LoadFriction { force: 0.4, coefficient: 0.6, joint: Some("rope".into()) };
     let truth = hiding(&network, vec![grounded("block", Law::LoadFriction(law))]);
     let mut plant = SealedPlant::new(&network, &truth, 1e-3).unwrap();
     // 1000 N/m x (1 - 0.6) = 0.4 N at 1 mm.

@@ -120,7 +120,7 @@ fn friction_under_load() {
     let spring = element("spring", "mass", &format!("kind = \"spring\"\nstiffness = {k}\n"))
         + &element("loss", "mass", "kind = \"damper\"\ndamping = 30.0");
     let network = device(&(MASS.to_string() + &spring));
-    let law = Law::LoadFriction(LoadFriction { force: c0, coefficient: mu, joint: "spring".into() });
+    let law = Law::LoadFriction(LoadFriction { force: c0, coefficient: mu, joint: Some("spring".into()) });
     let mut plant = SealedPlant::new(&network, &hiding(&network, vec![grounded("mass", law)]), PERIOD).unwrap();
     let found = run(&mut plant, 1500, PERIOD, |t| vec![force(t)]);
     let rows = runge_kutta(1500, force, |[x, v]: &[f64; 2], f| [*v, (f - k * x - 30.0 * v - c0 - mu * k * x.abs()) / 0.5]);

@@ -70,7 +70,7 @@ fn nobody_gains_energy_by_moving_a_law_about() {
 fn a_device_with_friction_under_load_comes_to_rest() {
     let text = MASS.to_string() + &element("spring", "mass", "kind = \"spring\"\nstiffness = 800.0");
     let network = device(&text);
-    let law = LoadFriction { force: 0.05, coefficient: 0.1, joint: "spring".into() };
+    let law = LoadFriction { force: 0.05, coefficient: 0.1, joint: Some("spring".into()) };
     let mut plant = SealedPlant::new(&network, &hiding(&network, vec![grounded("mass", Law::LoadFriction(law))]), 1e-4).unwrap();
     run(&mut plant, 200, 1e-4, |_| vec![20.0]);
     let energy = |row: &[f64]| 0.5 * 0.5 * row[1] * row[1] + 0.5 * 800.0 * row[0] * row[0];

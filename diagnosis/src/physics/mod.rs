@@ -36,6 +36,7 @@ register!(
     cubic_spring,
     dahl,
     stribeck,
+    load_friction,
     friction_deficit,
     cogging,
     backlash,

@@ -169,6 +169,7 @@ register!(
     path cubic_spring::CubicSpring,
     path cogging::Cogging,
     linear bias::Bias,
+    friction load_friction::LoadFriction,
 );
 
 impl Law {

@@ -1,4 +1,4 @@
-//! Dry friction under the force of a joint: a form of the hidden plant's own.
+//! Dry friction under the force of a joint.
 
 use super::described::{Checked, Described, Facts, Read};
 use super::draw::{Draw, Here};
@@ -17,8 +17,9 @@ pub struct LoadFriction {
     pub force: f64,
     /// mu, friction per load; it holds how the joint's force turns into a normal force (a wrap angle, a gear's pressure angle).
     pub coefficient: f64,
-    /// The element whose force is the load.
-    pub joint: String,
+    /// The element whose force is the load; model files name none and mean the joint that the friction sits in ([`Load::Joint`]).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub joint: Option<String>,
 }
 
 impl ForceLaw for LoadFriction {
@@ -32,14 +33,17 @@ impl ForceLaw for LoadFriction {
     }
 
     fn load(&self) -> Load<'_> {
-        Load::Element(&self.joint)
+        self.joint.as_deref().map_or(Load::Joint, Load::Element)
     }
 }
 
 impl Described for LoadFriction {
     const NAME: &'static str = "load_friction";
-    const FACTS: Facts = Facts { takes_energy: true, is_friction: true, is_linear: false, family: &[FRICTION] };
-    const READ: Read<LoadFriction> = None;
+    const FACTS: Facts = Facts { takes_energy: true, is_friction: true, is_linear: false, family: &[&["load_friction"], FRICTION] };
+    const READ: Read<LoadFriction> = Some(|section| {
+        let (force, coefficient) = (section.need_number("force", NotNegative)?, section.need_number("coefficient", NotNegative)?);
+        Ok(LoadFriction { force, coefficient, joint: None })
+    });
     const DRAWS: &'static [Draw] = &[Draw::Friction { loaded: true }];
 
     fn to_force(&self) -> Box<dyn ForceLaw> {
@@ -59,11 +63,12 @@ impl Described for LoadFriction {
         Some(LoadFriction {
             force: rounded(at.friction / (1.0 + part)),
             coefficient: rounded(at.friction * part / (1.0 + part) / load),
-            joint: joint.name.clone(),
+            joint: Some(joint.name.clone()),
         })
     }
 
+    /// Under a load that changes little it is Coulomb friction.
     fn names(_at_ground: bool) -> Vec<&'static str> {
-        vec!["coulomb"]
+        vec!["load_friction", "coulomb"]
     }
 }
