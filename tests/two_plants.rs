@@ -90,3 +90,9 @@ fn friction_under_load() {
     agree(&device("motor", &friction(["motor", "ground"])), to_and_fro, None, 2e-3);
     agree(&device("load", &friction(["ground", "motor"])), to_and_fro, None, 2e-3);
 }
+
+#[test]
+fn friction_that_warms() {
+    let text = device("motor", &element("warm_friction", ["motor", "ground"], "force = 0.4\nhalf_heat = 0.05\ncooling_time = 1.2"));
+    agree(&text, to_and_fro, None, 2e-3);
+}

@@ -38,6 +38,7 @@ register!(
     stribeck,
     load_friction,
     friction_deficit,
+    warm_friction,
     cogging,
     backlash,
     contact,

@@ -170,6 +170,7 @@ register!(
     path cogging::Cogging,
     linear bias::Bias,
     friction load_friction::LoadFriction,
+    friction warm_friction::WarmFriction,
 );
 
 impl Law {

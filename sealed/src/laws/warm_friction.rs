@@ -1,4 +1,4 @@
-//! Dry friction that its own heat lowers: a form of the hidden plant's own.
+//! Dry friction that its own heat lowers.
 
 use super::described::{Checked, Described, Facts, Read};
 use super::draw::{Draw, Here};
@@ -58,8 +58,13 @@ impl ForceLaw for WarmFriction {
 
 impl Described for WarmFriction {
     const NAME: &'static str = "warm_friction";
-    const FACTS: Facts = Facts { takes_energy: true, is_friction: true, is_linear: false, family: &[FRICTION] };
-    const READ: Read<WarmFriction> = None;
+    const FACTS: Facts = Facts { takes_energy: true, is_friction: true, is_linear: false, family: &[&["warm_friction"], FRICTION] };
+    /// Model files have the heat that halves the friction, `C T_half`, which is all that shows.
+    const READ: Read<WarmFriction> = Some(|section| {
+        let (force, half_heat) = (section.need_number("force", NotNegative)?, section.need_number("half_heat", Positive)?);
+        let cooling_time = section.need_number("cooling_time", Positive)?;
+        Ok(WarmFriction { force, half_warming: 1.0, heat_capacity: half_heat, cooling_time })
+    });
     const DRAWS: &'static [Draw] = &[Draw::Friction { loaded: false }];
 
     fn to_force(&self) -> Box<dyn ForceLaw> {
@@ -92,6 +97,6 @@ impl Described for WarmFriction {
 
     /// Heat lowers friction where it is fast: over a recording that is dry friction, falling with speed where it shows.
     fn names(_at_ground: bool) -> Vec<&'static str> {
-        vec!["coulomb", "stribeck"]
+        vec!["warm_friction", "coulomb", "stribeck"]
     }
 }
