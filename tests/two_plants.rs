@@ -96,3 +96,14 @@ fn friction_that_warms() {
     let text = device("motor", &element("warm_friction", ["motor", "ground"], "force = 0.4\nhalf_heat = 0.05\ncooling_time = 1.2"));
     agree(&text, to_and_fro, None, 2e-3);
 }
+
+#[test]
+fn loss_of_a_gear() {
+    let loss = |between, back: f64| element("gear_loss", between, &format!("efficiency = 0.8\nback_efficiency = {back}"));
+    for driven in ["motor", "load"] {
+        agree(&device(driven, &loss(["motor", "ground"], 0.7)), to_and_fro, None, 1e-3);
+    }
+    agree(&device("motor", &loss(["ground", "motor"], 0.5)), to_and_fro, None, 1e-3);
+    // Where it locks, the moment at which it does decides what follows: that takes short substeps.
+    agree(&device("motor", &loss(["motor", "ground"], -0.3)), to_and_fro, Some(16), 2e-3);
+}

@@ -2,6 +2,7 @@
 
 mod common;
 
+use backdrive_sealed::network::NetworkError;
 use backdrive_sealed::plant::SealedPlant;
 use backdrive_sealed::truth::Truth;
 use common::*;
@@ -57,4 +58,29 @@ fn friction_in_a_joint_takes_its_share_of_what_is_passed_on() {
     // Driven from behind the shaft gets L - c - mu L.
     let v = settled(gear("kind = 'load_friction'\nforce = 0.4\ncoefficient = 0.25", [10.0, 0.0], "load"), -5.0);
     near(10.0 * v, -(5.0 - 0.4 - 0.25 * 5.0), 1e-4);
+}
+
+#[test]
+fn a_gear_loses_by_the_direction_of_power() {
+    let loss = "kind = 'gear_loss'\nefficiency = 0.8\nback_efficiency = 0.7";
+    for force in [5.0, -5.0] {
+        near(10.0 * settled(gear(loss, [0.0, 10.0], "shaft"), force), 0.8 * force, 1e-4);
+        near(10.0 * settled(gear(loss, [10.0, 0.0], "load"), force), 0.7 * force, 1e-4);
+    }
+}
+
+#[test]
+fn a_self_locking_gear_is_moved_from_one_side_only() {
+    let loss = "kind = 'gear_loss'\nefficiency = 0.4\nback_efficiency = -0.2";
+    let mut plant = gear(loss, [0.0, 0.0], "load");
+    let rows = run(&mut plant, 3000, 1e-3, |t| vec![2.0 * t * t]);
+    assert!(rows[2999][1].abs() < 1e-7 && (rows[2999][1] - rows[2000][1]).abs() < 1e-14, "{}", rows[2999][1]);
+    near(10.0 * settled(gear(loss, [0.0, 10.0], "shaft"), 5.0), 0.4 * 5.0, 1e-4);
+}
+
+#[test]
+fn an_efficiency_above_one_is_refused() {
+    let text = MASS.to_string() + &element("gear", "mass", "kind = 'gear_loss'\nefficiency = 1.2\nback_efficiency = 0.5");
+    let error: NetworkError = backdrive_sealed::network::Network::from_toml(&text, "gear.toml").unwrap_err();
+    assert!(error.to_string().contains("expected at most 1, found 1.2"), "{error}");
 }

@@ -37,6 +37,7 @@ register!(
     dahl,
     stribeck,
     load_friction,
+    gear_loss,
     friction_deficit,
     warm_friction,
     cogging,

@@ -171,6 +171,7 @@ register!(
     linear bias::Bias,
     friction load_friction::LoadFriction,
     friction warm_friction::WarmFriction,
+    friction gear_loss::GearLoss,
 );
 
 impl Law {

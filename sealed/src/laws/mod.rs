@@ -134,6 +134,7 @@ register!(
     bristle_field::BristleField,
     warm_friction::WarmFriction,
     load_friction::LoadFriction,
+    gear_loss::GearLoss,
     spring::Spring,
     inerter::Inerter,
 );

@@ -1,0 +1,32 @@
+//! Friction of a gear or screw in proportion to the force that it passes on.
+
+use crate::hypothesis::builder::{ElementBuilder, even};
+use crate::hypothesis::{Against, Family, Mark, Physics, State};
+
+pub(super) const PHYSICS: Physics = Physics {
+    name: "gear_loss",
+    family: Family::Friction,
+    words: "a loss in proportion to the force passed on",
+    size: "efficiency",
+    proportional: false,
+    against: Against::Velocity,
+    state: State::Reversals,
+    mark: Mark::Other,
+    twin: None,
+    // It has no level of its own: without load there is no loss.
+    sliding: &[],
+    from_level: &[],
+    memory: false,
+    holds: false,
+    refine: |_, _, _| None,
+    contains: &[],
+    propose: |sites| {
+        let places = sites.near().filter(|site| sites.is_loaded(site) && !sites.has(site, &["gear_loss", "load_friction"]));
+        let one = |site| {
+            let new = ElementBuilder::new(sites, &PHYSICS, site)?;
+            let new = new.number("efficiency", even(0.05, 1.0, 1.0)).number("back_efficiency", even(-2.0, 1.0, 1.0));
+            Some(new.starts(vec![vec![0.9, 0.9], vec![0.7, 0.55]]))
+        };
+        places.filter_map(one).collect()
+    },
+};
