@@ -107,3 +107,9 @@ fn loss_of_a_gear() {
     // Where it locks, the moment at which it does decides what follows: that takes short substeps.
     agree(&device("motor", &loss(["motor", "ground"], -0.3)), to_and_fro, Some(16), 2e-3);
 }
+
+#[test]
+fn a_joint_that_creeps() {
+    let joint = element("creep", ["motor", "load"], "stiffness = 900.0\ncreep_stiffness = [2000.0, 700.0]\ntime = [0.02, 0.5]");
+    agree(&device("motor", &joint), to_and_fro, None, 1e-3);
+}

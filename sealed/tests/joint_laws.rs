@@ -84,3 +84,35 @@ fn an_efficiency_above_one_is_refused() {
     let error: NetworkError = backdrive_sealed::network::Network::from_toml(&text, "gear.toml").unwrap_err();
     assert!(error.to_string().contains("expected at most 1, found 1.2"), "{error}");
 }
+
+#[test]
+fn held_a_creeping_spring_relaxes_and_pulled_it_yields() {
+    let (k, k1, tau, x0) = (2000.0, 1000.0, 0.3, 2e-3);
+    let text = RAM.to_string()
+        + &element("creep", "ram", &format!("kind = 'creep'\nstiffness = {k:?}\ncreep_stiffness = [{k1:?}]\ntime = [{tau:?}]"));
+    let network = device(&text);
+    let mut plant = SealedPlant::new(&network, &Truth::nothing(&network), 1e-3).unwrap();
+    let rows = run(&mut plant, 1500, 1e-3, |_| vec![x0]);
+    let relaxed = k * k1 / (k + k1);
+    for i in [50, 400, 1499] {
+        // The ram takes its place within the first ms.
+        let t = (i as f64 + 0.5) * 1e-3;
+        near(rows[i][0], x0 * (relaxed + (k - relaxed) * (-t * k / relaxed / tau).exp()), 1e-3);
+    }
+    let mass = device(
+        &(MASS.replace("mass = 0.5", "mass = 1e-4")
+            + &element("damper", "mass", "kind = 'damper'\ndamping = 0.5")
+            + &element(
+                "creep",
+                "mass",
+                &format!("kind = 'creep'\nstiffness = {k:?}\ncreep_stiffness = [{k1:?}, 700.0]\ntime = [{tau:?}, 2.0]"),
+            )),
+    );
+    let mut plant = SealedPlant::new(&mass, &Truth::nothing(&mass), 1e-3).unwrap();
+    let rows = run(&mut plant, 4000, 1e-3, |_| vec![3.0]);
+    for i in [300, 1500, 3999] {
+        let t = f64::from(i + 1) * 1e-3;
+        let exact = 3.0 * (1.0 / k + (1.0 - (-t / tau).exp()) / k1 + (1.0 - (-t / 2.0_f64).exp()) / 700.0);
+        near(rows[i as usize][0], exact, 2e-3);
+    }
+}

@@ -45,6 +45,7 @@ register!(
     contact,
     hunt_crossley,
     series_compliance,
+    creep,
     bouc_wen,
     lugre,
     hysteretic_spring,

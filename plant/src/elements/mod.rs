@@ -172,6 +172,7 @@ register!(
     friction load_friction::LoadFriction,
     friction warm_friction::WarmFriction,
     friction gear_loss::GearLoss,
+    path creep::Creep,
 );
 
 impl Law {

@@ -135,6 +135,7 @@ register!(
     warm_friction::WarmFriction,
     load_friction::LoadFriction,
     gear_loss::GearLoss,
+    creep::Creep,
     spring::Spring,
     inerter::Inerter,
 );
