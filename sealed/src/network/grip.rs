@@ -1,6 +1,6 @@
 //! A hand that holds a device.
 
-use super::{Body, Element, Hold, Input, InputKind, Named, Network};
+use super::data::{Body, Element, Hold, Input, InputKind, Named, Network};
 
 /// What joins the body that a hand holds to the hand's own motion.
 #[derive(Debug, Clone, PartialEq)]

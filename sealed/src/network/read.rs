@@ -1,8 +1,10 @@
 //! Model files and grips in.
 
 use super::allowed::Allowed;
+use super::data::{Axis, Body, Element, Hold, Input, InputKind, Named, Network, Output, OutputKind, Place};
+use super::grip::Grip;
 use super::section::{NetworkError, Section, Source};
-use super::{Axis, Body, Element, GROUND, Grip, Hold, Input, InputKind, Named, Network, Output, OutputKind, Place};
+use crate::effects::site::GROUND;
 use crate::laws::Law;
 use crate::seal::hash;
 use toml_edit::Document;

@@ -1,13 +1,19 @@
 //! From a device to a plant that steps.
 
+use super::dense::{self, add_between, pick};
 use super::drive::Drive;
+use super::error::PlantError;
+use super::joint::Joint;
 use super::kick::Kick;
 use super::loading;
-use super::sense::Sensor;
-use super::{Joint, Names, PlantError, SUBSTEPS_AT_MOST, SealedPlant, dense};
+use super::sensor::Sensor;
+use super::state::{Names, SealedPlant};
 use crate::laws::{Damper, Law};
 use crate::network::{InputKind, Network};
 use crate::truth::Truth;
+
+/// Substeps of a period at most: more and a second takes minutes.
+const SUBSTEPS_AT_MOST: usize = 20_000;
 
 /// A dead time of more periods than this is a mistake.
 const PERIODS_OF_DELAY: usize = 100_000;
@@ -102,22 +108,6 @@ fn mass_matrix(device: &Network, joints: &[Joint]) -> Vec<f64> {
         add_between(&mut mass, n, joint.between, joint.force.inertance());
     }
     mass
-}
-
-/// Adds a coefficient between two places to a symmetric matrix of `n` rows.
-pub(super) fn add_between(matrix: &mut [f64], n: usize, between: [Option<usize>; 2], value: f64) {
-    for (a, sign_a) in [(between[0], 1.0), (between[1], -1.0)] {
-        for (b, sign_b) in [(between[0], 1.0), (between[1], -1.0)] {
-            if let (Some(a), Some(b)) = (a, b) {
-                matrix[a * n + b] += sign_a * sign_b * value;
-            }
-        }
-    }
-}
-
-/// The rows and columns of some bodies of a matrix of `n` rows.
-pub(super) fn pick(matrix: &[f64], n: usize, bodies: &[usize]) -> Vec<f64> {
-    bodies.iter().flat_map(|i| bodies.iter().map(move |j| matrix[i * n + j])).collect()
 }
 
 /// rad/s, a bound of the fastest motion: the trace of inverse mass times stiffness is the sum of all squared frequencies.

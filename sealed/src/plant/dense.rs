@@ -37,6 +37,22 @@ pub(super) fn inverse(matrix: &[f64], n: usize) -> Option<Vec<f64>> {
     Some(inverse)
 }
 
+/// Adds a coefficient between two places to a symmetric matrix of `n` rows.
+pub(super) fn add_between(matrix: &mut [f64], n: usize, between: [Option<usize>; 2], value: f64) {
+    for (a, sign_a) in [(between[0], 1.0), (between[1], -1.0)] {
+        for (b, sign_b) in [(between[0], 1.0), (between[1], -1.0)] {
+            if let (Some(a), Some(b)) = (a, b) {
+                matrix[a * n + b] += sign_a * sign_b * value;
+            }
+        }
+    }
+}
+
+/// The rows and columns of some bodies of a matrix of `n` rows.
+pub(super) fn pick(matrix: &[f64], n: usize, bodies: &[usize]) -> Vec<f64> {
+    bodies.iter().flat_map(|i| bodies.iter().map(move |j| matrix[i * n + j])).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::inverse;

@@ -8,8 +8,8 @@
 //!
 //! Levels and dampings that hang on speed are taken at v0, then once more at the v that this gives.
 
-use super::assemble::{add_between, pick};
-use super::{Joint, dense};
+use super::dense::{self, add_between, pick};
+use super::joint::Joint;
 
 /// Rounds of the friction forces at most. They hang together only through inertia, so a few rounds do.
 const ROUNDS: usize = 200;

@@ -10,17 +10,20 @@
 mod assemble;
 mod dense;
 mod drive;
+mod error;
+mod joint;
 mod kick;
 mod loading;
 mod sense;
+mod sensor;
+mod state;
 
-use crate::laws::{ForceLaw, Path};
-use crate::network::{Network, Place};
-use crate::truth::{Truth, TruthError};
-use drive::Drive;
-use kick::Kick;
-use sense::Sensor;
-use std::ops::Range;
+pub use error::{PlantError, StepError};
+pub use state::SealedPlant;
+
+use crate::laws::Path;
+use crate::network::Network;
+use crate::truth::Truth;
 
 /// The substep resolves the fastest motion that the stiffnesses allow to this phase, rad: its frequency is then off by
 /// `phase^2/24`, 1e-4 of itself, and that of a mode ten times slower by 1e-6.
@@ -31,128 +34,6 @@ const SUBSTEPS_AT_LEAST: usize = 20;
 
 /// The same where a look is enough: the fastest frequency is off by 4e-4 of itself.
 const COARSE: (f64, usize) = (0.1, 6);
-
-/// Substeps of a period at most: more and a second takes minutes.
-const SUBSTEPS_AT_MOST: usize = 20_000;
-
-/// A plant that cannot be made.
-#[derive(Debug, thiserror::Error)]
-pub enum PlantError {
-    /// The truth does not fit the model.
-    #[error(transparent)]
-    Truth(#[from] TruthError),
-    /// The sampling period is not a time.
-    #[error("the sampling period is {0} s; give a time above 0")]
-    Period(f64),
-    /// Bodies or elements between them have no inertia.
-    #[error("device \"{0}\": a body moves freely without inertia; give it some, or an inerter")]
-    NoInertia(String),
-    /// A dead time would fill the memory.
-    #[error("signal \"{signal}\" is delayed by {delay_s} s, more than {most} sampling periods; shorten it")]
-    Delay {
-        /// Name of the input or output.
-        signal: String,
-        /// s.
-        delay_s: f64,
-        /// Sampling periods.
-        most: usize,
-    },
-    /// The substep would be too short.
-    #[error(
-        "device \"{device}\" moves at up to {rad_per_s:.0} rad/s, which a period of {period_s} s cannot be divided for; \
-         soften its springs, add inertia or sample faster"
-    )]
-    TooStiff {
-        /// Its name.
-        device: String,
-        /// Bound of its fastest motion.
-        rad_per_s: f64,
-        /// The sampling period.
-        period_s: f64,
-    },
-}
-
-/// A step that cannot be made.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum StepError {
-    /// Too few or too many inputs.
-    #[error("{found} inputs were given, the device has {expected}")]
-    Inputs {
-        /// How many were given.
-        found: usize,
-        /// How many there are.
-        expected: usize,
-    },
-    /// An input is not a number.
-    #[error("input {0} is not a finite number; hold the last one or send 0")]
-    NotFinite(usize),
-    /// The device ran away beyond all numbers.
-    #[error("the device ran away; the inputs or the loop around it are not stable")]
-    RanAway,
-}
-
-/// A joint of the network, ready to step.
-struct Joint {
-    between: [Place; 2],
-    force: Box<dyn ForceLaw>,
-    memory: Range<usize>,
-    /// Elements whose forces load its friction, each with its sign.
-    loaded_by: Vec<(usize, f64)>,
-    /// m, where its memory stands.
-    last: f64,
-    /// N, what its path sets in this substep.
-    path_force: f64,
-    /// N s/m, in this substep.
-    damping: f64,
-    /// Index among the dry joints.
-    dry: Option<usize>,
-}
-
-impl Joint {
-    fn relative(&self, values: &[f64]) -> f64 {
-        self.between[0].map_or(0.0, |body| values[body]) - self.between[1].map_or(0.0, |body| values[body])
-    }
-
-    /// Adds the force `f` (N), positive when stretched, to the bodies' forces.
-    fn push(&self, f: f64, forces: &mut [f64]) {
-        if let Some(body) = self.between[0] {
-            forces[body] -= f;
-        }
-        if let Some(body) = self.between[1] {
-            forces[body] += f;
-        }
-    }
-}
-
-/// The true device, stepped one sampling period at a time. Deterministic: the same truth and inputs give the same bits.
-pub struct SealedPlant {
-    names: Names,
-    joints: Vec<Joint>,
-    drives: Vec<Drive>,
-    sensors: Vec<Sensor>,
-    kick: Kick,
-    memory: Vec<f64>,
-    scratch: Vec<f64>,
-    positions: Vec<f64>,
-    middle: Vec<f64>,
-    speeds: Vec<f64>,
-    accelerations: Vec<f64>,
-    applied: Vec<f64>,
-    element_forces: Vec<f64>,
-    reactions: Vec<f64>,
-    exact: Vec<f64>,
-    measured: Vec<f64>,
-    substeps: usize,
-    substep_s: f64,
-}
-
-/// What the device calls its parts.
-struct Names {
-    bodies: Vec<String>,
-    elements: Vec<String>,
-    inputs: Vec<String>,
-    outputs: Vec<String>,
-}
 
 impl SealedPlant {
     /// The device that `truth` makes of the nominal model (with its grip attached, [`Network::held`]), at rest, its outputs measured
