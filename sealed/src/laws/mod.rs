@@ -29,7 +29,7 @@ pub(crate) struct Kind {
     /// See [`Facts::is_linear`].
     pub is_linear: bool,
     /// See [`Described::READ`].
-    pub read: Option<fn(&mut Section) -> Result<Law, NetworkError>>,
+    pub read: Read<Law>,
     /// See [`Described::DRAWS`].
     pub draws: &'static [Draw],
     /// See [`Described::draw`].
