@@ -4,7 +4,7 @@
 mod tests;
 
 use crate::hypothesis::sites::{Kin, Sites};
-use crate::hypothesis::{Family, Hypothesis, Physics, Scales};
+use crate::hypothesis::{Hypothesis, Physics, Scales};
 use backdrive_plant::elements::Law;
 use backdrive_plant::model::Model;
 

@@ -1,7 +1,7 @@
 //! All hypotheses on all devices: what they do to a model and to its file, and whether it still moves.
 
 use super::*;
-use crate::hypothesis::{Against, HypothesisError, Parameter, refined, starts_beside};
+use crate::hypothesis::{Against, Family, HypothesisError, Parameter, refined, starts_beside};
 use backdrive_plant::elements::KINDS;
 use backdrive_plant::model::{InputKind, OutputKind};
 use backdrive_plant::stepper::{Options, simulate};

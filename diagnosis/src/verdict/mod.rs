@@ -93,6 +93,7 @@ pub fn verdict(
         rival_models: (1..=rivals.len()).map(rival_file).collect(),
         next_experiment,
         detectable: best.structure.added.is_empty().then(|| detectable(search)),
+        searched: Some(Searched { steps: search.work, exhausted: search.exhausted, cut_short: search.cut }),
         findings: decision.findings,
     };
     Ok((verdict, Files { model, rivals, experiment }))

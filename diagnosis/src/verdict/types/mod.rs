@@ -60,6 +60,20 @@ pub struct Verdict {
     /// Where nothing was added to the model: for each physics the smallest size that the recordings would have shown, at the place where it
     /// shows best. Otherwise null.
     pub detectable: Option<Vec<Detectable>>,
+    /// How far the search went; null in files of versions that did not say.
+    #[serde(default)]
+    pub searched: Option<Searched>,
+}
+
+/// How far a search went. It computes the same on every machine, unless it is cut short.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Searched {
+    /// Steps of simulations, those of a linear network being the unit.
+    pub steps: u64,
+    /// Whether its effort ended before everything was tried that was wanted.
+    pub exhausted: bool,
+    /// Whether it was interrupted, or ended by the clock: on another machine the verdict may be another one.
+    pub cut_short: bool,
 }
 
 /// A verdict in one word.
