@@ -208,7 +208,7 @@ mod tests {
         slot.take_status(NodeStatus { steps: 90, lost: 2, missed_deadlines: 1, peak_effort: 5.0, ..NodeStatus::default() }, now);
         slot.before = (1, 2);
         slot.take_status(NodeStatus { steps: 10, lost: 4, peak_effort: 3.0, ..NodeStatus::default() }, now);
-        let status = slot.status.clone().unwrap_or_default();
+        let status = slot.status.unwrap_or_default();
         assert_eq!((status.steps, status.lost, status.missed_deadlines, status.peak_effort), (90, 6, 1, 5.0));
         assert_eq!(slot.recent_peak(now), Some(5.0));
         assert_eq!(slot.recent_peak(now + Duration::from_secs(2)), None);

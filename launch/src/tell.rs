@@ -165,7 +165,7 @@ impl Supervisor {
         let nodes = self.slots.iter().map(|s| NodeReport {
             name: s.plan.name.clone(),
             kind: s.plan.kind.clone(),
-            status: s.status.clone(),
+            status: s.status,
             restarts: s.restarts,
             end: s.end.clone(),
         });
