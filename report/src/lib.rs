@@ -17,7 +17,7 @@
 //! ```
 //!
 //! Apache ECharts draws (`vendor/` says why it and which build of it); it stands in the page, once, if there is a figure. Ours is which
-//! figures a page has and what they say: [`plot`] is the data, `limits` chooses from where to where the axes go, `thin` makes long series
+//! figures a page has and what they say: `plot` is the data, `limits` chooses from where to where the axes go, `thin` makes long series
 //! short without losing their extremes, `data` writes them into the page, and `figures.js` there hands them to the library.
 
 mod data;

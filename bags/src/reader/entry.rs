@@ -12,7 +12,7 @@ use std::sync::Arc;
 /// A topic of a bag.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TopicRef {
-    /// Its place in [`Reader::topics`].
+    /// Its place in [`crate::Reader::topics`].
     pub index: usize,
     /// Number of its channel in the file.
     pub channel: u16,

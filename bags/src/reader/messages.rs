@@ -11,7 +11,7 @@ use std::collections::{HashMap, VecDeque};
 use std::path::PathBuf;
 use std::sync::Arc;
 
-/// See [`Reader::messages`].
+/// See [`crate::Reader::messages`].
 pub struct Messages {
     pub(super) path: PathBuf,
     pub(super) frames: Frames,

@@ -34,16 +34,16 @@ pub enum RosError {
 /// What a sample says that a `JointState` has no field for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Facts {
-    /// As [`Sample::layout`].
+    /// As [`crate::Sample::layout`].
     pub layout: u32,
-    /// As [`Sample::source`].
+    /// As [`crate::Sample::source`].
     pub source: u32,
-    /// As [`Sample::step`].
+    /// As [`crate::Sample::step`].
     pub step: u64,
-    /// As [`Sample::sequence`].
+    /// As [`crate::Sample::sequence`].
     pub sequence: u64,
-    /// As [`Sample::flags`].
+    /// As [`crate::Sample::flags`].
     pub flags: u32,
-    /// As [`Sample::stamp_ns`], where it is known apart from the header, which holds no time before 1901 or after 2038.
+    /// As [`crate::Sample::stamp_ns`], where it is known apart from the header, which holds no time before 1901 or after 2038.
     pub stamp_ns: Option<i64>,
 }
