@@ -209,7 +209,7 @@ pub struct Parameter {
     pub key: String,
     /// Its unit in this model.
     pub unit: String,
-    /// Where it stands in the edited model, as [`Model::values_at`] takes it. For `inertia` that holds the body's own as well.
+    /// Where it stands in the edited model, as [`backdrive_plant::model::Model::values_at`] takes it. For `inertia` that holds the body's own as well.
     pub path: String,
     /// Its place in the list, where the path leads to one.
     pub index: Option<usize>,

@@ -1,4 +1,4 @@
-//! A model in motion: compiles a [`Model`] to a stepper that advances by one sample period at a time.
+//! A model in motion: compiles a [`Model`](crate::model::Model) to a stepper that advances by one sample period at a time.
 //!
 //! - Springs, dampers, inerters and biases are constant matrices, factored once. Over a substep h the
 //!   velocity changes by `2 δ`, `(2M/h + D + θ h K/2) δ = F - K (x + h v/2) - D v`, and the position by the mean
