@@ -45,6 +45,7 @@ impl Source {
             }
             at += 1;
         }
+        source.modules.extend(registered(&words));
         source.words = words;
         source
     }
@@ -75,6 +76,19 @@ impl Source {
         }
         found
     }
+}
+
+/// Modules that a macro `register!` of the file declares (`mod $name;`): in each line of its call the word before `::`, or else the last one.
+fn registered(words: &[String]) -> Vec<String> {
+    let declares = words.windows(4).any(|w| w[0] == "mod" && w[1] == "$" && w[3] == ";");
+    let call = words.windows(3).position(|w| w[0] == "register" && w[1] == "!" && w[2] == "(");
+    let Some(at) = call.filter(|_| declares) else { return Vec::new() };
+    let end = words[at..].iter().position(|w| w == ")").map_or(words.len(), |i| at + i);
+    let name = |line: &[String]| {
+        let before = line.iter().position(|w| w == "::").and_then(|i| line.get(i.checked_sub(1)?));
+        before.or(line.last()).cloned()
+    };
+    words[at + 3..end].split(|w| w == ",").filter_map(name).collect()
 }
 
 fn is_name(word: &str) -> bool {
