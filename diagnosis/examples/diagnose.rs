@@ -1,8 +1,9 @@
 //! `diagnose SET --out DIR [--without KIND]...`: a verdict and a diagnosed model for a set.
 
+use backdrive_diagnosis::candidate::advantage_over;
 use backdrive_diagnosis::diagnose::diagnose;
 use backdrive_diagnosis::problem::Problem;
-use backdrive_diagnosis::search::{Settings, advantage_over};
+use backdrive_diagnosis::search::Settings;
 use backdrive_diagnosis::verdict::{MODEL_FILE, VERDICT_FILE};
 use std::path::{Path, PathBuf};
 use std::time::Instant;

@@ -1,9 +1,9 @@
 //! The force that gave a finding away: what the recordings ask for at its place when it alone is left out, beside what its law does there.
 
+use crate::candidate::Candidate;
 use crate::hypothesis::{Against, Hypothesis, Place};
 use crate::locate::{self, Course, force_along, locate};
 use crate::problem::{Problem, Record};
-use crate::search::Candidate;
 use crate::structure::Structure;
 use backdrive_plant::describe::unit_for;
 use backdrive_plant::model::{Element, Input, InputKind, Model, Output, OutputKind};

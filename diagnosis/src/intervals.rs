@@ -1,8 +1,8 @@
 //! How sure the numbers of a fit are.
 
+use crate::candidate::Candidate;
 use crate::fit::Evaluator;
 use crate::normal_equations::normal_equations;
-use crate::search::Candidate;
 use crate::simulate::TWICE;
 use crate::work::{Budget, Limit, Steps};
 use nalgebra::{DMatrix, DVector};

@@ -1,8 +1,8 @@
 //! The numbers of a fit beside those that the file gives: how far each had to move, how sure it is, and which hang together.
 
+use crate::candidate::Candidate;
 use crate::intervals::Spread;
 use crate::problem::Problem;
-use crate::search::Candidate;
 use crate::structure::Role;
 use backdrive_plant::describe::unit_for;
 use backdrive_plant::elements::KINDS;

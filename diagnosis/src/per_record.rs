@@ -1,11 +1,11 @@
 //! The same structure fitted to each record by itself: numbers that differ from record to record by more than their errors are the sign
 //! of a wrong structure, for a device has one set of numbers.
 
+use crate::candidate::{Candidate, candidate};
 use crate::fit::{Effort, Evaluator};
 use crate::intervals::Spread;
 use crate::numbers::name_of;
 use crate::problem::{Problem, Record};
-use crate::search::{Candidate, candidate};
 use crate::structure::{Role, Structure};
 use crate::work::Budget;
 use serde::Serialize;

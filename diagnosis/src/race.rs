@@ -1,10 +1,10 @@
 //! Many structures, fitted a little each; the better ones more, the best to their end.
 
+use crate::candidate::{Candidate, MIDDLE, NEAR, candidate, key_of};
 use crate::fit::{Effort, Evaluator, Fit};
 use crate::hypothesis::Hypothesis;
 use crate::problem::{Problem, Record};
 use crate::screen::worst_records;
-use crate::search::{Candidate, MIDDLE, candidate, key_of};
 use crate::structure::{Role, Structure};
 use backdrive_plant::set::Initial;
 use std::collections::HashSet;
@@ -138,6 +138,12 @@ impl Course<'_> {
             .map(|(s, f)| candidate(evaluator, s, f))
             .collect()
     }
+
+    /// The effects of a structure by their places in the list of hypotheses, with their values.
+    pub(crate) fn effects_of(&self, structure: &Structure, values: &[f64]) -> Vec<(usize, Vec<f64>)> {
+        let place = |h: &Hypothesis| self.hypotheses.iter().position(|other| other.id == h.id);
+        structure.added.iter().zip(structure.added_of(values)).filter_map(|(h, v)| Some((place(h)?, v))).collect()
+    }
 }
 
 /// A start whose curves of unknown inputs are fitted beside the rest of it, with derivatives that another fit knows: a law begins beside a hand that
@@ -167,8 +173,6 @@ fn restricted(evaluator: &Evaluator, fit: &Fit, records: &[usize]) -> Fit {
 
 /// Those that go on whatever the best has reached: after two steps a fit may be far from its end.
 const ALWAYS: usize = 3;
-/// Mean squared residual up to which a structure may be all that is missing, squares of the floor.
-pub(crate) const NEAR: f64 = 2.0;
 
 /// What a fit would cost if most of what its next step foresees came true.
 pub fn hopeful(fit: &Fit) -> f64 {

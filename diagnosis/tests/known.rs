@@ -98,8 +98,14 @@ fn refitted_numbers_lie_in_their_intervals() {
     let fit = evaluator.fit(&structure, &structure.values(&problem, &given, &[], &[]), Effort::FULL).unwrap();
     let level = (fit.cost / fit.residuals.len() as f64).sqrt();
     assert!(level < 1.1, "{level} floors");
-    let candidate =
-        backdrive_diagnosis::search::Candidate { structure, fit, correlation_time: 1.0, slowness: 0.0, levels: vec![level], unseen: None };
+    let candidate = backdrive_diagnosis::candidate::Candidate {
+        structure,
+        fit,
+        correlation_time: 1.0,
+        slowness: 0.0,
+        levels: vec![level],
+        unseen: None,
+    };
     let spread = Spread::measured(&evaluator, &candidate);
     for (path, true_value) in [("elements.belt.stiffness", 1100.0), ("elements.air.damping", 1.0), ("bodies.load", 0.4)] {
         let index = problem.stated.iter().position(|s| s.path == path).unwrap();

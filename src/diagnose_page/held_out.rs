@@ -2,11 +2,11 @@
 
 use super::adds;
 use crate::recordings::file_name;
+use backdrive_diagnosis::candidate::Candidate;
 use backdrive_diagnosis::compare::{Predicted, density, predictions, qualities};
 use backdrive_diagnosis::diagnose::Diagnosis;
 use backdrive_diagnosis::numbers::unit_of_output;
 use backdrive_diagnosis::problem::Record;
-use backdrive_diagnosis::search::Candidate;
 use backdrive_report::{Cell, Colour, Dash, Figure, Page, Plot, Series, Table, Tone, number, percent};
 
 /// Pairs of record and output that are drawn at once; the rest is folded away.

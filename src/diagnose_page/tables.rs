@@ -2,10 +2,10 @@
 
 use super::adds;
 use backdrive_diagnosis::audit::Weight;
+use backdrive_diagnosis::candidate::{Candidate, advantage_over};
 use backdrive_diagnosis::diagnose::Diagnosis;
 use backdrive_diagnosis::intervals::Spread;
 use backdrive_diagnosis::numbers::{Row, correlated, rows};
-use backdrive_diagnosis::search::{Candidate, advantage_over};
 use backdrive_report::{Cell, Page, Table, Tone, number, percent, si};
 
 /// Hypotheses that are shown at once.

@@ -15,9 +15,9 @@ mod sensor;
 mod tests;
 mod words;
 
+use crate::candidate::Candidate;
 use crate::fit::{Evaluator, Fit};
 use crate::problem::Problem;
-use crate::search::Candidate;
 use crate::structure::{Role, Structure};
 use crate::work::{Budget, Steps};
 use backdrive_plant::model::Model;

@@ -1,10 +1,13 @@
 //! The end of a search: the best made simpler and brought to their ends, and held against recordings that no fit has seen.
 
 use super::nominal::{Nominal, to_its_end};
-use super::trials::BLUR;
-use super::{Candidate, MIDDLE, Work, candidate, done, key_of, sort};
+use super::revive::revived;
+use super::share::Work;
+use crate::candidate::{BLUR, Candidate, MIDDLE, candidate, done, key_of, sort};
 use crate::compare::unseen;
 use crate::fit::{Effort, Evaluator, Fit};
+use crate::hypothesis::{self, Hypothesis};
+use crate::physics;
 use crate::race::Course;
 use crate::structure::Structure;
 use crate::work::Budget;
@@ -26,9 +29,9 @@ pub(super) fn make_simpler(course: &Course, found: &mut Vec<Candidate>, work: &W
     let last = course.evaluator.within(work.up_to(0.95));
     for _ in 0..SIMPLER {
         let before = found.first().map(|c| key_of(&c.structure.added));
-        let mut starts = course.fewer(found);
+        let mut starts = fewer(course, found);
         if !done(found, course.nominal, samples) {
-            starts.extend(course.revived(found));
+            starts.extend(revived(course, found));
         }
         found.extend(polished(&last, starts));
         sort(found, samples);
@@ -114,4 +117,37 @@ pub(super) fn polished(evaluator: &Evaluator, structures: Vec<(Structure, Vec<f6
     let fits = evaluator.budget.abreast(&structures, fit);
     let fitted = structures.iter().zip(fits).filter_map(|((structure, _), fit)| Some((structure, fit.flatten()?)));
     fitted.map(|(structure, fit)| candidate(evaluator, structure.clone(), fit)).collect()
+}
+
+/// The best with each of its effects left out, where there is more than one, or as a simpler law that it contains, and where to start: from where all
+/// else is.
+fn fewer(course: &Course, found: &[Candidate]) -> Vec<(Structure, Vec<f64>)> {
+    let problem = course.evaluator.problem;
+    let Some(best) = found.first() else { return Vec::new() };
+    let (stated, of_records) = (best.structure.stated_of(problem, &best.fit.values), best.structure.of_records(&best.fit.values));
+    let own: Vec<(Hypothesis, Vec<f64>)> = best.structure.added.iter().cloned().zip(best.structure.added_of(&best.fit.values)).collect();
+    let made = |effects: Vec<(Hypothesis, Vec<f64>)>| {
+        let (added, values): (Vec<_>, Vec<_>) = effects.into_iter().unzip();
+        let structure = Structure::new(problem, &problem.fit, added);
+        let start = structure.values(problem, &stated, &values, &of_records);
+        (structure, start)
+    };
+    let mut all = Vec::new();
+    for (out, (effect, values)) in own.iter().enumerate() {
+        if own.len() > 1 {
+            let rest = own.iter().enumerate().filter(|(i, _)| *i != out).map(|(_, effect)| effect.clone());
+            all.push(made(rest.collect()));
+        }
+        let simpler = |h: &&Hypothesis| {
+            h.place.same(&effect.place) && physics::contains(effect.physics, h.physics) && h.parameters.len() < effect.parameters.len()
+        };
+        for law in course.hypotheses.iter().filter(simpler) {
+            let Some(start) = hypothesis::starts_beside(effect, values, law).into_iter().next() else { continue };
+            let start = hypothesis::inherited(law, &start, effect, values);
+            let mut effects = own.clone();
+            effects[out] = (law.clone(), start);
+            all.push(made(effects));
+        }
+    }
+    all
 }

@@ -1,207 +1,31 @@
 //! Which physics was left out: from the nominal model, refitted, to the structures that explain the recordings best.
 
 mod ending;
-mod next;
 mod nominal;
-mod trials;
+mod result;
+mod revive;
+mod schedule;
+mod settings;
+mod share;
+mod state;
+mod steps;
 mod view;
-mod wave;
 
-use crate::compare::Unseen;
-use crate::fit::{Effort, Evaluator, Fit};
-use crate::hypothesis::{Hypothesis, Place};
+use crate::candidate::{COARSE, key_of};
+use crate::fit::{Effort, Evaluator};
+use crate::hypothesis::Hypothesis;
 use crate::parts::Parts;
 use crate::physics;
 use crate::problem::Problem;
 use crate::race::Course;
-use crate::statistics::{advantage, correlation_time, levels, slowness};
-use crate::structure::Structure;
-use crate::work::{Budget, Limit, PER_SECOND, Steps};
-use ending::polished;
+use crate::work::{Budget, Limit};
 use nominal::{Nominal, SHOWN};
+pub use result::{Detectable, Search, SearchError, Tried};
+pub use settings::{EFFORT, PATIENCE, Settings};
+use share::Work;
+use state::State;
 use std::collections::HashSet;
-use std::sync::atomic::AtomicBool;
-use std::time::{Duration, Instant};
-use trials::Trials;
 use view::View;
-
-/// How to search.
-#[derive(Debug, Clone)]
-pub struct Settings {
-    /// Physics that are withheld, and with them all that contain one.
-    pub without: Vec<String>,
-    /// Effects at once, at most.
-    pub effects: usize,
-    /// How much it may compute, as a multiple of what it does by default: the verdict depends on this, and not on how fast or busy a machine is.
-    pub effort: f64,
-    /// How long it may take on the clock, all in all. What that cuts off may differ from machine to machine, so a verdict says where it did.
-    pub patience: Duration,
-}
-
-/// What a search computes with an effort of 1.
-pub const EFFORT: Steps = 1_200_000_000;
-
-/// How long a search may take on the clock where nothing else is said: far longer than the default effort takes on a slow machine.
-pub const PATIENCE: Duration = Duration::from_secs(600);
-
-impl Default for Settings {
-    fn default() -> Settings {
-        Settings { without: Vec::new(), effects: 3, effort: 1.0, patience: PATIENCE }
-    }
-}
-
-impl Settings {
-    /// Work that the search may do.
-    pub fn work(&self) -> Steps {
-        (self.effort.max(0.0) * EFFORT as f64) as Steps
-    }
-
-    /// What ends a search that begins now from outside.
-    pub fn limit<'a>(&self, stop: Option<&'a AtomicBool>) -> Limit<'a> {
-        Limit { stop, deadline: Instant::now().checked_add(self.patience) }
-    }
-
-    /// About how long that takes on two threads of a laptop, for progress bars.
-    pub fn expected(&self) -> Duration {
-        Duration::from_secs_f64((self.work() as f64 / PER_SECOND).min(self.patience.as_secs_f64()))
-    }
-}
-
-/// A structure, fitted.
-#[derive(Debug, Clone)]
-pub struct Candidate {
-    /// What it is.
-    pub structure: Structure,
-    /// How it fits.
-    pub fit: Fit,
-    /// Correlation time of what it leaves over, samples.
-    pub correlation_time: f64,
-    /// How far what it leaves over is from white noise at longer spans, see [`slowness`].
-    pub slowness: f64,
-    /// Root mean square of what it leaves over at each output, floors.
-    pub levels: Vec<f64>,
-    /// What it leaves over of the recordings that no fit has seen; `None` where it was not held against them.
-    pub unseen: Option<Unseen>,
-}
-
-impl Candidate {
-    /// Whether what it leaves over is white noise, as far as chance can tell.
-    pub fn is_white(&self) -> bool {
-        white(self.correlation_time, self.slowness)
-    }
-}
-
-fn white(correlation_time: f64, slowness: f64) -> bool {
-    correlation_time < WHITE.0 && slowness < WHITE.1
-}
-
-/// A hypothesis that was tried alone.
-#[derive(Debug, Clone)]
-pub struct Tried {
-    /// Its id.
-    pub id: String,
-    /// Share of the misfit that screening promised.
-    pub promised: f64,
-    /// Share that a refit took, where there was one.
-    pub taken: Option<f64>,
-}
-
-/// The smallest size of a physics that the recordings would have shown.
-#[derive(Debug, Clone)]
-pub struct Detectable {
-    /// Its name.
-    pub physics: &'static str,
-    /// Where.
-    pub place: Place,
-    /// The parameter that says how large it is.
-    pub key: String,
-    /// Its size.
-    pub size: f64,
-    /// Unit of that.
-    pub unit: String,
-}
-
-/// What a search found.
-#[derive(Debug)]
-pub struct Search {
-    /// Standard deviation of each output's measuring error, in its unit.
-    pub floor: Vec<f64>,
-    /// Level of each output with the numbers as given, floors.
-    pub levels_given: Vec<f64>,
-    /// The nominal model refitted.
-    pub nominal: Candidate,
-    /// Structures with something added, each fitted to its end, best first.
-    pub found: Vec<Candidate>,
-    /// Hypotheses tried alone.
-    pub tried: Vec<Tried>,
-    /// How many hypotheses there were.
-    pub hypotheses: usize,
-    /// Number of residuals.
-    pub samples: usize,
-    /// Number of residuals of the recordings that no fit has seen.
-    pub unseen_samples: usize,
-    /// What would have been seen beside the refitted nominal model, each physics at the place where it shows best.
-    pub detectable: Vec<Detectable>,
-    /// Simulations of a recording.
-    pub simulations: u64,
-    /// Steps of simulations, of the model with its elements taken together: what it computed.
-    pub work: Steps,
-    /// Whether its effort ended before everything was tried.
-    pub exhausted: bool,
-    /// Whether it was interrupted, or the time on the clock ended it.
-    pub cut: bool,
-}
-
-/// Why a search cannot start.
-#[derive(Debug, thiserror::Error)]
-pub enum SearchError {
-    /// The nominal model's motion leaves all bounds on the recordings.
-    #[error("the nominal model runs away on the recordings: check units, signs and sample time of the inputs")]
-    RunsAway,
-    /// The refitted nominal model cannot be simulated.
-    #[error("the refitted nominal model cannot be simulated: {0}")]
-    Compile(#[from] backdrive_plant::stepper::CompileError),
-}
-
-/// How good a candidate is beside others of the same search: what it costs with a price on each number, the lower the better.
-pub fn price(candidate: &Candidate, samples: usize, correlation_time: f64) -> f64 {
-    let effective = (samples as f64 / correlation_time).max(2.0);
-    effective * (candidate.fit.cost.max(1e-300) / samples.max(1) as f64).ln() + candidate.structure.numbers.len() as f64 * effective.ln()
-}
-
-/// Correlation time of residuals that nothing could explain, samples, and their distance from white noise, in standard deviations of chance:
-/// whatever their size, they are measuring error.
-const WHITE: (f64, f64) = (1.5, 4.0);
-/// Substeps per sample, at most: for screening and the first steps of fits, and for their middle.
-pub(crate) const COARSE: usize = 2;
-/// See [`COARSE`].
-pub(crate) const MIDDLE: usize = 4;
-/// Level above which the nominal model's refit is brought to its end after the search only, and vanished numbers of a law stay so until its end, floors.
-const NOMINAL_END: f64 = 5.0;
-/// A residual at its floor has this level, up to chance and rounding.
-pub const AT_FLOOR: f64 = 1.04;
-
-/// How much work a search may do.
-struct Work<'a> {
-    budget: Budget<'a>,
-}
-
-impl<'a> Work<'a> {
-    /// So much of it.
-    fn share(&self, share: f64) -> Steps {
-        (share * self.budget.end() as f64) as Steps
-    }
-
-    /// A budget that ends when so much of it is gone.
-    fn up_to(&self, share: f64) -> Budget<'a> {
-        self.budget.extended(self.share(share))
-    }
-
-    /// Whether so much of it is gone, or the search is to stop.
-    fn is_past(&self, share: f64) -> bool {
-        self.up_to(share).is_over()
-    }
-}
 
 /// Searches.
 ///
@@ -239,10 +63,10 @@ pub fn search(problem: &Problem, settings: &Settings, limit: Limit, report: &(dy
         coarse: COARSE,
     };
     let mut tried = promised(&views, &hypotheses);
-    let mut trials = Trials::new(course, &views, &tried, &ripples, nominal.far, &work);
-    trials.run(settings, report);
-    let exhausted = trials.left_out;
-    let mut found = trials.found;
+    let mut state = State::new(course, &views, &tried, &ripples, nominal.far, &work);
+    schedule::run(&mut state, settings, report);
+    let exhausted = state.left_out;
+    let mut found = state.found;
     report("fitting the best to the end");
     ending::make_simpler(&course, &mut found, &work);
     ending::bring_to_their_ends(evaluator, &mut found, samples, &work);
@@ -296,41 +120,4 @@ fn promised(views: &[View], hypotheses: &[Hypothesis]) -> Vec<Tried> {
     }
     tried.sort_by(|a, b| b.promised.total_cmp(&a.promised));
     tried
-}
-
-/// The ids of a structure's effects, whatever their order.
-pub(crate) fn key_of<'h>(added: impl IntoIterator<Item = &'h Hypothesis>) -> String {
-    let mut ids: Vec<&str> = added.into_iter().map(|h| h.id.as_str()).collect();
-    ids.sort_unstable();
-    ids.join("+")
-}
-
-/// The best candidates of so many effects, each structure once.
-fn distinct_structures(found: &[Candidate], effects: usize) -> impl Iterator<Item = &Candidate> {
-    let mut seen = HashSet::new();
-    found.iter().filter(move |c| c.structure.added.len() == effects && seen.insert(key_of(&c.structure.added)))
-}
-
-pub(crate) fn candidate(evaluator: &Evaluator, structure: Structure, fit: Fit) -> Candidate {
-    let correlation_time = correlation_time(evaluator, &fit.residuals);
-    let (levels, slowness) = (levels(evaluator, &fit.residuals), slowness(evaluator, &fit.residuals));
-    Candidate { structure, fit, correlation_time, slowness, levels, unseen: None }
-}
-
-/// Sorts by price, with the correlation time of the one that costs least.
-fn sort(found: &mut [Candidate], samples: usize) {
-    let best = found.iter().min_by(|a, b| a.fit.cost.total_cmp(&b.fit.cost)).map_or(1.0, |c| c.correlation_time);
-    found.sort_by(|a, b| price(a, samples, best).total_cmp(&price(b, samples, best)));
-}
-
-/// Whether the best structure leaves nothing that another effect could explain.
-fn done(found: &[Candidate], nominal: &Candidate, samples: usize) -> bool {
-    let best = found.first().filter(|b| advantage_over(nominal, b, samples) > 0.0).unwrap_or(nominal);
-    best.is_white()
-}
-
-/// How much better a candidate is than another one, with the correlation time of the better.
-pub fn advantage_over(base: &Candidate, better: &Candidate, samples: usize) -> f64 {
-    let (a, b) = (base.structure.numbers.len(), better.structure.numbers.len());
-    advantage(base.fit.cost, a, better.fit.cost.max(1e-300), b, samples, better.correlation_time)
 }

@@ -1,6 +1,8 @@
 //! The nominal model: refitted, and led along the recordings where it stays far from the noise.
 
-use super::{COARSE, Candidate, MIDDLE, NOMINAL_END, SearchError, Work, candidate, white};
+use super::result::SearchError;
+use super::share::Work;
+use crate::candidate::{COARSE, Candidate, MIDDLE, NEAR_ENOUGH, candidate, white};
 use crate::fit::{Effort, Evaluator, Fit};
 use crate::floor;
 use crate::guide::Guide;
@@ -123,7 +125,7 @@ impl<'a> Nominal<'a> {
         };
         let levels_given = rescaled(&first);
         // Far from the noise its end waits until the rest is known.
-        let is_far = rescaled(&quick.residuals).iter().any(|l| *l > NOMINAL_END);
+        let is_far = rescaled(&quick.residuals).iter().any(|l| *l > NEAR_ENOUGH);
         let effort = if is_far { Effort { steps: 4, tolerance: 3.0 } } else { Effort::FULL };
         let mut refitted = evaluator.fit(&structure, &quick.values, effort).ok_or(SearchError::RunsAway)?;
         // Far from the noise the measured path shows better than a simulation what is missing, and leads the numbers out of wrong basins.

@@ -1,6 +1,7 @@
 //! What screening sees, and what would have been seen.
 
-use super::{Candidate, Detectable, candidate};
+use super::result::Detectable;
+use crate::candidate::{Candidate, candidate};
 use crate::fit::{Effort, Evaluator, Fit};
 use crate::hypothesis::{Family, Hypothesis};
 use crate::locate::{self, Ripple};

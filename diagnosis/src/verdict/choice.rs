@@ -1,8 +1,9 @@
 //! Which of the structures is claimed, and which cannot be told from it.
 
+use crate::candidate::{Candidate, advantage_over};
 use crate::hypothesis::{Hypothesis, Physics};
 use crate::physics::{PHYSICS, withheld};
-use crate::search::{Candidate, Search, advantage_over};
+use crate::search::Search;
 use std::collections::HashSet;
 
 /// Improvements below this advantage (difference of information criteria) are not claimed.

@@ -4,10 +4,11 @@ use super::choice::{alike, chosen};
 use super::findings::{adequacy, findings};
 use super::signals::bursts;
 use super::types::{Finding, Word};
+use crate::candidate::{AT_FLOOR, Candidate};
 use crate::fit::Evaluator;
 use crate::intervals::Spread;
 use crate::problem::Problem;
-use crate::search::{AT_FLOOR, Candidate, Search};
+use crate::search::Search;
 use crate::statistics::advantage;
 use crate::structure::{Number, Role, Structure};
 

@@ -3,10 +3,11 @@
 use super::choice::{contains, evidence};
 use super::rounded::rounded;
 use super::types::{Alternative, Detectable, Estimate, Estimates, Finding, Moved, Parameter};
+use crate::candidate::Candidate;
 use crate::hypothesis::Hypothesis;
 use crate::intervals::Spread;
 use crate::problem::Problem;
-use crate::search::{Candidate, Search};
+use crate::search::Search;
 use crate::structure::Role;
 use backdrive_plant::write::round_significant;
 use std::collections::BTreeMap;

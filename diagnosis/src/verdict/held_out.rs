@@ -3,10 +3,11 @@
 use super::rounded::rounded;
 use super::types::{HeldOut, RecordErrors};
 use crate::audit::file_name;
+use crate::candidate::Candidate;
 use crate::compare::mean_squares;
 use crate::fit::measured;
 use crate::problem::{Problem, Record};
-use crate::search::{Candidate, Search};
+use crate::search::Search;
 use std::collections::BTreeMap;
 
 /// An output that was measured in a record.

@@ -1,10 +1,11 @@
 //! Models as they are after the diagnosis.
 
+use crate::candidate::Candidate;
 use crate::hypothesis::apply_edits;
 use crate::intervals::Spread;
 use crate::numbers::stated_edits;
 use crate::problem::Problem;
-use crate::search::{Candidate, Search};
+use crate::search::Search;
 use backdrive_plant::write::{patch, round_significant};
 
 /// Why a verdict cannot be written.

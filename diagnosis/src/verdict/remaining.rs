@@ -4,8 +4,9 @@ use super::decision::LEFT_OVER;
 use super::rounded::rounded;
 use super::signals::place_in_signals;
 use super::types::{HeldOut, Remaining};
+use crate::candidate::Candidate;
 use crate::problem::Problem;
-use crate::search::{Candidate, Search};
+use crate::search::Search;
 use crate::words;
 
 /// What the explanation that is claimed leaves over; `None` where nothing was held against anything.

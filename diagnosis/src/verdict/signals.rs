@@ -1,9 +1,9 @@
 //! When and at which frequencies something is left over, glitches, and inputs that nobody measured.
 
 use super::types::Where;
+use crate::candidate::Candidate;
 use crate::fit::Evaluator;
 use crate::problem::Problem;
-use crate::search::Candidate;
 use crate::unknown::{Estimated, Unknown, estimated};
 use backdrive_plant::write::round_significant;
 

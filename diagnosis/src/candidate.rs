@@ -1,0 +1,117 @@
+//! A structure, fitted, and what tells a good one: the data that fitting, proposals, schedule and verdict speak of.
+
+use crate::compare::Unseen;
+use crate::fit::{Evaluator, Fit};
+use crate::hypothesis::Hypothesis;
+use crate::statistics::{advantage, correlation_time, levels, slowness};
+use crate::structure::Structure;
+use std::collections::HashSet;
+
+/// Correlation time of residuals that nothing could explain, samples, and their distance from white noise, in standard deviations of chance:
+/// whatever their size, they are measuring error.
+const WHITE: (f64, f64) = (1.5, 4.0);
+/// Substeps per sample, at most: for screening and the first steps of fits, and for their middle.
+pub(crate) const COARSE: usize = 2;
+/// See [`COARSE`].
+pub(crate) const MIDDLE: usize = 4;
+/// A residual at its floor has this level, up to chance and rounding.
+pub const AT_FLOOR: f64 = 1.04;
+
+/// Times the cost of the best up to which a law that is drawn coarsely may win when drawn more finely.
+pub(crate) const COARSELY: f64 = 3.0;
+/// Share of what is left over, in squares, that too few substeps may make up.
+pub(crate) const BLUR: f64 = 0.02;
+/// Works the cost of the best up to which a law leaves less than twice as much over.
+const TWICE: f64 = 4.0;
+/// Level above which the nominal model's refit is brought to its end after the search only, and vanished numbers of a law stay so until its end, floors.
+pub(crate) const NEAR_ENOUGH: f64 = 5.0;
+
+/// Mean squared residual up to which a structure may be all that is missing, squares of the floor.
+pub(crate) const NEAR: f64 = 2.0;
+
+/// A structure, fitted.
+#[derive(Debug, Clone)]
+pub struct Candidate {
+    /// What it is.
+    pub structure: Structure,
+    /// How it fits.
+    pub fit: Fit,
+    /// Correlation time of what it leaves over, samples.
+    pub correlation_time: f64,
+    /// How far what it leaves over is from white noise at longer spans, see [`slowness`].
+    pub slowness: f64,
+    /// Root mean square of what it leaves over at each output, floors.
+    pub levels: Vec<f64>,
+    /// What it leaves over of the recordings that no fit has seen; `None` where it was not held against them.
+    pub unseen: Option<Unseen>,
+}
+
+impl Candidate {
+    /// Whether what it leaves over is white noise, as far as chance can tell.
+    pub fn is_white(&self) -> bool {
+        white(self.correlation_time, self.slowness)
+    }
+}
+
+pub(crate) fn white(correlation_time: f64, slowness: f64) -> bool {
+    correlation_time < WHITE.0 && slowness < WHITE.1
+}
+
+/// How good a candidate is beside others of the same search: what it costs with a price on each number, the lower the better.
+pub fn price(candidate: &Candidate, samples: usize, correlation_time: f64) -> f64 {
+    let effective = (samples as f64 / correlation_time).max(2.0);
+    effective * (candidate.fit.cost.max(1e-300) / samples.max(1) as f64).ln() + candidate.structure.numbers.len() as f64 * effective.ln()
+}
+
+/// The ids of a structure's effects, whatever their order.
+pub(crate) fn key_of<'h>(added: impl IntoIterator<Item = &'h Hypothesis>) -> String {
+    let mut ids: Vec<&str> = added.into_iter().map(|h| h.id.as_str()).collect();
+    ids.sort_unstable();
+    ids.join("+")
+}
+
+/// The best candidates of so many effects, each structure once.
+pub(crate) fn distinct_structures(found: &[Candidate], effects: usize) -> impl Iterator<Item = &Candidate> {
+    let mut seen = HashSet::new();
+    found.iter().filter(move |c| c.structure.added.len() == effects && seen.insert(key_of(&c.structure.added)))
+}
+
+pub(crate) fn candidate(evaluator: &Evaluator, structure: Structure, fit: Fit) -> Candidate {
+    let correlation_time = correlation_time(evaluator, &fit.residuals);
+    let (levels, slowness) = (levels(evaluator, &fit.residuals), slowness(evaluator, &fit.residuals));
+    Candidate { structure, fit, correlation_time, slowness, levels, unseen: None }
+}
+
+/// Sorts by price, with the correlation time of the one that costs least.
+pub(crate) fn sort(found: &mut [Candidate], samples: usize) {
+    let best = found.iter().min_by(|a, b| a.fit.cost.total_cmp(&b.fit.cost)).map_or(1.0, |c| c.correlation_time);
+    found.sort_by(|a, b| price(a, samples, best).total_cmp(&price(b, samples, best)));
+}
+
+/// Whether the best structure leaves nothing that another effect could explain.
+pub(crate) fn done(found: &[Candidate], nominal: &Candidate, samples: usize) -> bool {
+    let best = found.first().filter(|b| advantage_over(nominal, b, samples) > 0.0).unwrap_or(nominal);
+    best.is_white()
+}
+
+/// How much better a candidate is than another one, with the correlation time of the better.
+pub fn advantage_over(base: &Candidate, better: &Candidate, samples: usize) -> f64 {
+    let (a, b) = (base.structure.numbers.len(), better.structure.numbers.len());
+    advantage(base.fit.cost, a, better.fit.cost.max(1e-300), b, samples, better.correlation_time)
+}
+
+/// The best, or far from the noise, where the law is open as well as its place, what does nearly as well with the fewest numbers.
+pub(crate) fn simplest(found: &[Candidate], samples: usize) -> Option<&Candidate> {
+    let effects = found.first()?.structure.added.len();
+    simplest_of(found.iter().filter(|c| c.structure.added.len() == effects), samples)
+}
+
+/// The same of some candidates, best first.
+pub(crate) fn simplest_of<'c>(candidates: impl Iterator<Item = &'c Candidate>, samples: usize) -> Option<&'c Candidate> {
+    let mut candidates = candidates.peekable();
+    let best = candidates.peek().copied()?;
+    if best.fit.cost < NEAR * samples as f64 {
+        return Some(best);
+    }
+    candidates.filter(|c| c.fit.cost < TWICE * best.fit.cost).min_by_key(|c| c.structure.numbers.len())
+}

@@ -1,0 +1,73 @@
+//! What a search found, and why one cannot start.
+
+use crate::candidate::Candidate;
+use crate::hypothesis::Place;
+use crate::work::Steps;
+
+/// A hypothesis that was tried alone.
+#[derive(Debug, Clone)]
+pub struct Tried {
+    /// Its id.
+    pub id: String,
+    /// Share of the misfit that screening promised.
+    pub promised: f64,
+    /// Share that a refit took, where there was one.
+    pub taken: Option<f64>,
+}
+
+/// The smallest size of a physics that the recordings would have shown.
+#[derive(Debug, Clone)]
+pub struct Detectable {
+    /// Its name.
+    pub physics: &'static str,
+    /// Where.
+    pub place: Place,
+    /// The parameter that says how large it is.
+    pub key: String,
+    /// Its size.
+    pub size: f64,
+    /// Unit of that.
+    pub unit: String,
+}
+
+/// What a search found.
+#[derive(Debug)]
+pub struct Search {
+    /// Standard deviation of each output's measuring error, in its unit.
+    pub floor: Vec<f64>,
+    /// Level of each output with the numbers as given, floors.
+    pub levels_given: Vec<f64>,
+    /// The nominal model refitted.
+    pub nominal: Candidate,
+    /// Structures with something added, each fitted to its end, best first.
+    pub found: Vec<Candidate>,
+    /// Hypotheses tried alone.
+    pub tried: Vec<Tried>,
+    /// How many hypotheses there were.
+    pub hypotheses: usize,
+    /// Number of residuals.
+    pub samples: usize,
+    /// Number of residuals of the recordings that no fit has seen.
+    pub unseen_samples: usize,
+    /// What would have been seen beside the refitted nominal model, each physics at the place where it shows best.
+    pub detectable: Vec<Detectable>,
+    /// Simulations of a recording.
+    pub simulations: u64,
+    /// Steps of simulations, of the model with its elements taken together: what it computed.
+    pub work: Steps,
+    /// Whether its effort ended before everything was tried.
+    pub exhausted: bool,
+    /// Whether it was interrupted, or the time on the clock ended it.
+    pub cut: bool,
+}
+
+/// Why a search cannot start.
+#[derive(Debug, thiserror::Error)]
+pub enum SearchError {
+    /// The nominal model's motion leaves all bounds on the recordings.
+    #[error("the nominal model runs away on the recordings: check units, signs and sample time of the inputs")]
+    RunsAway,
+    /// The refitted nominal model cannot be simulated.
+    #[error("the refitted nominal model cannot be simulated: {0}")]
+    Compile(#[from] backdrive_plant::stepper::CompileError),
+}

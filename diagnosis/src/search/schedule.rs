@@ -1,0 +1,78 @@
+//! In which order steps are taken, and how much work each may do: the only place that decides either.
+
+use super::settings::Settings;
+use super::state::State;
+use super::steps::{
+    Anew, Elsewhere, Exchanges, Finer, GivenBack, Laws, More, MorePairs, Pairs, Plain, Race, Relatives, Richer, Ripples, Singles, Step,
+};
+use crate::candidate::{NEAR, key_of};
+use crate::race::{Course, distinct};
+use std::collections::HashSet;
+
+/// Share of the work after which no step is begun, but for rivals of the best.
+const LAST: f64 = 0.7;
+/// Share of the work after which no step is begun for those.
+const LAST_FOR_RIVALS: f64 = 0.85;
+
+/// The steps of a search for so many effects, in their order. Where nothing is left over, only what may be wrong with single effects is asked.
+fn steps(is_quiet: bool, effects: usize) -> Vec<&'static dyn Step> {
+    let mut steps: Vec<&'static dyn Step> =
+        vec![&Ripples, &Singles::FIRST, &GivenBack, &Laws, &Singles::NEXT, &Plain, &Relatives, &Elsewhere, &Relatives];
+    if is_quiet {
+        return steps;
+    }
+    steps.extend([&Finer as &dyn Step, &Pairs, &Laws, &Exchanges, &Richer, &Singles::REST, &MorePairs, &Laws, &Exchanges, &Elsewhere]);
+    for _ in 2..effects {
+        steps.extend([&More as &dyn Step, &Anew, &Exchanges]);
+    }
+    steps.extend([&Elsewhere as &dyn Step, &Relatives]);
+    steps
+}
+
+/// Takes all steps, as far as there is work to be done and something left to explain.
+pub(super) fn run(state: &mut State, settings: &Settings, report: &(dyn Fn(&str) + Sync)) {
+    for step in steps(state.is_quiet(), settings.effects) {
+        if is_begun(step, state) {
+            report(step.name());
+            take(step, state);
+        }
+    }
+}
+
+fn is_begun(step: &dyn Step, state: &mut State) -> bool {
+    let is_for_rivals = step.is_for_rivals(state);
+    if !is_for_rivals && state.is_done() {
+        return false;
+    }
+    if state.work.is_past(if is_for_rivals { LAST_FOR_RIVALS } else { LAST }) {
+        state.left_out |= !state.is_done();
+        return false;
+    }
+    step.is_wanted(state)
+}
+
+/// Fits what a step proposes, and keeps what is worth it.
+fn take(step: &dyn Step, state: &mut State) {
+    let mut seeds = step.propose(state);
+    let course = state.course;
+    if !step.tries_again() {
+        distinct(&mut seeds);
+        let known: HashSet<String> = state.found.iter().map(|c| key_of(&c.structure.added)).collect();
+        seeds.retain(|s| !known.contains(&key_of(s.effects.iter().map(|(h, _)| &course.hypotheses[*h]))));
+    }
+    // Where the best leaves much over, another effect may be what is missing: other laws in its place have their share of the work, and no more.
+    let more_to_come = state.found.first().is_none_or(|c| c.fit.cost > NEAR * state.samples() as f64);
+    let share = state.work.share(if more_to_come { step.share() } else { 1.0 });
+    let budget = step.ends().map_or_else(|| course.evaluator.budget.clone(), |end| state.work.up_to(end));
+    let evaluator = course.evaluator.within(budget.next(share));
+    let course = Course { evaluator: &evaluator, ..course };
+    let course = match step.race() {
+        Race::Coupled => course,
+        Race::Free => Course { along: None, ..course },
+        Race::Finer => Course { along: None, coarse: state.fine, ..course },
+    };
+    let keep = step.keep();
+    let fitted = course.race(seeds, [keep.further, keep.to_the_end]);
+    state.take(fitted);
+    step.settle(state);
+}

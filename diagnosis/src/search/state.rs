@@ -1,0 +1,151 @@
+//! What a search has to go by, and what it has found so far.
+
+use super::result::Tried;
+use super::share::Work;
+use super::view::View;
+use crate::candidate::{AT_FLOOR, COARSE, Candidate, done, key_of, sort};
+use crate::hypothesis::Hypothesis;
+use crate::race::{Course, Seed, distinct};
+use std::collections::HashSet;
+
+/// What the best of many hypotheses takes from a cost of white noise by chance, squares of the noise.
+const CHANCE: f64 = 25.0;
+
+/// What is tried, and what was found.
+pub(super) struct State<'s, 'a> {
+    /// What structures are fitted against, and from where.
+    pub course: Course<'s>,
+    /// What screening sees: from the base along the measured path, then from others.
+    pub views: &'s [View<'a>],
+    /// What screening promised.
+    pub tried: &'s [Tried],
+    /// Ripples that stand alone, and where they start.
+    pub ripples: &'s [(usize, Vec<f64>)],
+    /// Whether the nominal model stays far from the noise.
+    pub far: bool,
+    /// How much time there is.
+    pub work: &'s Work<'s>,
+    /// What was found, best first.
+    pub found: Vec<Candidate>,
+    /// Single effects, what promises most first.
+    pub singles: std::vec::IntoIter<Seed>,
+    /// Laws of one parameter.
+    pub plain: std::vec::IntoIter<Seed>,
+    /// Effects at once.
+    pub effects: usize,
+    /// Substeps that blur less than what is left over.
+    pub fine: usize,
+    /// The best whose relatives were tried.
+    pub related: String,
+    /// The law that other places were tried for.
+    pub moved_about: String,
+    /// Whether the work did not suffice for something that was wanted.
+    pub left_out: bool,
+}
+
+impl<'s, 'a> State<'s, 'a> {
+    /// Nothing tried yet.
+    pub fn new(
+        course: Course<'s>,
+        views: &'s [View<'a>],
+        tried: &'s [Tried],
+        ripples: &'s [(usize, Vec<f64>)],
+        far: bool,
+        work: &'s Work<'s>,
+    ) -> State<'s, 'a> {
+        let none = || Vec::new().into_iter();
+        let (singles, plain) = (none(), none());
+        let (related, moved_about) = (String::new(), String::new());
+        let mut all = State {
+            course,
+            views,
+            tried,
+            ripples,
+            far,
+            work,
+            found: Vec::new(),
+            singles,
+            plain,
+            effects: 1,
+            fine: COARSE,
+            related,
+            moved_about,
+            left_out: false,
+        };
+        all.singles = all.promising().into_iter();
+        all.plain = all.of_one_number().into_iter();
+        all
+    }
+
+    /// At the floor only what promises more than chance is worth a fit.
+    pub fn is_quiet(&self) -> bool {
+        self.course.nominal.is_white() || self.course.nominal.levels.iter().all(|l| *l < AT_FLOOR)
+    }
+
+    /// Share of the misfit that the best of many hypotheses promises by chance.
+    pub fn chance(&self) -> f64 {
+        CHANCE * self.course.nominal.correlation_time / self.samples() as f64
+    }
+
+    /// Number of residuals.
+    pub fn samples(&self) -> usize {
+        self.course.nominal.fit.residuals.len()
+    }
+
+    /// Whether fits begin coupled to the measured motion.
+    pub fn is_guided(&self) -> bool {
+        self.course.along.is_some()
+    }
+
+    /// Whether the best leaves nothing that another effect could explain.
+    pub fn is_done(&self) -> bool {
+        done(&self.found, self.course.nominal, self.samples())
+    }
+
+    /// What the best adds.
+    pub fn best(&self) -> String {
+        self.found.first().map_or_else(String::new, |c| key_of(&c.structure.added))
+    }
+
+    /// Single effects, what promises most first.
+    fn promising(&self) -> Vec<Seed> {
+        let (quiet, chance) = (self.is_quiet(), self.chance());
+        let mut singles: Vec<Seed> = Vec::new();
+        for rank in 0..16 {
+            for view in self.views {
+                let mut used = HashSet::new();
+                let Some(promise) = view.simple.iter().filter(|p| used.insert(p.hypothesis)).nth(rank) else { continue };
+                // Those that promise little beside the best wait.
+                let top = view.simple.first().map_or(0.0, |p| p.share);
+                let wanted = if quiet {
+                    rank < 8 && promise.share > chance
+                } else {
+                    rank < 3 || rank < if self.is_guided() { 14 } else { 8 } && promise.share > 0.5 * top
+                };
+                if wanted {
+                    singles.push(view.seed(vec![(promise.hypothesis, promise.values.clone())]));
+                }
+            }
+        }
+        distinct(&mut singles);
+        singles
+    }
+
+    /// To first order a law may do no more than the nominal model's numbers do together, so that screening sees nothing of it, and still be what is
+    /// missing: where little is left over those of one number are fitted whatever they promise.
+    fn of_one_number(&self) -> Vec<Seed> {
+        let Some(view) = self.views.first().filter(|_| !self.far) else { return Vec::new() };
+        let one = |(index, h): (usize, &Hypothesis)| {
+            let start = h.starts.first().filter(|start| start.len() == 1)?;
+            Some(view.seed(vec![(index, start.clone())]))
+        };
+        self.course.hypotheses.iter().enumerate().filter_map(one).collect()
+    }
+
+    /// Takes fitted structures in, best first.
+    pub fn take(&mut self, fitted: Vec<Candidate>) {
+        let samples = self.samples();
+        self.found.extend(fitted);
+        sort(&mut self.found, samples);
+    }
+}

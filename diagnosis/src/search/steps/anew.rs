@@ -1,0 +1,85 @@
+//! Hypotheses screened anew beside a structure that was found.
+
+use super::step::{Keep, Race, Step};
+use crate::candidate::{BLUR, COARSE, Candidate, MIDDLE, distinct_structures, simplest_of};
+use crate::fit::{Effort, Evaluator};
+use crate::hypothesis::Hypothesis;
+use crate::race::{Course, Seed};
+use crate::screen::{Promise, Screen};
+use crate::search::state::State;
+use crate::search::view::SIMPLE;
+use crate::simulate::FINEST;
+use crate::work::Steps;
+use std::collections::HashSet;
+
+/// Share of the work for screening beside a structure that was found.
+const ANEW: f64 = 0.06;
+
+/// What only shows beside a law that was found shows little coupled to the motion of the nominal model.
+pub(crate) struct Anew;
+
+impl Step for Anew {
+    fn name(&self) -> &'static str {
+        "screening beside the best"
+    }
+
+    fn keep(&self) -> Keep {
+        Keep { further: 4, to_the_end: 2 }
+    }
+
+    fn race(&self) -> Race {
+        Race::Finer
+    }
+
+    fn propose(&self, state: &mut State) -> Vec<Seed> {
+        let (course, samples) = (state.course, state.samples());
+        let Some(view) = state.views.first() else { return Vec::new() };
+        let fewer = || distinct_structures(&state.found, state.effects - 1);
+        let best = fewer().next();
+        // The first step to it may have been the wrong one: so from the best without that, too.
+        let without = |first: &Hypothesis| fewer().find(|c| c.structure.added.iter().all(|h| h.physics != first.physics));
+        let late = state.work.is_past(0.5);
+        let other = best.and_then(|b| b.structure.added.first()).filter(|_| !late).and_then(without);
+        // And far from the noise from what does nearly as well with fewer numbers: it leaves more open.
+        let has_fewer = |c: &&Candidate| best.is_some_and(|b| c.structure.numbers.len() < b.structure.numbers.len());
+        let is_other = |c: &Candidate| other.is_some_and(|o| std::ptr::eq(o, c));
+        let plain = simplest_of(fewer(), samples).filter(has_fewer).filter(|c| !is_other(c));
+        let mut seeds = Vec::new();
+        let mut fine = COARSE;
+        for base in best.into_iter().chain(other).chain(plain) {
+            let substeps = substeps_for(&view.evaluator, base);
+            fine = fine.max(substeps);
+            seeds.extend(screened(&course, &Evaluator { substeps, ..view.evaluator.clone() }, base, state.work.share(ANEW)));
+        }
+        state.fine = fine;
+        seeds
+    }
+}
+
+/// A structure with each of what promises most added, screened beside it: an offset shows as one only where the spring behind it is bent, a law
+/// at low speed only where the friction at speed is right.
+fn screened(course: &Course, evaluator: &Evaluator, base: &Candidate, work: Steps) -> Vec<Seed> {
+    let problem = course.evaluator.problem;
+    let Some(fit) = evaluator.fit(&base.structure, &base.fit.values, Effort { steps: 4, tolerance: 2.0 }) else { return Vec::new() };
+    let screen = Screen::new(evaluator, &base.structure, &fit, course.hypotheses, work);
+    let own = course.effects_of(&base.structure, &fit.values);
+    let seed = |p: Promise, guided| {
+        Seed::beside(problem, (&base.structure, &fit.values), [own.clone(), vec![(p.hypothesis, p.values)]].concat(), guided)
+    };
+    let fits = |h: usize| course.hypotheses[h].parameters.len() <= SIMPLE;
+    let mut used = HashSet::new();
+    let next = screen.look(&fit, &fits).into_iter().filter(|p| used.insert(p.hypothesis));
+    next.take(6).map(|p| seed(p, false)).collect()
+}
+
+/// Fewest substeps per sample with which a simulation errs by less than a structure leaves over.
+fn substeps_for(evaluator: &Evaluator, candidate: &Candidate) -> usize {
+    let of = |substeps: usize| Evaluator { substeps, ..evaluator.clone() }.residuals(&candidate.structure, &candidate.fit.values);
+    let Some(exact) = of(FINEST) else { return MIDDLE };
+    let size: f64 = exact.iter().map(|x| x * x).sum();
+    let errs = |substeps: &usize| {
+        let off = of(*substeps).map_or(f64::INFINITY, |r| r.iter().zip(&exact).map(|(a, b)| (a - b) * (a - b)).sum());
+        off > BLUR * size
+    };
+    [COARSE, MIDDLE, 2 * MIDDLE, 4 * MIDDLE].into_iter().find(|s| !errs(s)).unwrap_or(FINEST)
+}

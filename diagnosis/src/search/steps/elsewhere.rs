@@ -1,0 +1,79 @@
+//! The law that was found, at other places.
+
+use super::step::{Keep, RIVALS_END, Race, Step};
+use crate::candidate::{Candidate, key_of, simplest};
+use crate::hypothesis::Hypothesis;
+use crate::race::{Course, Seed};
+use crate::search::state::State;
+
+/// The place where a law was found at first may be a neighbour of its own.
+pub(crate) struct Elsewhere;
+
+impl Step for Elsewhere {
+    fn name(&self) -> &'static str {
+        "fitting the same law in other places"
+    }
+
+    fn keep(&self) -> Keep {
+        Keep { further: 3, to_the_end: 3 }
+    }
+
+    fn share(&self) -> f64 {
+        0.08
+    }
+
+    fn race(&self) -> Race {
+        Race::Free
+    }
+
+    fn tries_again(&self) -> bool {
+        true
+    }
+
+    fn is_for_rivals(&self, _: &State) -> bool {
+        true
+    }
+
+    fn ends(&self) -> Option<f64> {
+        Some(RIVALS_END)
+    }
+
+    fn is_wanted(&self, state: &State) -> bool {
+        law(state) != state.moved_about
+    }
+
+    fn propose(&self, state: &mut State) -> Vec<Seed> {
+        state.moved_about = law(state);
+        simplest(&state.found, state.samples()).map_or_else(Vec::new, |law| elsewhere(&state.course, law))
+    }
+}
+
+/// The law that is moved about.
+fn law(state: &State) -> String {
+    simplest(&state.found, state.samples()).map_or_else(String::new, |c| key_of(&c.structure.added))
+}
+
+/// Each effect with its values at every other place where that physics may be: to first order neighbours that are firmly joined do the same, and
+/// screening, or a path along which they are led, may have taken one for the other.
+fn elsewhere(course: &Course, best: &Candidate) -> Vec<Seed> {
+    let own = course.effects_of(&best.structure, &best.fit.values);
+    let mut seeds = Vec::new();
+    for (slot, (effect, values)) in best.structure.added.iter().zip(best.structure.added_of(&best.fit.values)).enumerate() {
+        let beside = |h: &Hypothesis| best.structure.added.iter().enumerate().all(|(i, other)| i == slot || other.compatible(h));
+        for (index, h) in course.hypotheses.iter().enumerate() {
+            if h.physics != effect.physics || h.place.same(&effect.place) || !beside(h) {
+                continue;
+            }
+            let alike = h.parameters.len() == values.len() && h.parameters.iter().zip(&effect.parameters).all(|(a, b)| a.unit == b.unit);
+            let carried: Vec<f64> = h.parameters.iter().zip(&values).map(|(p, v)| v.clamp(p.range.0, p.range.1)).collect();
+            let start = if alike { Some(carried) } else { h.starts.first().cloned() };
+            let Some(start) = start else { continue };
+            let mut effects = own.clone();
+            if let Some(place) = effects.get_mut(slot) {
+                *place = (index, start);
+                seeds.push(Seed::beside(course.evaluator.problem, (&best.structure, &best.fit.values), effects, false));
+            }
+        }
+    }
+    seeds
+}

@@ -1,0 +1,72 @@
+//! Laws of the best, resolved more finely.
+
+use super::step::{Keep, Race, Step};
+use crate::candidate::{COARSELY, Candidate, NEAR_ENOUGH, distinct_structures};
+use crate::hypothesis;
+use crate::race::{Course, Seed};
+use crate::search::ending::polished;
+use crate::search::revive::revived;
+use crate::search::state::State;
+
+/// Share of the work for parameters that come back.
+const REVIVING: f64 = 0.2;
+
+/// How finely a law is resolved is no physics: that comes before another effect.
+pub(crate) struct Finer;
+
+impl Step for Finer {
+    fn name(&self) -> &'static str {
+        "drawing a law more finely"
+    }
+
+    fn keep(&self) -> Keep {
+        Keep { further: 3, to_the_end: 2 }
+    }
+
+    fn share(&self) -> f64 {
+        0.15
+    }
+
+    fn race(&self) -> Race {
+        Race::Free
+    }
+
+    fn tries_again(&self) -> bool {
+        true
+    }
+
+    fn settle(&self, state: &mut State) {
+        let comes_near = state.found.first().is_some_and(|c| c.levels.iter().all(|l| *l < NEAR_ENOUGH));
+        if comes_near && !state.work.is_past(0.6) {
+            // Before others are tried from the numbers of the best; where it leaves much over, more is missing than a mass.
+            let evaluator = state.course.evaluator.within(state.work.up_to(0.75).next(state.work.share(REVIVING)));
+            let back = polished(&evaluator, revived(&state.course, &state.found));
+            state.take(back);
+        }
+    }
+
+    fn propose(&self, state: &mut State) -> Vec<Seed> {
+        finer(&state.course, &state.found)
+    }
+}
+
+/// The best, and what does nearly as well with as many effects, with a law of theirs drawn more finely.
+fn finer(course: &Course, found: &[Candidate]) -> Vec<Seed> {
+    let Some(best) = found.first() else { return Vec::new() };
+    let near = |c: &&Candidate| c.fit.cost < COARSELY * best.fit.cost;
+    let mut seeds = Vec::new();
+    for c in distinct_structures(found, best.structure.added.len()).filter(near) {
+        let own = course.effects_of(&c.structure, &c.fit.values);
+        for (slot, (effect, values)) in c.structure.added.iter().zip(c.structure.added_of(&c.fit.values)).enumerate() {
+            for (index, h) in course.hypotheses.iter().enumerate() {
+                let Some(start) = hypothesis::refined(effect, &values, h) else { continue };
+                let mut effects = own.clone();
+                if let Some(place) = effects.get_mut(slot) {
+                    *place = (index, start);
+                    seeds.push(Seed::beside(course.evaluator.problem, (&c.structure, &c.fit.values), effects, false));
+                }
+            }
+        }
+    }
+    seeds
+}

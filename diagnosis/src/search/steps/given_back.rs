@@ -1,0 +1,74 @@
+//! Stated parameters that give back what they may have absorbed.
+
+use super::step::{Keep, Step};
+use crate::hypothesis::Place;
+use crate::race::{Course, Seed};
+use crate::screen::Promise;
+use crate::search::state::State;
+use std::collections::HashSet;
+
+/// Share of what promises most that a law has to promise, where a stated number is to give back what it may have taken on.
+const PROMISED: f64 = 0.5;
+/// Parts of a stated number that it may have taken on.
+const TAKEN_ON: [f64; 3] = [0.25, 0.5, 0.9];
+
+/// A law beside a stated parameter of its kind in the neighbourhood, which starts where that has given back what it may have absorbed.
+pub(crate) struct GivenBack;
+
+impl Step for GivenBack {
+    fn name(&self) -> &'static str {
+        "giving back what numbers took on"
+    }
+
+    fn keep(&self) -> Keep {
+        Keep { further: 5, to_the_end: 3 }
+    }
+
+    fn tries_again(&self) -> bool {
+        true
+    }
+
+    fn is_for_rivals(&self, _: &State) -> bool {
+        true
+    }
+
+    fn propose(&self, state: &mut State) -> Vec<Seed> {
+        // Near the noise, where what the parameters have absorbed is all that a law does.
+        match state.views.first().filter(|_| !state.far) {
+            Some(view) => given_back(&state.course, &view.simple, state.chance()),
+            None => Vec::new(),
+        }
+    }
+}
+
+/// Laws of one number that promise something, beside a stated number of the same kind that has a body in common with them and that gives back what it
+/// may have taken on. A damper at a motor and one at the drum behind a stiff cable do nearly the same: a fit goes from all at one to all at the other along
+/// a narrow valley, and not to its end. `chance` is the share that the best promises by chance.
+fn given_back(course: &Course, promises: &[Promise], chance: f64) -> Vec<Seed> {
+    let problem = course.evaluator.problem;
+    let top = promises.first().map_or(0.0, |p| p.share);
+    let (stated, of_records) = (
+        course.nominal.structure.stated_of(problem, &course.nominal.fit.values),
+        course.nominal.structure.of_records(&course.nominal.fit.values),
+    );
+    let mut used = HashSet::new();
+    let mut seeds = Vec::new();
+    for promise in promises.iter().filter(|p| p.share > chance.max(PROMISED * top) && used.insert(p.hypothesis)) {
+        let Some(law) = course.hypotheses.get(promise.hypothesis) else { continue };
+        let (Place::Between(a, b), [parameter]) = (&law.place, law.parameters.as_slice()) else { continue };
+        for element in problem.model.elements.iter().filter(|e| e.law.kind().name == law.physics.name) {
+            let ends = element.between.map(|end| problem.model.place_name(end));
+            let path = format!("elements.{}.{}", element.name, parameter.key);
+            let own = problem.stated.iter().zip(&stated).enumerate().find(|(_, (s, _))| s.path == path);
+            let Some((index, (number, value))) = own.filter(|_| ends.iter().any(|end| end == a || end == b)) else { continue };
+            let moved = (value - number.given).max(0.0);
+            for taken in TAKEN_ON.iter().map(|part| part * value).chain((moved > 0.0).then_some(moved)) {
+                let mut stated = stated.clone();
+                stated[index] = (value - taken).clamp(number.range.0, number.range.1);
+                let values = vec![taken.clamp(parameter.range.0, parameter.range.1)];
+                seeds.push(Seed { effects: vec![(promise.hypothesis, values)], stated, of_records: of_records.clone(), guided: false });
+            }
+        }
+    }
+    seeds
+}

@@ -1,0 +1,39 @@
+//! Every law at the place of the best: where one law helps another one may be the right one.
+
+use super::step::{Keep, Step};
+use crate::candidate::NEAR;
+use crate::race::{Seed, distinct};
+use crate::search::state::State;
+
+/// How many, where each costs a fit because no coupling to the measured motion makes the first steps cheap.
+const FREE: usize = 6;
+
+/// Other laws at the place of the best.
+pub(crate) struct Laws;
+
+impl Step for Laws {
+    fn name(&self) -> &'static str {
+        "fitting other laws in the same place"
+    }
+
+    fn keep(&self) -> Keep {
+        Keep { further: 3, to_the_end: 3 }
+    }
+
+    fn propose(&self, state: &mut State) -> Vec<Seed> {
+        let (course, guided, samples) = (state.course, state.is_guided(), state.samples());
+        // Coupled to the measured motion, what is far from the noise was tried already.
+        let best = state.found.first().filter(|c| !guided || c.fit.cost < NEAR * samples as f64);
+        let mut seeds = best.map_or_else(Vec::new, |best| course.laws(&best.structure, &best.fit.values));
+        if !guided {
+            let own = |s: &Seed| -> f64 {
+                let promised = |h: &usize| state.tried.iter().find(|t| t.id == course.hypotheses[*h].id).map_or(0.0, |t| t.promised);
+                s.effects.iter().map(|(h, _)| promised(h)).sum()
+            };
+            seeds.sort_by(|a, b| own(b).total_cmp(&own(a)));
+            distinct(&mut seeds);
+            seeds.truncate(FREE);
+        }
+        seeds
+    }
+}

@@ -1,0 +1,32 @@
+//! The steps of a search: each says which structures it wants fitted, given what was found; a file each. Their order is the schedule's.
+
+mod anew;
+mod elsewhere;
+mod exchanges;
+mod extensions;
+mod finer;
+mod given_back;
+mod laws;
+mod more;
+mod pairs;
+mod plain;
+mod relatives;
+mod richer;
+mod ripples;
+mod singles;
+mod step;
+
+pub(super) use anew::Anew;
+pub(super) use elsewhere::Elsewhere;
+pub(super) use exchanges::Exchanges;
+pub(super) use finer::Finer;
+pub(super) use given_back::GivenBack;
+pub(super) use laws::Laws;
+pub(super) use more::More;
+pub(super) use pairs::{MorePairs, Pairs};
+pub(super) use plain::Plain;
+pub(super) use relatives::Relatives;
+pub(super) use richer::Richer;
+pub(super) use ripples::Ripples;
+pub(super) use singles::Singles;
+pub(super) use step::{Race, Step};

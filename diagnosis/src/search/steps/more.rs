@@ -1,0 +1,27 @@
+//! One more effect.
+
+use super::extensions::extensions;
+use super::step::{Keep, Step};
+use crate::candidate::distinct_structures;
+use crate::race::Seed;
+use crate::search::state::State;
+
+/// The best with one effect fewer, and what promises most beside them.
+pub(crate) struct More;
+
+impl Step for More {
+    fn name(&self) -> &'static str {
+        "fitting more effects at once"
+    }
+
+    fn keep(&self) -> Keep {
+        Keep { further: 4, to_the_end: 3 }
+    }
+
+    fn propose(&self, state: &mut State) -> Vec<Seed> {
+        state.effects += 1;
+        let (course, found) = (state.course, &state.found);
+        let Some(view) = state.views.first() else { return Vec::new() };
+        distinct_structures(found, state.effects - 1).take(3).flat_map(|base| extensions(&course, view, base, 5)).collect()
+    }
+}

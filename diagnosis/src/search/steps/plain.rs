@@ -1,0 +1,28 @@
+//! Laws of one parameter, whatever screening promised of them.
+
+use super::step::{Keep, Step};
+use crate::race::Seed;
+use crate::search::state::State;
+
+/// Laws of one parameter: to first order they may do no more than the nominal parameters do together.
+pub(crate) struct Plain;
+
+impl Step for Plain {
+    fn name(&self) -> &'static str {
+        "fitting laws of one number"
+    }
+
+    fn keep(&self) -> Keep {
+        Keep { further: 4, to_the_end: 2 }
+    }
+
+    fn is_for_rivals(&self, state: &State) -> bool {
+        // They are rivals of a best that took more parameters.
+        let nominal = state.course.nominal.structure.numbers.len();
+        state.found.first().is_some_and(|c| c.structure.numbers.len() > nominal + 1)
+    }
+
+    fn propose(&self, state: &mut State) -> Vec<Seed> {
+        state.plain.by_ref().collect()
+    }
+}

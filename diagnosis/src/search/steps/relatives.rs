@@ -1,0 +1,78 @@
+//! Simpler laws of the family of the best, in its place.
+
+use super::step::{Keep, RIVALS_END, Race, Step};
+use crate::candidate::Candidate;
+use crate::hypothesis::{self, Hypothesis};
+use crate::race::{Course, Seed};
+use crate::search::state::State;
+
+/// A law that wins with more parameters has to win over its simpler relatives, whatever these promised; and far from the noise, where fits were cut
+/// short, the first that came near may not be the one.
+pub(crate) struct Relatives;
+
+impl Step for Relatives {
+    fn name(&self) -> &'static str {
+        "fitting simpler relatives"
+    }
+
+    fn keep(&self) -> Keep {
+        Keep { further: 3, to_the_end: 3 }
+    }
+
+    fn share(&self) -> f64 {
+        0.08
+    }
+
+    fn race(&self) -> Race {
+        Race::Free
+    }
+
+    fn tries_again(&self) -> bool {
+        true
+    }
+
+    fn is_for_rivals(&self, _: &State) -> bool {
+        true
+    }
+
+    fn ends(&self) -> Option<f64> {
+        Some(RIVALS_END)
+    }
+
+    fn is_wanted(&self, state: &State) -> bool {
+        state.related != state.best()
+    }
+
+    fn settle(&self, state: &mut State) {
+        state.related = state.best();
+    }
+
+    fn propose(&self, state: &mut State) -> Vec<Seed> {
+        relatives(&state.course, &state.found, state.is_done())
+    }
+}
+
+/// Simpler laws of the same family in the place of each effect of the best; where something is left to explain, laws that are as simple, too.
+fn relatives(course: &Course, found: &[Candidate], done: bool) -> Vec<Seed> {
+    let Some(best) = found.first() else { return Vec::new() };
+    let own = course.effects_of(&best.structure, &best.fit.values);
+    let mut seeds = Vec::new();
+    for (out, (effect, values)) in best.structure.added.iter().zip(best.structure.added_of(&best.fit.values)).enumerate() {
+        let relative = |h: &Hypothesis| {
+            h.place.same(&effect.place)
+                && h.physics.family == effect.physics.family
+                && h.id != effect.id
+                && h.parameters.len() < effect.parameters.len() + if done { 0 } else { 2 }
+        };
+        for (index, h) in course.hypotheses.iter().enumerate().filter(|(_, h)| relative(h)) {
+            for start in hypothesis::starts_beside(effect, &values, h) {
+                let mut effects = own.clone();
+                if let Some(slot) = effects.get_mut(out) {
+                    *slot = (index, start);
+                    seeds.push(Seed::beside(course.evaluator.problem, (&best.structure, &best.fit.values), effects, false));
+                }
+            }
+        }
+    }
+    seeds
+}

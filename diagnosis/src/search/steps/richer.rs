@@ -1,0 +1,31 @@
+//! A law of many parameters in the place of the best.
+
+use super::step::{Keep, Step};
+use crate::candidate::distinct_structures;
+use crate::hypothesis::{Family, Hypothesis};
+use crate::race::Seed;
+use crate::search::state::State;
+
+/// Physics of many parameters come in where simpler relatives do not suffice.
+pub(crate) struct Richer;
+
+impl Step for Richer {
+    fn name(&self) -> &'static str {
+        "fitting richer laws"
+    }
+
+    fn keep(&self) -> Keep {
+        Keep { further: 2, to_the_end: 1 }
+    }
+
+    fn propose(&self, state: &mut State) -> Vec<Seed> {
+        let Some(view) = state.views.first() else { return Vec::new() };
+        // In the place of what is the best of its kind.
+        let best = distinct_structures(&state.found, 1).next().map(|c| &c.structure.added[0]);
+        let like = |h: &Hypothesis| {
+            best.is_some_and(|b| b.place.same(&h.place) && matches!(b.physics.family, Family::Friction | Family::Hysteresis))
+        };
+        let rich = view.rich.iter().find(|p| like(&state.course.hypotheses[p.hypothesis]));
+        rich.map(|p| view.seed(vec![(p.hypothesis, p.values.clone())])).into_iter().collect()
+    }
+}

@@ -1,0 +1,36 @@
+//! Ripples that stand alone in the spectrum of their force.
+
+use super::step::{Keep, Race, Step};
+use crate::race::Seed;
+use crate::search::state::State;
+
+/// How many are fitted without the coupling to the measured motion that the others begin with.
+const RIPPLES: usize = 4;
+
+/// Coupled to the measured motion a ripple slides out of phase, so these are fitted without.
+pub(crate) struct Ripples;
+
+impl Step for Ripples {
+    fn name(&self) -> &'static str {
+        "fitting ripples"
+    }
+
+    fn keep(&self) -> Keep {
+        Keep { further: 3, to_the_end: 2 }
+    }
+
+    fn race(&self) -> Race {
+        Race::Free
+    }
+
+    fn propose(&self, state: &mut State) -> Vec<Seed> {
+        // Without a coupling they are among the single effects.
+        if !state.is_guided() {
+            return Vec::new();
+        }
+        let course = state.course;
+        let beside = (&course.nominal.structure, &course.nominal.fit.values[..]);
+        let seed = |ripple: &(usize, Vec<f64>)| Seed::beside(course.evaluator.problem, beside, vec![ripple.clone()], false);
+        state.ripples.iter().take(RIPPLES).map(seed).collect()
+    }
+}

@@ -1,0 +1,70 @@
+//! What a step of a search says of itself.
+
+use crate::race::Seed;
+use crate::search::state::State;
+
+/// Share of the work at which fits of rivals of the best end: a simpler law that does as well is worth a little more than the others' time.
+pub(crate) const RIVALS_END: f64 = 0.92;
+
+/// How many of the structures that a step proposes are fitted further than their first steps, and how many to their end.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Keep {
+    pub further: usize,
+    pub to_the_end: usize,
+}
+
+/// How structures are fitted at first.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Race {
+    /// Coupled to the measured motion, where the nominal model is far from the noise.
+    Coupled,
+    /// Not coupled.
+    Free,
+    /// Not coupled, with as many substeps as what the best leaves over asks for.
+    Finer,
+}
+
+/// A step of a search.
+pub(crate) trait Step {
+    /// What it does, as progress and explanation say it.
+    fn name(&self) -> &'static str;
+
+    /// How far its structures are fitted.
+    fn keep(&self) -> Keep;
+
+    /// Share of the work that it may take where the best is far from the noise and another effect may be what is missing.
+    fn share(&self) -> f64 {
+        1.0
+    }
+
+    /// Share of the whole work at which its fits end, where that is not the schedule's.
+    fn ends(&self) -> Option<f64> {
+        None
+    }
+
+    /// How its structures are fitted at first.
+    fn race(&self) -> Race {
+        Race::Coupled
+    }
+
+    /// Whether structures that were tried before are tried again, from other values.
+    fn tries_again(&self) -> bool {
+        false
+    }
+
+    /// Whether it is for rivals of the best: they are wanted however little that leaves over.
+    fn is_for_rivals(&self, _state: &State) -> bool {
+        false
+    }
+
+    /// Whether it has anything new to propose.
+    fn is_wanted(&self, _state: &State) -> bool {
+        true
+    }
+
+    /// The structures it wants fitted, with values to start from.
+    fn propose(&self, state: &mut State) -> Vec<Seed>;
+
+    /// What follows when they are fitted.
+    fn settle(&self, _state: &mut State) {}
+}
