@@ -3,6 +3,7 @@
 use crate::cli;
 use crate::diagnose_page::{Shown, page};
 use crate::diagnose_text::text;
+use crate::explain::explained;
 use crate::failure::{Failure, code};
 use crate::interrupt;
 use crate::output;
@@ -47,6 +48,9 @@ pub fn diagnose(options: &cli::Diagnose) -> Result<u8, Failure> {
         output::json(&found.verdict)?;
     } else {
         output::line(text(&found))?;
+        if options.explain {
+            output::line(format_args!("\n{}\n", explained(&found.search)))?;
+        }
         output::line(format_args!("wrote     {}: {} ({seconds:.1} s)", shown(&options.out), written.join(", ")))?;
     }
     if stop.load(Ordering::SeqCst) {

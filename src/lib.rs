@@ -12,6 +12,7 @@ mod diagnose_page;
 mod diagnose_text;
 mod doctor;
 mod experiments;
+mod explain;
 pub mod failure;
 mod fit;
 mod graph;

@@ -9,7 +9,7 @@ use std::path::PathBuf;
 pub const HELP: &str = "Examples:
   backdrive run launch/identify.toml --out out/identify
   backdrive diagnose out/identify --model plant/models/impulse-engine-linear.toml --grip plant/grips/normal.toml --out out/diagnosis
-  backdrive diagnose session.csv held-out.csv --model model.toml --out out/diagnosis --effort 3
+  backdrive diagnose session.csv held-out.csv --model model.toml --out out/diagnosis --effort 3 --explain
   backdrive diagnose set/ --without coulomb --out out/diagnosis
 
 Writes verdict.json, model.diagnosed.toml, report.html and time.txt. Ctrl-C ends the search and writes what was found until then.
@@ -49,6 +49,9 @@ pub struct Diagnose {
     /// A limit on the clock. Where it cuts the search off, the verdict may depend on the machine, and says so.
     #[arg(long, value_name = "SECONDS", value_parser = positive, default_value_t = PATIENCE, allow_negative_numbers = true)]
     pub patience: f64,
+    /// Print what the search tried, what it cost and why it lost.
+    #[arg(long, conflicts_with = "json")]
+    pub explain: bool,
     /// Print the verdict as JSON.
     #[arg(long)]
     pub json: bool,

@@ -1,6 +1,7 @@
 //! Which physics was left out: from the nominal model, refitted, to the structures that explain the recordings best.
 
 mod ending;
+mod journal;
 mod nominal;
 mod result;
 mod revive;
@@ -19,6 +20,7 @@ use crate::physics;
 use crate::problem::Problem;
 use crate::race::Course;
 use crate::work::{Budget, Limit};
+pub use journal::{Entry, Outcome};
 use nominal::{Nominal, SHOWN};
 pub use result::{Detectable, Search, SearchError, Tried};
 pub use settings::{EFFORT, PATIENCE, Settings};
@@ -65,7 +67,7 @@ pub fn search(problem: &Problem, settings: &Settings, limit: Limit, report: &(dy
     let mut tried = promised(&views, &hypotheses);
     let mut state = State::new(course, &views, &tried, &ripples, nominal.far, &work);
     schedule::run(&mut state, settings, report);
-    let exhausted = state.left_out;
+    let (exhausted, journal) = (state.left_out, std::mem::take(&mut state.journal));
     let mut found = state.found;
     report("fitting the best to the end");
     ending::make_simpler(&course, &mut found, &work);
@@ -90,6 +92,7 @@ pub fn search(problem: &Problem, settings: &Settings, limit: Limit, report: &(dy
         simulations: work.budget.simulations(),
         work: work.budget.spent(),
         exhausted,
+        journal,
         cut: work.budget.was_cut(),
         nominal: refitted,
     })

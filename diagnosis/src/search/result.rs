@@ -1,5 +1,6 @@
 //! What a search found, and why one cannot start.
 
+use super::journal::Entry;
 use crate::candidate::Candidate;
 use crate::hypothesis::Place;
 use crate::work::Steps;
@@ -57,6 +58,8 @@ pub struct Search {
     pub work: Steps,
     /// Whether its effort ended before everything was tried.
     pub exhausted: bool,
+    /// What it did, step by step.
+    pub journal: Vec<Entry>,
     /// Whether it was interrupted, or the time on the clock ended it.
     pub cut: bool,
 }

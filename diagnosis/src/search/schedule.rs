@@ -1,5 +1,6 @@
 //! In which order steps are taken, and how much work each may do: the only place that decides either.
 
+use super::journal::Outcome;
 use super::settings::Settings;
 use super::state::State;
 use super::steps::{
@@ -32,27 +33,33 @@ fn steps(is_quiet: bool, effects: usize) -> Vec<&'static dyn Step> {
 /// Takes all steps, as far as there is work to be done and something left to explain.
 pub(super) fn run(state: &mut State, settings: &Settings, report: &(dyn Fn(&str) + Sync)) {
     for step in steps(state.is_quiet(), settings.effects) {
-        if is_begun(step, state) {
-            report(step.name());
-            take(step, state);
-        }
+        let outcome = match hindrance(step, state) {
+            Some(hindrance) => hindrance,
+            None => {
+                report(step.name());
+                take(step, state)
+            }
+        };
+        state.note(step.name(), outcome);
     }
 }
 
-fn is_begun(step: &dyn Step, state: &mut State) -> bool {
+/// Why a step is not begun; `None` where nothing hinders it.
+fn hindrance(step: &dyn Step, state: &mut State) -> Option<Outcome> {
     let is_for_rivals = step.is_for_rivals(state);
     if !is_for_rivals && state.is_done() {
-        return false;
+        return Some(Outcome::ResidualIsWhite);
     }
     if state.work.is_past(if is_for_rivals { LAST_FOR_RIVALS } else { LAST }) {
         state.left_out |= !state.is_done();
-        return false;
+        return Some(Outcome::NoWorkLeft);
     }
-    step.is_wanted(state)
+    (!step.is_wanted(state)).then_some(Outcome::NothingNew)
 }
 
 /// Fits what a step proposes, and keeps what is worth it.
-fn take(step: &dyn Step, state: &mut State) {
+fn take(step: &dyn Step, state: &mut State) -> Outcome {
+    let before = state.work.budget.spent();
     let mut seeds = step.propose(state);
     let course = state.course;
     if !step.tries_again() {
@@ -72,7 +79,10 @@ fn take(step: &dyn Step, state: &mut State) {
         Race::Finer => Course { along: None, coarse: state.fine, ..course },
     };
     let keep = step.keep();
-    let fitted = course.race(seeds, [keep.further, keep.to_the_end]);
-    state.take(fitted);
+    let proposed = seeds.len();
+    let raced = course.race(seeds, [keep.further, keep.to_the_end]);
+    let fitted = raced.len();
+    state.take(raced);
     step.settle(state);
+    Outcome::Taken { proposed, fitted, work: state.work.budget.spent() - before }
 }

@@ -1,5 +1,6 @@
 //! What a search has to go by, and what it has found so far.
 
+use super::journal::{Entry, Outcome};
 use super::result::Tried;
 use super::share::Work;
 use super::view::View;
@@ -41,6 +42,8 @@ pub(super) struct State<'s, 'a> {
     pub moved_about: String,
     /// Whether the work did not suffice for something that was wanted.
     pub left_out: bool,
+    /// What was done.
+    pub journal: Vec<Entry>,
 }
 
 impl<'s, 'a> State<'s, 'a> {
@@ -71,6 +74,7 @@ impl<'s, 'a> State<'s, 'a> {
             related,
             moved_about,
             left_out: false,
+            journal: Vec::new(),
         };
         all.singles = all.promising().into_iter();
         all.plain = all.of_one_number().into_iter();
@@ -140,6 +144,13 @@ impl<'s, 'a> State<'s, 'a> {
             Some(view.seed(vec![(index, start.clone())]))
         };
         self.course.hypotheses.iter().enumerate().filter_map(one).collect()
+    }
+
+    /// Notes what became of a step.
+    pub fn note(&mut self, step: &'static str, outcome: Outcome) {
+        let best = self.found.first().unwrap_or(self.course.nominal);
+        let residual = (best.fit.cost / self.samples().max(1) as f64).sqrt();
+        self.journal.push(Entry { step, outcome, best: key_of(&best.structure.added), residual });
     }
 
     /// Takes fitted structures in, best first.

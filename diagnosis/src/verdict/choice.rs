@@ -63,7 +63,7 @@ pub(super) fn evidence(search: &Search, base: &Candidate, better: &Candidate) ->
 }
 
 /// What the recordings that no fit has seen say alone; 0 where there are none.
-fn unseen_evidence(search: &Search, base: &Candidate, better: &Candidate) -> f64 {
+pub(super) fn unseen_evidence(search: &Search, base: &Candidate, better: &Candidate) -> f64 {
     match (base.unseen, better.unseen) {
         (Some(a), Some(b)) if a.mean_square > 0.0 && b.mean_square > 0.0 => {
             (search.unseen_samples as f64 / a.correlation_time.max(b.correlation_time)) * (a.mean_square / b.mean_square).ln()

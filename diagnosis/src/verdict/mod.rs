@@ -1,5 +1,6 @@
 //! What a search says: the verdict, the nominal model's file with what was found, and the files beside it.
 
+mod beaten;
 mod choice;
 mod decision;
 mod experiments;
@@ -14,6 +15,7 @@ mod shows;
 mod signals;
 pub(crate) mod types;
 
+pub use beaten::{Beaten, Why, beaten};
 pub use choice::chosen;
 pub use experiments::EXPERIMENT_FILE;
 pub use models::VerdictError;
