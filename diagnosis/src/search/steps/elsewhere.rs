@@ -11,7 +11,7 @@ pub(crate) struct Elsewhere;
 
 impl Step for Elsewhere {
     fn name(&self) -> &'static str {
-        "fitting the same law in other places"
+        "fitting the same law at other places"
     }
 
     fn keep(&self) -> Keep {

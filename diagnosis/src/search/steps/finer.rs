@@ -16,7 +16,7 @@ pub(crate) struct Finer;
 
 impl Step for Finer {
     fn name(&self) -> &'static str {
-        "drawing a law more finely"
+        "resolving a law more finely"
     }
 
     fn keep(&self) -> Keep {

@@ -17,7 +17,7 @@ pub(crate) struct GivenBack;
 
 impl Step for GivenBack {
     fn name(&self) -> &'static str {
-        "giving back what numbers took on"
+        "splitting parameters with a neighbour"
     }
 
     fn keep(&self) -> Keep {

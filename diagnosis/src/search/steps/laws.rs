@@ -13,7 +13,7 @@ pub(crate) struct Laws;
 
 impl Step for Laws {
     fn name(&self) -> &'static str {
-        "fitting other laws in the same place"
+        "fitting other laws at the same place"
     }
 
     fn keep(&self) -> Keep {

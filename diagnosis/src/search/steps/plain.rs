@@ -9,7 +9,7 @@ pub(crate) struct Plain;
 
 impl Step for Plain {
     fn name(&self) -> &'static str {
-        "fitting laws of one number"
+        "fitting laws of one parameter"
     }
 
     fn keep(&self) -> Keep {

@@ -12,7 +12,7 @@ pub(crate) struct Relatives;
 
 impl Step for Relatives {
     fn name(&self) -> &'static str {
-        "fitting simpler relatives"
+        "fitting simpler laws of the same family"
     }
 
     fn keep(&self) -> Keep {
