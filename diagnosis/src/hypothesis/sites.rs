@@ -137,8 +137,11 @@ impl<'a> Sites<'a> {
         self.elements_at(site).any(|(_, e)| matches!(e.law.role(), Role::Friction))
     }
 
-    /// Whether something that holds a joint is tied to a body of the site, so that a friction there is loaded.
+    /// Whether a friction there is loaded by a joint: between two bodies by what holds these two, between a body and ground by what holds the body.
     pub fn is_loaded(&self, site: &Site) -> bool {
+        if site.reach != Reach::Ground {
+            return self.holding(site).is_some();
+        }
         let tied = |e: &Element| e.between.iter().flatten().any(|body| site.ends.contains(&Some(*body)));
         self.model.elements.iter().zip(&self.kin).any(|(e, kin)| kin.holds && tied(e))
     }

@@ -27,7 +27,7 @@ pub(super) const PHYSICS: Physics = Physics {
             let (period, duration) = (sites.scales.period, sites.scales.duration);
             let new = ElementBuilder::new(sites, &PHYSICS, site).filter(|_| k > 0.0)?.replacing(index);
             let stiffness = Freedom { neutral: Some(k), ..log(1e-2 * k, 1e3 * k) };
-            let retarded = Freedom { neutral: Some(f64::INFINITY), ..log(1e-2 * k, 1e4 * k) };
+            let retarded = Freedom { neutral: Some(1e4 * k), ..log(1e-2 * k, 1e4 * k) };
             let new =
                 new.number("stiffness", stiffness).list("creep_stiffness", 1, retarded).list("time", 1, log(2.0 * period, 10.0 * duration));
             let starts = [(1.1, 5.0, 0.1), (1.3, 3.0, 0.01), (1.1, 5.0, 1.0), (1.5, 2.0, 0.001)];

@@ -34,7 +34,7 @@ pub(super) const PHYSICS: Physics = Physics {
             let most = 20.0 * site.force.max(stated.unwrap_or(0.0));
             let c = stated.unwrap_or(0.05 * site.force);
             let new = new.number("force", even(0.0, most, stated.unwrap_or(0.0))).number("coefficient", even(0.0, MOST, 0.0));
-            Some(new.starts(vec![vec![0.7 * c, 0.1], vec![0.0, 0.1], vec![c, 0.5]]))
+            Some(new.starts(vec![vec![0.7 * c, 0.1], vec![0.05 * c, 0.1], vec![c, 0.5]]))
         };
         sites.near().filter(|site| sites.is_loaded(site)).filter_map(one).collect()
     },

@@ -392,7 +392,7 @@ fn friction_laws_begin_at_the_level_of_the_one_before() {
             let mut values = law.starts[0].clone();
             let slot = law.parameters.iter().position(is_force).expect("has a level");
             values[slot] *= 1.7;
-            for other in hypotheses.iter().filter(|h| h.physics.family == Family::Friction && h.place.same(&law.place) && h.id != law.id) {
+            for other in hypotheses.iter().filter(|h| !h.physics.sliding.is_empty() && h.place.same(&law.place) && h.id != law.id) {
                 for start in starts_beside(law, &values, other) {
                     let forces: Vec<f64> = other.parameters.iter().zip(&start).filter(|(p, _)| is_force(p)).map(|(_, v)| *v).collect();
                     let together: f64 = forces.iter().sum();

@@ -33,7 +33,7 @@ pub(super) const PHYSICS: Physics = Physics {
             let level = Freedom { range: (0.0, 20.0 * f.max(c)), neutral: Some(stated.unwrap_or(0.0)), log: false };
             // What a friction of that level makes of heat in a recording.
             let heat = c * site.speed * duration;
-            let half_heat = Freedom { neutral: stated.map(|_| f64::INFINITY), ..log(1e-3 * heat, 1e3 * heat) };
+            let half_heat = Freedom { neutral: stated.map(|_| 1e3 * heat), ..log(1e-3 * heat, 1e3 * heat) };
             let new =
                 new.number("force", level).number("half_heat", half_heat).number("cooling_time", log(1e-3 * duration, 100.0 * duration));
             let starts = [(1.3, 0.5, 0.3), (1.6, 0.3, 1.0), (1.3, 0.05, 0.05)];
