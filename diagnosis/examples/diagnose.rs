@@ -1,9 +1,12 @@
-//! `diagnose SET --out DIR [--without KIND]...`: a verdict and a diagnosed model for a set.
+//! `diagnose SET --out DIR [--without KIND] [--tuning NAME=VALUE]...`: a verdict and a diagnosed model for a set.
+//!
+//! `--tuning claim.tie=4` or `--tuning claim.tie=x2` changes an entry of the tuning table, to see how much verdicts depend on it.
 
 use backdrive_diagnosis::candidate::advantage_over;
 use backdrive_diagnosis::diagnose::diagnose;
 use backdrive_diagnosis::problem::Problem;
 use backdrive_diagnosis::search::Settings;
+use backdrive_diagnosis::tuning::Tuning;
 use backdrive_diagnosis::verdict::{MODEL_FILE, VERDICT_FILE};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -14,6 +17,16 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let set = args.first().ok_or("usage: diagnose SET --out DIR [--without KIND] [-v]")?;
     let out = PathBuf::from(after("--out").unwrap_or_else(|| "diagnosis".to_string()));
     let talk = args.iter().any(|a| a == "-v");
+    let mut tuning = Tuning::default();
+    for (_, change) in args.iter().zip(args.iter().skip(1)).filter(|(key, _)| *key == "--tuning") {
+        let (name, value) = change.split_once('=').ok_or("--tuning takes NAME=VALUE, such as claim.tie=4 or claim.tie=x2")?;
+        let entry = tuning.quantity(name).ok_or_else(|| format!("there is no tuning entry {name}: docs/tuning.md lists them"))?;
+        match value.strip_prefix('x') {
+            Some(factor) => entry.times(factor.parse()?),
+            None => entry.set(value.parse()?),
+        }
+    }
+    tuning.adopt().map_err(|_| "the tuning is in use already")?;
     let began = Instant::now();
     let problem = Problem::open(Path::new(set), after("--model").as_deref().map(Path::new))?;
     let settings = Settings { without: after("--without").into_iter().collect(), ..Default::default() };

@@ -5,29 +5,8 @@ use crate::fit::{Evaluator, Fit};
 use crate::hypothesis::Hypothesis;
 use crate::statistics::{advantage, correlation_time, levels, slowness};
 use crate::structure::Structure;
+use crate::tuning::tuning;
 use std::collections::HashSet;
-
-/// Correlation time of residuals that nothing could explain, samples, and their distance from white noise, in standard deviations of chance:
-/// whatever their size, they are measuring error.
-const WHITE: (f64, f64) = (1.5, 4.0);
-/// Substeps per sample, at most: for screening and the first steps of fits, and for their middle.
-pub(crate) const COARSE: usize = 2;
-/// See [`COARSE`].
-pub(crate) const MIDDLE: usize = 4;
-/// A residual at its floor has this level, up to chance and rounding.
-pub const AT_FLOOR: f64 = 1.04;
-
-/// Times the cost of the best up to which a law that is drawn coarsely may win when drawn more finely.
-pub(crate) const COARSELY: f64 = 3.0;
-/// Share of what is left over, in squares, that too few substeps may make up.
-pub(crate) const BLUR: f64 = 0.02;
-/// Works the cost of the best up to which a law leaves less than twice as much over.
-const TWICE: f64 = 4.0;
-/// Level above which the nominal model's refit is brought to its end after the search only, and vanished numbers of a law stay so until its end, floors.
-pub(crate) const NEAR_ENOUGH: f64 = 5.0;
-
-/// Mean squared residual up to which a structure may be all that is missing, squares of the floor.
-pub(crate) const NEAR: f64 = 2.0;
 
 /// A structure, fitted.
 #[derive(Debug, Clone)]
@@ -54,7 +33,7 @@ impl Candidate {
 }
 
 pub(crate) fn white(correlation_time: f64, slowness: f64) -> bool {
-    correlation_time < WHITE.0 && slowness < WHITE.1
+    correlation_time < tuning().noise.white_correlation && slowness < tuning().noise.white_statistic
 }
 
 /// How good a candidate is beside others of the same search: what it costs with a price on each number, the lower the better.
@@ -110,8 +89,8 @@ pub(crate) fn simplest(found: &[Candidate], samples: usize) -> Option<&Candidate
 pub(crate) fn simplest_of<'c>(candidates: impl Iterator<Item = &'c Candidate>, samples: usize) -> Option<&'c Candidate> {
     let mut candidates = candidates.peekable();
     let best = candidates.peek().copied()?;
-    if best.fit.cost < NEAR * samples as f64 {
+    if best.fit.cost < tuning().noise.near * samples as f64 {
         return Some(best);
     }
-    candidates.filter(|c| c.fit.cost < TWICE * best.fit.cost).min_by_key(|c| c.structure.numbers.len())
+    candidates.filter(|c| c.fit.cost < tuning().claim.twice * best.fit.cost).min_by_key(|c| c.structure.numbers.len())
 }

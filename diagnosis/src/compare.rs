@@ -1,10 +1,11 @@
 //! What a fitted structure says of recordings that it has not seen, beside what was measured.
 
-use crate::fit::{Effort, Evaluator, measured};
+use crate::effort::Effort;
+use crate::fit::{Evaluator, measured};
 use crate::problem::{Problem, Record};
-use crate::simulate::FINEST;
 use crate::statistics::correlation_time;
 use crate::structure::{Along, Structure};
+use crate::tuning::tuning;
 use crate::work::Budget;
 use serde::Serialize;
 
@@ -39,7 +40,7 @@ impl Ready {
 pub fn predictions(problem: &Problem, records: &[Record], structure: &Structure, values: &[f64]) -> Option<Vec<Predicted>> {
     let Ready { fixed, own, values } = Ready::of(problem, records, structure, values)?;
     let budget = Budget::default();
-    let along = Along { substeps: FINEST, guide: None, budget: &budget };
+    let along = Along { substeps: tuning().fit.fine_substeps, guide: None, budget: &budget };
     let one = |(r, record): (usize, &Record)| {
         let columns = own.predict(&fixed, &fixed.model, &values, (record, r), along)?;
         let mut of_outputs: Predicted = vec![None; record.outputs.len()];

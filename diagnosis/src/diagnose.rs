@@ -5,12 +5,10 @@ use crate::locate::{self, Location, locate};
 use crate::per_record::{PerRecord, fit_each};
 use crate::problem::Problem;
 use crate::search::{Search, SearchError, Settings, search};
+use crate::tuning::tuning;
 use crate::verdict::{Files, Verdict, VerdictError, verdict};
-use crate::work::{Budget, Steps};
+use crate::work::Budget;
 use std::sync::atomic::AtomicBool;
-
-/// Work in which each record is fitted by itself, at most.
-const PER_RECORD: Steps = 200_000_000;
 
 /// Everything that was found.
 pub struct Diagnosis {
@@ -60,7 +58,7 @@ pub fn diagnose(
     report("deciding");
     let (verdict, files) = verdict(&problem, &search, &remarks, location.as_ref(), limit)?;
     report("fitting each record by itself");
-    let per_record = fit_each(&problem, &search.nominal, &search.floor, &Budget::new(PER_RECORD, limit));
+    let per_record = fit_each(&problem, &search.nominal, &search.floor, &Budget::new(tuning().search.per_record, limit));
     Ok(Diagnosis { problem, remarks, search, location, verdict, files, per_record })
 }
 

@@ -1,10 +1,11 @@
 //! Fits by simulation error: bounded Levenberg-Marquardt steps with differences in parallel.
 
+use crate::effort::Effort;
 use crate::guide::Guide;
 use crate::normal_equations::normal_equations;
 use crate::problem::{Problem, Record};
-use crate::simulate::FINEST;
 use crate::structure::{Along, Number, Role, Structure};
+use crate::tuning::tuning;
 use crate::work::{Budget, Steps};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -33,20 +34,6 @@ pub struct Evaluator<'a> {
     pub widest: f64,
     /// Whether only numbers of single records move, such as the curve of a hand that nobody measured.
     pub own_only: bool,
-}
-
-/// How long to try.
-#[derive(Debug, Clone, Copy)]
-pub struct Effort {
-    /// Steps at most.
-    pub steps: usize,
-    /// A fit ends when its next step foresees less than this many units of the mean squared residual.
-    pub tolerance: f64,
-}
-
-impl Effort {
-    /// Until nothing that could matter is foreseen.
-    pub const FULL: Effort = Effort { steps: 40, tolerance: 0.3 };
 }
 
 /// A fitted structure.
@@ -80,11 +67,11 @@ impl<'a> Evaluator<'a> {
             floor: problem.floor.clone(),
             robust: f64::INFINITY,
             budget: Budget::default(),
-            substeps: FINEST,
+            substeps: tuning().fit.fine_substeps,
             guide: None,
             stretch: 1.0,
             own_only: false,
-            widest: 64.0,
+            widest: tuning().fit.widest,
         }
     }
 
@@ -181,7 +168,7 @@ impl<'a> Evaluator<'a> {
         let mut together: BTreeMap<Set, Vec<usize>> = BTreeMap::new();
         for (at, j) in which.iter().enumerate() {
             match (&structure.numbers[*j].role, &structure.numbers[*j].records) {
-                (Role::Knot(unknown, knot, r), _) => together.entry((*unknown, *r, knot % APART)).or_default().push(at),
+                (Role::Knot(unknown, knot, r), _) => together.entry((*unknown, *r, knot % tuning().fit.knots_apart)).or_default().push(at),
                 (_, Some(of)) => jobs.extend(of.iter().map(|r| (at, *r))),
                 (_, None) => jobs.extend((0..self.records.len()).map(|r| (at, r))),
             }
@@ -255,7 +242,7 @@ impl<'a> Evaluator<'a> {
             let mut columns = vec![vec![0.0; part.len()]; ats.len()];
             for ((at, step), column) in ats.iter().zip(&steps).zip(&mut columns) {
                 let Role::Knot(_, knot, _) = structure.numbers[which[*at]].role else { continue };
-                let window = self.problem.unknown.get(*unknown)?.window(knot, APART, record);
+                let window = self.problem.unknown.get(*unknown)?.window(knot, tuning().fit.knots_apart, record);
                 for from in (0..part.len()).step_by(record.len.max(1)) {
                     for i in window.start + from..window.end + from {
                         column[i] = (part[i] - before[i]) / step;
@@ -295,7 +282,7 @@ impl<'a> Evaluator<'a> {
         let mut jacobian = self.first_jacobian(structure, &own, &residuals, known);
         // Steps since the derivatives were computed.
         let mut age = if known.is_some() { 1 } else { 0 };
-        let (mut lambda, mut steps, mut weak) = (1e-3, 0, 0);
+        let (mut lambda, mut steps, mut weak) = (tuning().fit.damping, 0, 0);
         // Slips that start a step earlier or later make small differences rough: wider ones are taken where narrow ones mislead.
         let mut stretch = self.stretch;
         let everything: Vec<usize> = (0..own.len()).filter(|j| self.moves(&numbers[*j])).collect();
@@ -314,12 +301,12 @@ impl<'a> Evaluator<'a> {
             foreseen = step_of(&matrix, &slope, &free, 1e-9).map_or(0.0, |step| free.iter().zip(&step).map(|(j, s)| -slope[*j] * s).sum());
             let unit = cost / residuals.len().max(1) as f64;
             self.budget.count(algebra(residuals.len(), own.len()));
-            let ended = self.budget.is_over() || steps >= effort.steps || weak >= 3;
+            let ended = self.budget.is_over() || steps >= effort.steps || weak >= tuning().fit.weak_steps;
             if ended {
                 break;
             }
             // Far from the noise a thousandth of what is left decides nothing.
-            let enough = if unit > 2.0 { 1e-3 * cost } else { 0.0 };
+            let enough = if unit > tuning().noise.near { tuning().fit.relative_tolerance * cost } else { 0.0 };
             if foreseen < (effort.tolerance * unit).max(enough) {
                 if age == 0 || effort.tolerance > 1.0 {
                     break;
@@ -334,7 +321,7 @@ impl<'a> Evaluator<'a> {
                 let mut next = own.clone();
                 for (j, s) in free.iter().zip(&step) {
                     let (low, high) = numbers[*j].bounds();
-                    let longest = if numbers[*j].log { 1.5 } else { 0.5 * (high - low) };
+                    let longest = if numbers[*j].log { tuning().fit.longest_log } else { tuning().fit.longest * (high - low) };
                     next[*j] = (own[*j] + s.clamp(-longest, longest)).clamp(low, high);
                 }
                 let tried = self.residuals(structure, &outward(&next)).map(|r| (self.cost(&r) + prior(&next), r));
@@ -343,7 +330,7 @@ impl<'a> Evaluator<'a> {
                         accepted = Some((next, r, c));
                         break;
                     }
-                    _ => lambda = (lambda * 8.0).min(1e9),
+                    _ => lambda = (lambda * tuning().fit.more_damping).min(1e9),
                 }
             }
             let Some((next, r, c)) = accepted else {
@@ -351,16 +338,16 @@ impl<'a> Evaluator<'a> {
                     if stretch >= self.widest {
                         break;
                     }
-                    stretch *= 8.0;
+                    stretch *= tuning().fit.wider;
                 }
                 (jacobian, age, lambda) = (self.all_columns(structure, &own, &residuals, &everything, stretch), 0, lambda.min(1e-1));
                 continue;
             };
             let ratio = (cost - c) / foreseen.max(1e-300);
-            lambda = if ratio > 0.5 { lambda * 0.1 } else { lambda * 0.4 }.max(1e-9);
+            lambda = if ratio > 0.5 { lambda * tuning().fit.less_damping } else { lambda * tuning().fit.keep_damping }.max(1e-9);
             // Far from any end and hardly moving: other structures deserve the time.
-            weak = if cost - c < 2e-3 * cost && unit > 2.0 { weak + 1 } else { 0 };
-            let fresh = ratio < 0.3 || age >= 4;
+            weak = if cost - c < tuning().fit.weak_decrease * cost && unit > tuning().noise.near { weak + 1 } else { 0 };
+            let fresh = ratio < tuning().fit.as_predicted || age >= tuning().fit.secant_steps;
             if !fresh {
                 secant(&mut jacobian, &residuals, &r, &own, &next, &matrix);
             }
@@ -425,14 +412,11 @@ impl<'a> Evaluator<'a> {
 }
 
 /// Weights of an unknown curve that are moved at the same time: which unknown input, which record, and what is left of their number when
-/// divided by [`APART`].
+/// divided by `fit.knots_apart`.
 type Set = (usize, usize, usize);
 
 /// The residuals of a record.
 type Span = std::ops::Range<usize>;
-
-/// How many weights of an unknown curve apart those are that are moved at the same time: each has an effect over four knots, and two more to die.
-const APART: usize = 6;
 
 /// The values in the model of a fit's own.
 fn outward(structure: &Structure, own: &[f64]) -> Vec<f64> {

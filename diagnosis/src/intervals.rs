@@ -4,6 +4,7 @@ use crate::candidate::Candidate;
 use crate::fit::Evaluator;
 use crate::normal_equations::normal_equations;
 use crate::simulate::TWICE;
+use crate::tuning::tuning;
 use crate::work::{Budget, Limit, Steps};
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
@@ -22,12 +23,6 @@ pub struct Spread {
 
 /// 97.5 % of a normal distribution.
 const NORMAL_975: f64 = 1.959_964;
-/// Probability below which numbers lie elsewhere than a fit has them.
-const CHANCE: f64 = 1e-3;
-/// Blocks that each recording's output is divided into, where the scores of a fit are summed.
-const BLOCKS: usize = 25;
-/// What a simulation of all recordings may compute before it counts as slow.
-const SLOW: Steps = 10_000_000;
 
 impl Spread {
     /// From the curvature where the fit ended.
@@ -60,8 +55,8 @@ impl Spread {
         let counted = evaluator.within(Budget::new(Steps::MAX, Limit::default()));
         let Some(residuals) = counted.residuals(structure, &candidate.fit.values) else { return spread };
         // Where simulations are slow, derivatives come from fewer substeps, and finer ones are not tried.
-        let slow = counted.budget.spent() > SLOW;
-        let coarser = Evaluator { substeps: if slow { 8 } else { evaluator.substeps }, ..evaluator.clone() };
+        let slow = counted.budget.spent() > tuning().intervals.slow;
+        let coarser = Evaluator { substeps: if slow { tuning().intervals.slow_substeps } else { evaluator.substeps }, ..evaluator.clone() };
         let Some(there) = (if slow { coarser.residuals(structure, &candidate.fit.values) } else { Some(residuals.clone()) }) else {
             return spread;
         };
@@ -77,7 +72,9 @@ impl Spread {
         let mut scatter = DMatrix::<f64>::zeros(n, n);
         let mut blocks = 0.0f64;
         for (_, _, range) in evaluator.layout() {
-            let length = (range.len() / BLOCKS).max((4.0 * candidate.correlation_time) as usize).clamp(1, range.len().max(1));
+            let length = (range.len() / tuning().intervals.blocks)
+                .max((tuning().intervals.block_correlations * candidate.correlation_time) as usize)
+                .clamp(1, range.len().max(1));
             for from in range.clone().step_by(length) {
                 let to = (from + length).min(range.end);
                 let score = DVector::from_iterator(n, jacobian.iter().map(|c| crate::fit::dot(&c[from..to], &residuals[from..to])));
@@ -101,7 +98,7 @@ impl Spread {
                 spread.deviation[j] = variance.sqrt();
             }
             let prior = structure.numbers[j].prior.is_none() || spread.deviation[j] < 1.0;
-            let moved = if prior { last[j].abs().min(3.0 * spread.deviation[j]) } else { 0.0 };
+            let moved = if prior { last[j].abs().min(tuning().intervals.last_step * spread.deviation[j]) } else { 0.0 };
             spread.bias[j] = moved + numerical.as_ref().map_or(0.0, |d| d[j].abs());
         }
         spread
@@ -120,7 +117,7 @@ impl Spread {
         let known: Vec<(usize, f64)> = others.iter().filter_map(away).collect();
         let correlation = DMatrix::from_fn(known.len(), known.len(), |a, b| self.correlation[(known[a].0, known[b].0)]);
         let square = distance_square(&known.iter().map(|k| k.1).collect::<Vec<f64>>(), correlation);
-        ChiSquared::new(known.len() as f64).is_ok_and(|d| d.sf(square) < CHANCE)
+        ChiSquared::new(known.len() as f64).is_ok_and(|d| d.sf(square) < tuning().claim.significance)
     }
 
     /// Half of a number's 95 % interval, in the fit's own unit.

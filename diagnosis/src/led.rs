@@ -1,24 +1,16 @@
 //! The first part of a race, along the measured path: simulations are short there, fits go far in a step, and what is left over tells laws
 //! apart that a free simulation does not show until all else is right.
 
-use crate::fit::{Effort, Evaluator, Fit};
+use crate::effort::Effort;
+use crate::fit::{Evaluator, Fit};
 use crate::hypothesis::{Hypothesis, Place, inherited};
 use crate::race::{Course, Seed, distinct_fits, hopeful, own_first};
 use crate::structure::Structure;
+use crate::tuning::tuning;
 use crate::work::{Budget, Steps};
 
-/// How many times the best cost ends a race.
-const BEHIND: f64 = 2.5;
-/// Mean squared residual along the measured path up to which a structure may be all that is missing, squares of the floor.
-const CLOSE: f64 = 1.2;
-/// Places whose laws are tried.
-const PLACES: usize = 2;
 /// Share of its cost that a fit may foresee to lose, at most, where it is asked whether it is behind.
 const FORESEEN: f64 = 0.95;
-/// Structures that start from a free simulation beside those that were led.
-const FREE: usize = 2;
-/// Work in which every law at a place takes its first step; starts beyond the first of each come last.
-const LAWS: Steps = 120_000_000;
 
 /// A structure and values to start from.
 pub type Entry = (Structure, Vec<Vec<f64>>);
@@ -31,24 +23,24 @@ impl Course<'_> {
         }
         let mut led = self.lead(self.first_steps(seeds, None), count);
         // Where one law helps another one may be the right one: the places first, then the laws.
-        if led.first().is_some_and(|(_, f)| hopeful(f) > CLOSE * f.residuals.len() as f64) {
+        if led.first().is_some_and(|(_, f)| hopeful(f) > tuning().coupling.complete * f.residuals.len() as f64) {
             let mut places: Vec<Vec<&Place>> = Vec::new();
             let mut laws = Vec::new();
             for (structure, fit) in &led {
                 let at: Vec<&Place> = structure.added.iter().map(|h| &h.place).collect();
-                if places.len() < PLACES && !places.contains(&at) {
+                if places.len() < tuning().search.places && !places.contains(&at) {
                     laws.extend(self.ranked_laws(structure, &fit.values));
                     places.push(at);
                 }
             }
             laws.sort_by_key(|(rank, _)| *rank);
             let laws: Vec<Seed> = laws.into_iter().map(|(_, seed)| seed).collect();
-            led.extend(self.first_steps(&laws, Some(LAWS)));
+            led.extend(self.first_steps(&laws, Some(tuning().search.laws)));
             led = self.lead(led, count);
         }
         led = self.loosen(led, count);
         // What shows best on a free simulation may show little along the path, and several may show there nearly as well.
-        let others = seeds.iter().filter(|s| !s.guided).take(FREE).map(|seed| self.entry(seed));
+        let others = seeds.iter().filter(|s| !s.guided).take(tuning().search.uncoupled).map(|seed| self.entry(seed));
         led.into_iter().map(|(structure, fit)| (structure, vec![fit.values])).chain(others).collect()
     }
 
@@ -74,7 +66,7 @@ impl Course<'_> {
             let (structure, starts) = self.entry(seed);
             let known = Some((&base.structure, &base.fit));
             let start = own_first(&held, known, &structure, starts.first()?.clone());
-            let fit = held.fit_knowing(&structure, &start, Effort { steps: 1, tolerance: 3.0 }, known)?;
+            let fit = held.fit_knowing(&structure, &start, tuning().fit.first_coupled, known)?;
             Some((structure, fit))
         });
         begun.into_iter().flatten().flatten().collect()
@@ -83,9 +75,9 @@ impl Course<'_> {
     /// More steps of fewer; in the end so many, best first.
     fn lead(&self, mut led: Vec<(Structure, Fit)>, count: usize) -> Vec<(Structure, Fit)> {
         let Some((held, _)) = self.along else { return led };
-        for (keep, steps) in [(3 * count, 1), (2 * count, 2), (count + 2, 3)] {
+        for (keep, steps) in [3 * count, 2 * count, count + 2].into_iter().zip(tuning().fit.coupled_steps) {
             rank(&mut led, keep);
-            let effort = Effort { steps, tolerance: 3.0 };
+            let effort = Effort { steps, ..tuning().fit.first_coupled };
             self.go_on(&mut led, |budget, structure, fit| {
                 held.within(budget).fit_knowing(structure, &fit.values, effort, Some((structure, fit)))
             });
@@ -97,9 +89,9 @@ impl Course<'_> {
     /// The same led more loosely: what is left over is less and less the force at hand, more and more the simulation error.
     fn loosen(&self, mut led: Vec<(Structure, Fit)>, count: usize) -> Vec<(Structure, Fit)> {
         let Some((held, _)) = self.along else { return led };
-        let guide = held.guide.as_ref().map(|g| g.with(0.1 * g.strength));
+        let guide = held.guide.as_ref().map(|g| g.with(tuning().coupling.looser * g.strength));
         let held = Evaluator { guide, ..held.clone() };
-        let effort = Effort { steps: 3, tolerance: 3.0 };
+        let effort = tuning().fit.looser;
         self.go_on(&mut led, |budget, structure, fit| held.within(budget).fit(structure, &fit.values, effort));
         rank(&mut led, count);
         led
@@ -153,6 +145,6 @@ fn rank(led: &mut Vec<(Structure, Fit)>, keep: usize) {
     let best = led.first().map_or(0.0, |(_, f)| hopeful(f).max(f.residuals.len() as f64));
     // One that is still on its way is not behind yet, if its next step foresees that it comes near.
     let on_its_way = |f: &Fit| f.cost - f.foreseen.min(FORESEEN * f.cost);
-    led.retain(|(_, f)| on_its_way(f) < BEHIND * best);
+    led.retain(|(_, f)| on_its_way(f) < tuning().search.behind * best);
     led.truncate(keep);
 }

@@ -4,6 +4,7 @@ use crate::candidate::Candidate;
 use crate::intervals::Spread;
 use crate::problem::Problem;
 use crate::structure::Role;
+use crate::tuning::tuning;
 use backdrive_plant::describe::unit_for;
 use backdrive_plant::elements::KINDS;
 use backdrive_plant::model::{InputKind, OutputKind};
@@ -44,9 +45,6 @@ pub struct Pair {
     pub correlation: f64,
 }
 
-/// Standard deviation in the fit's own unit (a factor of e to this power) above which the recordings say little of a number.
-const UNSURE: f64 = 0.7;
-
 /// Every number of a fit.
 pub fn rows(problem: &Problem, candidate: &Candidate, spread: &Spread) -> Vec<Row> {
     // The weights of a curve that nobody measured are no numbers of the device.
@@ -62,8 +60,8 @@ pub fn rows(problem: &Problem, candidate: &Candidate, spread: &Spread) -> Vec<Ro
         let own = number.inward(*value);
         let edge = 1e-6 * (high - low);
         let sure = match (number.log, given) {
-            (true, _) => deviation < UNSURE,
-            (false, Some(given)) => deviation < UNSURE * given.abs().max(value.abs()),
+            (true, _) => deviation < tuning().claim.undetermined,
+            (false, Some(given)) => deviation < tuning().claim.undetermined * given.abs().max(value.abs()),
             (false, None) => deviation < 0.25 * (high - low),
         };
         Row {

@@ -8,6 +8,7 @@ use crate::guide::Guide;
 use crate::problem::Record;
 use crate::simulate::{Conditions, motion_at};
 use crate::structure::Structure;
+use crate::tuning::tuning;
 use backdrive_plant::set::Initial;
 use rayon::prelude::*;
 use std::ops::Range;
@@ -33,7 +34,7 @@ impl Parts {
         }
         let model = structure.model(problem, &fit.values)?;
         // Led firmly, so that a part begins as it was measured and not as a model has it that lacks something.
-        let firm = evaluator.guide.as_ref().map(|g| g.with(FIRM * g.strength));
+        let firm = evaluator.guide.as_ref().map(|g| g.with(tuning().coupling.firm * g.strength));
         let layout = evaluator.layout();
         // No part can begin with a memory of what came before.
         let remembers = model.elements.iter().any(|e| e.law.memory_len() > 0);
@@ -41,13 +42,13 @@ impl Parts {
             .iter()
             .enumerate()
             .map(|(r, record)| {
-                let length = (record.len * samples / total).clamp(record.len.min(SHORTEST), record.len);
+                let length = (record.len * samples / total).clamp(record.len.min(tuning().coupling.shortest), record.len);
                 let columns: Vec<&[f64]> = layout.iter().filter(|l| l.0 == r).filter_map(|l| fit.residuals.get(l.2.clone())).collect();
                 let stride = (length / 8).max(1);
                 let energy = |from: usize| columns.iter().filter_map(|c| c.get(from..from + length)).map(|c| dot(c, c)).sum::<f64>();
                 let from = (0..=record.len - length).step_by(stride).max_by(|a, b| energy(*a).total_cmp(&energy(*b))).unwrap_or(0);
                 // Of the same number of samples, less the first that do not count.
-                let early = remembers || energy(0) > (1.0 - FORGOTTEN) * energy(from) * ENOUGH;
+                let early = remembers || energy(0) > (1.0 - tuning().coupling.transient) * energy(from) * tuning().coupling.beginning;
                 if early { 0..length } else { from..from + length }
             })
             .collect();
@@ -68,7 +69,7 @@ impl Parts {
                     at,
                 )?,
             };
-            let skip = if range.start == 0 { 0 } else { (FORGOTTEN * range.len() as f64) as usize };
+            let skip = if range.start == 0 { 0 } else { (tuning().coupling.transient * range.len() as f64) as usize };
             Some(records[r].part(range.clone(), begins, skip))
         };
         let parts = ranges.par_iter().enumerate().map(cut).collect::<Vec<_>>().into_iter().collect::<Option<Vec<Record>>>()?;
@@ -81,12 +82,3 @@ impl Parts {
         Evaluator { records: &self.records, guide: self.guide.clone(), ..of.clone() }
     }
 }
-
-/// Share of a part that does not begin where its recording does, until what came before is forgotten.
-const FORGOTTEN: f64 = 0.3;
-/// Share of the most that a part could show which is enough for one that begins where its recording does.
-const ENOUGH: f64 = 0.4;
-/// How much more firmly the way to a part's beginning is led.
-const FIRM: f64 = 30.0;
-/// Samples of a part, at least.
-const SHORTEST: usize = 256;

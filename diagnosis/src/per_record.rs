@@ -2,11 +2,12 @@
 //! of a wrong structure, for a device has one set of numbers.
 
 use crate::candidate::{Candidate, candidate};
-use crate::fit::{Effort, Evaluator};
+use crate::fit::Evaluator;
 use crate::intervals::Spread;
 use crate::numbers::name_of;
 use crate::problem::{Problem, Record};
 use crate::structure::{Role, Structure};
+use crate::tuning::tuning;
 use crate::work::Budget;
 use serde::Serialize;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
@@ -46,11 +47,6 @@ pub struct PerRecord {
     pub numbers: Vec<Across>,
 }
 
-/// Probability below which records disagree, over all numbers together.
-const SURPRISE: f64 = 1e-3;
-/// Standard deviation in the fit's own unit above which a record says little of a number by itself.
-const UNSURE: f64 = 0.5;
-
 /// Fits the structure of `joint` to each record by itself, from the joint values on. `floor` is the measuring error of each output, in
 /// its unit. Fits end early once the budget is used up.
 pub fn fit_each<'a>(problem: &'a Problem, joint: &Candidate, floor: &[f64], budget: &Budget<'a>) -> PerRecord {
@@ -65,7 +61,7 @@ pub fn fit_each<'a>(problem: &'a Problem, joint: &Candidate, floor: &[f64], budg
         let here: Vec<(Role, f64)> =
             own.iter().filter(|(role, _)| role.in_record(*index) == *role).map(|(role, value)| (role.in_record(0), *value)).collect();
         let start = structure.values(problem, &stated, &added, &here);
-        let fit = evaluator.fit(&structure, &start, Effort { steps: 25, tolerance: 0.3 })?;
+        let fit = evaluator.fit(&structure, &start, tuning().fit.per_record)?;
         let candidate = candidate(&evaluator, structure, fit);
         let spread = Spread::of(&candidate);
         Some((record.name.clone(), candidate, spread))
@@ -85,7 +81,7 @@ fn across(problem: &Problem, joint: &Candidate, index: usize, role: &Role, fits:
         let (number, value) = (candidate.structure.numbers.get(place)?, *candidate.fit.values.get(place)?);
         let deviation = spread.deviation.get(place).copied().unwrap_or(f64::INFINITY);
         let scale = if number.log { 1.0 } else { value.abs() };
-        let determined = deviation > 0.0 && deviation < UNSURE * scale;
+        let determined = deviation > 0.0 && deviation < tuning().claim.undetermined_alone * scale;
         if determined {
             points.push((number.inward(value), deviation));
         }
@@ -110,7 +106,7 @@ fn disagreement(points: &[(f64, f64)]) -> (f64, f64) {
 impl PerRecord {
     /// Numbers in which the records disagree by more than chance, the clearest first.
     pub fn disagreements(&self) -> Vec<&Across> {
-        let each = SURPRISE / self.numbers.len().max(1) as f64;
+        let each = tuning().claim.significance / self.numbers.len().max(1) as f64;
         let mut all: Vec<&Across> = self.numbers.iter().filter(|n| n.p_value < each).collect();
         all.sort_by(|a, b| b.chi_square.total_cmp(&a.chi_square));
         all

@@ -1,11 +1,13 @@
 //! Many structures, fitted a little each; the better ones more, the best to their end.
 
-use crate::candidate::{Candidate, MIDDLE, NEAR, candidate, key_of};
-use crate::fit::{Effort, Evaluator, Fit};
+use crate::candidate::{Candidate, candidate, key_of};
+use crate::effort::Effort;
+use crate::fit::{Evaluator, Fit};
 use crate::hypothesis::Hypothesis;
 use crate::problem::{Problem, Record};
 use crate::screen::worst_records;
 use crate::structure::{Role, Structure};
+use crate::tuning::tuning;
 use backdrive_plant::set::Initial;
 use std::collections::HashSet;
 
@@ -78,7 +80,7 @@ impl Course<'_> {
             let coarse = coarse.within(budget.clone());
             // Along the path the numbers have moved far from where the nominal model's derivatives hold.
             let known = if self.along.is_some() { None } else { Some((&self.nominal.structure, &nominal_there)) };
-            let effort = Effort { steps: 2, tolerance: 3.0 };
+            let effort = tuning().fit.first;
             let starts = starts.iter().cloned().map(|start| {
                 let problem = evaluator.problem;
                 let numbers = (structure.stated_of(problem, &start), structure.added_of(&start));
@@ -92,11 +94,12 @@ impl Course<'_> {
             Some((structure.clone(), best))
         });
         let mut running: Vec<(Structure, Fit)> = begun.into_iter().flatten().flatten().collect();
-        let middle = Evaluator { substeps: MIDDLE.max(self.coarse), widest: 8.0, ..evaluator.clone() };
+        let middle =
+            Evaluator { substeps: tuning().fit.middle_substeps.max(self.coarse), widest: tuning().fit.widest_midway, ..evaluator.clone() };
         let stages = [
-            (if self.along.is_some() { 0 } else { keep[0] + 4 }, &coarse, Effort { steps: 3, tolerance: 2.0 }),
-            (keep[0], &middle, Effort { steps: 5, tolerance: 1.0 }),
-            (keep[1], evaluator, Effort { steps: 30, tolerance: 0.3 }),
+            (if self.along.is_some() { 0 } else { keep[0] + 4 }, &coarse, tuning().fit.early),
+            (keep[0], &middle, tuning().fit.middle),
+            (keep[1], evaluator, tuning().fit.late),
         ];
         for (stage, (count, held_against, effort)) in stages.into_iter().enumerate().filter(|(_, s)| s.0 > 0) {
             running.sort_by(|a, b| hopeful(&a.1).total_cmp(&hopeful(&b.1)));
@@ -104,11 +107,16 @@ impl Course<'_> {
             // Once one is near its end, those far behind have no chance.
             let best = running.first().map_or(0.0, |(_, f)| hopeful(f));
             let floor = running.first().map_or(0.0, |(_, f)| f.residuals.len() as f64);
-            let margin = if best < 1.2 * floor { 1.3 } else { 4.0 };
+            let margin =
+                if best < tuning().search.best_at_noise * floor { tuning().search.behind_at_noise } else { tuning().search.behind_far };
             let mut place = 0..;
-            running.retain(|(_, f)| place.next() < Some(ALWAYS) || hopeful(f) < margin * best.max(floor) || best > 4.0 * floor);
+            running.retain(|(_, f)| {
+                place.next() < Some(tuning().search.always)
+                    || hopeful(f) < margin * best.max(floor)
+                    || best > tuning().search.behind_far * floor
+            });
             // Far from the noise there is more to come: nothing is decided by the last steps.
-            if stage == 2 && best > NEAR * floor {
+            if stage == 2 && best > tuning().noise.near * floor {
                 break;
             }
             // In the last stage those behind are kept as they are: they are rivals, if beaten ones.
@@ -121,7 +129,7 @@ impl Course<'_> {
                 if beaten && hopeful(fit) > margin * lead {
                     return None;
                 }
-                let effort = if beaten { Effort { steps: 6, ..effort } } else { effort };
+                let effort = if beaten { Effort { steps: tuning().fit.beaten_steps, ..effort } } else { effort };
                 held_against.within(budget.clone()).fit_knowing(structure, &fit.values, effort, Some((structure, fit)))
             });
             for ((_, fit), next) in running.iter_mut().zip(next) {
@@ -153,7 +161,7 @@ pub(crate) fn own_first(evaluator: &Evaluator, known: Option<(&Structure, &Fit)>
         return start;
     }
     let only = Evaluator { own_only: true, ..evaluator.clone() };
-    only.fit_knowing(structure, &start, Effort { steps: 4, tolerance: 3.0 }, known).map_or(start, |fit| fit.values)
+    only.fit_knowing(structure, &start, tuning().fit.of_records, known).map_or(start, |fit| fit.values)
 }
 
 /// Keeps the first fit of each structure.
@@ -170,9 +178,6 @@ fn restricted(evaluator: &Evaluator, fit: &Fit, records: &[usize]) -> Fit {
     };
     Fit { residuals: pick(&fit.residuals), jacobian: fit.jacobian.iter().map(pick).collect(), ..fit.clone() }
 }
-
-/// Those that go on whatever the best has reached: after two steps a fit may be far from its end.
-const ALWAYS: usize = 3;
 
 /// What a fit would cost if most of what its next step foresees came true.
 pub fn hopeful(fit: &Fit) -> f64 {

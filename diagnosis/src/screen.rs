@@ -3,6 +3,7 @@
 use crate::fit::{Evaluator, Fit, dot};
 use crate::hypothesis::Hypothesis;
 use crate::structure::Structure;
+use crate::tuning::tuning;
 use crate::work::Steps;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -19,11 +20,6 @@ pub struct Promise {
     /// Its effects, with what the free numbers can do taken out.
     columns: Vec<Vec<f64>>,
 }
-
-/// Residuals kept for screening, at most.
-const KEPT: usize = 16_000;
-/// Strength of a weak effect beside a full one.
-const WEAK: f64 = 0.15;
 
 /// What is left of columns when everything that the fit's numbers can do is taken out.
 struct Projector {
@@ -59,8 +55,8 @@ impl Projector {
 /// Values between none and all of an effect.
 fn weakened(hypothesis: &Hypothesis, values: &[f64]) -> Vec<f64> {
     let one = |(p, v): (&crate::hypothesis::Parameter, &f64)| match p.neutral {
-        Some(neutral) if neutral.is_infinite() => (v / WEAK).clamp(p.range.0, p.range.1),
-        Some(neutral) => (neutral + WEAK * (v - neutral)).clamp(p.range.0, p.range.1),
+        Some(neutral) if neutral.is_infinite() => (v / tuning().screening.weak).clamp(p.range.0, p.range.1),
+        Some(neutral) => (neutral + tuning().screening.weak * (v - neutral)).clamp(p.range.0, p.range.1),
         None => *v,
     };
     hypothesis.parameters.iter().zip(values).map(one).collect()
@@ -95,14 +91,11 @@ struct Effect {
     length: f64,
 }
 
-/// Starts that pass to the second pass.
-const STARTS: usize = 70;
-
 impl Screen {
     /// Simulates every hypothesis beside a base: all starts on the two recordings that are explained worst, the best ones on all.
     /// With about so much work: where that is little, fewer starts of each are tried.
     pub fn new(evaluator: &Evaluator, base: &Structure, fit: &Fit, hypotheses: &[Hypothesis], work: Steps) -> Screen {
-        let stride = fit.residuals.len().div_ceil(KEPT).max(1);
+        let stride = fit.residuals.len().div_ceil(tuning().screening.residuals).max(1);
         let problem = evaluator.problem;
         let (stated, added, own) = (base.stated_of(problem, &fit.values), base.added_of(&fit.values), base.of_records(&fit.values));
         // What a simulation of a recording takes, by a sample of the hypotheses: nonlinear ones are slower than a linear base.
@@ -134,7 +127,7 @@ impl Screen {
         // First starts first: where simulations are slower than the sample, the last ones are left out.
         let rank = |(index, start): &(usize, &Vec<f64>)| hypotheses[*index].starts.iter().position(|s| std::ptr::eq(s, *start));
         jobs.sort_by_key(rank);
-        let most = (affordable / (2 * evaluator.records.len()).max(1)).clamp(24, STARTS);
+        let most = (affordable / (2 * evaluator.records.len()).max(1)).clamp(24, tuning().screening.starts);
         let with = |index: usize| {
             let mut with = base.added.clone();
             with.push(hypotheses[index].clone());
@@ -264,7 +257,7 @@ fn share(columns: &[&Vec<f64>], left: &[f64], total: f64) -> f64 {
     }
     let size: Vec<f64> = columns.iter().map(|c| dot(c, c).sqrt().max(1e-300)).collect();
     // An effect that the free numbers imitate to a thousandth is not there to be seen.
-    if size.iter().all(|s| *s < 1e-3) {
+    if size.iter().all(|s| *s < tuning().screening.imitated) {
         return 0.0;
     }
     let gram = DMatrix::from_fn(n, n, |i, j| dot(columns[i], columns[j]) / (size[i] * size[j]) + if i == j { 1e-4 } else { 0.0 });
@@ -283,7 +276,7 @@ pub fn pairs(
     count: usize,
     compatible: impl Fn(usize, usize) -> bool,
 ) -> Vec<(usize, usize, f64)> {
-    let stride = fit.residuals.len().div_ceil(KEPT).max(1);
+    let stride = fit.residuals.len().div_ceil(tuning().screening.residuals).max(1);
     let mut left: Vec<f64> = fit.residuals.iter().step_by(stride).copied().collect();
     let total = dot(&left, &left);
     Projector::new(jacobian, stride).apply(&mut left);

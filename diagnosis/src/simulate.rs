@@ -10,9 +10,6 @@ use backdrive_plant::stepper::{Options, Plant, Segment, ahead, segments};
 /// What it takes to set a simulation up.
 const SETTING_UP: Steps = 200;
 
-/// Substeps per sample, at most, whatever the model asks for.
-pub const FINEST: usize = 64;
-
 /// As a number of substeps: twice as many as the model asks for.
 pub const TWICE: usize = usize::MAX;
 

@@ -1,6 +1,7 @@
 //! Correlated residuals: how many independent samples they are worth, and what an improvement among them says.
 
 use crate::fit::Evaluator;
+use crate::tuning::tuning;
 
 /// Correlation time of residuals in samples, at least 1: one residual in so many counts. Lags up to the first correlation that is
 /// not positive, over each recording's output apart, weighed by what they cost.
@@ -41,7 +42,7 @@ fn time_of(part: &[f64], energy: f64) -> f64 {
 pub fn slowness(evaluator: &Evaluator, residuals: &[f64]) -> f64 {
     let layout = evaluator.layout();
     let parts: Vec<&[f64]> = layout.iter().filter_map(|(_, _, range)| residuals.get(range.clone())).collect();
-    BLOCKS.into_iter().map(|length| slow_by(&parts, length)).fold(0.0, f64::max)
+    tuning().noise.blocks.into_iter().map(|length| slow_by(&parts, length)).fold(0.0, f64::max)
 }
 
 /// How much larger sums over blocks of so many samples are than those of white noise, in standard deviations.
@@ -50,7 +51,7 @@ fn slow_by(parts: &[&[f64]], length: usize) -> f64 {
     for part in parts {
         let blocks = part.len() / length;
         let power = part.iter().map(|x| x * x).sum::<f64>() / part.len().max(1) as f64;
-        if blocks < FEWEST_BLOCKS || power <= 0.0 {
+        if blocks < tuning().noise.fewest_blocks || power <= 0.0 {
             continue;
         }
         let sums = part.chunks_exact(length).map(|block| block.iter().sum::<f64>().powi(2) / (length as f64 * power));
@@ -59,11 +60,6 @@ fn slow_by(parts: &[&[f64]], length: usize) -> f64 {
     }
     if variance > 0.0 { surplus / variance.sqrt() } else { 0.0 }
 }
-
-/// Lengths of blocks, samples.
-const BLOCKS: [usize; 4] = [4, 16, 64, 256];
-/// Fewer blocks in a recording say little.
-const FEWEST_BLOCKS: usize = 12;
 
 /// Root mean square of the residuals of each output, in floors; 0 where none was measured.
 pub fn levels(evaluator: &Evaluator, residuals: &[f64]) -> Vec<f64> {

@@ -4,6 +4,7 @@ use crate::guide::Guide;
 use crate::hypothesis::Hypothesis;
 use crate::problem::{Problem, Record, Stated};
 use crate::simulate::{Conditions, Curve, Start, predict_under};
+use crate::tuning::tuning;
 use crate::unknown::Unknown;
 use crate::work::Budget;
 use backdrive_plant::model::Model;
@@ -58,11 +59,6 @@ pub struct Number {
     /// What it would be without data, and how sure that is, in the fit's own unit: holds what the recordings say nothing of.
     pub prior: Option<(f64, f64)>,
 }
-
-/// Step of differences by a number that shifts a signal, sample periods: behind a zero hold less than a sample has no gradient.
-const WITHIN_A_SAMPLE: f64 = 0.7;
-/// How far, as a factor e^2, a stated number may be off without surprise: only numbers that the recordings do not determine feel it.
-const PRIOR_SPREAD: f64 = 2.0;
 
 impl Number {
     /// From the value in the model to the fit's own unit.
@@ -128,9 +124,9 @@ impl Structure {
                 let width = (parameter.range.1 - parameter.range.0).abs();
                 let size = hypothesis.starts.iter().filter_map(|s| s.get(p)).fold(0.0f64, |a, x| a.max(x.abs())).min(width);
                 let step = match () {
-                    () if parameter.in_samples => WITHIN_A_SAMPLE * period,
-                    () if parameter.log => 1e-3,
-                    () if size > 0.0 && size.is_finite() => 1e-3 * size,
+                    () if parameter.in_samples => tuning().fit.difference_of_delay * period,
+                    () if parameter.log => tuning().fit.difference,
+                    () if size > 0.0 && size.is_finite() => tuning().fit.difference * size,
                     () => 1e-5 * width,
                 };
                 numbers.push(Number {
@@ -158,7 +154,7 @@ impl Structure {
                 let later = (r + 1..records.len()).filter(session);
                 let given = problem.model.values_at(path).ok().and_then(|v| v.first().copied()).unwrap_or(0.0);
                 let (range, log) = if given > 0.0 { ((given / 1e3, given * 1e3), true) } else { ((-1e6, 1e6), false) };
-                let step = if log { 1e-3 } else { 1e-6 };
+                let step = if log { tuning().fit.difference } else { 1e-6 };
                 numbers.push(Number {
                     role: Role::Condition(path.clone(), r),
                     range,
@@ -302,13 +298,10 @@ fn estimated(condition: &Condition) -> bool {
 fn stated_number(index: usize, stated: &Stated) -> Number {
     let (range, log) = (stated.range, stated.log);
     let centre = if log { stated.given.ln() } else { stated.given };
-    let spread = if log { PRIOR_SPREAD } else { 2.0 * stated.given.abs() };
-    let step = if log { 1e-3 } else { 1e-3 * stated.given.abs() };
+    let spread = if log { tuning().fit.prior } else { 2.0 * stated.given.abs() };
+    let step = if log { tuning().fit.difference } else { tuning().fit.difference * stated.given.abs() };
     Number { role: Role::Stated(index), range, log, step, coarse: false, records: None, prior: Some((centre, spread)) }
 }
-
-/// How far an unknown input may go, in sizes of what was measured; a fit moves it by a hundredth of that without surprise.
-const UNKNOWN_REACH: f64 = 100.0;
 
 /// The weights of the unknown inputs in a record.
 fn knots<'a>(problem: &'a Problem, record: &'a Record, r: usize) -> impl Iterator<Item = Number> + 'a {
@@ -316,12 +309,12 @@ fn knots<'a>(problem: &'a Problem, record: &'a Record, r: usize) -> impl Iterato
         let size = unknown.scale(problem);
         (0..unknown.knots(record)).map(move |k| Number {
             role: Role::Knot(index, k, r),
-            range: (-UNKNOWN_REACH * size, UNKNOWN_REACH * size),
+            range: (-tuning().fit.unknown_range * size, tuning().fit.unknown_range * size),
             log: false,
-            step: 1e-3 * size,
+            step: tuning().fit.difference * size,
             coarse: false,
             records: Some(vec![r]),
-            prior: Some((0.0, 0.01 * UNKNOWN_REACH * size)),
+            prior: Some((0.0, 0.01 * tuning().fit.unknown_range * size)),
         })
     })
 }

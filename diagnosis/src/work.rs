@@ -4,6 +4,7 @@
 //! that what it says does not depend on which of two threads was faster: tasks that run side by side each count for themselves, and are added up
 //! when their group is done ([`Budget::abreast`]). Seconds end a search only as a limit from outside, and then the budget remembers that they did.
 
+use crate::tuning::tuning;
 use rayon::prelude::*;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -11,14 +12,6 @@ use std::time::Instant;
 
 /// Steps of a linear network.
 pub type Steps = u64;
-
-/// About how many of them a second of two threads takes, where something has to be said in seconds: for progress bars only.
-pub const PER_SECOND: f64 = 60e6;
-
-/// Tasks of a group that run side by side before their work is added up: enough for eight processors, each of which has a second task to go on with.
-const GROUP: usize = 16;
-/// Share of what is left of a budget that one task of a group may take.
-const OF_ONE: f64 = 0.25;
 
 /// What ends work from outside, whatever is left of a budget.
 #[derive(Debug, Clone, Copy, Default)]
@@ -120,12 +113,16 @@ impl<'a> Budget<'a> {
     /// it is used up: in the place of those stands `None`.
     pub fn abreast<T: Sync, R: Send>(&self, tasks: &[T], run: impl Fn(&Budget<'a>, &T) -> R + Sync) -> Vec<Option<R>> {
         let mut done = Vec::with_capacity(tasks.len());
-        for group in tasks.chunks(GROUP) {
+        for group in tasks.chunks(tuning().search.abreast.max(1)) {
             if self.is_over() {
                 break;
             }
             let (from, simulations) = (self.spent(), self.simulations());
-            let share = if group.len() as f64 * OF_ONE > 1.0 { (self.left() as f64 * OF_ONE) as Steps } else { self.left() };
+            let share = if group.len() as f64 * tuning().search.of_one > 1.0 {
+                (self.left() as f64 * tuning().search.of_one) as Steps
+            } else {
+                self.left()
+            };
             let own = |task: &T| {
                 let budget = Budget {
                     spent: Arc::new(AtomicU64::new(from)),

@@ -1,12 +1,13 @@
 //! Devices of known physics: what was left out is named, and nothing is named where nothing was.
 
 use backdrive_diagnosis::compare::unseen;
-use backdrive_diagnosis::fit::{Effort, Evaluator};
+use backdrive_diagnosis::fit::Evaluator;
 use backdrive_diagnosis::hypothesis::Place;
 use backdrive_diagnosis::intervals::Spread;
 use backdrive_diagnosis::problem::{Problem, Record};
 use backdrive_diagnosis::search::{Settings, search};
 use backdrive_diagnosis::structure::Structure;
+use backdrive_diagnosis::tuning::tuning;
 use backdrive_diagnosis::verdict::{Files, Finding, Parameter, Verdict, Word, verdict};
 use backdrive_diagnosis::work::Limit;
 use backdrive_plant::model::Model;
@@ -95,7 +96,7 @@ fn refitted_numbers_lie_in_their_intervals() {
     let evaluator = Evaluator::new(&problem);
     let structure = Structure::new(&problem, &problem.fit, Vec::new());
     let given: Vec<f64> = problem.stated.iter().map(|s| s.given).collect();
-    let fit = evaluator.fit(&structure, &structure.values(&problem, &given, &[], &[]), Effort::FULL).unwrap();
+    let fit = evaluator.fit(&structure, &structure.values(&problem, &given, &[], &[]), tuning().fit.to_the_end).unwrap();
     let level = (fit.cost / fit.residuals.len() as f64).sqrt();
     assert!(level < 1.1, "{level} floors");
     let candidate = backdrive_diagnosis::candidate::Candidate {

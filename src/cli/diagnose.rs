@@ -1,6 +1,6 @@
 //! Options of `backdrive diagnose`.
 
-use super::values::{PATIENCE, positive};
+use super::values::{patience, positive};
 use backdrive_diagnosis::physics::{PHYSICS, physics_named};
 use clap::Args;
 use std::path::PathBuf;
@@ -47,7 +47,7 @@ pub struct Diagnose {
     #[arg(long, value_name = "FACTOR", value_parser = positive, default_value_t = 1.0, allow_negative_numbers = true)]
     pub effort: f64,
     /// A limit on the clock. Where it cuts the search off, the verdict may depend on the machine, and says so.
-    #[arg(long, value_name = "SECONDS", value_parser = positive, default_value_t = PATIENCE, allow_negative_numbers = true)]
+    #[arg(long, value_name = "SECONDS", value_parser = positive, default_value_t = patience(), allow_negative_numbers = true)]
     pub patience: f64,
     /// Print what the search tried, what it cost and why it lost.
     #[arg(long, conflicts_with = "json")]

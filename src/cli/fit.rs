@@ -1,6 +1,6 @@
 //! Options of `backdrive fit`.
 
-use super::values::{PATIENCE, positive};
+use super::values::{patience, positive};
 use clap::Args;
 use std::path::PathBuf;
 
@@ -38,7 +38,7 @@ pub struct Fit {
     #[arg(long, value_name = "FACTOR", value_parser = positive, default_value_t = 1.0, allow_negative_numbers = true)]
     pub effort: f64,
     /// A limit on the clock. What it cuts off may differ from machine to machine.
-    #[arg(long, value_name = "SECONDS", value_parser = positive, default_value_t = PATIENCE, allow_negative_numbers = true)]
+    #[arg(long, value_name = "SECONDS", value_parser = positive, default_value_t = patience(), allow_negative_numbers = true)]
     pub patience: f64,
     /// Print the result as JSON.
     #[arg(long)]

@@ -1,6 +1,6 @@
 //! Options of `backdrive prove`.
 
-use super::values::{PATIENCE, positive};
+use super::values::{patience, positive};
 use clap::{Args, ValueEnum};
 use std::path::PathBuf;
 
@@ -56,7 +56,7 @@ pub struct Prove {
     #[arg(long, value_name = "FACTOR", value_parser = positive, default_value_t = 1.0)]
     pub effort: f64,
     /// A limit on the clock for each diagnosis.
-    #[arg(long, value_name = "SECONDS", value_parser = positive, default_value_t = PATIENCE)]
+    #[arg(long, value_name = "SECONDS", value_parser = positive, default_value_t = patience())]
     pub patience: f64,
     /// Whether the bags hold what the hand wants: in a real session nobody measures it.
     #[arg(long, value_name = "WHICH", value_enum, default_value_t = Operator::Half)]

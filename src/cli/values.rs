@@ -3,7 +3,9 @@
 use backdrive_nodes::graph::MAX_RATE_HZ;
 
 /// s, how long a search may take on the clock where nothing else is said: the library's own.
-pub const PATIENCE: f64 = backdrive_diagnosis::search::PATIENCE.as_secs() as f64;
+pub fn patience() -> f64 {
+    backdrive_diagnosis::search::Settings::default().patience.as_secs_f64()
+}
 
 /// A finite number.
 pub fn number(text: &str) -> Result<f64, String> {

@@ -4,9 +4,10 @@ use crate::run::{Ask, LIKELY, diagnose, diagnosed_model, findings, instead, para
 use crate::table::Report;
 use crate::{Context, Study, StudyError, csv_columns};
 use backdrive_diagnosis::compare::{predictions, qualities};
-use backdrive_diagnosis::fit::{Effort, Evaluator};
+use backdrive_diagnosis::fit::Evaluator;
 use backdrive_diagnosis::problem::{Problem, Record};
 use backdrive_diagnosis::structure::{Role, Structure};
+use backdrive_diagnosis::tuning::tuning;
 use backdrive_diagnosis::verdict::MODEL_FILE;
 use backdrive_plant::model::Model;
 
@@ -244,7 +245,7 @@ fn with_own_friction(context: &Context, model: &Model, file: &str) -> Result<([f
     let own = Structure::new(&fixed, &fixed.held_out, Vec::new());
     let start = own.values(&fixed, &[], &[], &[]);
     let failed = || StudyError::Diagnosis(format!("{file}: the model cannot be simulated"));
-    let fit = Evaluator::on(&fixed, &fixed.held_out).fit(&own, &start, Effort::FULL).ok_or_else(failed)?;
+    let fit = Evaluator::on(&fixed, &fixed.held_out).fit(&own, &start, tuning().fit.to_the_end).ok_or_else(failed)?;
     let value = |path: &str| {
         let at = own.numbers.iter().position(|n| matches!(&n.role, Role::Condition(p, _) if p == path));
         at.and_then(|i| fit.values.get(i).copied()).unwrap_or(f64::NAN)

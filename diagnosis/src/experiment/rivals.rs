@@ -1,7 +1,8 @@
 //! Fitted structures on an experiment that was not made yet: what each predicts, and how far one can imitate another.
 
 use super::menu::{Play, Stand, constant, scaled};
-use crate::fit::{Effort, Evaluator, Fit, dot, measured};
+use crate::effort::Effort;
+use crate::fit::{Evaluator, Fit, dot, measured};
 use crate::normal_equations::normal_equations;
 use crate::problem::{Problem, Record};
 use crate::simulate::{Conditions, predict_under};

@@ -1,10 +1,11 @@
 //! Experiments chosen for devices of known physics, and what they then show.
 
 use super::*;
-use crate::fit::{Effort, Fit};
+use crate::fit::Fit;
 use crate::hypothesis::{Hypothesis, Scales};
 use crate::physics;
 use crate::problem::Record;
+use crate::tuning::tuning;
 use backdrive_plant::excitation::load_experiments;
 use backdrive_plant::recording::Recording;
 use backdrive_plant::set::Initial;
@@ -91,7 +92,7 @@ fn fitted(problem: &Problem, ids: &[&str]) -> (Structure, Fit) {
             structure.values(problem, &given, &added.iter().map(|h| h.starts[s.min(h.starts.len() - 1)].clone()).collect::<Vec<_>>(), &[])
         })
         .collect();
-    let fit = Evaluator::new(problem).best_of(&structure, &starts, Effort::FULL).unwrap();
+    let fit = Evaluator::new(problem).best_of(&structure, &starts, tuning().fit.to_the_end).unwrap();
     (structure, fit)
 }
 
@@ -124,7 +125,7 @@ fn dry_and_viscous_friction_are_told_apart_by_as_much_as_was_said() {
         let driven = columns(&found.text, &problem.model);
         problem.fit.push(record(&device, &problem.model, &driven, noise, 7));
         let evaluator = Evaluator::new(&problem);
-        let cost = |s: &(Structure, Fit)| evaluator.fit(&s.0, &s.1.values, Effort::FULL).unwrap().cost;
+        let cost = |s: &(Structure, Fit)| evaluator.fit(&s.0, &s.1.values, tuning().fit.to_the_end).unwrap().cost;
         let seen = cost(&wrong) - cost(&right);
         let said = found.separation.powi(2);
         println!("{truth}: said {said:.0}, seen {seen:.0}");

@@ -3,31 +3,23 @@
 use super::nominal::{Nominal, to_its_end};
 use super::revive::revived;
 use super::share::Work;
-use crate::candidate::{BLUR, Candidate, MIDDLE, candidate, done, key_of, sort};
+use crate::candidate::{Candidate, candidate, done, key_of, sort};
 use crate::compare::unseen;
-use crate::fit::{Effort, Evaluator, Fit};
+use crate::fit::{Evaluator, Fit};
 use crate::hypothesis::{self, Hypothesis};
 use crate::physics;
 use crate::race::Course;
 use crate::structure::Structure;
+use crate::tuning::tuning;
 use crate::work::Budget;
 use rayon::prelude::*;
-
-/// Steps from the best to something simpler, at most.
-const SIMPLER: usize = 3;
-/// The last steps of those that could still win.
-const POLISH: Effort = Effort { steps: 15, tolerance: 0.3 };
-/// Share of the time in which fits that too few substeps have blurred go on.
-const REFITTED: f64 = 0.1;
-/// Structures of so many effects that are held against recordings that no fit has seen.
-const FINALISTS: usize = 8;
 
 /// An effect may only have led the rest out of a wrong valley: each of the best's is left out again, the others from where they are now; and a law of many
 /// numbers has to win over those that it contains. One such step may open the next.
 pub(super) fn make_simpler(course: &Course, found: &mut Vec<Candidate>, work: &Work) {
     let samples = course.nominal.fit.residuals.len();
-    let last = course.evaluator.within(work.up_to(0.95));
-    for _ in 0..SIMPLER {
+    let last = course.evaluator.within(work.up_to(tuning().search.best_end));
+    for _ in 0..tuning().search.simpler {
         let before = found.first().map(|c| key_of(&c.structure.added));
         let mut starts = fewer(course, found);
         if !done(found, course.nominal, samples) {
@@ -44,23 +36,23 @@ pub(super) fn make_simpler(course: &Course, found: &mut Vec<Candidate>, work: &W
 /// Brings those that could still win, or tie with the best, to their ends. Far from the noise a fit may have ended at parameters that make up for
 /// what few substeps err by: it is judged, and goes on, with as many as the model asks for, even where the time is up.
 pub(super) fn bring_to_their_ends(evaluator: &Evaluator, found: &mut [Candidate], samples: usize, work: &Work) {
-    let exact_end = work.share(0.95).max(work.budget.spent() + work.share(REFITTED));
-    let (last, exact) = (work.up_to(0.95), work.budget.extended(exact_end));
+    let exact_end = work.share(tuning().search.best_end).max(work.budget.spent() + work.share(tuning().search.refitted));
+    let (last, exact) = (work.up_to(tuning().search.best_end), work.budget.extended(exact_end));
     let best = found.first().map_or(f64::INFINITY, |c| c.fit.cost);
     let unit = best / samples as f64;
     let open = |c: &Candidate| c.fit.foreseen > 0.5 * unit && c.fit.cost - 2.0 * c.fit.foreseen < best + 20.0 * unit * c.correlation_time;
-    let near: Vec<usize> = (0..found.len().min(6)).filter(|i| found[*i].fit.cost < 1.5 * best).collect();
+    let near: Vec<usize> = (0..found.len().min(tuning().search.last_fits)).filter(|i| found[*i].fit.cost < 1.5 * best).collect();
     let polish = |budget: &Budget, i: usize| -> Option<(usize, Fit)> {
         let c = &found[i];
         let evaluator = evaluator.within(budget.clone());
         let cost = evaluator.residuals(&c.structure, &c.fit.values).map_or(f64::INFINITY, |r| evaluator.cost(&r));
-        let is_blurred = (cost - c.fit.cost).abs() > BLUR * c.fit.cost;
+        let is_blurred = (cost - c.fit.cost).abs() > tuning().screening.substep_error * c.fit.cost;
         let by = match (is_blurred, open(c)) {
             (true, _) => budget.clone(),
             (false, true) => budget.until(last.end()),
             (false, false) => return None,
         };
-        Some((i, evaluator.within(by).fit(&c.structure, &c.fit.values, POLISH)?))
+        Some((i, evaluator.within(by).fit(&c.structure, &c.fit.values, tuning().fit.last)?))
     };
     let polished: Vec<(usize, Fit)> = exact.abreast(&near, |budget, i| polish(budget, *i)).into_iter().flatten().flatten().collect();
     for (i, fit) in polished {
@@ -76,9 +68,9 @@ pub(super) fn nominal_at_its_end(nominal: &Nominal, found: &[Candidate], work: &
     let numbers = |c: &Candidate| (c.structure.stated_of(problem, &c.fit.values), c.structure.of_records(&c.fit.values));
     let others = found.iter().take(2).map(numbers);
     // Far from the noise its last thousandths say nothing.
-    let effort = if nominal.is_far { Effort { steps: 8, tolerance: 3.0 } } else { Effort::FULL };
-    let substeps = if nominal.is_far { MIDDLE } else { evaluator.substeps };
-    let last = Evaluator { substeps, ..evaluator.within(work.up_to(0.97)) };
+    let effort = if nominal.is_far { tuning().fit.nominal_last } else { tuning().fit.to_the_end };
+    let substeps = if nominal.is_far { tuning().fit.middle_substeps } else { evaluator.substeps };
+    let last = Evaluator { substeps, ..evaluator.within(work.up_to(tuning().search.nominal_end)) };
     let mut better = None;
     for (stated, of_records) in others.chain(nominal.is_far.then(|| numbers(refitted))) {
         let start = refitted.structure.values(problem, &stated, &[], &of_records);
@@ -102,7 +94,7 @@ pub(super) fn hold_against_unseen(evaluator: &Evaluator, found: &mut [Candidate]
     let mut so_many = vec![0; found.iter().map(|c| c.structure.added.len() + 1).max().unwrap_or(0)];
     let finalists = found.iter_mut().filter(|c| {
         let before = so_many.get_mut(c.structure.added.len());
-        before.is_some_and(|n| std::mem::replace(n, *n + 1) < FINALISTS)
+        before.is_some_and(|n| std::mem::replace(n, *n + 1) < tuning().search.finalists)
     });
     let mut finalists: Vec<&mut Candidate> = finalists.chain(std::iter::once(nominal)).collect();
     finalists.par_iter_mut().for_each(|c| {
@@ -113,7 +105,9 @@ pub(super) fn hold_against_unseen(evaluator: &Evaluator, found: &mut [Candidate]
 
 /// Each fitted from where it starts.
 pub(super) fn polished(evaluator: &Evaluator, structures: Vec<(Structure, Vec<f64>)>) -> Vec<Candidate> {
-    let fit = |budget: &Budget, (structure, start): &(Structure, Vec<f64>)| evaluator.within(budget.clone()).fit(structure, start, POLISH);
+    let fit = |budget: &Budget, (structure, start): &(Structure, Vec<f64>)| {
+        evaluator.within(budget.clone()).fit(structure, start, tuning().fit.last)
+    };
     let fits = evaluator.budget.abreast(&structures, fit);
     let fitted = structures.iter().zip(fits).filter_map(|((structure, _), fit)| Some((structure, fit.flatten()?)));
     fitted.map(|(structure, fit)| candidate(evaluator, structure.clone(), fit)).collect()

@@ -12,18 +12,20 @@ mod state;
 mod steps;
 mod view;
 
-use crate::candidate::{COARSE, key_of};
-use crate::fit::{Effort, Evaluator};
+use crate::candidate::key_of;
+use crate::effort::Effort;
+use crate::fit::Evaluator;
 use crate::hypothesis::Hypothesis;
 use crate::parts::Parts;
 use crate::physics;
 use crate::problem::Problem;
 use crate::race::Course;
+use crate::tuning::tuning;
 use crate::work::{Budget, Limit};
 pub use journal::{Entry, Outcome};
-use nominal::{Nominal, SHOWN};
+use nominal::Nominal;
 pub use result::{Detectable, Search, SearchError, Tried};
-pub use settings::{EFFORT, PATIENCE, Settings};
+pub use settings::Settings;
 use share::Work;
 use state::State;
 use std::collections::HashSet;
@@ -43,15 +45,15 @@ pub fn search(problem: &Problem, settings: &Settings, limit: Limit, report: &(dy
     let ripples = view::ripples(&nominal.seen, &nominal.model, &evaluator.floor, &mut hypotheses);
     report("screening");
     let led = &nominal.led;
-    let seeing = work.share(if nominal.far { 0.08 } else { 0.2 });
+    let seeing = work.share(if nominal.far { tuning().screening.share_far } else { tuning().screening.share_near });
     let base = (&refitted.structure, led.fit.clone());
     let mut views = vec![View::of(&led.coarse, led.parts.as_ref(), base, &hypotheses, seeing, nominal.guided)];
     // Some effects show better on a free simulation; and the refit of a wrong structure may have carried the numbers off, so that
     // without a measured path the given ones are another base.
     let free = Evaluator { guide: None, ..led.coarse.clone() };
-    let (from, steps) = if nominal.held { (&refitted.fit.values, 2) } else { (&nominal.start, 0) };
-    let other = if nominal.far { free.fit(&refitted.structure, from, Effort { steps, tolerance: 1.0 }) } else { None };
-    let free_parts = other.as_ref().and_then(|fit| Parts::of(&free, &refitted.structure, fit, SHOWN));
+    let (from, steps) = if nominal.held { (&refitted.fit.values, tuning().fit.nominal_view.steps) } else { (&nominal.start, 0) };
+    let other = if nominal.far { free.fit(&refitted.structure, from, Effort { steps, ..tuning().fit.nominal_view }) } else { None };
+    let free_parts = other.as_ref().and_then(|fit| Parts::of(&free, &refitted.structure, fit, tuning().screening.samples));
     if let Some(fit) = other {
         views.push(View::of(&free, free_parts.as_ref(), (&refitted.structure, fit), &hypotheses, seeing, false));
     }
@@ -62,7 +64,7 @@ pub fn search(problem: &Problem, settings: &Settings, limit: Limit, report: &(dy
         hypotheses: &hypotheses,
         nominal: refitted,
         given: &nominal.given,
-        coarse: COARSE,
+        coarse: tuning().fit.coarse_substeps,
     };
     let mut tried = promised(&views, &hypotheses);
     let mut state = State::new(course, &views, &tried, &ripples, nominal.far, &work);

@@ -2,8 +2,9 @@
 
 use super::result::SearchError;
 use super::share::Work;
-use crate::candidate::{COARSE, Candidate, MIDDLE, NEAR_ENOUGH, candidate, white};
-use crate::fit::{Effort, Evaluator, Fit};
+use crate::candidate::{Candidate, candidate, white};
+use crate::effort::Effort;
+use crate::fit::{Evaluator, Fit};
 use crate::floor;
 use crate::guide::Guide;
 use crate::hypothesis::Scales;
@@ -12,22 +13,8 @@ use crate::problem::{Problem, Record};
 use crate::screen::worst_records;
 use crate::statistics::{correlation_time, levels, slowness};
 use crate::structure::Structure;
+use crate::tuning::tuning;
 use backdrive_plant::model::{InputKind, Model};
-
-/// Residuals beyond this many times the size of most of them count by their size, not their square, where dry friction acts on a prescribed body.
-const FAR_OFF: f64 = 6.0;
-/// Level above which fits start along the measured path, floors.
-const FAR: f64 = 2.0;
-/// Mean squared residual that the nominal model has to leave along the measured path, squares of the floor, or this share of what it leaves
-/// over without it.
-const SHOWS: f64 = 3.0;
-/// See [`SHOWS`].
-const SHARE: f64 = 0.3;
-/// Other ways to be led, until enough is left over: how much looser than at first, and whether parts of the recordings are enough. On parts the
-/// numbers of the nominal model may take on what differs from one part to the next.
-const LOOSER: [(f64, bool); 5] = [(0.2, true), (1.0, false), (0.2, false), (0.04, false), (0.008, false)];
-/// Samples that screening is shown far from the noise, about.
-pub(super) const SHOWN: usize = 5_000;
 
 /// The nominal model refitted, and what was learnt of the recordings by it.
 pub(super) struct Nominal<'a> {
@@ -81,12 +68,16 @@ impl Path<'_> {
     /// The nominal model led from some values, so much looser than at first, in parts of the recordings where those are enough.
     fn lead<'a>(&self, evaluator: &Evaluator<'a>, structure: &Structure, from: &[f64], looser: f64, in_parts: bool) -> Option<Led<'a>> {
         let guide = self.held.then(|| self.firm.with(looser * self.firm.strength));
-        let coarse = Evaluator { substeps: COARSE, widest: 8.0, guide, ..evaluator.clone() };
-        let at = coarse.fit(structure, from, Effort { steps: if self.held { 0 } else { 2 }, tolerance: 1.0 })?;
+        let coarse = Evaluator { substeps: tuning().fit.coarse_substeps, widest: tuning().fit.widest_midway, guide, ..evaluator.clone() };
+        let at = coarse.fit(
+            structure,
+            from,
+            Effort { steps: if self.held { 0 } else { tuning().fit.nominal_view.steps }, ..tuning().fit.nominal_view },
+        )?;
         // The parts where most is left over are enough for screening; along the measured path they begin as they were measured.
-        let parts = if self.far && in_parts { Parts::of(&coarse, structure, &at, SHOWN) } else { None };
+        let parts = if self.far && in_parts { Parts::of(&coarse, structure, &at, tuning().screening.samples) } else { None };
         let base = if self.guided {
-            let effort = Effort { steps: 12, tolerance: 1.0 };
+            let effort = tuning().fit.nominal_coupled;
             match &parts {
                 Some(parts) => parts.evaluator(&coarse).fit(structure, &at.values, effort),
                 None => coarse.fit(structure, &at.values, effort),
@@ -102,39 +93,39 @@ impl<'a> Nominal<'a> {
     /// Refits the nominal model, and leads it.
     pub fn refitted(problem: &'a Problem, work: &Work<'a>, report: &(dyn Fn(&str) + Sync)) -> Result<Nominal<'a>, SearchError> {
         let mut evaluator = Evaluator::new(problem);
-        evaluator.budget = work.up_to(0.75);
+        evaluator.budget = work.up_to(tuning().search.refit_ends);
         if friction_on_prescribed(problem) {
-            evaluator.robust = FAR_OFF;
+            evaluator.robust = tuning().fit.robust;
         }
         report("refitting the nominal model");
         let structure = Structure::new(problem, &problem.fit, Vec::new());
         let given: Vec<f64> = problem.stated.iter().map(|s| s.given).collect();
         let start = structure.values(problem, &given, &[], &[]);
         let first = evaluator.residuals(&structure, &start).ok_or(SearchError::RunsAway)?;
-        let middle = Evaluator { substeps: MIDDLE, ..evaluator.clone() };
-        let quick = worst_first(&middle, &structure, &start, &first, [12, 3]).ok_or(SearchError::RunsAway)?;
+        let middle = Evaluator { substeps: tuning().fit.middle_substeps, ..evaluator.clone() };
+        let quick = worst_first(&middle, &structure, &start, &first, tuning().fit.nominal_first).ok_or(SearchError::RunsAway)?;
         // What a fit leaves over shows the measuring error better than the signal does.
         let before = evaluator.floor.clone();
         evaluator.floor = floors(&evaluator, &quick.residuals);
         if evaluator.robust.is_finite() {
             // Large is what is large beside the rest, which far from the noise is far from the noise itself.
-            evaluator.robust = FAR_OFF * bulk(&quick.residuals, &before, &evaluator).max(1.0);
+            evaluator.robust = tuning().fit.robust * bulk(&quick.residuals, &before, &evaluator).max(1.0);
         }
         let rescaled = |residuals: &[f64]| -> Vec<f64> {
             levels(&evaluator, residuals).iter().zip(before.iter().zip(&evaluator.floor)).map(|(l, (b, f))| l * b / f).collect()
         };
         let levels_given = rescaled(&first);
         // Far from the noise its end waits until the rest is known.
-        let is_far = rescaled(&quick.residuals).iter().any(|l| *l > NEAR_ENOUGH);
-        let effort = if is_far { Effort { steps: 4, tolerance: 3.0 } } else { Effort::FULL };
+        let is_far = rescaled(&quick.residuals).iter().any(|l| *l > tuning().noise.very_far);
+        let effort = if is_far { tuning().fit.nominal_far } else { tuning().fit.to_the_end };
         let mut refitted = evaluator.fit(&structure, &quick.values, effort).ok_or(SearchError::RunsAway)?;
         // Far from the noise the measured path shows better than a simulation what is missing, and leads the numbers out of wrong basins.
         let model = structure.model(problem, &refitted.values).ok_or(SearchError::RunsAway)?;
         let seen = structure.with_unknown(problem, &problem.fit, &refitted.values);
         let scales = scales(problem, &model, &seen)?;
         let level = levels(&evaluator, &refitted.residuals).into_iter().fold(0.0, f64::max);
-        let strength = if level > 3.0 * FAR { 1.0 } else { 0.3 };
-        let far = level > FAR;
+        let strength = if level > tuning().coupling.full_above * tuning().noise.far { 1.0 } else { tuning().coupling.weak };
+        let far = level > tuning().noise.far;
         let firm = Guide::new(problem, &problem.fit, &scales, &evaluator.floor, strength);
         let held = far && !firm.is_empty();
         // A motion that is prescribed leads the device by itself.
@@ -146,7 +137,7 @@ impl<'a> Nominal<'a> {
         let mut led = lead(from, 1.0, true).ok_or(SearchError::RunsAway)?;
         if held
             && let Some(there) = middle.residuals(&structure, &led.fit.values)
-            && let Some(other) = worst_first(&middle, &structure, &led.fit.values, &there, [8, 2])
+            && let Some(other) = worst_first(&middle, &structure, &led.fit.values, &there, tuning().fit.nominal_again)
             && other.cost < 0.99 * refitted.cost
             && let Some(other) = evaluator.fit(&structure, &other.values, effort)
             && other.cost < refitted.cost
@@ -156,12 +147,13 @@ impl<'a> Nominal<'a> {
         refitted = to_its_end(&evaluator, &structure, refitted);
         // Where the nominal model explains the path as it is led there, every physics looks as good as any other.
         let left = |fit: &Fit| fit.cost / fit.residuals.len().max(1) as f64;
-        let enough = SHOWS.min(SHARE * left(&refitted));
-        for (looser, in_parts) in if held { LOOSER.as_slice() } else { &[] } {
+        let enough = tuning().search.coupled_leaves_noise.min(tuning().search.coupled_leaves * left(&refitted));
+        // On parts the parameters of the nominal model may take on what differs from one part to the next: only the first.
+        for (nth, looser) in tuning().search.couplings.iter().enumerate().filter(|_| held) {
             if left(&led.fit) > enough {
                 break;
             }
-            if let Some(other) = lead(&led.fit.values, *looser, *in_parts) {
+            if let Some(other) = lead(&led.fit.values, *looser, nth == 0) {
                 led = other;
             }
         }
@@ -187,8 +179,8 @@ fn worst_first(evaluator: &Evaluator, structure: &Structure, start: &[f64], ther
     let problem = evaluator.problem;
     let own_numbers = structure.numbers.iter().any(|n| n.records.is_some());
     let worst = worst_records(evaluator, there, 2);
-    let effort = |steps: usize| Effort { steps, tolerance: 3.0 };
-    if own_numbers || there.len() < SHOWN || 2 * worst.len() > problem.fit.len() {
+    let effort = |steps: usize| Effort { steps, ..tuning().fit.nominal_far };
+    if own_numbers || there.len() < tuning().screening.samples || 2 * worst.len() > problem.fit.len() {
         return evaluator.fit(structure, start, effort(steps[0]));
     }
     let some: Vec<Record> = worst.iter().map(|r| problem.fit[*r].clone()).collect();
@@ -237,10 +229,10 @@ fn floors(evaluator: &Evaluator, residuals: &[f64]) -> Vec<f64> {
 
 /// Near the noise the end of a fit counts: what is left over short of it looks like missing physics.
 pub(super) fn to_its_end(evaluator: &Evaluator, structure: &Structure, fit: Fit) -> Fit {
-    let near = levels(evaluator, &fit.residuals).iter().all(|l| *l < FAR);
+    let near = levels(evaluator, &fit.residuals).iter().all(|l| *l < tuning().noise.far);
     if !near || white(correlation_time(evaluator, &fit.residuals), slowness(evaluator, &fit.residuals)) {
         return fit;
     }
-    let ended = evaluator.fit_knowing(structure, &fit.values, Effort::FULL, Some((structure, &fit)));
+    let ended = evaluator.fit_knowing(structure, &fit.values, tuning().fit.to_the_end, Some((structure, &fit)));
     ended.filter(|e| e.cost < fit.cost).unwrap_or(fit)
 }

@@ -1,13 +1,9 @@
 //! Parameters that have all but vanished, brought back.
 
-use crate::candidate::{COARSELY, Candidate, distinct_structures};
+use crate::candidate::{Candidate, distinct_structures};
 use crate::race::Course;
 use crate::structure::Structure;
-
-/// Times the least value of a number in logarithms below which it has all but vanished.
-const VANISHED: f64 = 2.0;
-/// How many structures get back numbers that have vanished.
-const REVIVED: usize = 3;
+use crate::tuning::tuning;
 
 /// The best, and what does nearly as well with as many effects, where some of their numbers have all but vanished, and where to start: with a mass
 /// shared with the neighbour that took it on, where no mass is gone with the other numbers as given. Searched in logarithms, a number near 0 moves
@@ -15,12 +11,13 @@ const REVIVED: usize = 3;
 pub(super) fn revived(course: &Course, found: &[Candidate]) -> Vec<(Structure, Vec<f64>)> {
     let problem = course.evaluator.problem;
     let Some(best) = found.first() else { return Vec::new() };
-    let near = |c: &&Candidate| c.fit.cost < COARSELY * best.fit.cost;
+    let near = |c: &&Candidate| c.fit.cost < tuning().search.as_good * best.fit.cost;
     let mut all = Vec::new();
-    for c in distinct_structures(found, best.structure.added.len()).filter(near).take(REVIVED) {
+    for c in distinct_structures(found, best.structure.added.len()).filter(near).take(tuning().search.revived) {
         let mut stated = c.structure.stated_of(problem, &c.fit.values);
-        let mut gone: Vec<usize> =
-            (0..stated.len()).filter(|i| problem.stated[*i].log && stated[*i] < VANISHED * problem.stated[*i].range.0).collect();
+        let mut gone: Vec<usize> = (0..stated.len())
+            .filter(|i| problem.stated[*i].log && stated[*i] < tuning().search.vanished * problem.stated[*i].range.0)
+            .collect();
         // A damper or a spring may vanish beside a law that was found; a body does not.
         let is_mass = |i: &usize| problem.stated[*i].path.starts_with("bodies.");
         if gone.iter().any(is_mass) {

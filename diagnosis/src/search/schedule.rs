@@ -6,14 +6,10 @@ use super::state::State;
 use super::steps::{
     Anew, Elsewhere, Exchanges, Finer, GivenBack, Laws, More, MorePairs, Pairs, Plain, Race, Relatives, Richer, Ripples, Singles, Step,
 };
-use crate::candidate::{NEAR, key_of};
+use crate::candidate::key_of;
 use crate::race::{Course, distinct};
+use crate::tuning::tuning;
 use std::collections::HashSet;
-
-/// Share of the work after which no step is begun, but for rivals of the best.
-const LAST: f64 = 0.7;
-/// Share of the work after which no step is begun for those.
-const LAST_FOR_RIVALS: f64 = 0.85;
 
 /// The steps of a search for so many effects, in their order. Where nothing is left over, only what may be wrong with single effects is asked.
 fn steps(is_quiet: bool, effects: usize) -> Vec<&'static dyn Step> {
@@ -50,7 +46,7 @@ fn hindrance(step: &dyn Step, state: &mut State) -> Option<Outcome> {
     if !is_for_rivals && state.is_done() {
         return Some(Outcome::ResidualIsWhite);
     }
-    if state.work.is_past(if is_for_rivals { LAST_FOR_RIVALS } else { LAST }) {
+    if state.work.is_past(if is_for_rivals { tuning().search.last_rival } else { tuning().search.last_step }) {
         state.left_out |= !state.is_done();
         return Some(Outcome::NoWorkLeft);
     }
@@ -68,7 +64,7 @@ fn take(step: &dyn Step, state: &mut State) -> Outcome {
         seeds.retain(|s| !known.contains(&key_of(s.effects.iter().map(|(h, _)| &course.hypotheses[*h]))));
     }
     // Where the best leaves much over, another effect may be what is missing: other laws in its place have their share of the work, and no more.
-    let more_to_come = state.found.first().is_none_or(|c| c.fit.cost > NEAR * state.samples() as f64);
+    let more_to_come = state.found.first().is_none_or(|c| c.fit.cost > tuning().noise.near * state.samples() as f64);
     let share = state.work.share(if more_to_come { step.share() } else { 1.0 });
     let budget = step.ends().map_or_else(|| course.evaluator.budget.clone(), |end| state.work.up_to(end));
     let evaluator = course.evaluator.within(budget.next(share));

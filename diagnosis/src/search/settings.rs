@@ -1,6 +1,7 @@
 //! How much to search, and for what.
 
-use crate::work::{Limit, PER_SECOND, Steps};
+use crate::tuning::tuning;
+use crate::work::{Limit, Steps};
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
@@ -17,22 +18,16 @@ pub struct Settings {
     pub patience: Duration,
 }
 
-/// What a search computes with an effort of 1.
-pub const EFFORT: Steps = 1_200_000_000;
-
-/// How long a search may take on the clock where nothing else is said: far longer than the default effort takes on a slow machine.
-pub const PATIENCE: Duration = Duration::from_secs(600);
-
 impl Default for Settings {
     fn default() -> Settings {
-        Settings { without: Vec::new(), effects: 3, effort: 1.0, patience: PATIENCE }
+        Settings { without: Vec::new(), effects: 3, effort: 1.0, patience: Duration::from_secs(tuning().search.patience) }
     }
 }
 
 impl Settings {
     /// Work that the search may do.
     pub fn work(&self) -> Steps {
-        (self.effort.max(0.0) * EFFORT as f64) as Steps
+        (self.effort.max(0.0) * tuning().search.work as f64) as Steps
     }
 
     /// What ends a search that begins now from outside.
@@ -42,6 +37,6 @@ impl Settings {
 
     /// About how long that takes on two threads of a laptop, for progress bars.
     pub fn expected(&self) -> Duration {
-        Duration::from_secs_f64((self.work() as f64 / PER_SECOND).min(self.patience.as_secs_f64()))
+        Duration::from_secs_f64((self.work() as f64 / tuning().search.steps_per_second).min(self.patience.as_secs_f64()))
     }
 }

@@ -4,13 +4,11 @@ use super::journal::{Entry, Outcome};
 use super::result::Tried;
 use super::share::Work;
 use super::view::View;
-use crate::candidate::{AT_FLOOR, COARSE, Candidate, done, key_of, sort};
+use crate::candidate::{Candidate, done, key_of, sort};
 use crate::hypothesis::Hypothesis;
 use crate::race::{Course, Seed, distinct};
+use crate::tuning::tuning;
 use std::collections::HashSet;
-
-/// What the best of many hypotheses takes from a cost of white noise by chance, squares of the noise.
-const CHANCE: f64 = 25.0;
 
 /// What is tried, and what was found.
 pub(super) struct State<'s, 'a> {
@@ -70,7 +68,7 @@ impl<'s, 'a> State<'s, 'a> {
             singles,
             plain,
             effects: 1,
-            fine: COARSE,
+            fine: tuning().fit.coarse_substeps,
             related,
             moved_about,
             left_out: false,
@@ -83,12 +81,12 @@ impl<'s, 'a> State<'s, 'a> {
 
     /// At the floor only what promises more than chance is worth a fit.
     pub fn is_quiet(&self) -> bool {
-        self.course.nominal.is_white() || self.course.nominal.levels.iter().all(|l| *l < AT_FLOOR)
+        self.course.nominal.is_white() || self.course.nominal.levels.iter().all(|l| *l < tuning().noise.at_noise)
     }
 
     /// Share of the misfit that the best of many hypotheses promises by chance.
     pub fn chance(&self) -> f64 {
-        CHANCE * self.course.nominal.correlation_time / self.samples() as f64
+        tuning().screening.chance * self.course.nominal.correlation_time / self.samples() as f64
     }
 
     /// Number of residuals.
@@ -124,7 +122,7 @@ impl<'s, 'a> State<'s, 'a> {
                 let wanted = if quiet {
                     rank < 8 && promise.share > chance
                 } else {
-                    rank < 3 || rank < if self.is_guided() { 14 } else { 8 } && promise.share > 0.5 * top
+                    rank < 3 || rank < if self.is_guided() { 14 } else { 8 } && promise.share > tuning().search.promise * top
                 };
                 if wanted {
                     singles.push(view.seed(vec![(promise.hypothesis, promise.values.clone())]));

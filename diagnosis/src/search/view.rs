@@ -2,7 +2,8 @@
 
 use super::result::Detectable;
 use crate::candidate::{Candidate, candidate};
-use crate::fit::{Effort, Evaluator, Fit};
+use crate::effort::Effort;
+use crate::fit::{Evaluator, Fit};
 use crate::hypothesis::{Family, Hypothesis};
 use crate::locate::{self, Ripple};
 use crate::parts::Parts;
@@ -10,18 +11,10 @@ use crate::problem::Record;
 use crate::race::Seed;
 use crate::screen::{Promise, Screen, pairs};
 use crate::structure::Structure;
+use crate::tuning::tuning;
 use crate::work::Steps;
 use backdrive_plant::model::Model;
 use std::collections::HashSet;
-
-/// Numbers of a physics that is tried first, at most.
-pub(super) const SIMPLE: usize = 6;
-/// Samples in which ripples are looked for, at most.
-const LOCATED: usize = 12_000;
-/// Power of a ripple's line over the median of all: the highest of a thousand lines of white noise has about ten times that.
-const PROMINENT: f64 = 100.0;
-/// Share of a force that a ripple explains over the next one's, above which it stands alone.
-const ALONE: f64 = 3.0;
 
 /// What screening sees from one base.
 pub(super) struct View<'a> {
@@ -57,7 +50,7 @@ impl<'a> View<'a> {
         };
         let screen = Screen::new(&on, structure, &fit, hypotheses, work);
         let promises = screen.look(&fit, &|_| true);
-        let (simple, rich) = promises.into_iter().partition(|p| hypotheses[p.hypothesis].parameters.len() <= SIMPLE);
+        let (simple, rich) = promises.into_iter().partition(|p| hypotheses[p.hypothesis].parameters.len() <= tuning().screening.parameters);
         View { screen, base: candidate(&on, structure.clone(), fit), evaluator: on, guided, whole, simple, rich }
     }
 
@@ -70,7 +63,7 @@ impl<'a> View<'a> {
     pub fn pairs(&self, hypotheses: &[Hypothesis], count: usize) -> Vec<Seed> {
         let simple = &self.simple;
         let compatible = |a: usize, b: usize| hypotheses[a].compatible(&hypotheses[b]);
-        let together = pairs(simple, &self.base.fit, &self.base.fit.jacobian, 90, compatible);
+        let together = pairs(simple, &self.base.fit, &self.base.fit.jacobian, tuning().screening.pairs_among, compatible);
         let mut used = HashSet::new();
         let best = together.iter().filter(|(a, b, _)| used.insert((simple[*a].hypothesis, simple[*b].hypothesis)));
         let pair = |a: usize, b: usize| [a, b].map(|p| (simple[p].hypothesis, simple[p].values.clone())).to_vec();
@@ -83,7 +76,7 @@ impl<'a> View<'a> {
 /// Those that stand alone in the spectrum of their force, with what makes them, are given back, the largest share first: gaps and friction make many lines.
 pub(super) fn ripples(records: &[Record], model: &Model, floor: &[f64], hypotheses: &mut [Hypothesis]) -> Vec<(usize, Vec<f64>)> {
     let runs: Vec<locate::Run> = records.iter().map(locate::Run::from).collect();
-    let options = locate::Options { most_samples: LOCATED, laws_of_a_form: 0, ..locate::Options::quick() };
+    let options = locate::Options { most_samples: tuning().screening.ripple_samples, laws_of_a_form: 0, ..locate::Options::quick() };
     // Where the model cannot be located in, fits start from the usual periods.
     let Ok(location) = locate::locate(model, &runs, floor, &options) else { return Vec::new() };
     let mut alone: Vec<(f64, usize, Vec<f64>)> = Vec::new();
@@ -94,7 +87,10 @@ pub(super) fn ripples(records: &[Record], model: &Model, floor: &[f64], hypothes
             let start = |r: &Ripple| vec![r.amplitude, r.period, r.phase];
             let inside = |start: &Vec<f64>| start.iter().zip(&h.parameters).all(|(x, p)| (p.range.0..=p.range.1).contains(x));
             let next = place.ripples.get(1).map_or(0.0, |r| r.share);
-            let first = place.ripples.first().filter(|r| r.prominence > PROMINENT && r.share > ALONE * next);
+            let first = place
+                .ripples
+                .first()
+                .filter(|r| r.prominence > tuning().screening.ripple_prominence && r.share > tuning().screening.ripple_alone * next);
             alone.extend(first.map(|r| (r.share, index, start(r))).filter(|(_, _, start)| inside(start)));
             let new: Vec<Vec<f64>> = place.ripples.iter().map(start).filter(inside).collect();
             h.starts.splice(0..0, new);
@@ -110,7 +106,8 @@ pub(super) fn detectable(view: &View, samples: usize, hypotheses: &[Hypothesis])
     // All of the recordings show what their parts do, and more.
     let more = samples as f64 / base.fit.residuals.len().max(1) as f64;
     let effective = (samples as f64 / base.correlation_time).max(2.0);
-    let needed = (30.0 + effective.ln()) * base.correlation_time * base.fit.cost / base.fit.residuals.len().max(1) as f64;
+    let needed =
+        (tuning().claim.least_advantage + effective.ln()) * base.correlation_time * base.fit.cost / base.fit.residuals.len().max(1) as f64;
     let mut found: Vec<Detectable> = Vec::new();
     for (index, length) in view.screen.lengths(&base.fit) {
         let h = &hypotheses[index.0];

@@ -4,18 +4,8 @@ use crate::candidate::{Candidate, advantage_over};
 use crate::hypothesis::{Hypothesis, Physics};
 use crate::physics::{PHYSICS, withheld};
 use crate::search::Search;
+use crate::tuning::tuning;
 use std::collections::HashSet;
-
-/// Improvements below this advantage (difference of information criteria) are not claimed.
-const LEAST_ADVANTAGE: f64 = 30.0;
-/// Nor those that take less than this share of the cost.
-const LEAST_SHARE: f64 = 0.02;
-/// Structures of an advantage below this over a simpler one are ties, which the simpler one wins.
-const TIE: f64 = 8.0;
-/// Explanations of an advantage below this over each other cannot be told apart.
-const ALIKE: f64 = 6.0;
-/// Times the cost of a fit up to which another one leaves less than twice as much over.
-const TWICE: f64 = 4.0;
 
 /// Which of the structures is claimed.
 pub fn chosen(search: &Search) -> &Candidate {
@@ -32,7 +22,7 @@ pub fn chosen(search: &Search) -> &Candidate {
         let simplest = search
             .found
             .iter()
-            .filter(|c| c.structure.added.len() == effects && evidence(search, c, next) < TIE)
+            .filter(|c| c.structure.added.len() == effects && evidence(search, c, next) < tuning().claim.tie)
             .min_by_key(|c| (c.structure.numbers.len(), c.structure.added.iter().map(order).sum::<usize>()))
             .unwrap_or(next);
         if worth(search, best, simplest) {
@@ -56,8 +46,8 @@ pub(super) fn evidence(search: &Search, base: &Candidate, better: &Candidate) ->
     let (fits, unseen) = (advantage_over(base, better, search.samples), unseen_evidence(search, base, better));
     let (simple, rich) = if unseen > 0.0 { (better, base) } else { (base, better) };
     let is_overfit = simple.structure.numbers.len() < rich.structure.numbers.len()
-        && simple.fit.cost < TWICE * rich.fit.cost
-        && unseen.abs() > TIE
+        && simple.fit.cost < tuning().claim.twice * rich.fit.cost
+        && unseen.abs() > tuning().claim.tie
         && fits * unseen < 0.0;
     if is_overfit { unseen } else { fits + unseen }
 }
@@ -75,10 +65,12 @@ pub(super) fn unseen_evidence(search: &Search, base: &Candidate, better: &Candid
 fn worth(search: &Search, base: &Candidate, better: &Candidate) -> bool {
     // What no fit has seen must not speak against it: a law that is there is there in every recording, if not always to be seen.
     let seen_again = match (base.unseen, better.unseen) {
-        (Some(a), Some(b)) => b.mean_square < a.mean_square * 1.005,
+        (Some(a), Some(b)) => b.mean_square < a.mean_square * tuning().claim.unseen,
         _ => true,
     };
-    evidence(search, base, better) > LEAST_ADVANTAGE && better.fit.cost < (1.0 - LEAST_SHARE) * base.fit.cost && seen_again
+    evidence(search, base, better) > tuning().claim.least_advantage
+        && better.fit.cost < (1.0 - tuning().claim.least_share) * base.fit.cost
+        && seen_again
 }
 
 /// Structures of as many effects that cannot be told from the best: another place, or a law that is no richer form of its own.
@@ -95,7 +87,9 @@ pub(super) fn alike<'s>(search: &'s Search, best: &Candidate) -> Vec<&'s Candida
         }
     };
     let mut seen = HashSet::new();
-    let close = |c: &&Candidate| c.structure.added.len() == best.structure.added.len() && evidence(search, c, best) < ALIKE && differs(c);
+    let close = |c: &&Candidate| {
+        c.structure.added.len() == best.structure.added.len() && evidence(search, c, best) < tuning().claim.alike && differs(c)
+    };
     search.found.iter().filter(close).filter(|c| seen.insert(c.structure.name())).take(3).collect()
 }
 

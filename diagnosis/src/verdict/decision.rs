@@ -4,19 +4,14 @@ use super::choice::{alike, chosen};
 use super::findings::{adequacy, findings};
 use super::signals::bursts;
 use super::types::{Finding, Word};
-use crate::candidate::{AT_FLOOR, Candidate};
+use crate::candidate::Candidate;
 use crate::fit::Evaluator;
 use crate::intervals::Spread;
 use crate::problem::Problem;
 use crate::search::Search;
 use crate::statistics::advantage;
 use crate::structure::{Number, Role, Structure};
-
-/// Distance from white noise, standard deviations of chance, beyond which something is left over however small it is: fits of the right structure
-/// stay below 3, and 2 or 3 times that where they stop before their end.
-const WANDERS: f64 = 12.0;
-/// Level above which what is left over is no measuring error.
-pub(super) const LEFT_OVER: f64 = 1.15;
+use crate::tuning::tuning;
 
 /// What is claimed.
 pub(super) struct Decision<'s> {
@@ -41,7 +36,7 @@ pub(super) fn decide<'s>(problem: &Problem, search: &'s Search) -> Decision<'s> 
     let best = chosen(search);
     let evaluator = Evaluator { floor: search.floor.clone(), ..Evaluator::new(problem) };
     let spread = Spread::measured(&evaluator, best);
-    let at_floor = best.levels.iter().all(|l| *l < LEFT_OVER);
+    let at_floor = best.levels.iter().all(|l| *l < tuning().noise.unexplained);
     let nominal_cost = search.nominal.fit.cost;
     let excess = |c: f64| (c / search.samples as f64 - 1.0).max(0.0);
     let explained = 1.0 - excess(best.fit.cost) / excess(nominal_cost).max(1e-12);
@@ -50,15 +45,15 @@ pub(super) fn decide<'s>(problem: &Problem, search: &'s Search) -> Decision<'s> 
     let alike = alike(search, best);
     let nominal = &search.nominal;
     let off = given_is_off(problem, search) && (added || spread.is_far(nominal, &stated_in(problem, &nominal.structure)));
-    let wanders = nominal.slowness > WANDERS && nominal.levels.iter().any(|l| *l > AT_FLOOR);
+    let wanders = nominal.slowness > tuning().claim.wanders && nominal.levels.iter().any(|l| *l > tuning().noise.at_noise);
     let findings = findings(search, best, &spread, adequacy(best));
     let is_outdone = findings.first().is_some_and(Finding::has_likelier_rival);
     let word = match () {
-        () if added && (at_floor || explained > 0.99) && (!alike.is_empty() || is_outdone) => Word::Ambiguous,
-        () if added && (at_floor || explained > 0.99) => Word::Missing,
+        () if added && (at_floor || explained > tuning().claim.explained) && (!alike.is_empty() || is_outdone) => Word::Ambiguous,
+        () if added && (at_floor || explained > tuning().claim.explained) => Word::Missing,
         () if added => Word::Unexplained,
         () if !bursts.is_empty() => Word::Unexplained,
-        () if !at_floor && nominal.correlation_time > 3.0 || wanders => Word::Unexplained,
+        () if !at_floor && nominal.correlation_time > tuning().claim.correlated || wanders => Word::Unexplained,
         () if off => Word::Parameters,
         () if !is_excited(problem, search) => Word::CannotTell,
         () => Word::NothingMissing,
@@ -78,7 +73,7 @@ fn given_is_off(problem: &Problem, search: &Search) -> bool {
     }
     let refit = &search.nominal;
     let numbers = refit.structure.numbers.len();
-    advantage(cost, 0, refit.fit.cost, numbers, total, refit.correlation_time) > 0.0 && refit.fit.cost < 0.99 * cost
+    advantage(cost, 0, refit.fit.cost, numbers, total, refit.correlation_time) > 0.0 && refit.fit.cost < tuning().claim.refit_gains * cost
 }
 
 /// Where the stated numbers are among a structure's, and what the nominal file says.
@@ -93,7 +88,7 @@ fn stated_in(problem: &Problem, structure: &Structure) -> Vec<(usize, f64)> {
 /// Whether the recordings move the device by more than the measuring error.
 fn is_excited(problem: &Problem, search: &Search) -> bool {
     let moves = |(output, floor): (usize, &f64)| {
-        problem.fit.iter().any(|r| r.outputs.get(output).is_some_and(Option::is_some) && r.spread[output] > 5.0 * floor)
+        problem.fit.iter().any(|r| r.outputs.get(output).is_some_and(Option::is_some) && r.spread[output] > tuning().claim.excited * floor)
     };
     search.floor.iter().enumerate().any(moves)
 }

@@ -9,20 +9,17 @@ use crate::intervals::Spread;
 use crate::problem::Problem;
 use crate::search::Search;
 use crate::structure::Role;
+use crate::tuning::tuning;
 use backdrive_plant::write::round_significant;
 use std::collections::BTreeMap;
-
-/// Level and correlation time (samples) up to which what is left over is measuring error beyond doubt.
-const NOISE_LEVEL: f64 = 1.05;
-/// See [`NOISE_LEVEL`].
-const NOISE_MEMORY: f64 = 1.2;
 
 /// How far what is left over is measuring error: 1 where it has its size and hangs together no more than it, less the more of either. A law
 /// that only imitates what is there leaves a little over, and that little is not white.
 pub(super) fn adequacy(best: &Candidate) -> f64 {
     let level = best.levels.iter().fold(0.0f64, |a, b| a.max(*b));
-    let size = (-(level - NOISE_LEVEL).max(0.0) / 0.15).exp();
-    let whiteness = (-(best.correlation_time - NOISE_MEMORY).max(0.0) / 1.5).exp();
+    let size = (-(level - tuning().claim.adequate).max(0.0) / tuning().claim.adequate_scale).exp();
+    let whiteness =
+        (-(best.correlation_time - tuning().claim.adequate_correlation).max(0.0) / tuning().claim.adequate_correlation_scale).exp();
     (size * whiteness).max(0.05)
 }
 
@@ -40,12 +37,14 @@ fn finding(search: &Search, best: &Candidate, spread: &Spread, adequacy: f64, wh
     // The weight of each, softened: a simulator is never the device.
     // A richer law at the same place that fits no better is the same law.
     let nested = |rival: &Hypothesis| rival.place.same(&hypothesis.place) && contains(rival.physics, hypothesis);
-    let weight = |(rival, behind): &(Hypothesis, f64)| (-behind.max(0.0) / 20.0).exp() * if nested(rival) { 0.1 } else { 1.0 };
+    let weight = |(rival, behind): &(Hypothesis, f64)| {
+        (-behind.max(0.0) / tuning().claim.softened).exp() * if nested(rival) { tuning().claim.richer } else { 1.0 }
+    };
     let weights: Vec<f64> = rivals.iter().map(weight).collect();
     // And of those that promised as much, but were not fitted: little, for they did not win their race.
     let own = search.tried.iter().find(|t| t.id == hypothesis.id).map_or(1.0, |t| t.promised);
     let unfitted = search.tried.iter().filter(|t| t.taken.is_none() && t.promised > 0.9 * own).count() as f64;
-    let sum = 1.0 + weights.iter().sum::<f64>() + 0.02 * unfitted.min(10.0);
+    let sum = 1.0 + weights.iter().sum::<f64>() + tuning().claim.unfitted * unfitted.min(10.0);
     let alternative = |((rival, _), weight): (&(Hypothesis, f64), &f64)| Alternative {
         physics: rival.physics.name.to_string(),
         place: rival.place.clone(),

@@ -15,6 +15,7 @@ mod shows;
 mod signals;
 pub(crate) mod types;
 
+use crate::tuning::tuning;
 pub use beaten::{Beaten, Why, beaten};
 pub use choice::chosen;
 pub use experiments::EXPERIMENT_FILE;
@@ -26,7 +27,7 @@ use crate::audit;
 use crate::locate::Location;
 use crate::problem::Problem;
 use crate::search::Search;
-use crate::work::{Budget, Limit, Steps};
+use crate::work::{Budget, Limit};
 use decision::decide;
 use experiments::next_experiment;
 use findings::{detectable, moved};
@@ -46,9 +47,6 @@ pub const MODEL_FILE: &str = "model.diagnosed.toml";
 pub fn rival_file(number: usize) -> String {
     format!("model.rival-{number}.toml")
 }
-
-/// Work in which the next experiment is looked for.
-const EXPERIMENT: Steps = 100_000_000;
 
 /// What is written beside a verdict: texts of files.
 #[derive(Debug, Clone, PartialEq)]
@@ -76,7 +74,7 @@ pub fn verdict(
 ) -> Result<(Verdict, Files), VerdictError> {
     let decision = decide(problem, search);
     let (best, changes) = (decision.best, decision.changes);
-    let budget = Budget::new(EXPERIMENT, limit);
+    let budget = Budget::new(tuning().search.experiment, limit);
     let (next_experiment, experiment) = next_experiment(problem, search, &decision, &budget);
     let held_out = held_out(problem, search, best, changes);
     let model = model_text(problem, best, &decision.spread, changes)?;

@@ -6,6 +6,7 @@ use crate::intervals::Spread;
 use crate::numbers::stated_edits;
 use crate::problem::Problem;
 use crate::search::Search;
+use crate::tuning::tuning;
 use backdrive_plant::write::{patch, round_significant};
 
 /// Why a verdict cannot be written.
@@ -21,11 +22,6 @@ pub enum VerdictError {
     #[error(transparent)]
     Hypothesis(#[from] crate::hypothesis::HypothesisError),
 }
-
-/// Rivals whose models are written, at most.
-const RIVALS: usize = 3;
-/// What a rival leaves over, in squares of what the claimed explanation does, at most.
-const NEARLY: f64 = 2.0;
 
 /// The nominal model's text with the fitted numbers and what was found.
 pub(super) fn model_text(problem: &Problem, best: &Candidate, spread: &Spread, use_best: bool) -> Result<String, VerdictError> {
@@ -48,13 +44,13 @@ pub(super) fn rival_models(problem: &Problem, search: &Search, best: &Candidate)
     let names = |c: &Candidate| c.structure.added.iter().map(|h| h.id.clone()).collect::<Vec<_>>();
     let near = |c: &&Candidate| {
         let unseen = match (best.unseen, c.unseen) {
-            (Some(a), Some(b)) => b.mean_square <= NEARLY * a.mean_square,
+            (Some(a), Some(b)) => b.mean_square <= tuning().claim.rival_cost * a.mean_square,
             _ => true,
         };
-        unseen && c.fit.cost <= NEARLY * best.fit.cost && names(c) != names(best)
+        unseen && c.fit.cost <= tuning().claim.rival_cost * best.fit.cost && names(c) != names(best)
     };
     let mut rivals: Vec<&Candidate> = search.found.iter().chain([&search.nominal]).filter(near).collect();
     rivals.sort_by(|a, b| a.fit.cost.total_cmp(&b.fit.cost));
     let models = rivals.into_iter().filter_map(|c| c.structure.model(problem, &c.fit.values));
-    models.take(RIVALS).map(|model| model.to_toml()).collect()
+    models.take(tuning().claim.rivals).map(|model| model.to_toml()).collect()
 }

@@ -1,12 +1,12 @@
 //! What remains beside what was found: a statement of its own, for a claim is not taken back by it and does not hide it.
 
-use super::decision::LEFT_OVER;
 use super::rounded::rounded;
 use super::signals::place_in_signals;
 use super::types::{HeldOut, Remaining};
 use crate::candidate::Candidate;
 use crate::problem::Problem;
 use crate::search::Search;
+use crate::tuning::tuning;
 use crate::words;
 
 /// What the explanation that is claimed leaves over; `None` where nothing was held against anything.
@@ -14,7 +14,7 @@ pub(super) fn remaining(problem: &Problem, search: &Search, best: &Candidate, he
     let (refit, after, floor) = (held_out.nrmse_refit?, held_out.nrmse_after?, held_out.noise_floor?);
     let share = |x: f64| if refit > 0.0 { rounded(x / refit, 3) } else { None };
     let level = best.levels.iter().fold(0.0f64, |a, b| a.max(*b));
-    let left = level >= LEFT_OVER;
+    let left = level >= tuning().noise.unexplained;
     Some(Remaining {
         share: share(after),
         floor_share: share(floor),

@@ -1,8 +1,9 @@
 //! The verdict in one sentence.
 
-use super::decision::{Decision, LEFT_OVER};
+use super::decision::Decision;
 use super::types::{Finding, Word};
 use crate::hypothesis::Place;
+use crate::tuning::tuning;
 use crate::words;
 use backdrive_plant::write::round_significant;
 
@@ -12,8 +13,13 @@ pub(super) fn sentence(decision: &Decision, planned: bool) -> String {
     let level = best.levels.iter().fold(0.0f64, |a, b| a.max(*b));
     let times = round_significant(level, 2);
     // Below this the residual is the sensor's noise up to chance and rounding.
-    let end = if level < LEFT_OVER { "down to the sensor noise".to_string() } else { format!("to {times} times the sensor noise") };
-    let still = if level < LEFT_OVER { String::new() } else { format!("; the residual is still {times} times the sensor noise") };
+    let end = if level < tuning().noise.unexplained {
+        "down to the sensor noise".to_string()
+    } else {
+        format!("to {times} times the sensor noise")
+    };
+    let still =
+        if level < tuning().noise.unexplained { String::new() } else { format!("; the residual is still {times} times the sensor noise") };
     let all = findings.iter().map(asserted).collect::<Vec<_>>().join(", and ");
     match decision.word {
         Word::Ambiguous => {

@@ -4,11 +4,9 @@ use super::types::Where;
 use crate::candidate::Candidate;
 use crate::fit::Evaluator;
 use crate::problem::Problem;
+use crate::tuning::tuning;
 use crate::unknown::{Estimated, Unknown, estimated};
 use backdrive_plant::write::round_significant;
-
-/// Samples a burst may span, and how many spreads away it starts.
-const BURST: (usize, f64) = (40, 8.0);
 
 /// Times at which a motion sensor is far off for a moment while all the rest is measuring error, s: glitches, which no physics of the
 /// device makes. Empty where the rest is no measuring error, or a reversal of friction could be it.
@@ -25,7 +23,7 @@ pub(super) fn bursts(problem: &Problem, best: &Candidate) -> Vec<[f64; 2]> {
         let middle = sizes.len() / 2;
         let spread = 1.4826 * *sizes.select_nth_unstable_by(middle, f64::total_cmp).1;
         // A rounded signal may well be right in more than half of its samples.
-        let far = BURST.1 * spread.max(1.0);
+        let far = tuning().claim.glitch * spread.max(1.0);
         let away: Vec<usize> = part.iter().enumerate().filter(|(_, x)| x.abs() > far).map(|(i, _)| i).collect();
         if away.len() < 3 || away.len() * 50 > part.len() {
             continue;
@@ -33,12 +31,14 @@ pub(super) fn bursts(problem: &Problem, best: &Candidate) -> Vec<[f64; 2]> {
         let mut groups: Vec<(usize, usize)> = Vec::new();
         for i in away {
             match groups.last_mut() {
-                Some(group) if i - group.1 <= BURST.0 => group.1 = i,
+                Some(group) if i - group.1 <= tuning().claim.glitch_gap => group.1 = i,
                 _ => groups.push((i, i)),
             }
         }
         let period = problem.fit[r].period;
-        all.extend(groups.iter().filter(|g| g.1 - g.0 <= 4 * BURST.0).map(|g| [g.0 as f64 * period, (g.1 + 1) as f64 * period]));
+        all.extend(
+            groups.iter().filter(|g| g.1 - g.0 <= 4 * tuning().claim.glitch_gap).map(|g| [g.0 as f64 * period, (g.1 + 1) as f64 * period]),
+        );
     }
     all
 }

@@ -1,19 +1,15 @@
 //! Hypotheses screened anew beside a structure that was found.
 
 use super::step::{Keep, Race, Step};
-use crate::candidate::{BLUR, COARSE, Candidate, MIDDLE, distinct_structures, simplest_of};
-use crate::fit::{Effort, Evaluator};
+use crate::candidate::{Candidate, distinct_structures, simplest_of};
+use crate::fit::Evaluator;
 use crate::hypothesis::Hypothesis;
 use crate::race::{Course, Seed};
 use crate::screen::{Promise, Screen};
 use crate::search::state::State;
-use crate::search::view::SIMPLE;
-use crate::simulate::FINEST;
+use crate::tuning::tuning;
 use crate::work::Steps;
 use std::collections::HashSet;
-
-/// Share of the work for screening beside a structure that was found.
-const ANEW: f64 = 0.06;
 
 /// What only shows beside a law that was found shows little coupled to the motion of the nominal model.
 pub(crate) struct Anew;
@@ -45,11 +41,16 @@ impl Step for Anew {
         let is_other = |c: &Candidate| other.is_some_and(|o| std::ptr::eq(o, c));
         let plain = simplest_of(fewer(), samples).filter(has_fewer).filter(|c| !is_other(c));
         let mut seeds = Vec::new();
-        let mut fine = COARSE;
+        let mut fine = tuning().fit.coarse_substeps;
         for base in best.into_iter().chain(other).chain(plain) {
             let substeps = substeps_for(&view.evaluator, base);
             fine = fine.max(substeps);
-            seeds.extend(screened(&course, &Evaluator { substeps, ..view.evaluator.clone() }, base, state.work.share(ANEW)));
+            seeds.extend(screened(
+                &course,
+                &Evaluator { substeps, ..view.evaluator.clone() },
+                base,
+                state.work.share(tuning().screening.share_anew),
+            ));
         }
         state.fine = fine;
         seeds
@@ -60,13 +61,13 @@ impl Step for Anew {
 /// at low speed only where the friction at speed is right.
 fn screened(course: &Course, evaluator: &Evaluator, base: &Candidate, work: Steps) -> Vec<Seed> {
     let problem = course.evaluator.problem;
-    let Some(fit) = evaluator.fit(&base.structure, &base.fit.values, Effort { steps: 4, tolerance: 2.0 }) else { return Vec::new() };
+    let Some(fit) = evaluator.fit(&base.structure, &base.fit.values, tuning().fit.base) else { return Vec::new() };
     let screen = Screen::new(evaluator, &base.structure, &fit, course.hypotheses, work);
     let own = course.effects_of(&base.structure, &fit.values);
     let seed = |p: Promise, guided| {
         Seed::beside(problem, (&base.structure, &fit.values), [own.clone(), vec![(p.hypothesis, p.values)]].concat(), guided)
     };
-    let fits = |h: usize| course.hypotheses[h].parameters.len() <= SIMPLE;
+    let fits = |h: usize| course.hypotheses[h].parameters.len() <= tuning().screening.parameters;
     let mut used = HashSet::new();
     let next = screen.look(&fit, &fits).into_iter().filter(|p| used.insert(p.hypothesis));
     next.take(6).map(|p| seed(p, false)).collect()
@@ -75,11 +76,14 @@ fn screened(course: &Course, evaluator: &Evaluator, base: &Candidate, work: Step
 /// Fewest substeps per sample with which a simulation errs by less than a structure leaves over.
 fn substeps_for(evaluator: &Evaluator, candidate: &Candidate) -> usize {
     let of = |substeps: usize| Evaluator { substeps, ..evaluator.clone() }.residuals(&candidate.structure, &candidate.fit.values);
-    let Some(exact) = of(FINEST) else { return MIDDLE };
+    let Some(exact) = of(tuning().fit.fine_substeps) else { return tuning().fit.middle_substeps };
     let size: f64 = exact.iter().map(|x| x * x).sum();
     let errs = |substeps: &usize| {
         let off = of(*substeps).map_or(f64::INFINITY, |r| r.iter().zip(&exact).map(|(a, b)| (a - b) * (a - b)).sum());
-        off > BLUR * size
+        off > tuning().screening.substep_error * size
     };
-    [COARSE, MIDDLE, 2 * MIDDLE, 4 * MIDDLE].into_iter().find(|s| !errs(s)).unwrap_or(FINEST)
+    [tuning().fit.coarse_substeps, tuning().fit.middle_substeps, 2 * tuning().fit.middle_substeps, 4 * tuning().fit.middle_substeps]
+        .into_iter()
+        .find(|s| !errs(s))
+        .unwrap_or(tuning().fit.fine_substeps)
 }

@@ -1,10 +1,11 @@
 //! The law that was found, at other places.
 
-use super::step::{Keep, RIVALS_END, Race, Step};
+use super::step::{Keep, Race, Step};
 use crate::candidate::{Candidate, key_of, simplest};
 use crate::hypothesis::Hypothesis;
 use crate::race::{Course, Seed};
 use crate::search::state::State;
+use crate::tuning::tuning;
 
 /// The place where a law was found at first may be a neighbour of its own.
 pub(crate) struct Elsewhere;
@@ -19,7 +20,7 @@ impl Step for Elsewhere {
     }
 
     fn share(&self) -> f64 {
-        0.08
+        tuning().search.share_of_relatives
     }
 
     fn race(&self) -> Race {
@@ -35,7 +36,7 @@ impl Step for Elsewhere {
     }
 
     fn ends(&self) -> Option<f64> {
-        Some(RIVALS_END)
+        Some(tuning().search.rivals_end)
     }
 
     fn is_wanted(&self, state: &State) -> bool {

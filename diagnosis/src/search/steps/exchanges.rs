@@ -3,12 +3,12 @@
 use super::extensions::extensions;
 use super::step::{Keep, Step};
 use crate::candidate::{Candidate, candidate};
-use crate::fit::Effort;
 use crate::hypothesis::Hypothesis;
 use crate::race::{Course, Seed};
 use crate::search::state::State;
 use crate::search::view::View;
 use crate::structure::Structure;
+use crate::tuning::tuning;
 
 /// Each effect of the best exchanged for what promises most in its place.
 pub(crate) struct Exchanges;
@@ -42,7 +42,7 @@ fn exchanges(course: &Course, view: &View, best: &Candidate, count: usize) -> Ve
         let kept: Vec<Vec<f64>> = (0..values.len()).filter(keep).map(|i| values[i].clone()).collect();
         let structure = Structure::new(problem, &problem.fit, added);
         let start = structure.values(problem, &stated, &kept, &of_records);
-        let Some(fit) = view.evaluator.fit(&structure, &start, Effort { steps: 3, tolerance: 2.0 }) else { continue };
+        let Some(fit) = view.evaluator.fit(&structure, &start, tuning().fit.early) else { continue };
         seeds.extend(extensions(course, view, &candidate(&view.evaluator, structure, fit), count));
     }
     seeds

@@ -1,24 +1,20 @@
 //! A structure with one effect more.
 
 use crate::candidate::Candidate;
-use crate::fit::Effort;
 use crate::race::{Course, Seed};
 use crate::screen::Promise;
-use crate::search::view::{SIMPLE, View};
+use crate::search::view::View;
+use crate::tuning::tuning;
 use std::collections::HashSet;
 
 /// A structure with each of what promises most beside it added.
 pub(super) fn extensions(course: &Course, view: &View, base: &Candidate, count: usize) -> Vec<Seed> {
     let problem = course.evaluator.problem;
-    let fit = if view.whole {
-        Some(base.fit.clone())
-    } else {
-        view.evaluator.fit(&base.structure, &base.fit.values, Effort { steps: 4, tolerance: 2.0 })
-    };
+    let fit = if view.whole { Some(base.fit.clone()) } else { view.evaluator.fit(&base.structure, &base.fit.values, tuning().fit.base) };
     let Some(fit) = fit else { return Vec::new() };
     let fits = |h: usize| {
         let new = &course.hypotheses[h];
-        new.parameters.len() <= SIMPLE && base.structure.added.iter().all(|b| b.compatible(new))
+        new.parameters.len() <= tuning().screening.parameters && base.structure.added.iter().all(|b| b.compatible(new))
     };
     let own = course.effects_of(&base.structure, &fit.values);
     let seed = |p: Promise, guided| {

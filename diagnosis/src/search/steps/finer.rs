@@ -1,12 +1,13 @@
 //! Laws of the best, resolved more finely.
 
 use super::step::{Keep, Race, Step};
-use crate::candidate::{COARSELY, Candidate, NEAR_ENOUGH, distinct_structures};
+use crate::candidate::{Candidate, distinct_structures};
 use crate::hypothesis;
 use crate::race::{Course, Seed};
 use crate::search::ending::polished;
 use crate::search::revive::revived;
 use crate::search::state::State;
+use crate::tuning::tuning;
 
 /// Share of the work for parameters that come back.
 const REVIVING: f64 = 0.2;
@@ -24,7 +25,7 @@ impl Step for Finer {
     }
 
     fn share(&self) -> f64 {
-        0.15
+        tuning().search.share_of_finer
     }
 
     fn race(&self) -> Race {
@@ -36,7 +37,7 @@ impl Step for Finer {
     }
 
     fn settle(&self, state: &mut State) {
-        let comes_near = state.found.first().is_some_and(|c| c.levels.iter().all(|l| *l < NEAR_ENOUGH));
+        let comes_near = state.found.first().is_some_and(|c| c.levels.iter().all(|l| *l < tuning().noise.very_far));
         if comes_near && !state.work.is_past(0.6) {
             // Before others are tried from the numbers of the best; where it leaves much over, more is missing than a mass.
             let evaluator = state.course.evaluator.within(state.work.up_to(0.75).next(state.work.share(REVIVING)));
@@ -53,7 +54,7 @@ impl Step for Finer {
 /// The best, and what does nearly as well with as many effects, with a law of theirs drawn more finely.
 fn finer(course: &Course, found: &[Candidate]) -> Vec<Seed> {
     let Some(best) = found.first() else { return Vec::new() };
-    let near = |c: &&Candidate| c.fit.cost < COARSELY * best.fit.cost;
+    let near = |c: &&Candidate| c.fit.cost < tuning().search.as_good * best.fit.cost;
     let mut seeds = Vec::new();
     for c in distinct_structures(found, best.structure.added.len()).filter(near) {
         let own = course.effects_of(&c.structure, &c.fit.values);

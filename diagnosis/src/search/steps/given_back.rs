@@ -5,12 +5,8 @@ use crate::hypothesis::Place;
 use crate::race::{Course, Seed};
 use crate::screen::Promise;
 use crate::search::state::State;
+use crate::tuning::tuning;
 use std::collections::HashSet;
-
-/// Share of what promises most that a law has to promise, where a stated number is to give back what it may have taken on.
-const PROMISED: f64 = 0.5;
-/// Parts of a stated number that it may have taken on.
-const TAKEN_ON: [f64; 3] = [0.25, 0.5, 0.9];
 
 /// A law beside a stated parameter of its kind in the neighbourhood, which starts where that has given back what it may have absorbed.
 pub(crate) struct GivenBack;
@@ -53,7 +49,7 @@ fn given_back(course: &Course, promises: &[Promise], chance: f64) -> Vec<Seed> {
     );
     let mut used = HashSet::new();
     let mut seeds = Vec::new();
-    for promise in promises.iter().filter(|p| p.share > chance.max(PROMISED * top) && used.insert(p.hypothesis)) {
+    for promise in promises.iter().filter(|p| p.share > chance.max(tuning().search.promise * top) && used.insert(p.hypothesis)) {
         let Some(law) = course.hypotheses.get(promise.hypothesis) else { continue };
         let (Place::Between(a, b), [parameter]) = (&law.place, law.parameters.as_slice()) else { continue };
         for element in problem.model.elements.iter().filter(|e| e.law.kind().name == law.physics.name) {
@@ -62,7 +58,7 @@ fn given_back(course: &Course, promises: &[Promise], chance: f64) -> Vec<Seed> {
             let own = problem.stated.iter().zip(&stated).enumerate().find(|(_, (s, _))| s.path == path);
             let Some((index, (number, value))) = own.filter(|_| ends.iter().any(|end| end == a || end == b)) else { continue };
             let moved = (value - number.given).max(0.0);
-            for taken in TAKEN_ON.iter().map(|part| part * value).chain((moved > 0.0).then_some(moved)) {
+            for taken in tuning().search.taken_over.iter().map(|part| part * value).chain((moved > 0.0).then_some(moved)) {
                 let mut stated = stated.clone();
                 stated[index] = (value - taken).clamp(number.range.0, number.range.1);
                 let values = vec![taken.clamp(parameter.range.0, parameter.range.1)];

@@ -1,12 +1,9 @@
 //! Every law at the place of the best: where one law helps another one may be the right one.
 
 use super::step::{Keep, Step};
-use crate::candidate::NEAR;
 use crate::race::{Seed, distinct};
 use crate::search::state::State;
-
-/// How many, where each costs a fit because no coupling to the measured motion makes the first steps cheap.
-const FREE: usize = 6;
+use crate::tuning::tuning;
 
 /// Other laws at the place of the best.
 pub(crate) struct Laws;
@@ -23,7 +20,7 @@ impl Step for Laws {
     fn propose(&self, state: &mut State) -> Vec<Seed> {
         let (course, guided, samples) = (state.course, state.is_guided(), state.samples());
         // Coupled to the measured motion, what is far from the noise was tried already.
-        let best = state.found.first().filter(|c| !guided || c.fit.cost < NEAR * samples as f64);
+        let best = state.found.first().filter(|c| !guided || c.fit.cost < tuning().noise.near * samples as f64);
         let mut seeds = best.map_or_else(Vec::new, |best| course.laws(&best.structure, &best.fit.values));
         if !guided {
             let own = |s: &Seed| -> f64 {
@@ -32,7 +29,7 @@ impl Step for Laws {
             };
             seeds.sort_by(|a, b| own(b).total_cmp(&own(a)));
             distinct(&mut seeds);
-            seeds.truncate(FREE);
+            seeds.truncate(tuning().search.laws_uncoupled);
         }
         seeds
     }

@@ -1,10 +1,11 @@
 //! Simpler laws of the family of the best, in its place.
 
-use super::step::{Keep, RIVALS_END, Race, Step};
+use super::step::{Keep, Race, Step};
 use crate::candidate::Candidate;
 use crate::hypothesis::{self, Hypothesis};
 use crate::race::{Course, Seed};
 use crate::search::state::State;
+use crate::tuning::tuning;
 
 /// A law that wins with more parameters has to win over its simpler relatives, whatever these promised; and far from the noise, where fits were cut
 /// short, the first that came near may not be the one.
@@ -20,7 +21,7 @@ impl Step for Relatives {
     }
 
     fn share(&self) -> f64 {
-        0.08
+        tuning().search.share_of_relatives
     }
 
     fn race(&self) -> Race {
@@ -36,7 +37,7 @@ impl Step for Relatives {
     }
 
     fn ends(&self) -> Option<f64> {
-        Some(RIVALS_END)
+        Some(tuning().search.rivals_end)
     }
 
     fn is_wanted(&self, state: &State) -> bool {

@@ -3,9 +3,7 @@
 use super::step::{Keep, Race, Step};
 use crate::race::Seed;
 use crate::search::state::State;
-
-/// How many are fitted without the coupling to the measured motion that the others begin with.
-const RIPPLES: usize = 4;
+use crate::tuning::tuning;
 
 /// Coupled to the measured motion a ripple slides out of phase, so these are fitted without.
 pub(crate) struct Ripples;
@@ -31,6 +29,6 @@ impl Step for Ripples {
         let course = state.course;
         let beside = (&course.nominal.structure, &course.nominal.fit.values[..]);
         let seed = |ripple: &(usize, Vec<f64>)| Seed::beside(course.evaluator.problem, beside, vec![ripple.clone()], false);
-        state.ripples.iter().take(RIPPLES).map(seed).collect()
+        state.ripples.iter().take(tuning().search.ripples).map(seed).collect()
     }
 }

@@ -3,9 +3,6 @@
 use crate::race::Seed;
 use crate::search::state::State;
 
-/// Share of the work at which fits of rivals of the best end: a simpler law that does as well is worth a little more than the others' time.
-pub(crate) const RIVALS_END: f64 = 0.92;
-
 /// How many of the structures that a step proposes are fitted further than their first steps, and how many to their end.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Keep {

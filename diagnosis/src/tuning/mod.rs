@@ -1,0 +1,83 @@
+//! Every number that decides what is tried, how well it is fitted and what is claimed: with its unit, its value, and what it rests on.
+//!
+//! `docs/tuning.md` is this table, and what the measurements of `diagnosis/tests/concealed/sensitivity.py` say of it. What belongs to one physics
+//! (ranges, starting values) stands in its file in `physics/`, and what follows from a formula stands in the formula.
+
+mod claim;
+mod coupling;
+mod fit;
+mod intervals;
+mod noise;
+mod screening;
+mod search;
+mod table;
+
+pub use claim::Claim;
+pub use coupling::Coupling;
+pub use fit::Fit;
+pub use intervals::Intervals;
+pub use noise::Noise;
+pub use screening::Screening;
+pub use search::Search;
+use std::sync::OnceLock;
+pub use table::{Evidence, Group, Quantity, Row};
+
+/// All of it.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Tuning {
+    /// When residuals count as noise.
+    pub noise: Noise,
+    /// How a structure is fitted.
+    pub fit: Fit,
+    /// How a model is coupled to the measured motion.
+    pub coupling: Coupling,
+    /// How hypotheses are screened.
+    pub screening: Screening,
+    /// How much is tried, and when it ends.
+    pub search: Search,
+    /// How sure parameters are.
+    pub intervals: Intervals,
+    /// What is claimed.
+    pub claim: Claim,
+}
+
+static IN_USE: OnceLock<Tuning> = OnceLock::new();
+
+/// The tuning in use.
+pub fn tuning() -> &'static Tuning {
+    IN_USE.get_or_init(Tuning::default)
+}
+
+impl Tuning {
+    fn groups(&mut self) -> [(&'static str, &mut dyn Group); 7] {
+        [
+            ("noise", &mut self.noise),
+            ("fit", &mut self.fit),
+            ("coupling", &mut self.coupling),
+            ("screening", &mut self.screening),
+            ("search", &mut self.search),
+            ("intervals", &mut self.intervals),
+            ("claim", &mut self.claim),
+        ]
+    }
+
+    /// Every entry.
+    pub fn rows(&self) -> Vec<Row> {
+        self.clone().groups().into_iter().flat_map(|(name, group)| group.rows(name)).collect()
+    }
+
+    /// One entry by its name, such as `claim.tie`; `None` where there is none of it.
+    pub fn quantity(&mut self, name: &str) -> Option<&mut dyn Quantity> {
+        let (group, field) = name.split_once('.')?;
+        let (_, group) = self.groups().into_iter().find(|(name, _)| *name == group)?;
+        group.quantity(field)
+    }
+
+    /// Puts this tuning to use, for a study of how much verdicts depend on it. It has to be called before anything is diagnosed.
+    ///
+    /// # Errors
+    /// When another one is in use: it is given back.
+    pub fn adopt(self) -> Result<(), Tuning> {
+        IN_USE.set(self)
+    }
+}

@@ -1,0 +1,27 @@
+//! When residuals count as noise.
+
+use super::table::group;
+
+group! {
+    /// When residuals count as noise. They are normalised: divided by the noise standard deviation of their output.
+    Noise {
+        /// Correlation time below which residuals may be white.
+        white_correlation: f64 = 1.5, "samples", Statistics("white noise has 1; the sum over lags that chance makes positive adds up to about 0.3 at 1000 samples and more");
+        /// Whiteness statistic below which residuals may be white.
+        white_statistic: f64 = 4.0, "standard deviations", Statistics("the largest of four block lengths exceeds 4 by chance in about 1 of 8000 fits (normal tail)");
+        /// Block lengths over which the whiteness statistic sums residuals.
+        blocks: [usize; 4] = [4, 16, 64, 256], "samples", Statistics("sums over blocks see slow residuals that neighbours do not show; factors of four leave no gap between them");
+        /// Blocks of a record below which the whiteness statistic leaves it out.
+        fewest_blocks: usize = 12, "blocks", Statistics("a chi-square of fewer is far from the normal distribution that the statistic is read by");
+        /// Normalised residual (rms) up to which a fit has reached the noise.
+        at_noise: f64 = 1.04, "rms", Judgement("the noise standard deviation is itself estimated, to about 2 % from 1000 samples, and rounding adds as much");
+        /// Normalised residual (rms) above which an output is not explained.
+        unexplained: f64 = 1.15, "rms", Judgement("seven times that error of the noise estimate");
+        /// Normalised residual (rms) above which a model is far from the noise, and fits start coupled to the measured motion.
+        far: f64 = 2.0, "rms", Judgement("three quarters of the squares are then not noise");
+        /// Mean squared normalised residual up to which a structure may be complete.
+        near: f64 = 2.0, "mean square", Judgement("as much as the noise is unexplained");
+        /// Normalised residual (rms) above which the nominal refit is brought to its end only after the search.
+        very_far: f64 = 5.0, "rms", Cost("its last steps decide nothing while a 25 times larger misfit is unexplained");
+    }
+}

@@ -1,0 +1,89 @@
+//! How much is tried, in which order, and when it ends.
+
+use super::table::group;
+
+group! {
+    /// How much is tried and when it ends. Shares are of the work that a search may do ([`Search::work`] times the effort asked for).
+    Search {
+        /// Work of a search with an effort of 1.
+        work: u64 = 1_200_000_000, "simulation steps", Cost("about 20 s on two threads of a laptop");
+        /// Wall-clock limit of a search, where nothing else is said.
+        patience: u64 = 600, "s", Cost("far longer than the default effort takes on a slow machine");
+        /// Simulation steps of two threads of a laptop in a second: for progress bars only.
+        steps_per_second: f64 = 60e6, "simulation steps", Measured("`cargo bench -p backdrive-plant --bench stepper`: 25 to 35 ns a step");
+        /// Fits that run side by side before their work is added up.
+        abreast: usize = 16, "fits", Cost("two for each of eight processors; fixed, so that a verdict does not depend on their number");
+        /// Share of what is left that one of many fits side by side may take.
+        of_one: f64 = 0.25, "of what is left", Cost("one fit of a slow law must not starve the others");
+        /// Share at which the nominal model's refit ends.
+        refit_ends: f64 = 0.75, "of the work", Cost("never reached in practice");
+        /// Share after which no step is begun.
+        last_step: f64 = 0.7, "of the work", Cost("the rest is for bringing the best to their ends");
+        /// Share after which no step for rivals of the best is begun.
+        last_rival: f64 = 0.85, "of the work", Cost("a simpler law that does as well is worth more than another effect");
+        /// Share at which fits of rivals end.
+        rivals_end: f64 = 0.92, "of the work", Cost("as last_rival");
+        /// Share at which the best are at their ends.
+        best_end: f64 = 0.95, "of the work", Cost("the rest is for the nominal model");
+        /// Share at which the nominal model is at its end.
+        nominal_end: f64 = 0.97, "of the work", Cost("the rest is for holding structures against unseen recordings");
+        /// Share in which fits that coarse substeps have blurred go on, whatever is left.
+        refitted: f64 = 0.1, "of the work", Numerics("a structure must not win by the error of its substeps");
+        /// Share of a step that tries other laws or places for the best, far from the noise.
+        share_of_relatives: f64 = 0.08, "of the work", Cost("another effect may be what is missing");
+        /// Share of the step that resolves laws more finely, far from the noise.
+        share_of_finer: f64 = 0.15, "of the work", Cost("as share_of_relatives");
+        /// Work in which every law at a place takes its first step.
+        laws: u64 = 120_000_000, "simulation steps", Cost("a tenth of the work");
+        /// Work in which each record is fitted by itself.
+        per_record: u64 = 200_000_000, "simulation steps", Cost("a sixth of the work");
+        /// Work in which the next experiment is looked for.
+        experiment: u64 = 100_000_000, "simulation steps", Cost("a twelfth of the work");
+        /// Share of the best promise that a single effect has to reach, beyond the first few.
+        promise: f64 = 0.5, "-", Cost("those that promise less are tried beside others");
+        /// Single effects fitted first and next, where a coupled fit makes first steps cheap.
+        singles_coupled: usize = 30, "structures", Cost("first steps");
+        /// Single effects fitted first, otherwise.
+        singles_first: usize = 4, "structures", Cost("first steps");
+        /// Single effects fitted next, otherwise.
+        singles_next: usize = 5, "structures", Cost("first steps");
+        /// Ripples fitted without coupling.
+        ripples: usize = 4, "structures", Cost("first steps");
+        /// Other laws at the place of the best, where fits are not coupled.
+        laws_uncoupled: usize = 6, "structures", Cost("first steps");
+        /// Places whose laws are all tried, where fits are coupled.
+        places: usize = 2, "places", Cost("as many laws as there are for each");
+        /// Structures that start from an uncoupled simulation beside coupled ones.
+        uncoupled: usize = 2, "structures", Cost("first steps");
+        /// Structures that go on after their first steps whatever the best has reached.
+        always: usize = 3, "structures", Cost("after two steps a fit may be far from its end");
+        /// Predicted cost over the best's up to which a coupled fit goes on.
+        behind: f64 = 2.5, "-", Cost("costs along the measured motion differ by little");
+        /// Predicted cost over the best's up to which an uncoupled fit goes on, once the best is at the noise.
+        behind_at_noise: f64 = 1.3, "-", Cost("no structure far behind can win any more");
+        /// The same before the best is at the noise.
+        behind_far: f64 = 4.0, "-", Cost("twice the residual");
+        /// Mean squared residual of the best below which it is at the noise, for the two above.
+        best_at_noise: f64 = 1.2, "mean square", Cost("as noise.at_noise squared, and a fit that is not at its end");
+        /// Cost over the best's up to which a structure is refined or has parameters given back.
+        as_good: f64 = 3.0, "-", Cost("1.7 times the residual");
+        /// Structures whose vanished parameters are given back, at most.
+        revived: usize = 3, "structures", Cost("one fit each");
+        /// Value over a parameter's least one below which it has vanished.
+        vanished: f64 = 2.0, "-", Numerics("a parameter that is fitted as its logarithm has no gradient near its lower bound");
+        /// Parts of a stated parameter that a law beside it may take over.
+        taken_over: [f64; 3] = [0.25, 0.5, 0.9], "-", Judgement("two dampers in a row are told apart along a narrow valley: starts along it");
+        /// Steps to something simpler at the end, at most.
+        simpler: usize = 3, "steps", Cost("one fit for each effect and law");
+        /// Structures of each number of effects that are held against unseen recordings.
+        finalists: usize = 8, "structures", Cost("one simulation each");
+        /// Structures that are brought to their ends.
+        last_fits: usize = 6, "structures", Cost("one fit each");
+        /// Share of the nominal model's residual (mean square) that it has to leave when coupled to the measured motion.
+        coupled_leaves: f64 = 0.3, "-", Judgement("where coupling explains more than that, it explains what is missing, too");
+        /// The same in mean squares of the noise.
+        coupled_leaves_noise: f64 = 3.0, "mean square", Judgement("three times the noise is enough to tell physics apart");
+        /// Factors on the coupling, tried in this order until the nominal model leaves enough.
+        couplings: [f64; 5] = [0.2, 1.0, 0.2, 0.04, 0.008], "-", Judgement("the first on parts of the recordings, the others on the whole");
+    }
+}
