@@ -456,7 +456,7 @@ fn moved_values(structure: &Structure, own: &[f64], j: usize, stretch: f64) -> (
 /// Whether a number has an effect and is not pushed against its bound.
 fn may_move(number: &Number, own: f64, slope: f64, curvature: f64) -> bool {
     let (low, high) = number.bounds();
-    let edge = 1e-9 * (high - low);
+    let edge = tuning().fit.pushed * (high - low);
     curvature > 0.0 && !(own <= low + edge && slope > 0.0) && !(own >= high - edge && slope < 0.0)
 }
 

@@ -9,9 +9,6 @@ use crate::structure::Structure;
 use crate::tuning::tuning;
 use crate::work::{Budget, Steps};
 
-/// Share of its cost that a fit may foresee to lose, at most, where it is asked whether it is behind.
-const FORESEEN: f64 = 0.95;
-
 /// A structure and values to start from.
 pub type Entry = (Structure, Vec<Vec<f64>>);
 
@@ -144,7 +141,7 @@ fn rank(led: &mut Vec<(Structure, Fit)>, keep: usize) {
     distinct_fits(led);
     let best = led.first().map_or(0.0, |(_, f)| hopeful(f).max(f.residuals.len() as f64));
     // One that is still on its way is not behind yet, if its next step foresees that it comes near.
-    let on_its_way = |f: &Fit| f.cost - f.foreseen.min(FORESEEN * f.cost);
+    let on_its_way = |f: &Fit| f.cost - f.foreseen.min(tuning().search.may_gain_coupled * f.cost);
     led.retain(|(_, f)| on_its_way(f) < tuning().search.behind * best);
     led.truncate(keep);
 }

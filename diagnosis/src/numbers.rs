@@ -58,11 +58,11 @@ pub fn rows(problem: &Problem, candidate: &Candidate, spread: &Spread) -> Vec<Ro
         let deviation = spread.deviation.get(index).copied().unwrap_or(f64::INFINITY);
         let (low, high) = number.bounds();
         let own = number.inward(*value);
-        let edge = 1e-6 * (high - low);
+        let edge = tuning().fit.at_bound * (high - low);
         let sure = match (number.log, given) {
             (true, _) => deviation < tuning().claim.undetermined,
             (false, Some(given)) => deviation < tuning().claim.undetermined * given.abs().max(value.abs()),
-            (false, None) => deviation < 0.25 * (high - low),
+            (false, None) => deviation < tuning().claim.undetermined_range * (high - low),
         };
         Row {
             name: name_of(problem, candidate, index),

@@ -125,7 +125,7 @@ impl Course<'_> {
             let lead = running.first().map_or(0.0, |(_, f)| hopeful(f));
             let next = evaluator.budget.abreast(&running, |budget, (structure, fit)| {
                 // Beside one that leaves nothing over, others only have to show that they do no better; those far behind have.
-                let beaten = stage == 2 && lead < 1.1 * floor && hopeful(fit) > lead;
+                let beaten = stage == 2 && lead < tuning().search.best_ends * floor && hopeful(fit) > lead;
                 if beaten && hopeful(fit) > margin * lead {
                     return None;
                 }
@@ -181,5 +181,5 @@ fn restricted(evaluator: &Evaluator, fit: &Fit, records: &[usize]) -> Fit {
 
 /// What a fit would cost if most of what its next step foresees came true.
 pub fn hopeful(fit: &Fit) -> f64 {
-    fit.cost - fit.foreseen.min(0.6 * fit.cost)
+    fit.cost - fit.foreseen.min(tuning().search.may_gain * fit.cost)
 }

@@ -127,7 +127,7 @@ impl Screen {
         // First starts first: where simulations are slower than the sample, the last ones are left out.
         let rank = |(index, start): &(usize, &Vec<f64>)| hypotheses[*index].starts.iter().position(|s| std::ptr::eq(s, *start));
         jobs.sort_by_key(rank);
-        let most = (affordable / (2 * evaluator.records.len()).max(1)).clamp(24, tuning().screening.starts);
+        let most = (affordable / (2 * evaluator.records.len()).max(1)).clamp(tuning().screening.fewest_starts, tuning().screening.starts);
         let with = |index: usize| {
             let mut with = base.added.clone();
             with.push(hypotheses[index].clone());
@@ -146,7 +146,7 @@ impl Screen {
             let mut left = before.clone();
             small.apply(&mut left);
             let total = dot(&left, &left);
-            let first_pass = evaluator.budget.next((work as f64 * 0.6) as Steps);
+            let first_pass = evaluator.budget.next((work as f64 * tuning().screening.first_pass) as Steps);
             let scored = first_pass.abreast(&jobs, |budget, (index, start)| {
                 let evaluator = evaluator.within(budget.clone());
                 let structure = with(*index);
@@ -260,7 +260,9 @@ fn share(columns: &[&Vec<f64>], left: &[f64], total: f64) -> f64 {
     if size.iter().all(|s| *s < tuning().screening.imitated) {
         return 0.0;
     }
-    let gram = DMatrix::from_fn(n, n, |i, j| dot(columns[i], columns[j]) / (size[i] * size[j]) + if i == j { 1e-4 } else { 0.0 });
+    let gram = DMatrix::from_fn(n, n, |i, j| {
+        dot(columns[i], columns[j]) / (size[i] * size[j]) + if i == j { tuning().screening.ridge } else { 0.0 }
+    });
     let right = DVector::from_iterator(n, columns.iter().zip(&size).map(|(c, s)| dot(c, left) / s));
     match gram.cholesky() {
         Some(factor) => (right.dot(&factor.solve(&right)) / total).clamp(0.0, 1.0),
@@ -287,7 +289,8 @@ pub fn pairs(
     let size: Vec<f64> = columns.iter().map(|c| dot(c, c).sqrt().max(1e-300)).collect();
     let gram: Vec<Vec<f64>> =
         (0..columns.len()).into_par_iter().map(|i| (0..=i).map(|j| dot(columns[i], columns[j]) / (size[i] * size[j])).collect()).collect();
-    let right: Vec<f64> = columns.iter().zip(&size).map(|(c, s)| if *s < 1e-3 { 0.0 } else { dot(c, &left) / s }).collect();
+    let right: Vec<f64> =
+        columns.iter().zip(&size).map(|(c, s)| if *s < tuning().screening.imitated { 0.0 } else { dot(c, &left) / s }).collect();
     let mut found = Vec::new();
     for a in &firsts {
         for b in firsts.iter().filter(|b| *b > a) {
@@ -297,7 +300,7 @@ pub fn pairs(
             let own: Vec<usize> = (0..columns.len()).filter(|c| owner[*c] == *a || owner[*c] == *b).collect();
             let n = own.len();
             let at = |i: usize, j: usize| if i >= j { gram[i][j] } else { gram[j][i] };
-            let matrix = DMatrix::from_fn(n, n, |i, j| at(own[i], own[j]) + if i == j { 1e-3 } else { 0.0 });
+            let matrix = DMatrix::from_fn(n, n, |i, j| at(own[i], own[j]) + if i == j { tuning().screening.pair_ridge } else { 0.0 });
             let vector = DVector::from_iterator(n, own.iter().map(|c| right[*c]));
             if let Some(factor) = matrix.cholesky() {
                 found.push((*a, *b, (vector.dot(&factor.solve(&vector)) / total).clamp(0.0, 1.0)));

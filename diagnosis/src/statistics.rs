@@ -61,6 +61,12 @@ fn slow_by(parts: &[&[f64]], length: usize) -> f64 {
     if variance > 0.0 { surplus / variance.sqrt() } else { 0.0 }
 }
 
+/// Standard deviation of white noise whose sizes have this median (1/0.6745 of it): a few that are far off do not count. `sizes` is reordered; 0 for none.
+pub fn deviation_by_median(sizes: &mut [f64]) -> f64 {
+    let middle = sizes.len() / 2;
+    if sizes.is_empty() { 0.0 } else { 1.4826 * *sizes.select_nth_unstable_by(middle, f64::total_cmp).1 }
+}
+
 /// Root mean square of the residuals of each output, in floors; 0 where none was measured.
 pub fn levels(evaluator: &Evaluator, residuals: &[f64]) -> Vec<f64> {
     let outputs = evaluator.problem.model.outputs.len();

@@ -342,10 +342,10 @@ fn start_numbers(problem: &Problem, record: &Record, r: usize) -> Vec<Number> {
             step: 1e-5 * width,
             coarse: false,
             records: Some(vec![r]),
-            prior: Some((0.0, 0.3 * width)),
+            prior: Some((0.0, tuning().fit.start_prior * width)),
         };
-        let speed = size / (20.0 * record.period);
-        [number(Role::Position(body, r), 20.0 * size), number(Role::Velocity(body, r), speed)]
+        let speed = size / (tuning().fit.start_range * record.period);
+        [number(Role::Position(body, r), tuning().fit.start_range * size), number(Role::Velocity(body, r), speed)]
     })
     .collect()
 }

@@ -40,8 +40,12 @@ pub(super) fn bring_to_their_ends(evaluator: &Evaluator, found: &mut [Candidate]
     let (last, exact) = (work.up_to(tuning().search.best_end), work.budget.extended(exact_end));
     let best = found.first().map_or(f64::INFINITY, |c| c.fit.cost);
     let unit = best / samples as f64;
-    let open = |c: &Candidate| c.fit.foreseen > 0.5 * unit && c.fit.cost - 2.0 * c.fit.foreseen < best + 20.0 * unit * c.correlation_time;
-    let near: Vec<usize> = (0..found.len().min(tuning().search.last_fits)).filter(|i| found[*i].fit.cost < 1.5 * best).collect();
+    let open = |c: &Candidate| {
+        c.fit.foreseen > tuning().search.open_tolerance * unit
+            && c.fit.cost - 2.0 * c.fit.foreseen < best + tuning().search.open_advantage * unit * c.correlation_time
+    };
+    let near: Vec<usize> =
+        (0..found.len().min(tuning().search.last_fits)).filter(|i| found[*i].fit.cost < tuning().search.last_cost * best).collect();
     let polish = |budget: &Budget, i: usize| -> Option<(usize, Fit)> {
         let c = &found[i];
         let evaluator = evaluator.within(budget.clone());
@@ -66,7 +70,7 @@ pub(super) fn nominal_at_its_end(nominal: &Nominal, found: &[Candidate], work: &
     let (evaluator, refitted) = (&nominal.evaluator, &nominal.refitted);
     let problem = evaluator.problem;
     let numbers = |c: &Candidate| (c.structure.stated_of(problem, &c.fit.values), c.structure.of_records(&c.fit.values));
-    let others = found.iter().take(2).map(numbers);
+    let others = found.iter().take(tuning().search.nominal_from).map(numbers);
     // Far from the noise its last thousandths say nothing.
     let effort = if nominal.is_far { tuning().fit.nominal_last } else { tuning().fit.to_the_end };
     let substeps = if nominal.is_far { tuning().fit.middle_substeps } else { evaluator.substeps };
@@ -76,7 +80,7 @@ pub(super) fn nominal_at_its_end(nominal: &Nominal, found: &[Candidate], work: &
         let start = refitted.structure.values(problem, &stated, &[], &of_records);
         let least = better.as_ref().map_or(refitted.fit.cost, |f: &Fit| f.cost);
         if let Some(fit) = last.fit(&refitted.structure, &start, effort)
-            && fit.cost < 0.999 * least
+            && fit.cost < (1.0 - tuning().fit.relative_tolerance) * least
         {
             better = Some(fit);
         }

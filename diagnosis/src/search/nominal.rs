@@ -11,7 +11,7 @@ use crate::hypothesis::Scales;
 use crate::parts::Parts;
 use crate::problem::{Problem, Record};
 use crate::screen::worst_records;
-use crate::statistics::{correlation_time, levels, slowness};
+use crate::statistics::{correlation_time, deviation_by_median, levels, slowness};
 use crate::structure::Structure;
 use crate::tuning::tuning;
 use backdrive_plant::model::{InputKind, Model};
@@ -138,7 +138,7 @@ impl<'a> Nominal<'a> {
         if held
             && let Some(there) = middle.residuals(&structure, &led.fit.values)
             && let Some(other) = worst_first(&middle, &structure, &led.fit.values, &there, tuning().fit.nominal_again)
-            && other.cost < 0.99 * refitted.cost
+            && other.cost < tuning().claim.refit_gains * refitted.cost
             && let Some(other) = evaluator.fit(&structure, &other.values, effort)
             && other.cost < refitted.cost
         {
@@ -196,9 +196,7 @@ fn bulk(residuals: &[f64], before: &[f64], evaluator: &Evaluator) -> f64 {
         let scale = before[output] / evaluator.floor[output];
         sizes.extend(residuals.get(range).unwrap_or(&[]).iter().map(|r| scale * r.abs()));
     }
-    let middle = sizes.len() / 2;
-    // The median of white noise is 0.6745 of its standard deviation.
-    if sizes.is_empty() { 1.0 } else { 1.4826 * *sizes.select_nth_unstable_by(middle, f64::total_cmp).1 }
+    if sizes.is_empty() { 1.0 } else { deviation_by_median(&mut sizes) }
 }
 
 /// Whether dry friction acts on a body whose motion is prescribed: its force then jumps with the sign of a measured motion.

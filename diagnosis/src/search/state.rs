@@ -113,16 +113,18 @@ impl<'s, 'a> State<'s, 'a> {
     fn promising(&self) -> Vec<Seed> {
         let (quiet, chance) = (self.is_quiet(), self.chance());
         let mut singles: Vec<Seed> = Vec::new();
-        for rank in 0..16 {
+        for rank in 0..tuning().search.ranks_coupled.max(tuning().search.ranks_uncoupled) {
             for view in self.views {
                 let mut used = HashSet::new();
                 let Some(promise) = view.simple.iter().filter(|p| used.insert(p.hypothesis)).nth(rank) else { continue };
                 // Those that promise little beside the best wait.
                 let top = view.simple.first().map_or(0.0, |p| p.share);
                 let wanted = if quiet {
-                    rank < 8 && promise.share > chance
+                    rank < tuning().search.ranks_uncoupled && promise.share > chance
                 } else {
-                    rank < 3 || rank < if self.is_guided() { 14 } else { 8 } && promise.share > tuning().search.promise * top
+                    rank < tuning().search.ranks_always
+                        || rank < if self.is_guided() { tuning().search.ranks_coupled } else { tuning().search.ranks_uncoupled }
+                            && promise.share > tuning().search.promise * top
                 };
                 if wanted {
                     singles.push(view.seed(vec![(promise.hypothesis, promise.values.clone())]));

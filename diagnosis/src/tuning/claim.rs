@@ -31,18 +31,30 @@ group! {
         significance: f64 = 1e-3, "probability", Statistics("one false alarm in a thousand diagnoses");
         /// Standard deviation of a parameter as a logarithm above which the recordings do not determine it.
         undetermined: f64 = 0.7, "logarithm", Statistics("a 95 % interval of a factor of 16 from end to end");
+        /// The same of a parameter that is not fitted as its logarithm and was not stated, as a share of its range.
+        undetermined_range: f64 = 0.25, "-", Statistics("a 95 % interval is then the whole range");
         /// The same for what one record alone says.
         undetermined_alone: f64 = 0.5, "logarithm", Statistics("a 95 % interval of a factor of 7");
         /// Excursion above which a sample belongs to a glitch, in median deviations of the residual.
         glitch: f64 = 8.0, "median deviations", Statistics("white noise does not reach it");
         /// Samples without an excursion that end a glitch.
         glitch_gap: usize = 40, "samples", Judgement("a sensor's filter rings that long");
+        /// Longest glitch.
+        glitch_longest: usize = 160, "samples", Judgement("four times glitch_gap");
+        /// Samples that glitches have, at least.
+        glitch_samples: usize = 3, "samples", Statistics("two may be a transmission error that moves no fit");
+        /// Share of the samples that glitches have, at most.
+        glitch_share: f64 = 0.02, "-", Judgement("what is off more often is no glitch");
         /// Factor of the softened weight of a rival in a confidence: advantage per unit of log-odds.
         softened: f64 = 20.0, "criterion", Judgement("an information criterion says 2; a simulator is never the device");
         /// Weight in a confidence of a richer law of the same family at the same place.
         richer: f64 = 0.1, "-", Judgement("it contains the claimed law");
         /// Weight in a confidence of a hypothesis that promised as much and was not fitted.
         unfitted: f64 = 0.02, "-", Judgement("it lost its race before its fit");
+        /// Such hypotheses that count, at most.
+        unfitted_most: f64 = 10.0, "hypotheses", Judgement("their weight is then that of one rival at 1.6 softened");
+        /// Alternatives that are listed.
+        alternatives: usize = 6, "structures", Cost("nobody reads more");
         /// Normalised residual (rms) up to which a confidence is not lowered.
         adequate: f64 = 1.05, "rms", Judgement("as noise.at_noise");
         /// Excess of the residual that lowers a confidence by a factor of e.

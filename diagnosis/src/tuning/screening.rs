@@ -11,6 +11,14 @@ group! {
         weak: f64 = 0.15, "-", Judgement("effects with a threshold (backlash, saturation) look different when small");
         /// Starts that pass the first of two passes, at most.
         starts: usize = 70, "starts", Cost("the second pass simulates each on all recordings");
+        /// The same, at least.
+        fewest_starts: usize = 24, "starts", Cost("fewer would leave whole families out");
+        /// Share of the work for the first pass, on the two worst recordings.
+        first_pass: f64 = 0.6, "of the work", Cost("it tries all starts");
+        /// Ridge of the projection on one hypothesis' two effects.
+        ridge: f64 = 1e-4, "-", Numerics("the two are nearly parallel where the law is linear");
+        /// Ridge of the projection on those of two hypotheses.
+        pair_ridge: f64 = 1e-3, "-", Numerics("as ridge, for four columns");
         /// Correlation below which an effect counts as imitated by the free parameters: length that is left of one.
         imitated: f64 = 1e-3, "-", Numerics("below it the projection's rounding is what is left");
         /// Share of the work for one base, near the noise.

@@ -55,6 +55,24 @@ group! {
         places: usize = 2, "places", Cost("as many laws as there are for each");
         /// Structures that start from an uncoupled simulation beside coupled ones.
         uncoupled: usize = 2, "structures", Cost("first steps");
+        /// Single effects from each base that are tried whatever they promise.
+        ranks_always: usize = 3, "structures", Cost("screening is of first order");
+        /// Single effects from each base that are tried at most, where fits are coupled.
+        ranks_coupled: usize = 14, "structures", Cost("as singles_coupled");
+        /// The same otherwise.
+        ranks_uncoupled: usize = 8, "structures", Cost("as singles_first");
+        /// Share of its cost that a fit may gain by its next step, at most, where fits are ranked.
+        may_gain: f64 = 0.6, "-", Judgement("a prediction from a linearisation is optimistic");
+        /// The same where coupled fits are dropped.
+        may_gain_coupled: f64 = 0.95, "-", Cost("a fit on its way is not behind yet");
+        /// Mean squared residual of the best below which others need only show that they do no better.
+        best_ends: f64 = 1.1, "mean square", Cost("it leaves noise");
+        /// Share in which vanished parameters are given back.
+        reviving: f64 = 0.2, "of the work", Cost("a few fits");
+        /// Share after which that is not begun.
+        last_revival: f64 = 0.6, "of the work", Cost("as last_step");
+        /// Share after which screening beside a structure takes the best structure only.
+        last_other_base: f64 = 0.5, "of the work", Cost("as last_step");
         /// Structures that go on after their first steps whatever the best has reached.
         always: usize = 3, "structures", Cost("after two steps a fit may be far from its end");
         /// Predicted cost over the best's up to which a coupled fit goes on.
@@ -77,6 +95,14 @@ group! {
         simpler: usize = 3, "steps", Cost("one fit for each effect and law");
         /// Structures of each number of effects that are held against unseen recordings.
         finalists: usize = 8, "structures", Cost("one simulation each");
+        /// Predicted decrease above which one of the best goes on, in mean squared residuals.
+        open_tolerance: f64 = 0.5, "mean squares", Statistics("as fit.to_the_end");
+        /// Distance from the best, in mean squared residuals over the correlation time, up to which it does.
+        open_advantage: f64 = 20.0, "criterion", Statistics("beyond twice claim.tie nothing changes any more");
+        /// Cost over the best's up to which it is looked at.
+        last_cost: f64 = 1.5, "-", Cost("as open_advantage");
+        /// Structures whose parameters the nominal model starts from at the end.
+        nominal_from: usize = 2, "structures", Cost("one fit each");
         /// Structures that are brought to their ends.
         last_fits: usize = 6, "structures", Cost("one fit each");
         /// Share of the nominal model's residual (mean square) that it has to leave when coupled to the measured motion.

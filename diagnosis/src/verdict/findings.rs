@@ -44,7 +44,7 @@ fn finding(search: &Search, best: &Candidate, spread: &Spread, adequacy: f64, wh
     // And of those that promised as much, but were not fitted: little, for they did not win their race.
     let own = search.tried.iter().find(|t| t.id == hypothesis.id).map_or(1.0, |t| t.promised);
     let unfitted = search.tried.iter().filter(|t| t.taken.is_none() && t.promised > 0.9 * own).count() as f64;
-    let sum = 1.0 + weights.iter().sum::<f64>() + tuning().claim.unfitted * unfitted.min(10.0);
+    let sum = 1.0 + weights.iter().sum::<f64>() + tuning().claim.unfitted * unfitted.min(tuning().claim.unfitted_most);
     let alternative = |((rival, _), weight): (&(Hypothesis, f64), &f64)| Alternative {
         physics: rival.physics.name.to_string(),
         place: rival.place.clone(),
@@ -56,7 +56,7 @@ fn finding(search: &Search, best: &Candidate, spread: &Spread, adequacy: f64, wh
         parameters: parameters_of(best, spread, which),
         replaces: hypothesis.replaces.clone(),
         confidence: round_significant(adequacy / sum, 3),
-        alternatives: rivals.iter().zip(&weights).take(6).map(alternative).collect(),
+        alternatives: rivals.iter().zip(&weights).take(tuning().claim.alternatives).map(alternative).collect(),
     }
 }
 

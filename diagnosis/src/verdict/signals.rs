@@ -4,6 +4,7 @@ use super::types::Where;
 use crate::candidate::Candidate;
 use crate::fit::Evaluator;
 use crate::problem::Problem;
+use crate::statistics::deviation_by_median;
 use crate::tuning::tuning;
 use crate::unknown::{Estimated, Unknown, estimated};
 use backdrive_plant::write::round_significant;
@@ -20,12 +21,11 @@ pub(super) fn bursts(problem: &Problem, best: &Candidate) -> Vec<[f64; 2]> {
             continue;
         }
         let mut sizes: Vec<f64> = part.iter().map(|x| x.abs()).collect();
-        let middle = sizes.len() / 2;
-        let spread = 1.4826 * *sizes.select_nth_unstable_by(middle, f64::total_cmp).1;
+        let spread = deviation_by_median(&mut sizes);
         // A rounded signal may well be right in more than half of its samples.
         let far = tuning().claim.glitch * spread.max(1.0);
         let away: Vec<usize> = part.iter().enumerate().filter(|(_, x)| x.abs() > far).map(|(i, _)| i).collect();
-        if away.len() < 3 || away.len() * 50 > part.len() {
+        if away.len() < tuning().claim.glitch_samples || away.len() as f64 > tuning().claim.glitch_share * part.len() as f64 {
             continue;
         }
         let mut groups: Vec<(usize, usize)> = Vec::new();
@@ -37,7 +37,7 @@ pub(super) fn bursts(problem: &Problem, best: &Candidate) -> Vec<[f64; 2]> {
         }
         let period = problem.fit[r].period;
         all.extend(
-            groups.iter().filter(|g| g.1 - g.0 <= 4 * tuning().claim.glitch_gap).map(|g| [g.0 as f64 * period, (g.1 + 1) as f64 * period]),
+            groups.iter().filter(|g| g.1 - g.0 <= tuning().claim.glitch_longest).map(|g| [g.0 as f64 * period, (g.1 + 1) as f64 * period]),
         );
     }
     all

@@ -34,7 +34,7 @@ impl Step for Anew {
         let best = fewer().next();
         // The first step to it may have been the wrong one: so from the best without that, too.
         let without = |first: &Hypothesis| fewer().find(|c| c.structure.added.iter().all(|h| h.physics != first.physics));
-        let late = state.work.is_past(0.5);
+        let late = state.work.is_past(tuning().search.last_other_base);
         let other = best.and_then(|b| b.structure.added.first()).filter(|_| !late).and_then(without);
         // And far from the noise from what does nearly as well with fewer numbers: it leaves more open.
         let has_fewer = |c: &&Candidate| best.is_some_and(|b| c.structure.numbers.len() < b.structure.numbers.len());

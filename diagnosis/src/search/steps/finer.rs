@@ -9,9 +9,6 @@ use crate::search::revive::revived;
 use crate::search::state::State;
 use crate::tuning::tuning;
 
-/// Share of the work for parameters that come back.
-const REVIVING: f64 = 0.2;
-
 /// How finely a law is resolved is no physics: that comes before another effect.
 pub(crate) struct Finer;
 
@@ -38,9 +35,12 @@ impl Step for Finer {
 
     fn settle(&self, state: &mut State) {
         let comes_near = state.found.first().is_some_and(|c| c.levels.iter().all(|l| *l < tuning().noise.very_far));
-        if comes_near && !state.work.is_past(0.6) {
+        if comes_near && !state.work.is_past(tuning().search.last_revival) {
             // Before others are tried from the numbers of the best; where it leaves much over, more is missing than a mass.
-            let evaluator = state.course.evaluator.within(state.work.up_to(0.75).next(state.work.share(REVIVING)));
+            let evaluator = state
+                .course
+                .evaluator
+                .within(state.work.up_to(tuning().search.refit_ends).next(state.work.share(tuning().search.reviving)));
             let back = polished(&evaluator, revived(&state.course, &state.found));
             state.take(back);
         }
