@@ -1,6 +1,7 @@
 //! `diagnose SET --out DIR [--without KIND] [--tuning NAME=VALUE]...`: a verdict and a diagnosed model for a set.
 //!
-//! `--tuning claim.tie=4` or `--tuning claim.tie=x2` changes an entry of the tuning table, to see how much verdicts depend on it.
+//! `--tuning claim.tie=4` or `--tuning claim.tie=x2` changes an entry of the tuning table, to see how much verdicts depend on it;
+//! `diagnose --list-tuning` lists them.
 
 use backdrive_diagnosis::candidate::advantage_over;
 use backdrive_diagnosis::diagnose::diagnose;
@@ -18,6 +19,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let out = PathBuf::from(after("--out").unwrap_or_else(|| "diagnosis".to_string()));
     let talk = args.iter().any(|a| a == "-v");
     let mut tuning = Tuning::default();
+    if set == "--list-tuning" {
+        tuning.rows().iter().for_each(|row| println!("{}\t{}\t{}", row.name, row.value, row.unit));
+        return Ok(());
+    }
     for (_, change) in args.iter().zip(args.iter().skip(1)).filter(|(key, _)| *key == "--tuning") {
         let (name, value) = change.split_once('=').ok_or("--tuning takes NAME=VALUE, such as claim.tie=4 or claim.tie=x2")?;
         let entry = tuning.quantity(name).ok_or_else(|| format!("there is no tuning entry {name}: docs/tuning.md lists them"))?;

@@ -1,7 +1,8 @@
 //! A structure, fitted, and what tells a good one: the data that fitting, proposals, schedule and verdict speak of.
 
 use crate::compare::Unseen;
-use crate::fit::{Evaluator, Fit};
+use crate::evaluator::Evaluator;
+use crate::fit::Fit;
 use crate::hypothesis::Hypothesis;
 use crate::statistics::{advantage, correlation_time, levels, slowness};
 use crate::structure::Structure;

@@ -1,7 +1,7 @@
 //! What a fitted structure says of recordings that it has not seen, beside what was measured.
 
 use crate::effort::Effort;
-use crate::fit::{Evaluator, measured};
+use crate::evaluator::{Evaluator, measured};
 use crate::problem::{Problem, Record};
 use crate::statistics::correlation_time;
 use crate::structure::{Along, Structure};

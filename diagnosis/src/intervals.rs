@@ -1,7 +1,7 @@
 //! How sure the numbers of a fit are.
 
 use crate::candidate::Candidate;
-use crate::fit::Evaluator;
+use crate::evaluator::Evaluator;
 use crate::normal_equations::normal_equations;
 use crate::simulate::TWICE;
 use crate::tuning::tuning;

@@ -2,15 +2,13 @@
 //! apart that a free simulation does not show until all else is right.
 
 use crate::effort::Effort;
-use crate::fit::{Evaluator, Fit};
+use crate::evaluator::Evaluator;
+use crate::fit::Fit;
 use crate::hypothesis::{Hypothesis, Place, inherited};
-use crate::race::{Course, Seed, distinct_fits, hopeful, own_first};
+use crate::race::{Course, Entry, Seed, distinct_fits, hopeful, own_first};
 use crate::structure::Structure;
 use crate::tuning::tuning;
 use crate::work::{Budget, Steps};
-
-/// A structure and values to start from.
-pub type Entry = (Structure, Vec<Vec<f64>>);
 
 impl Course<'_> {
     /// Structures to fit and where from. Where a measured path leads, all are fitted along it first, and only so many go on.
@@ -95,7 +93,7 @@ impl Course<'_> {
     }
 
     /// Fits go on side by side; those that cannot stay as they are.
-    fn go_on<'b>(&'b self, fits: &mut [(Structure, Fit)], next: impl Fn(Budget<'b>, &Structure, &Fit) -> Option<Fit> + Sync) {
+    pub(crate) fn go_on<'b>(&'b self, fits: &mut [(Structure, Fit)], next: impl Fn(Budget<'b>, &Structure, &Fit) -> Option<Fit> + Sync) {
         let nexts = self.evaluator.budget.abreast(fits, |budget, (structure, fit)| next(budget.clone(), structure, fit));
         for ((_, fit), next) in fits.iter_mut().zip(nexts) {
             if let Some(next) = next.flatten() {

@@ -10,8 +10,11 @@
 pub mod audit;
 pub mod candidate;
 pub mod compare;
+mod derivatives;
 pub mod diagnose;
+pub mod document;
 pub mod effort;
+pub mod evaluator;
 pub mod evidence;
 pub mod experiment;
 pub mod fit;

@@ -3,7 +3,8 @@
 //! A part is the recording's beginning where that shows enough. Others begin with the motion that the base of the search has there when it
 //! is led firmly; their first samples do not count, for laws with a memory begin without one.
 
-use crate::fit::{Evaluator, Fit, dot};
+use crate::evaluator::Evaluator;
+use crate::fit::{Fit, dot};
 use crate::guide::Guide;
 use crate::problem::Record;
 use crate::simulate::{Conditions, motion_at};

@@ -2,7 +2,7 @@
 //! of a wrong structure, for a device has one set of numbers.
 
 use crate::candidate::{Candidate, candidate};
-use crate::fit::Evaluator;
+use crate::evaluator::Evaluator;
 use crate::intervals::Spread;
 use crate::numbers::name_of;
 use crate::problem::{Problem, Record};

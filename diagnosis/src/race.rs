@@ -2,7 +2,8 @@
 
 use crate::candidate::{Candidate, candidate, key_of};
 use crate::effort::Effort;
-use crate::fit::{Evaluator, Fit};
+use crate::evaluator::Evaluator;
+use crate::fit::Fit;
 use crate::hypothesis::Hypothesis;
 use crate::problem::{Problem, Record};
 use crate::screen::worst_records;
@@ -62,89 +63,104 @@ pub struct Course<'a> {
     pub coarse: usize,
 }
 
+/// A structure and values to start from.
+pub(crate) type Entry = (Structure, Vec<Vec<f64>>);
+
+/// A structure and where its fit stands.
+type Running = (Structure, Fit);
+
+/// How well the best of a race fits.
+#[derive(Clone, Copy)]
+struct Lead {
+    /// Its predicted cost.
+    cost: f64,
+    /// What noise alone would cost.
+    noise: f64,
+}
+
+impl Lead {
+    fn of(running: &[Running]) -> Lead {
+        running.first().map_or(Lead { cost: 0.0, noise: 0.0 }, |(_, f)| Lead { cost: hopeful(f), noise: f.residuals.len() as f64 })
+    }
+
+    /// Cost over the best's up to which others have a chance.
+    fn margin(&self) -> f64 {
+        let tuning = &tuning().search;
+        if self.cost < tuning.best_at_noise * self.noise { tuning.behind_at_noise } else { tuning.behind_far }
+    }
+}
+
 impl Course<'_> {
     /// Fits all seeds a little, `keep[0]` of them more, and `keep[1]` to their end.
     pub fn race(&self, seeds: Vec<Seed>, keep: [usize; 2]) -> Vec<Candidate> {
-        let (evaluator, problem) = (self.evaluator, self.evaluator.problem);
-        // The first steps on the recordings that are explained worst, with few substeps.
+        let evaluator = self.evaluator;
+        // The first steps on the recordings with the largest residuals, with few substeps.
         let few = worst_records(evaluator, &self.nominal.fit.residuals, 2);
-        let whole = few.len() == evaluator.records.len()
-            || problem.initial == Initial::Free
-            || !problem.unknown.is_empty()
-            || problem.fit.iter().any(|r| !r.conditions.is_empty());
+        let whole = few.len() == evaluator.records.len() || !can_be_cut(evaluator.problem);
+        let problem = evaluator.problem;
         let some: Vec<Record> = if whole { problem.fit.clone() } else { few.iter().map(|r| problem.fit[*r].clone()).collect() };
         let coarse = Evaluator { substeps: self.coarse, records: &some, widest: 1.0, ..evaluator.clone() };
         let nominal_there = if whole { self.nominal.fit.clone() } else { restricted(evaluator, &self.nominal.fit, &few) };
         let entries = self.entries(&seeds, keep[0] + 2);
-        let begun = evaluator.budget.abreast(&entries, |budget, (structure, starts)| {
+        let mut running = self.begun(&entries, &coarse, &nominal_there);
+        let substeps = tuning().fit.middle_substeps.max(self.coarse);
+        let middle = Evaluator { substeps, widest: tuning().fit.widest_midway, ..evaluator.clone() };
+        let early = if self.along.is_some() { 0 } else { keep[0] + 4 };
+        for (count, held_against, effort) in [(early, &coarse, tuning().fit.early), (keep[0], &middle, tuning().fit.middle)] {
+            if count > 0 {
+                drop_those_behind(&mut running);
+                running.truncate(count);
+                self.go_on(&mut running, |budget, structure, fit| {
+                    held_against.within(budget).fit_knowing(structure, &fit.values, effort, Some((structure, fit)))
+                });
+            }
+        }
+        drop_those_behind(&mut running);
+        // Far from the noise there is more to come: nothing is decided by the last steps.
+        if keep[1] > 0 && Lead::of(&running).cost <= tuning().noise.near * Lead::of(&running).noise {
+            self.to_their_ends(&mut running, keep[1]);
+        }
+        let size = evaluator.len();
+        let ended = running.into_iter().filter(|(_, f)| f.residuals.len() == size && f.cost.is_finite());
+        ended.map(|(s, f)| candidate(evaluator, s, f)).collect()
+    }
+
+    /// The first steps of each: the better of its starts.
+    fn begun(&self, entries: &[Entry], coarse: &Evaluator, nominal_there: &Fit) -> Vec<Running> {
+        let problem = self.evaluator.problem;
+        let nominal = (&self.nominal.structure, nominal_there);
+        // Coupled fits have moved far from where the nominal model's derivatives hold.
+        let known = if self.along.is_some() { None } else { Some(nominal) };
+        let begun = self.evaluator.budget.abreast(entries, |budget, (structure, starts)| {
             let coarse = coarse.within(budget.clone());
-            // Along the path the numbers have moved far from where the nominal model's derivatives hold.
-            let known = if self.along.is_some() { None } else { Some((&self.nominal.structure, &nominal_there)) };
-            let effort = tuning().fit.first;
             let starts = starts.iter().cloned().map(|start| {
-                let problem = evaluator.problem;
                 let numbers = (structure.stated_of(problem, &start), structure.added_of(&start));
                 let anew = || structure.values(problem, &numbers.0, &numbers.1, &self.nominal.structure.of_records(&nominal_there.values));
-                // Along the measured path, and on parts of recordings, next to nothing is known of an unknown curve.
+                // Coupled to the measured motion, and on parts of recordings, next to nothing is known of an unknown input.
                 let start = if problem.unknown.is_empty() { start } else { anew() };
-                own_first(&coarse, Some((&self.nominal.structure, &nominal_there)), structure, start)
+                own_first(&coarse, Some(nominal), structure, start)
             });
-            let fits = starts.filter_map(|start| coarse.fit_knowing(structure, &start, effort, known));
+            let fits = starts.filter_map(|start| coarse.fit_knowing(structure, &start, tuning().fit.first, known));
             let best = fits.min_by(|a, b| hopeful(a).total_cmp(&hopeful(b)))?;
             Some((structure.clone(), best))
         });
-        let mut running: Vec<(Structure, Fit)> = begun.into_iter().flatten().flatten().collect();
-        let middle =
-            Evaluator { substeps: tuning().fit.middle_substeps.max(self.coarse), widest: tuning().fit.widest_midway, ..evaluator.clone() };
-        let stages = [
-            (if self.along.is_some() { 0 } else { keep[0] + 4 }, &coarse, tuning().fit.early),
-            (keep[0], &middle, tuning().fit.middle),
-            (keep[1], evaluator, tuning().fit.late),
-        ];
-        for (stage, (count, held_against, effort)) in stages.into_iter().enumerate().filter(|(_, s)| s.0 > 0) {
-            running.sort_by(|a, b| hopeful(&a.1).total_cmp(&hopeful(&b.1)));
-            distinct_fits(&mut running);
-            // Once one is near its end, those far behind have no chance.
-            let best = running.first().map_or(0.0, |(_, f)| hopeful(f));
-            let floor = running.first().map_or(0.0, |(_, f)| f.residuals.len() as f64);
-            let margin =
-                if best < tuning().search.best_at_noise * floor { tuning().search.behind_at_noise } else { tuning().search.behind_far };
-            let mut place = 0..;
-            running.retain(|(_, f)| {
-                place.next() < Some(tuning().search.always)
-                    || hopeful(f) < margin * best.max(floor)
-                    || best > tuning().search.behind_far * floor
-            });
-            // Far from the noise there is more to come: nothing is decided by the last steps.
-            if stage == 2 && best > tuning().noise.near * floor {
-                break;
+        begun.into_iter().flatten().flatten().collect()
+    }
+
+    /// The last stage: so many are fitted to their ends. Those behind stay as they are: they are rivals, if beaten ones.
+    fn to_their_ends(&self, running: &mut Vec<Running>, count: usize) {
+        let (lead, late) = (Lead::of(running), tuning().fit.late);
+        let rest = running.split_off(count.min(running.len()));
+        let is_beaten = |fit: &Fit| lead.cost < tuning().search.best_ends * lead.noise && hopeful(fit) > lead.cost;
+        self.go_on(running, |budget, structure, fit| {
+            // Beside one that leaves noise, others only have to show that they do no better; those far behind have.
+            if is_beaten(fit) && hopeful(fit) > lead.margin() * lead.cost {
+                return None;
             }
-            // In the last stage those behind are kept as they are: they are rivals, if beaten ones.
-            let rest = if stage == 2 { running.split_off(count.min(running.len())) } else { Vec::new() };
-            running.truncate(count);
-            let lead = running.first().map_or(0.0, |(_, f)| hopeful(f));
-            let next = evaluator.budget.abreast(&running, |budget, (structure, fit)| {
-                // Beside one that leaves nothing over, others only have to show that they do no better; those far behind have.
-                let beaten = stage == 2 && lead < tuning().search.best_ends * floor && hopeful(fit) > lead;
-                if beaten && hopeful(fit) > margin * lead {
-                    return None;
-                }
-                let effort = if beaten { Effort { steps: tuning().fit.beaten_steps, ..effort } } else { effort };
-                held_against.within(budget.clone()).fit_knowing(structure, &fit.values, effort, Some((structure, fit)))
-            });
-            for ((_, fit), next) in running.iter_mut().zip(next) {
-                if let Some(next) = next.flatten() {
-                    *fit = next;
-                }
-            }
-            running.extend(rest);
-        }
-        let size = evaluator.len();
-        running
-            .into_iter()
-            .filter(|(_, f)| f.residuals.len() == size && f.cost.is_finite())
-            .map(|(s, f)| candidate(evaluator, s, f))
-            .collect()
+            let steps = if is_beaten(fit) { tuning().fit.beaten_steps } else { late.steps };
+            self.evaluator.within(budget).fit_knowing(structure, &fit.values, Effort { steps, ..late }, Some((structure, fit)))
+        });
+        running.extend(rest);
     }
 
     /// The effects of a structure by their places in the list of hypotheses, with their values.
@@ -162,6 +178,22 @@ pub(crate) fn own_first(evaluator: &Evaluator, known: Option<(&Structure, &Fit)>
     }
     let only = Evaluator { own_only: true, ..evaluator.clone() };
     only.fit_knowing(structure, &start, tuning().fit.of_records, known).map_or(start, |fit| fit.values)
+}
+
+/// Whether first steps may be taken on some of the recordings only: nothing belongs to single ones.
+fn can_be_cut(problem: &Problem) -> bool {
+    problem.initial != Initial::Free && problem.unknown.is_empty() && problem.fit.iter().all(|r| r.conditions.is_empty())
+}
+
+/// Best first, each structure once, without those that have no chance against the best.
+fn drop_those_behind(running: &mut Vec<Running>) {
+    running.sort_by(|a, b| hopeful(&a.1).total_cmp(&hopeful(&b.1)));
+    distinct_fits(running);
+    let lead = Lead::of(running);
+    let is_open = lead.cost > tuning().search.behind_far * lead.noise;
+    let mut place = 0..;
+    running
+        .retain(|(_, f)| place.next() < Some(tuning().search.always) || hopeful(f) < lead.margin() * lead.cost.max(lead.noise) || is_open);
 }
 
 /// Keeps the first fit of each structure.

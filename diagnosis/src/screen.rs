@@ -1,12 +1,15 @@
 //! Which hypotheses could explain what a fit leaves over: their effects, as residuals see them, held against it.
 
-use crate::fit::{Evaluator, Fit, dot};
+use crate::evaluator::Evaluator;
+use crate::fit::{Fit, dot};
 use crate::hypothesis::Hypothesis;
-use crate::structure::Structure;
+use crate::structure::{Role, Structure};
 use crate::tuning::tuning;
 use crate::work::Steps;
+use backdrive_plant::set::Initial;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
+use std::collections::HashSet;
 
 /// What a hypothesis could explain.
 #[derive(Debug, Clone)]
@@ -91,102 +94,138 @@ struct Effect {
     length: f64,
 }
 
-impl Screen {
-    /// Simulates every hypothesis beside a base: all starts on the two recordings that are explained worst, the best ones on all.
-    /// With about so much work: where that is little, fewer starts of each are tried.
-    pub fn new(evaluator: &Evaluator, base: &Structure, fit: &Fit, hypotheses: &[Hypothesis], work: Steps) -> Screen {
+/// A start of a hypothesis: its place in the list, and values.
+type Start<'h> = (usize, &'h Vec<f64>);
+
+/// A base with its fit, and the hypotheses beside it.
+struct Beside<'b, 'a> {
+    evaluator: &'b Evaluator<'a>,
+    base: &'b Structure,
+    fit: &'b Fit,
+    hypotheses: &'b [Hypothesis],
+    stride: usize,
+    /// Values of the base: stated parameters, those of its own effects, those of single records.
+    stated: Vec<f64>,
+    added: Vec<Vec<f64>>,
+    own: Vec<(Role, f64)>,
+}
+
+impl<'b, 'a> Beside<'b, 'a> {
+    fn new(evaluator: &'b Evaluator<'a>, base: &'b Structure, fit: &'b Fit, hypotheses: &'b [Hypothesis]) -> Beside<'b, 'a> {
         let stride = fit.residuals.len().div_ceil(tuning().screening.residuals).max(1);
-        let problem = evaluator.problem;
-        let (stated, added, own) = (base.stated_of(problem, &fit.values), base.added_of(&fit.values), base.of_records(&fit.values));
-        // What a simulation of a recording takes, by a sample of the hypotheses: nonlinear ones are slower than a linear base.
+        let (stated, added, own) =
+            (base.stated_of(evaluator.problem, &fit.values), base.added_of(&fit.values), base.of_records(&fit.values));
+        Beside { evaluator, base, fit, hypotheses, stride, stated, added, own }
+    }
+
+    /// The base with one hypothesis, and its values.
+    fn with(&self, index: usize, values: &[f64]) -> (Structure, Vec<f64>) {
+        let problem = self.evaluator.problem;
+        let structure =
+            Structure::new(problem, self.evaluator.records, [self.base.added.clone(), vec![self.hypotheses[index].clone()]].concat());
+        let values = structure.values(problem, &self.stated, &[self.added.clone(), vec![values.to_vec()]].concat(), &self.own);
+        (structure, values)
+    }
+
+    /// What a simulation of a recording computes, by a sample of the hypotheses: nonlinear ones are slower than a linear base.
+    fn cost_of_a_simulation(&self) -> Steps {
+        let (evaluator, problem) = (self.evaluator, self.evaluator.problem);
         let before = evaluator.budget.spent();
-        let sample: Vec<&Hypothesis> = hypotheses.iter().step_by((hypotheses.len() / 8).max(1)).collect();
-        sample.par_iter().for_each(|h| {
-            let structure = Structure::new(problem, evaluator.records, [base.added.clone(), vec![(*h).clone()]].concat());
-            let values =
-                structure.values(problem, &stated, &[added.clone(), h.starts.first().cloned().into_iter().collect()].concat(), &own);
+        let sample: Vec<usize> = (0..self.hypotheses.len()).step_by((self.hypotheses.len() / 8).max(1)).collect();
+        sample.par_iter().for_each(|index| {
+            let first = self.hypotheses[*index].starts.first().cloned().unwrap_or_default();
+            let (structure, values) = self.with(*index, &first);
             if let Some(model) = structure.model(problem, &values) {
                 let _ = evaluator.record_residuals(&structure, &model, &values, 0);
             }
         });
-        let each = (evaluator.budget.spent() - before) / sample.len().max(1) as Steps;
-        // Half of the work for either pass.
-        let affordable = (work / each.max(1)) as usize / 2;
-        let mut few = worst_records(evaluator, &fit.residuals, 2);
-        let starts: usize = hypotheses.iter().map(|h| h.starts.len()).sum();
-        if 2 * starts > affordable {
-            few = worst_records(evaluator, &fit.residuals, 1);
-        }
-        let depth = (affordable / (few.len() * hypotheses.len().max(1))).max(1);
-        let mut jobs: Vec<(usize, &Vec<f64>)> = hypotheses
-            .iter()
-            .enumerate()
-            .filter(|(_, h)| base.added.iter().all(|b| b.compatible(h)))
-            .flat_map(|(index, h)| h.starts.iter().take(depth).map(move |start| (index, start)))
-            .collect();
-        // First starts first: where simulations are slower than the sample, the last ones are left out.
-        let rank = |(index, start): &(usize, &Vec<f64>)| hypotheses[*index].starts.iter().position(|s| std::ptr::eq(s, *start));
-        jobs.sort_by_key(rank);
-        let most = (affordable / (2 * evaluator.records.len()).max(1)).clamp(tuning().screening.fewest_starts, tuning().screening.starts);
-        let with = |index: usize| {
-            let mut with = base.added.clone();
-            with.push(hypotheses[index].clone());
-            Structure::new(problem, evaluator.records, with)
+        (evaluator.budget.spent() - before) / sample.len().max(1) as Steps
+    }
+
+    /// Starts of the hypotheses that go with the base, so many of each at most. First starts come first: where simulations are slower than the sample,
+    /// the last ones are left out.
+    fn starts(&self, depth: usize) -> Vec<Start<'b>> {
+        let hypotheses = self.hypotheses;
+        let compatible = hypotheses.iter().enumerate().filter(|(_, h)| self.base.added.iter().all(|b| b.compatible(h)));
+        let mut starts: Vec<Start> =
+            compatible.flat_map(|(index, h)| h.starts.iter().take(depth).map(move |start| (index, start))).collect();
+        let rank = |(index, start): &Start| hypotheses[*index].starts.iter().position(|s| std::ptr::eq(s, *start));
+        starts.sort_by_key(rank);
+        starts
+    }
+
+    /// The first of two passes: all starts on the recordings with the largest residuals, the best so many go on. At most two of each hypothesis, and one
+    /// of each at least: what does little beside the base may do much beside something else.
+    fn first_pass(&self, starts: &[Start<'b>], few: &[usize], most: usize, work: Steps) -> Vec<Start<'b>> {
+        let (evaluator, problem, stride) = (self.evaluator, self.evaluator.problem, self.stride);
+        let layout = evaluator.layout();
+        let kept: Vec<usize> = layout.iter().filter(|l| few.contains(&l.0)).flat_map(|l| l.2.clone()).step_by(stride).collect();
+        let pick = |all: &[f64]| kept.iter().filter_map(|i| all.get(*i).copied()).collect::<Vec<f64>>();
+        let projector = Projector::of(self.fit.jacobian.iter().map(|c| pick(c)).collect());
+        let before = pick(&self.fit.residuals);
+        let mut left = before.clone();
+        projector.apply(&mut left);
+        let total = dot(&left, &left);
+        let budget = evaluator.budget.next((work as f64 * tuning().screening.first_pass) as Steps);
+        let scored = budget.abreast(starts, |budget, (index, start)| {
+            let evaluator = evaluator.within(budget.clone());
+            let (structure, values) = self.with(*index, start);
+            let model = structure.model(problem, &values)?;
+            let parts: Option<Vec<Vec<f64>>> = few.iter().map(|r| evaluator.record_residuals(&structure, &model, &values, *r)).collect();
+            let mut column = unit(parts?.concat().into_iter().step_by(stride).zip(&before).map(|(a, b)| a - b).collect())?;
+            projector.apply(&mut column);
+            Some((share(&[&column], &left, total), (*index, *start)))
+        });
+        let mut scores: Vec<(f64, Start)> = scored.into_iter().flatten().flatten().collect();
+        scores.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let mut seen = vec![0; self.hypotheses.len()];
+        scores.retain(|s| {
+            seen[s.1.0] += 1;
+            seen[s.1.0] <= 2
+        });
+        let mut first = HashSet::new();
+        let (firsts, seconds): (Vec<_>, Vec<_>) = scores.into_iter().map(|s| s.1).partition(|job| first.insert(job.0));
+        let room = most.saturating_sub(firsts.len());
+        firsts.into_iter().take(most).chain(seconds.into_iter().take(room)).collect()
+    }
+
+    /// The effect of a start in full and weakened.
+    fn effect(&self, evaluator: &Evaluator, (index, start): Start) -> Effect {
+        let (fit, stride) = (self.fit, self.stride);
+        let measured = |values: &Vec<f64>| -> Option<(Vec<f64>, f64)> {
+            let (structure, values) = self.with(index, values);
+            let residuals = evaluator.residuals(&structure, &values)?;
+            measured(residuals.iter().step_by(stride).zip(fit.residuals.iter().step_by(stride)).map(|(a, b)| a - b).collect())
         };
-        if evaluator.records.len() > few.len()
-            && problem.initial == backdrive_plant::set::Initial::Rest
-            && problem.unknown.is_empty()
-            && jobs.len() > most
-        {
-            let layout = evaluator.layout();
-            let kept: Vec<usize> = layout.iter().filter(|l| few.contains(&l.0)).flat_map(|l| l.2.clone()).step_by(stride).collect();
-            let pick = |all: &[f64]| kept.iter().filter_map(|i| all.get(*i).copied()).collect::<Vec<f64>>();
-            let small = Projector::of(fit.jacobian.iter().map(|c| pick(c)).collect());
-            let before = pick(&fit.residuals);
-            let mut left = before.clone();
-            small.apply(&mut left);
-            let total = dot(&left, &left);
-            let first_pass = evaluator.budget.next((work as f64 * tuning().screening.first_pass) as Steps);
-            let scored = first_pass.abreast(&jobs, |budget, (index, start)| {
-                let evaluator = evaluator.within(budget.clone());
-                let structure = with(*index);
-                let values = structure.values(problem, &stated, &[added.clone(), vec![start.to_vec()]].concat(), &own);
-                let model = structure.model(problem, &values)?;
-                let parts: Option<Vec<Vec<f64>>> =
-                    few.iter().map(|r| evaluator.record_residuals(&structure, &model, &values, *r)).collect();
-                let mut column = unit(parts?.concat().into_iter().step_by(stride).zip(&before).map(|(a, b)| a - b).collect())?;
-                small.apply(&mut column);
-                Some((share(&[&column], &left, total), (*index, *start)))
-            });
-            let mut scores: Vec<(f64, (usize, &Vec<f64>))> = scored.into_iter().flatten().flatten().collect();
-            scores.sort_by(|a, b| b.0.total_cmp(&a.0));
-            let mut seen = vec![0; hypotheses.len()];
-            scores.retain(|s| {
-                seen[s.1.0] += 1;
-                seen[s.1.0] <= 2
-            });
-            // One start of each at least: what does little beside the base may do much beside something else.
-            let mut first = std::collections::HashSet::new();
-            let (firsts, seconds): (Vec<_>, Vec<_>) = scores.into_iter().map(|s| s.1).partition(|job| first.insert(job.0));
-            let room = most.saturating_sub(firsts.len());
-            jobs = firsts.into_iter().take(most).chain(seconds.into_iter().take(room)).collect();
+        let values = [start.to_vec(), weakened(&self.hypotheses[index], start)];
+        let (full, weak) = (measured(&values[0]), measured(&values[1]));
+        // One residual in so many was kept.
+        let length = weak.as_ref().map_or(0.0, |w| w.1 * (stride as f64).sqrt());
+        Effect { hypothesis: index, values, columns: [full.map(|e| e.0), weak.map(|e| e.0)], length }
+    }
+}
+
+impl Screen {
+    /// Simulates every hypothesis beside a base: all starts on the two recordings with the largest residuals, the best ones on all.
+    /// With about so much work: where that is little, fewer starts of each are tried.
+    pub fn new(evaluator: &Evaluator, base: &Structure, fit: &Fit, hypotheses: &[Hypothesis], work: Steps) -> Screen {
+        let beside = Beside::new(evaluator, base, fit, hypotheses);
+        // Half of the work for either pass.
+        let affordable = (work / beside.cost_of_a_simulation().max(1)) as usize / 2;
+        let all: usize = hypotheses.iter().map(|h| h.starts.len()).sum();
+        let few = worst_records(evaluator, &fit.residuals, if 2 * all > affordable { 1 } else { 2 });
+        let depth = (affordable / (few.len() * hypotheses.len().max(1))).max(1);
+        let mut starts = beside.starts(depth);
+        let (fewest, most) = (tuning().screening.fewest_starts, tuning().screening.starts);
+        let most = (affordable / (2 * evaluator.records.len()).max(1)).clamp(fewest.min(most), most);
+        let problem = evaluator.problem;
+        let can_be_cut = problem.initial == Initial::Rest && problem.unknown.is_empty();
+        if evaluator.records.len() > few.len() && can_be_cut && starts.len() > most {
+            starts = beside.first_pass(&starts, &few, most, work);
         }
         let second_pass = evaluator.budget.next(work);
-        let effects = second_pass.abreast(&jobs, |budget, (index, start)| {
-            let evaluator = evaluator.within(budget.clone());
-            let structure = with(*index);
-            let effect = |values: &Vec<f64>| -> Option<(Vec<f64>, f64)> {
-                let all = [added.clone(), vec![values.clone()]].concat();
-                let residuals = evaluator.residuals(&structure, &structure.values(problem, &stated, &all, &own))?;
-                measured(residuals.iter().step_by(stride).zip(fit.residuals.iter().step_by(stride)).map(|(a, b)| a - b).collect())
-            };
-            let values = [start.to_vec(), weakened(&hypotheses[*index], start)];
-            let (full, weak) = (effect(&values[0]), effect(&values[1]));
-            // Every so manieth residual was kept.
-            let length = weak.as_ref().map_or(0.0, |w| w.1 * (stride as f64).sqrt());
-            Effect { hypothesis: *index, values, columns: [full.map(|e| e.0), weak.map(|e| e.0)], length }
-        });
-        Screen { stride, effects: effects.into_iter().flatten().collect() }
+        let effects = second_pass.abreast(&starts, |budget, start| beside.effect(&evaluator.within(budget.clone()), *start));
+        Screen { stride: beside.stride, effects: effects.into_iter().flatten().collect() }
     }
 
     /// For each start (hypothesis, values of the weakened effect) the length of what its effect adds beyond all that the fit's numbers can do, floors.

@@ -1,6 +1,6 @@
 //! Correlated residuals: how many independent samples they are worth, and what an improvement among them says.
 
-use crate::fit::Evaluator;
+use crate::evaluator::Evaluator;
 use crate::tuning::tuning;
 
 /// Correlation time of residuals in samples, at least 1: one residual in so many counts. Lags up to the first correlation that is

@@ -1,7 +1,7 @@
 //! Devices of known physics: what was left out is named, and nothing is named where nothing was.
 
 use backdrive_diagnosis::compare::unseen;
-use backdrive_diagnosis::fit::Evaluator;
+use backdrive_diagnosis::evaluator::Evaluator;
 use backdrive_diagnosis::hypothesis::Place;
 use backdrive_diagnosis::intervals::Spread;
 use backdrive_diagnosis::problem::{Problem, Record};

@@ -4,7 +4,7 @@ use crate::run::{Ask, LIKELY, diagnose, diagnosed_model, findings, instead, para
 use crate::table::Report;
 use crate::{Context, Study, StudyError, csv_columns};
 use backdrive_diagnosis::compare::{predictions, qualities};
-use backdrive_diagnosis::fit::Evaluator;
+use backdrive_diagnosis::evaluator::Evaluator;
 use backdrive_diagnosis::problem::{Problem, Record};
 use backdrive_diagnosis::structure::{Role, Structure};
 use backdrive_diagnosis::tuning::tuning;

@@ -2,7 +2,7 @@
 
 use super::file_name;
 use super::units::factor;
-use crate::fit::measured;
+use crate::evaluator::measured;
 use crate::problem::{Problem, Record};
 use crate::simulate::predict;
 use backdrive_plant::stepper::segments;

@@ -36,7 +36,7 @@ pub(super) fn remarks(problem: &Problem) -> Vec<Remark> {
         let mut of_records = Vec::new();
         for (record, predicted) in problem.fit.iter().zip(&predicted) {
             let (Some(predicted), Some(Some(samples))) = (predicted, record.outputs.get(index)) else { continue };
-            let place = crate::fit::measured(record).position(|o| o == index).unwrap_or(0);
+            let place = crate::evaluator::measured(record).position(|o| o == index).unwrap_or(0);
             let Some(column) = predicted.get(place * record.len..(place + 1) * record.len) else { continue };
             let lag = problem.lag.get(index).copied().unwrap_or(0);
             of_records.push((factor(samples, column, lag), record));

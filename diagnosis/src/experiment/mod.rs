@@ -16,7 +16,8 @@ mod tests;
 mod words;
 
 use crate::candidate::Candidate;
-use crate::fit::{Evaluator, Fit};
+use crate::evaluator::Evaluator;
+use crate::fit::Fit;
 use crate::problem::Problem;
 use crate::structure::{Role, Structure};
 use crate::work::{Budget, Steps};

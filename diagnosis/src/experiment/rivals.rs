@@ -2,7 +2,8 @@
 
 use super::menu::{Play, Stand, constant, scaled};
 use crate::effort::Effort;
-use crate::fit::{Evaluator, Fit, dot, measured};
+use crate::evaluator::{Evaluator, measured};
+use crate::fit::{Fit, dot};
 use crate::normal_equations::normal_equations;
 use crate::problem::{Problem, Record};
 use crate::simulate::{Conditions, predict_under};

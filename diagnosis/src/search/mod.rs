@@ -14,7 +14,7 @@ mod view;
 
 use crate::candidate::key_of;
 use crate::effort::Effort;
-use crate::fit::Evaluator;
+use crate::evaluator::Evaluator;
 use crate::hypothesis::Hypothesis;
 use crate::parts::Parts;
 use crate::physics;
@@ -25,6 +25,7 @@ use crate::work::{Budget, Limit};
 pub use journal::{Entry, Outcome};
 use nominal::Nominal;
 pub use result::{Detectable, Search, SearchError, Tried};
+pub use schedule::{StepRow, table as step_table};
 pub use settings::Settings;
 use share::Work;
 use state::State;

@@ -4,7 +4,8 @@ use super::result::SearchError;
 use super::share::Work;
 use crate::candidate::{Candidate, candidate, white};
 use crate::effort::Effort;
-use crate::fit::{Evaluator, Fit};
+use crate::evaluator::Evaluator;
+use crate::fit::Fit;
 use crate::floor;
 use crate::guide::Guide;
 use crate::hypothesis::Scales;
@@ -56,110 +57,140 @@ pub(super) struct Led<'a> {
     pub fit: Fit,
 }
 
-/// What leads, and how.
-struct Path<'p> {
+/// How the nominal model is coupled to the measured motion.
+struct Path<'p, 'a> {
+    evaluator: &'p Evaluator<'a>,
+    middle: &'p Evaluator<'a>,
+    structure: &'p Structure,
+    /// The coupling at its full strength.
     firm: &'p Guide,
     far: bool,
     held: bool,
     guided: bool,
 }
 
-impl Path<'_> {
-    /// The nominal model led from some values, so much looser than at first, in parts of the recordings where those are enough.
-    fn lead<'a>(&self, evaluator: &Evaluator<'a>, structure: &Structure, from: &[f64], looser: f64, in_parts: bool) -> Option<Led<'a>> {
-        let guide = self.held.then(|| self.firm.with(looser * self.firm.strength));
-        let coarse = Evaluator { substeps: tuning().fit.coarse_substeps, widest: tuning().fit.widest_midway, guide, ..evaluator.clone() };
-        let at = coarse.fit(
-            structure,
-            from,
-            Effort { steps: if self.held { 0 } else { tuning().fit.nominal_view.steps }, ..tuning().fit.nominal_view },
-        )?;
-        // The parts where most is left over are enough for screening; along the measured path they begin as they were measured.
+impl<'a> Path<'_, 'a> {
+    /// The nominal model coupled, from some values, with so many times the full strength, in parts of the recordings where those are enough.
+    fn lead(&self, from: &[f64], strength: f64, in_parts: bool) -> Option<Led<'a>> {
+        let (evaluator, structure, fit) = (self.evaluator, self.structure, &tuning().fit);
+        let guide = self.held.then(|| self.firm.with(strength * self.firm.strength));
+        let coarse = Evaluator { substeps: fit.coarse_substeps, widest: fit.widest_midway, guide, ..evaluator.clone() };
+        let view = if self.held { Effort { steps: 0, ..fit.nominal_view } } else { fit.nominal_view };
+        let at = coarse.fit(structure, from, view)?;
+        // The parts with the largest residuals are enough for screening; coupled, they begin as they were measured.
         let parts = if self.far && in_parts { Parts::of(&coarse, structure, &at, tuning().screening.samples) } else { None };
-        let base = if self.guided {
-            let effort = tuning().fit.nominal_coupled;
-            match &parts {
-                Some(parts) => parts.evaluator(&coarse).fit(structure, &at.values, effort),
-                None => coarse.fit(structure, &at.values, effort),
-            }
-        } else {
-            None
+        let base = match &parts {
+            _ if !self.guided => None,
+            Some(parts) => parts.evaluator(&coarse).fit(structure, &at.values, fit.nominal_coupled),
+            None => coarse.fit(structure, &at.values, fit.nominal_coupled),
         };
         Some(Led { coarse, parts, fit: base.unwrap_or(at) })
+    }
+
+    /// A refit from the parameters of the coupled fit; `None` where it is no better than the other.
+    fn refit_from(&self, values: &[f64], other: &Fit, effort: Effort) -> Option<Fit> {
+        let there = self.middle.residuals(self.structure, values)?;
+        let again = worst_first(self.middle, self.structure, values, &there, tuning().fit.nominal_again)?;
+        if again.cost >= tuning().claim.refit_gains * other.cost {
+            return None;
+        }
+        self.evaluator.fit(self.structure, &again.values, effort).filter(|fit| fit.cost < other.cost)
+    }
+
+    /// Where the nominal model explains the recordings as it is coupled, every physics looks as good as any other: so with other strengths, until it
+    /// leaves enough.
+    fn until_it_shows(&self, mut led: Led<'a>, refitted: &Fit) -> Led<'a> {
+        let left = |fit: &Fit| fit.cost / fit.residuals.len().max(1) as f64;
+        let enough = tuning().search.coupled_leaves_noise.min(tuning().search.coupled_leaves * left(refitted));
+        // On parts the parameters may take on what differs from one part to the next: the first time only.
+        for (nth, strength) in tuning().search.couplings.iter().enumerate() {
+            if left(&led.fit) > enough {
+                break;
+            }
+            if let Some(other) = self.lead(&led.fit.values, *strength, nth == 0) {
+                led = other;
+            }
+        }
+        led
     }
 }
 
 impl<'a> Nominal<'a> {
-    /// Refits the nominal model, and leads it.
+    /// Refits the nominal model, and couples it to the measured motion where it stays far from the noise.
     pub fn refitted(problem: &'a Problem, work: &Work<'a>, report: &(dyn Fn(&str) + Sync)) -> Result<Nominal<'a>, SearchError> {
-        let mut evaluator = Evaluator::new(problem);
-        evaluator.budget = work.up_to(tuning().search.refit_ends);
-        if friction_on_prescribed(problem) {
-            evaluator.robust = tuning().fit.robust;
-        }
         report("refitting the nominal model");
         let structure = Structure::new(problem, &problem.fit, Vec::new());
         let given: Vec<f64> = problem.stated.iter().map(|s| s.given).collect();
         let start = structure.values(problem, &given, &[], &[]);
-        let first = evaluator.residuals(&structure, &start).ok_or(SearchError::RunsAway)?;
-        let middle = Evaluator { substeps: tuning().fit.middle_substeps, ..evaluator.clone() };
-        let quick = worst_first(&middle, &structure, &start, &first, tuning().fit.nominal_first).ok_or(SearchError::RunsAway)?;
-        // What a fit leaves over shows the measuring error better than the signal does.
-        let before = evaluator.floor.clone();
-        evaluator.floor = floors(&evaluator, &quick.residuals);
-        if evaluator.robust.is_finite() {
-            // Large is what is large beside the rest, which far from the noise is far from the noise itself.
-            evaluator.robust = tuning().fit.robust * bulk(&quick.residuals, &before, &evaluator).max(1.0);
-        }
-        let rescaled = |residuals: &[f64]| -> Vec<f64> {
-            levels(&evaluator, residuals).iter().zip(before.iter().zip(&evaluator.floor)).map(|(l, (b, f))| l * b / f).collect()
-        };
-        let levels_given = rescaled(&first);
-        // Far from the noise its end waits until the rest is known.
-        let is_far = rescaled(&quick.residuals).iter().any(|l| *l > tuning().noise.very_far);
+        let FirstFit { evaluator, middle, fit, levels_given, is_far } =
+            FirstFit::of(problem, work, &structure, &start).ok_or(SearchError::RunsAway)?;
         let effort = if is_far { tuning().fit.nominal_far } else { tuning().fit.to_the_end };
-        let mut refitted = evaluator.fit(&structure, &quick.values, effort).ok_or(SearchError::RunsAway)?;
-        // Far from the noise the measured path shows better than a simulation what is missing, and leads the numbers out of wrong basins.
+        let mut refitted = evaluator.fit(&structure, &fit.values, effort).ok_or(SearchError::RunsAway)?;
+        // Far from the noise the residuals coupled to the measured motion show better than those of a simulation what is missing, and coupled fits
+        // leave wrong valleys.
         let model = structure.model(problem, &refitted.values).ok_or(SearchError::RunsAway)?;
         let seen = structure.with_unknown(problem, &problem.fit, &refitted.values);
         let scales = scales(problem, &model, &seen)?;
         let level = levels(&evaluator, &refitted.residuals).into_iter().fold(0.0, f64::max);
         let strength = if level > tuning().coupling.full_above * tuning().noise.far { 1.0 } else { tuning().coupling.weak };
-        let far = level > tuning().noise.far;
         let firm = Guide::new(problem, &problem.fit, &scales, &evaluator.floor, strength);
+        let far = level > tuning().noise.far;
         let held = far && !firm.is_empty();
-        // A motion that is prescribed leads the device by itself.
-        let moved = problem.model.inputs.iter().any(|i| i.kind == InputKind::Motion);
-        let guided = held || far && moved;
-        let path = Path { firm: &firm, far, held, guided };
-        let lead = |from: &[f64], looser: f64, in_parts: bool| path.lead(&evaluator, &structure, from, looser, in_parts);
+        // A prescribed motion couples the device by itself.
+        let guided = held || far && problem.model.inputs.iter().any(|i| i.kind == InputKind::Motion);
+        let path = Path { evaluator: &evaluator, middle: &middle, structure: &structure, firm: &firm, far, held, guided };
         let from = if held { &start } else { &refitted.values };
-        let mut led = lead(from, 1.0, true).ok_or(SearchError::RunsAway)?;
-        if held
-            && let Some(there) = middle.residuals(&structure, &led.fit.values)
-            && let Some(other) = worst_first(&middle, &structure, &led.fit.values, &there, tuning().fit.nominal_again)
-            && other.cost < tuning().claim.refit_gains * refitted.cost
-            && let Some(other) = evaluator.fit(&structure, &other.values, effort)
-            && other.cost < refitted.cost
-        {
+        let mut led = path.lead(from, 1.0, true).ok_or(SearchError::RunsAway)?;
+        if held && let Some(other) = path.refit_from(&led.fit.values, &refitted, effort) {
             refitted = other;
         }
         refitted = to_its_end(&evaluator, &structure, refitted);
-        // Where the nominal model explains the path as it is led there, every physics looks as good as any other.
-        let left = |fit: &Fit| fit.cost / fit.residuals.len().max(1) as f64;
-        let enough = tuning().search.coupled_leaves_noise.min(tuning().search.coupled_leaves * left(&refitted));
-        // On parts the parameters of the nominal model may take on what differs from one part to the next: only the first.
-        for (nth, looser) in tuning().search.couplings.iter().enumerate().filter(|_| held) {
-            if left(&led.fit) > enough {
-                break;
-            }
-            if let Some(other) = lead(&led.fit.values, *looser, nth == 0) {
-                led = other;
-            }
+        if held {
+            led = path.until_it_shows(led, &refitted);
         }
-        let refitted = candidate(&evaluator, structure, refitted);
+        let refitted = candidate(&evaluator, structure.clone(), refitted);
         Ok(Nominal { evaluator, given, start, refitted, levels_given, model, scales, seen, is_far, far, held, guided, led })
     }
+}
+
+/// The nominal model's first fit, and the noise estimated from its residuals.
+struct FirstFit<'a> {
+    evaluator: Evaluator<'a>,
+    middle: Evaluator<'a>,
+    fit: Fit,
+    /// Normalised residual (rms) of each output with the parameters as given.
+    levels_given: Vec<f64>,
+    is_far: bool,
+}
+
+impl<'a> FirstFit<'a> {
+    fn of(problem: &'a Problem, work: &Work<'a>, structure: &Structure, start: &[f64]) -> Option<FirstFit<'a>> {
+        let mut evaluator = Evaluator::new(problem);
+        evaluator.budget = work.up_to(tuning().search.refit_ends);
+        if friction_on_prescribed(problem) {
+            evaluator.robust = tuning().fit.robust;
+        }
+        let first = evaluator.residuals(structure, start)?;
+        let middle = at_middle(&evaluator);
+        let fit = worst_first(&middle, structure, start, &first, tuning().fit.nominal_first)?;
+        // The residuals of a fit show the noise better than the signal does.
+        let before = evaluator.floor.clone();
+        evaluator.floor = floors(&evaluator, &fit.residuals);
+        if evaluator.robust.is_finite() {
+            // Large is what is large beside the rest, which far from the noise is far from the noise itself.
+            evaluator.robust = tuning().fit.robust * bulk(&fit.residuals, &before, &evaluator).max(1.0);
+        }
+        let rescaled = |residuals: &[f64]| -> Vec<f64> {
+            levels(&evaluator, residuals).iter().zip(before.iter().zip(&evaluator.floor)).map(|(l, (b, f))| l * b / f).collect()
+        };
+        let levels_given = rescaled(&first);
+        let is_far = rescaled(&fit.residuals).iter().any(|l| *l > tuning().noise.very_far);
+        Some(FirstFit { evaluator, middle, fit, levels_given, is_far })
+    }
+}
+
+fn at_middle<'a>(evaluator: &Evaluator<'a>) -> Evaluator<'a> {
+    Evaluator { substeps: tuning().fit.middle_substeps, ..evaluator.clone() }
 }
 
 /// How far a model moves on the recordings.

@@ -4,7 +4,8 @@ use super::journal::Outcome;
 use super::settings::Settings;
 use super::state::State;
 use super::steps::{
-    Anew, Elsewhere, Exchanges, Finer, GivenBack, Laws, More, MorePairs, Pairs, Plain, Race, Relatives, Richer, Ripples, Singles, Step,
+    Anew, Elsewhere, Exchanges, Finer, GivenBack, Keep, Laws, More, MorePairs, Pairs, Plain, Race, Relatives, Richer, Ripples, Singles,
+    Step,
 };
 use crate::candidate::key_of;
 use crate::race::{Course, distinct};
@@ -24,6 +25,32 @@ fn steps(is_quiet: bool, effects: usize) -> Vec<&'static dyn Step> {
     }
     steps.extend([&Elsewhere as &dyn Step, &Relatives]);
     steps
+}
+
+/// A step as a table shows it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StepRow {
+    /// What it does.
+    pub name: &'static str,
+    /// How many of the structures it proposes go on after their first steps.
+    pub further: usize,
+    /// How many are fitted to their end.
+    pub to_the_end: usize,
+    /// Share of the work that it may take where the best is far from the noise.
+    pub share: f64,
+}
+
+/// The steps of a search for three effects in their order, each where it comes first.
+pub fn table() -> Vec<StepRow> {
+    let mut rows: Vec<StepRow> = Vec::new();
+    for step in steps(false, 3) {
+        let Keep { further, to_the_end } = step.keep();
+        let row = StepRow { name: step.name(), further, to_the_end, share: step.share() };
+        if !rows.contains(&row) {
+            rows.push(row);
+        }
+    }
+    rows
 }
 
 /// Takes all steps, as far as there is work to be done and something left to explain.

@@ -3,7 +3,8 @@
 use super::result::Detectable;
 use crate::candidate::{Candidate, candidate};
 use crate::effort::Effort;
-use crate::fit::{Evaluator, Fit};
+use crate::evaluator::Evaluator;
+use crate::fit::Fit;
 use crate::hypothesis::{Family, Hypothesis};
 use crate::locate::{self, Ripple};
 use crate::parts::Parts;

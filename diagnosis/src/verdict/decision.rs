@@ -5,7 +5,7 @@ use super::findings::{adequacy, findings};
 use super::signals::bursts;
 use super::types::{Finding, Word};
 use crate::candidate::Candidate;
-use crate::fit::Evaluator;
+use crate::evaluator::Evaluator;
 use crate::intervals::Spread;
 use crate::problem::Problem;
 use crate::search::Search;
@@ -64,10 +64,10 @@ pub(super) fn decide<'s>(problem: &Problem, search: &'s Search) -> Decision<'s> 
 /// Whether the refitted numbers explain more than the given ones do.
 fn given_is_off(problem: &Problem, search: &Search) -> bool {
     let each: Vec<f64> = search.levels_given.clone();
-    let total: usize = problem.fit.iter().map(|r| crate::fit::measured(r).map(|_| r.len).sum::<usize>()).sum();
+    let total: usize = problem.fit.iter().map(|r| crate::evaluator::measured(r).map(|_| r.len).sum::<usize>()).sum();
     let mut cost = 0.0;
     for record in &problem.fit {
-        for output in crate::fit::measured(record) {
+        for output in crate::evaluator::measured(record) {
             cost += each.get(output).map_or(0.0, |l| l * l) * record.len as f64;
         }
     }

@@ -5,7 +5,7 @@ use super::types::{HeldOut, RecordErrors};
 use crate::audit::file_name;
 use crate::candidate::Candidate;
 use crate::compare::mean_squares;
-use crate::fit::measured;
+use crate::evaluator::measured;
 use crate::problem::{Problem, Record};
 use crate::search::Search;
 use std::collections::BTreeMap;

@@ -2,7 +2,7 @@
 
 use super::types::Where;
 use crate::candidate::Candidate;
-use crate::fit::Evaluator;
+use crate::evaluator::Evaluator;
 use crate::problem::Problem;
 use crate::statistics::deviation_by_median;
 use crate::tuning::tuning;

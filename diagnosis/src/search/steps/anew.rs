@@ -2,7 +2,7 @@
 
 use super::step::{Keep, Race, Step};
 use crate::candidate::{Candidate, distinct_structures, simplest_of};
-use crate::fit::Evaluator;
+use crate::evaluator::Evaluator;
 use crate::hypothesis::Hypothesis;
 use crate::race::{Course, Seed};
 use crate::screen::{Promise, Screen};

@@ -1,0 +1,187 @@
+//! Derivatives of the residuals by the parameters of a fit, by differences of simulations, in parallel.
+
+use crate::evaluator::{Evaluator, residuals_in};
+use crate::structure::{Number, Role, Structure};
+use crate::tuning::tuning;
+use backdrive_plant::model::Model;
+use nalgebra::DMatrix;
+use rayon::prelude::*;
+use std::collections::BTreeMap;
+use std::ops::Range;
+
+/// Weights of an unknown input that are moved at the same time: which unknown input, which record, and the remainder of their number divided by
+/// `fit.knots_apart`.
+type Set = (usize, usize, usize);
+
+/// A parameter moved: all values as they stand in the model, the model, and the difference taken in the fit's own unit.
+type Moved = (Vec<f64>, Model, f64);
+
+impl Evaluator<'_> {
+    /// Derivatives of the residuals by each parameter in the fit's own unit.
+    pub fn jacobian(&self, structure: &Structure, own: &[f64], residuals: &[f64]) -> Vec<Vec<f64>> {
+        self.columns(structure, own, residuals, &(0..own.len()).collect::<Vec<_>>(), 1.0)
+    }
+
+    /// The same by some of the parameters, with `stretch` times their differences.
+    pub(crate) fn columns(&self, structure: &Structure, own: &[f64], residuals: &[f64], which: &[usize], stretch: f64) -> Vec<Vec<f64>> {
+        let spans = self.spans();
+        let mut jobs: Vec<(usize, usize)> = Vec::new();
+        // Weights of unknown inputs that are far from each other are moved at the same time.
+        let mut together: BTreeMap<Set, Vec<usize>> = BTreeMap::new();
+        for (at, j) in which.iter().enumerate() {
+            match (&structure.numbers[*j].role, &structure.numbers[*j].records) {
+                (Role::Knot(unknown, knot, r), _) => together.entry((*unknown, *r, knot % tuning().fit.knots_apart)).or_default().push(at),
+                (_, Some(of)) => jobs.extend(of.iter().map(|r| (at, *r))),
+                (_, None) => jobs.extend((0..self.records.len()).map(|r| (at, r))),
+            }
+        }
+        let moved: Vec<Option<Moved>> = which.iter().map(|j| self.moved(structure, own, *j, stretch)).collect();
+        let difference = |(j, r): &(usize, usize)| {
+            if self.budget.is_halted() {
+                return None;
+            }
+            let (values, model, step) = moved.get(*j)?.as_ref()?;
+            let mut part = self.record_residuals(structure, model, values, *r)?;
+            let before = residuals.get(spans[*r].clone())?;
+            part.iter_mut().zip(before).for_each(|(a, b)| *a = (*a - b) / step);
+            Some(part)
+        };
+        let parts: Vec<Option<Vec<f64>>> = jobs.par_iter().map(difference).collect();
+        let mut jacobian = vec![vec![0.0; residuals.len()]; which.len()];
+        for ((j, r), part) in jobs.iter().zip(parts) {
+            if let Some(part) = part {
+                jacobian[*j][spans[*r].clone()].copy_from_slice(&part);
+            }
+        }
+        let together: Vec<(Set, Vec<usize>)> = together.into_iter().collect();
+        let parts = self.knots(structure, own, residuals, which, (&together, &spans), stretch);
+        for (((_, r, _), ats), columns) in together.iter().zip(parts) {
+            for (at, column) in ats.iter().zip(columns.unwrap_or_default()) {
+                jacobian[*at][spans[*r].clone()].copy_from_slice(&column);
+            }
+        }
+        jacobian
+    }
+
+    /// Where the residuals of each record stand, all outputs together.
+    fn spans(&self) -> Vec<Range<usize>> {
+        let next = |at: &mut usize, record| {
+            let from = *at;
+            *at += residuals_in(record);
+            Some(from..*at)
+        };
+        self.records.iter().scan(0, next).collect()
+    }
+
+    /// One parameter moved; `None` for a weight of an unknown input, which are moved together, and where no model can be made.
+    fn moved(&self, structure: &Structure, own: &[f64], j: usize, stretch: f64) -> Option<Moved> {
+        if matches!(structure.numbers[j].role, Role::Knot(..)) {
+            return None;
+        }
+        let (values, step) = moved_values(structure, own, j, stretch);
+        Some((values.clone(), structure.model(self.problem, &values)?, step))
+    }
+
+    /// Derivatives by the weights of unknown inputs (Curtis, Powell & Reid 1974): the effect of a weight is over when the next that is moved along
+    /// with it begins, but for what the device never forgets.
+    fn knots(
+        &self,
+        structure: &Structure,
+        own: &[f64],
+        residuals: &[f64],
+        which: &[usize],
+        (together, spans): (&[(Set, Vec<usize>)], &[Range<usize>]),
+        stretch: f64,
+    ) -> Vec<Option<Vec<Vec<f64>>>> {
+        let Some(model) = structure.model(self.problem, &outward(structure, own)).filter(|_| !together.is_empty()) else {
+            return Vec::new();
+        };
+        let one = |((unknown, r, _), ats): &(Set, Vec<usize>)| {
+            if self.budget.is_halted() {
+                return None;
+            }
+            let (mut values, mut steps) = (outward(structure, own), Vec::new());
+            for at in ats.iter() {
+                let (changed, step) = moved_values(structure, own, which[*at], stretch);
+                values[which[*at]] = changed[which[*at]];
+                steps.push(step);
+            }
+            let part = self.record_residuals(structure, &model, &values, *r)?;
+            let record = self.records.get(*r)?;
+            let before = residuals.get(spans[*r].clone())?;
+            let mut columns = vec![vec![0.0; part.len()]; ats.len()];
+            for ((at, step), column) in ats.iter().zip(&steps).zip(&mut columns) {
+                let Role::Knot(_, knot, _) = structure.numbers[which[*at]].role else { continue };
+                let window = self.problem.unknown.get(*unknown)?.window(knot, tuning().fit.knots_apart, record);
+                for from in (0..part.len()).step_by(record.len.max(1)) {
+                    for i in window.start + from..window.end + from {
+                        column[i] = (part[i] - before[i]) / step;
+                    }
+                }
+            }
+            Some(columns)
+        };
+        together.par_iter().map(one).collect()
+    }
+
+    /// Whether a parameter moves in this fit.
+    pub(crate) fn moves(&self, number: &Number) -> bool {
+        !self.own_only || number.records.is_some()
+    }
+
+    /// Derivatives by all parameters, 0 by those that do not move.
+    pub(crate) fn all_columns(
+        &self,
+        structure: &Structure,
+        own: &[f64],
+        residuals: &[f64],
+        which: &[usize],
+        stretch: f64,
+    ) -> Vec<Vec<f64>> {
+        let mut all = vec![Vec::new(); own.len()];
+        for (j, column) in which.iter().zip(self.columns(structure, own, residuals, which, stretch)) {
+            all[*j] = column;
+        }
+        all.iter_mut().filter(|c| c.is_empty()).for_each(|c| c.resize(residuals.len(), 0.0));
+        all
+    }
+}
+
+/// The values in the model of a fit's own.
+pub(crate) fn outward(structure: &Structure, own: &[f64]) -> Vec<f64> {
+    structure.numbers.iter().zip(own).map(|(n, x)| n.outward(*x)).collect()
+}
+
+/// Values with one parameter moved by its difference, away from a bound, and the difference taken in the fit's own unit.
+fn moved_values(structure: &Structure, own: &[f64], j: usize, stretch: f64) -> (Vec<f64>, f64) {
+    let number = &structure.numbers[j];
+    let (low, high) = number.bounds();
+    // What already spans a sample has no need of more.
+    let longer = if number.coarse { stretch.clamp(-1.0, 2.0) } else { stretch };
+    let mut step = (number.step * longer).clamp(-0.5 * (high - low), 0.5 * (high - low));
+    if own[j] + step > high || own[j] + step < low {
+        step = -step;
+    }
+    let moved = (own[j] + step).clamp(low, high);
+    let values = structure.numbers.iter().enumerate().map(|(i, n)| n.outward(if i == j { moved } else { own[i] })).collect();
+    let taken = moved - own[j];
+    (values, if taken == 0.0 { 1.0 } else { taken })
+}
+
+/// Updates derivatives by the secant of a step (Broyden 1965): the smallest change, with each parameter scaled by its curvature, that makes them agree
+/// with what the step did.
+pub(crate) fn secant(jacobian: &mut [Vec<f64>], before: &[f64], after: &[f64], from: &[f64], to: &[f64], matrix: &DMatrix<f64>) {
+    let step: Vec<f64> = to.iter().zip(from).map(|(a, b)| a - b).collect();
+    let scaled: Vec<f64> = step.iter().enumerate().map(|(j, s)| s * matrix[(j, j)]).collect();
+    let size: f64 = step.iter().zip(&scaled).map(|(a, b)| a * b).sum();
+    if !(size > 0.0 && size.is_finite()) {
+        return;
+    }
+    let mut missed: Vec<f64> = after.iter().zip(before).map(|(a, b)| a - b).collect();
+    for (column, s) in jacobian.iter().zip(&step).filter(|(_, s)| **s != 0.0) {
+        missed.iter_mut().zip(column).for_each(|(m, c)| *m -= c * s);
+    }
+    for (column, s) in jacobian.iter_mut().zip(&scaled).filter(|(_, s)| **s != 0.0) {
+        column.iter_mut().zip(&missed).for_each(|(c, m)| *c += m * s / size);
+    }
+}

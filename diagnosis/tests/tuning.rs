@@ -1,0 +1,51 @@
+//! The tuning table: its page, and its evidence.
+
+use backdrive_diagnosis::document::{MEASURED, tuning_page};
+use backdrive_diagnosis::tuning::{Evidence, Tuning, tuning};
+use std::collections::HashSet;
+
+#[test]
+fn the_page_is_what_the_code_says() {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/tuning.md");
+    let page = std::fs::read_to_string(path).unwrap_or_default();
+    let own = page.split(MEASURED).next().unwrap_or_default();
+    assert!(
+        own == tuning_page(),
+        "docs/tuning.md is not what the code says: cargo run -p backdrive-diagnosis --example tuning prints its first part"
+    );
+    assert!(page.contains(MEASURED), "docs/tuning.md lacks what was measured");
+}
+
+#[test]
+fn every_entry_has_a_unit_a_reason_and_a_name_of_its_own() {
+    let rows = Tuning::default().rows();
+    let mut names = HashSet::new();
+    for row in &rows {
+        let (_, why) = row.evidence.told();
+        assert!(!row.unit.is_empty() && !row.decides.is_empty() && !why.is_empty(), "{row:?}");
+        assert!(names.insert(row.name.clone()), "{} stands twice", row.name);
+        if let Evidence::Measured(text) = row.evidence {
+            assert!(text.contains('`'), "{}: a measurement names its command", row.name);
+        }
+        // "as other" and "see other" name an entry that is there.
+        for other in why.split_whitespace().map(|w| w.trim_matches([',', ';', '.', ':'])).filter(|w| w.contains('.') && !w.starts_with('`'))
+        {
+            let is_entry = rows.iter().any(|r| r.name == other);
+            let groups = ["noise", "fit", "coupling", "screening", "search", "intervals", "claim", "audit", "locate", "experiment"];
+            assert!(is_entry || !groups.iter().any(|g| other.starts_with(&format!("{g}."))), "{}: there is no entry {other}", row.name);
+        }
+    }
+}
+
+#[test]
+fn an_entry_can_be_changed_for_a_study_before_the_table_is_in_use_and_not_after() {
+    let mut changed = Tuning::default();
+    let before = changed.claim.tie;
+    changed.quantity("claim.tie").unwrap().times(2.0);
+    changed.quantity("noise.blocks").unwrap().set(8.0);
+    changed.quantity("fit.last").unwrap().set(3.0);
+    assert_eq!((changed.claim.tie, changed.noise.blocks, changed.fit.last.steps), (2.0 * before, [8; 4], 3));
+    assert!(changed.quantity("claim.nothing").is_none() && changed.quantity("tie").is_none());
+    assert_eq!(*tuning(), Tuning::default());
+    assert!(changed.adopt().is_err());
+}
