@@ -4,8 +4,9 @@
 //! The curve is a uniform cubic B-spline (de Boor, A Practical Guide to Splines, ch. IX) with four knots per period of its bandwidth. The one nearest
 //! to a sine is off by 1.3 % of it at the bandwidth, by 0.05 % at half of it, and hardly follows it at twice the bandwidth.
 
-use crate::problem::{Problem, Record};
-use backdrive_plant::model::{InputKind, OutputKind};
+use crate::problem::Record;
+use crate::signal::rms;
+use backdrive_plant::model::{InputKind, Model, OutputKind};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -58,11 +59,8 @@ impl Unknown {
     }
 
     /// About how large it is, in its own unit: as the positions that were measured for a motion, as the other forces for a force; 1 where there are none.
-    pub fn scale(&self, problem: &Problem) -> f64 {
-        let model = &problem.model;
+    pub fn scale(&self, model: &Model, records: &[Record]) -> f64 {
         let most = |sizes: &mut dyn Iterator<Item = f64>| sizes.filter(|x| x.is_finite()).fold(0.0, f64::max);
-        let rms = |x: &[f64]| (x.iter().map(|x| x * x).sum::<f64>() / x.len().max(1) as f64).sqrt();
-        let records = &problem.fit;
         let size = match model.inputs.get(self.input).map(|i| i.kind) {
             Some(InputKind::Motion) => most(&mut records.iter().flat_map(|r| {
                 let positions = model.outputs.iter().enumerate().filter(|(_, o)| matches!(o.kind, OutputKind::Position(_)));

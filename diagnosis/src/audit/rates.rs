@@ -1,6 +1,6 @@
 //! Sample times that cannot be right: recordings of different rates in one set, and time in another unit than seconds.
 
-use super::file_name;
+use super::remark::file_name;
 use super::units::factor;
 use crate::fit::measured;
 use crate::problem::{Problem, Record};

@@ -8,6 +8,7 @@
 //!
 //! Where no excitation separates them, the sensor is named that would.
 
+mod extra_output;
 mod menu;
 mod rivals;
 mod sensor;
@@ -18,6 +19,7 @@ mod words;
 use crate::candidate::Candidate;
 use crate::fit::{Evaluator, Fit};
 use crate::problem::Problem;
+use crate::signal::rms;
 use crate::structure::{Role, Structure};
 use crate::work::{Budget, Steps};
 use backdrive_plant::model::Model;
@@ -206,12 +208,7 @@ pub fn excite<'a>(
     );
     let jacobian = known.jacobian(&stage.scene, &show.trial, &known.own, &show.seen[0]);
     let change: Vec<f64> = jacobian.get(numbers[0]).map(|c| c.iter().map(|x| x * after[numbers[0]]).collect()).unwrap_or_default();
-    Ok(stage.experiment(show, sentence, names, *separation, &change, rms_of(&change)))
-}
-
-/// Root mean square.
-fn rms_of(change: &[f64]) -> f64 {
-    (change.iter().map(|x| x * x).sum::<f64>() / change.len().max(1) as f64).sqrt()
+    Ok(stage.experiment(show, sentence, names, *separation, &change, rms(&change)))
 }
 
 /// What a number is called.

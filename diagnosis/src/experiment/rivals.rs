@@ -1,5 +1,6 @@
 //! Fitted structures on an experiment that was not made yet: what each predicts, and how far one can imitate another.
 
+use super::extra_output::output;
 use super::menu::{Play, Stand, constant, scaled};
 use crate::effort::Effort;
 use crate::fit::{Evaluator, Fit, dot, measured};
@@ -268,7 +269,7 @@ impl<'a> Scene<'a> {
         let mut seen = model.clone();
         let mut record = trial.record.clone();
         for kind in &self.extra {
-            seen.outputs.push(super::sensor::output(&self.problem.model, model, kind)?);
+            seen.outputs.push(output(&self.problem.model, model, kind)?);
             record.outputs.push(Some(Vec::new()));
         }
         predict_under(&seen, &record, &self.conditions())

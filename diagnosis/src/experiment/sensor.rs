@@ -1,7 +1,9 @@
 //! Which other sensor would tell explanations apart that no excitation separates with the sensors there are.
 
+use super::extra_output::output;
 use super::rivals::{Rival, Scene, Trial};
-use backdrive_plant::model::{InputKind, Model, Motion, Output, OutputKind};
+use backdrive_plant::describe::unit_for;
+use backdrive_plant::model::{InputKind, OutputKind};
 use backdrive_plant::write::round_significant;
 
 /// Error of a sensor that is not there, over the root mean square of what it would read, where no other of its kind is there.
@@ -26,20 +28,6 @@ fn extra(scene: &Scene) -> Vec<OutputKind> {
     let bodies = (0..model.bodies.len()).filter(free).flat_map(|b| [OutputKind::Position(b), OutputKind::Velocity(b)]);
     let forces = (0..model.elements.len()).map(|e| OutputKind::Force(vec![e]));
     bodies.chain(forces).filter(|kind| !there(kind)).collect()
-}
-
-/// An output of a kind in terms of the nominal model, in a model that was made from it. `None` where what it reads is gone.
-pub(super) fn output(nominal: &Model, model: &Model, kind: &OutputKind) -> Option<Output> {
-    let body = |b: usize| model.bodies.iter().position(|other| nominal.bodies.get(b).is_some_and(|n| n.name == other.name));
-    let element = |e: &usize| model.elements.iter().position(|other| nominal.elements.get(*e).is_some_and(|n| n.name == other.name));
-    let kind = match kind {
-        OutputKind::Position(b) => OutputKind::Position(body(*b)?),
-        OutputKind::Velocity(b) => OutputKind::Velocity(body(*b)?),
-        OutputKind::Acceleration(b) => OutputKind::Acceleration(body(*b)?),
-        OutputKind::Reaction(b) => OutputKind::Reaction(body(*b)?),
-        OutputKind::Force(list) => OutputKind::Force(list.iter().map(element).collect::<Option<_>>()?),
-    };
-    Some(Output { name: String::new(), kind, gain: 1.0, delay: 0.0, offset: 0.0, resolution: 0.0, noise: 0.0 })
 }
 
 /// The sensor that separates two rivals best on one of some experiments.
@@ -110,19 +98,16 @@ fn like(scene: &Scene, kind: &OutputKind) -> Option<f64> {
 fn words(scene: &Scene, kind: &OutputKind, floor: f64) -> String {
     let model = &scene.problem.model;
     let body = |b: &usize| model.bodies.get(*b).map_or("", |b| b.name.as_str());
-    let (length, force) = match model.motion {
-        Motion::Translation => ("m", "N"),
-        Motion::Rotation => ("rad", "N m"),
-    };
-    let (what, unit) = match kind {
-        OutputKind::Position(b) => (format!("the position of \"{}\"", body(b)), length.to_string()),
-        OutputKind::Velocity(b) => (format!("the velocity of \"{}\"", body(b)), format!("{length}/s")),
-        OutputKind::Acceleration(b) => (format!("the acceleration of \"{}\"", body(b)), format!("{length}/s²")),
-        OutputKind::Reaction(b) => (format!("the force that moves \"{}\"", body(b)), force.to_string()),
+    let what = match kind {
+        OutputKind::Position(b) => format!("the position of \"{}\"", body(b)),
+        OutputKind::Velocity(b) => format!("the velocity of \"{}\"", body(b)),
+        OutputKind::Acceleration(b) => format!("the acceleration of \"{}\"", body(b)),
+        OutputKind::Reaction(b) => format!("the force that moves \"{}\"", body(b)),
         OutputKind::Force(list) => {
             let names: Vec<&str> = list.iter().filter_map(|e| model.elements.get(*e)).map(|e| e.name.as_str()).collect();
-            (format!("the force in \"{}\"", names.join(", ")), force.to_string())
+            format!("the force in \"{}\"", names.join(", "))
         }
     };
+    let unit = unit_for(model.motion, kind.unit());
     format!("{what} to {} {unit}", round_significant(floor, 2))
 }

@@ -3,8 +3,9 @@
 use super::rivals::Trial;
 use crate::hypothesis::{Hypothesis, Mark};
 use crate::structure::Structure;
+use backdrive_plant::describe::unit_for;
 use backdrive_plant::excitation::{Excitation, Shape};
-use backdrive_plant::model::{InputKind, Model, Motion};
+use backdrive_plant::model::{InputKind, Model};
 use backdrive_plant::write::round_significant;
 use std::fmt::Write;
 
@@ -70,12 +71,7 @@ pub(super) fn short(x: f64) -> String {
 /// An excitation in words, such as `a triangle between reversals at 4 N, periods 3 and 1 s`.
 pub(super) fn described(model: &Model, trial: &Trial) -> String {
     let input = model.inputs.get(trial.play.input);
-    let unit = match (input.map(|i| i.kind), model.motion) {
-        (Some(InputKind::Motion), Motion::Translation) => "m",
-        (Some(InputKind::Motion), Motion::Rotation) => "rad",
-        (_, Motion::Translation) => "N",
-        (_, Motion::Rotation) => "N m",
-    };
+    let unit = unit_for(model.motion, input.map_or(InputKind::Force, |i| i.kind).unit());
     let list = |values: &[f64]| match values {
         [rest @ .., last] if !rest.is_empty() => {
             format!("{} and {}", rest.iter().map(|x| short(*x)).collect::<Vec<_>>().join(", "), short(*last))

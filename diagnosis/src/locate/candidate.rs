@@ -2,13 +2,15 @@
 
 use super::channel::Channel;
 use super::character::Character;
-use super::law::{Reversals, Samples, Variable};
-use super::nonlinear::rms;
+use super::law::Variable;
 use super::period::scan;
+use super::regression::Samples;
+use super::reversals::Reversals;
 use super::scene::{Scene, Trial};
 use super::smoother::Smoothed;
-use super::{Candidate, Course};
+use super::types::{Candidate, Course};
 use crate::hypothesis::Place;
+use crate::signal::{rate, rms};
 use backdrive_plant::model::InputKind;
 
 /// Displacement that makes a turning point, in rms displacements.
@@ -193,14 +195,4 @@ fn pieces<'a>(column: &'a [f64], courses: &[Course]) -> Vec<&'a [f64]> {
             own
         })
         .collect()
-}
-
-/// Central differences.
-fn rate(column: &[f64], period: f64) -> Vec<f64> {
-    let last = column.len().saturating_sub(1);
-    let at = |k: usize| {
-        let (a, b) = (k.saturating_sub(1), (k + 1).min(last));
-        if b > a { (column[b] - column[a]) / ((b - a) as f64 * period) } else { 0.0 }
-    };
-    (0..column.len()).map(at).collect()
 }

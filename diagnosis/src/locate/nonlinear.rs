@@ -2,6 +2,7 @@
 
 use super::channel::Split;
 use super::trajectory::Trajectory;
+use crate::signal::rms;
 use backdrive_plant::elements::{Law, Role, Rubbing, Side};
 
 /// Forces of the nonlinear elements along the simulated motion with the deviation added, less those along the simulated motion, less what
@@ -64,10 +65,6 @@ fn along(law: &Law, x: &[f64], v: &[f64], period: f64, slip: f64) -> Vec<f64> {
         force
     };
     x.iter().zip(v).map(step).collect()
-}
-
-pub(super) fn rms(x: &[f64]) -> f64 {
-    (x.iter().map(|x| x * x).sum::<f64>() / x.len().max(1) as f64).sqrt()
 }
 
 /// Distance over which dry friction builds up, in rms displacements.

@@ -1,11 +1,12 @@
 //! What all places share, and the force at one of them: the filter that suits it best, and the smoother along the path that the device took.
 
 use super::channel::{Channel, Split};
-use super::nonlinear::{extra_forces, rms};
+use super::nonlinear::extra_forces;
 use super::smoother::{Data, Smoothed, System};
 use super::trajectory::Trajectory;
-use super::{Options, Run};
+use super::types::{Options, Run};
 use crate::hypothesis::Place;
+use crate::signal::rms;
 use backdrive_plant::model::{InputKind, Model};
 
 /// Noise at least, as a share of a signal: below that the simulation itself is not exact.

@@ -2,9 +2,10 @@
 
 use super::channel::Channel;
 use super::classes;
+use super::law::Variable;
 use super::scene::Scene;
 use super::trajectory::Trajectory;
-use super::{Candidate, Class, Variable, Where};
+use super::types::{Candidate, Class, Where};
 
 /// Places whose readings differ by less than this many noises are one.
 const INDISTINCT: f64 = 0.3;

@@ -1,6 +1,6 @@
 //! What the nominal model does in a run, and how far the recording is from it.
 
-use super::{LocateError, Run};
+use super::types::{LocateError, Run};
 use backdrive_plant::model::Model;
 use backdrive_plant::stepper::{Options, Plant, Segment, ahead, segments};
 
