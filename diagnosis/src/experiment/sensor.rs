@@ -1,7 +1,8 @@
 //! Which other sensor would tell explanations apart that no excitation separates with the sensors there are.
 
 use super::extra_output::output;
-use super::rivals::{Rival, Scene, Trial};
+use super::rivals::Rival;
+use super::setup::{Setup, Trial};
 use backdrive_plant::describe::unit_for;
 use backdrive_plant::model::{InputKind, OutputKind};
 use backdrive_plant::write::round_significant;
@@ -21,9 +22,9 @@ pub(super) struct Sensor {
 }
 
 /// What a device could be asked beyond what it is: position and velocity of each body that moves freely, force of each element.
-fn extra(scene: &Scene) -> Vec<OutputKind> {
-    let model = &scene.problem.model;
-    let there = |kind: &OutputKind| model.outputs.iter().zip(&scene.sensors.there).any(|(o, there)| *there && o.kind == *kind);
+fn extra(setup: &Setup) -> Vec<OutputKind> {
+    let model = &setup.problem.model;
+    let there = |kind: &OutputKind| model.outputs.iter().zip(&setup.sensors.there).any(|(o, there)| *there && o.kind == *kind);
     let free = |b: &usize| !model.inputs.iter().any(|i| i.kind == InputKind::Motion && i.on == *b);
     let bodies = (0..model.bodies.len()).filter(free).flat_map(|b| [OutputKind::Position(b), OutputKind::Velocity(b)]);
     let forces = (0..model.elements.len()).map(|e| OutputKind::Force(vec![e]));
@@ -31,23 +32,23 @@ fn extra(scene: &Scene) -> Vec<OutputKind> {
 }
 
 /// The sensor that separates two rivals best on one of some experiments.
-pub(super) fn best(scene: &Scene, trials: &[&Trial], pair: [&Rival; 2]) -> Option<Sensor> {
-    let mut wide = scene.clone();
+pub(super) fn best(setup: &Setup, trials: &[&Trial], pair: [&Rival; 2]) -> Option<Sensor> {
+    let mut wide = setup.clone();
     // Each by itself, where both rivals have what it would read.
-    let kinds = extra(scene);
-    let lag = scene.sensors.lag.iter().copied().max().unwrap_or(0);
+    let kinds = extra(setup);
+    let lag = setup.sensors.lag.iter().copied().max().unwrap_or(0);
     let mut found: Option<Sensor> = None;
     for (index, trial) in trials.iter().enumerate() {
-        if index > 0 && scene.budget.is_over() {
+        if index > 0 && setup.budget.is_over() {
             break;
         }
-        let own = scene.outputs(&trial.record).len() * trial.record.len;
+        let own = setup.outputs(&trial.record).len() * trial.record.len;
         wide.extra = kinds.clone();
         wide.extra.retain(|kind| {
-            let alone = Scene { extra: vec![kind.clone()], ..scene.clone() };
+            let alone = Setup { extra: vec![kind.clone()], ..setup.clone() };
             pair.iter().all(|rival| alone.reads(rival))
         });
-        wide.sensors = scene.sensors.clone();
+        wide.sensors = setup.sensors.clone();
         for kind in &wide.extra {
             wide.sensors.floor.push(1.0);
             wide.sensors.lag.push(if matches!(kind, OutputKind::Position(_)) { lag } else { 0 });
@@ -55,32 +56,32 @@ pub(super) fn best(scene: &Scene, trials: &[&Trial], pair: [&Rival; 2]) -> Optio
         let Some(first) = pair[0].prediction(&wide, trial) else { continue };
         for (column, (at, kind)) in first[own..].chunks_exact(trial.record.len).zip(wide.extra.iter().enumerate()) {
             let rms = (column.iter().map(|y| y * y).sum::<f64>() / column.len() as f64).sqrt();
-            let at = scene.sensors.floor.len() + at;
-            wide.sensors.floor[at] = like(scene, kind).unwrap_or(ERROR * rms).max(f64::MIN_POSITIVE);
+            let at = setup.sensors.floor.len() + at;
+            wide.sensors.floor[at] = like(setup, kind).unwrap_or(ERROR * rms).max(f64::MIN_POSITIVE);
         }
-        let seen: Option<Vec<Vec<f64>>> = pair.iter().map(|r| r.prediction(&wide, trial)).collect();
-        let Some(seen) = seen else { continue };
-        let jacobians: Vec<Vec<Vec<f64>>> = pair.iter().zip(&seen).map(|(r, y)| r.jacobian(&wide, trial, &r.own, y)).collect();
+        let predictions: Option<Vec<Vec<f64>>> = pair.iter().map(|r| r.prediction(&wide, trial)).collect();
+        let Some(predictions) = predictions else { continue };
+        let jacobians: Vec<Vec<Vec<f64>>> = pair.iter().zip(&predictions).map(|(r, y)| r.jacobian(&wide, trial, &r.own, y)).collect();
         for (e, kind) in wide.extra.iter().enumerate() {
             let from = own + e * trial.record.len;
             let pick = |all: &[f64]| [&all[..own], &all[from..from + trial.record.len]].concat();
-            let apart: Vec<f64> = pick(&seen[1]).iter().zip(pick(&seen[0])).map(|(b, a)| b - a).collect();
+            let difference: Vec<f64> = pick(&predictions[1]).iter().zip(pick(&predictions[0])).map(|(b, a)| b - a).collect();
             let left = pair.iter().zip(&jacobians).map(|(rival, jacobian)| {
                 let columns: Vec<Vec<f64>> = jacobian.iter().map(|c| pick(c)).collect();
-                rival.remainder(&columns, &apart)
+                rival.unexplained(&columns, &difference)
             });
             let unit = pair[0].unit.max(pair[1].unit);
             let separation = (left.fold(f64::INFINITY, f64::min) / unit).sqrt();
             if found.as_ref().is_none_or(|f| separation > f.separation) {
-                let floor = wide.sensors.floor[scene.sensors.floor.len() + e];
-                found = Some(Sensor { words: words(scene, kind, floor), separation, trial: index });
+                let floor = wide.sensors.floor[setup.sensors.floor.len() + e];
+                found = Some(Sensor { words: words(setup, kind, floor), separation, trial: index });
             }
         }
     }
     found
 }
 
-impl Scene<'_> {
+impl Setup<'_> {
     /// Whether a rival's model has what the extra outputs read.
     fn reads(&self, rival: &Rival) -> bool {
         let nominal = &self.problem.model;
@@ -89,14 +90,14 @@ impl Scene<'_> {
 }
 
 /// The measuring error of a sensor of the same kind that is there.
-fn like(scene: &Scene, kind: &OutputKind) -> Option<f64> {
+fn like(setup: &Setup, kind: &OutputKind) -> Option<f64> {
     let same = |other: &OutputKind| std::mem::discriminant(other) == std::mem::discriminant(kind);
-    let outputs = scene.problem.model.outputs.iter().zip(&scene.sensors.floor).zip(&scene.sensors.there);
+    let outputs = setup.problem.model.outputs.iter().zip(&setup.sensors.floor).zip(&setup.sensors.there);
     outputs.filter(|((o, floor), there)| **there && same(&o.kind) && floor.is_finite()).map(|((_, floor), _)| *floor).reduce(f64::min)
 }
 
-fn words(scene: &Scene, kind: &OutputKind, floor: f64) -> String {
-    let model = &scene.problem.model;
+fn words(setup: &Setup, kind: &OutputKind, floor: f64) -> String {
+    let model = &setup.problem.model;
     let body = |b: &usize| model.bodies.get(*b).map_or("", |b| b.name.as_str());
     let what = match kind {
         OutputKind::Position(b) => format!("the position of \"{}\"", body(b)),

@@ -2,7 +2,7 @@
 //!
 //! For each place the deviation of the device from the simulated nominal model obeys linear equations driven by a latent force there
 //! (after Rogers & Friis 2022); a smoother finds the force, its standard deviation and the likelihood of the recordings. What is not linear in
-//! the nominal model enters as known forces along the path that the device really took, found by iteration. Sign jumps survive because the
+//! the nominal model enters as known forces along the motion that the device really made, found by iteration. Sign jumps survive because the
 //! force may jump where the place's motion reverses (after Marino & Cicirello 2023). Each force is then tabulated against what moves
 //! at its place (`law`); the place whose force follows the simplest law explains the recordings best.
 
@@ -10,12 +10,15 @@ mod candidate;
 mod channel;
 mod character;
 mod classes;
+mod context;
+mod equations;
+mod estimate;
+mod filter;
 mod law;
 mod nonlinear;
 mod period;
 mod regression;
 mod reversals;
-mod scene;
 mod shows;
 mod smoother;
 #[cfg(test)]
@@ -30,11 +33,13 @@ pub use types::{Candidate, Class, Course, LocateError, Location, Options, Run, W
 
 use crate::signal::rms;
 use backdrive_plant::model::Model;
-use channel::{Channel, Split, channels};
+use channel::{Channel, channels};
+use context::{Context, noise_of};
+use equations::Linearisation;
+use estimate::Estimate;
 pub(crate) use nonlinear::force_along;
-use nonlinear::sizes;
+use nonlinear::rms_beyond_linear;
 use rayon::prelude::*;
-use scene::{Scene, Trial, floor_of};
 use trajectory::Trajectory;
 
 /// Finds the latent force at every place of a model. `noise` is the standard deviation of the measuring error of each output, in its unit.
@@ -59,43 +64,47 @@ pub fn locate(model: &Model, runs: &[Run], noise: &[f64], options: &Options) -> 
         let across = nonlinear.flat_map(|ends| trajectories.iter().map(move |t| rms(&t.across(ends).0)));
         across.fold(0.0, f64::max) * std::f64::consts::SQRT_2
     };
-    let split = Split::of(model, amplitude).ok_or(LocateError::Singular)?;
-    let noise = (0..noise.len()).map(|output| floor_of(output, noise[output], &trajectories)).collect();
-    let sizes = trajectories.iter().map(|t| sizes(&split, t)).collect();
-    let scene = Scene { model, runs, split, trajectories, sizes, noise, options };
-    let wanted = |channel: &Channel| options.only.as_ref().is_none_or(|place| scene.stands_for(*channel, place));
-    let mut trials: Vec<Trial> = channels(model).into_par_iter().filter(wanted).filter_map(|channel| scene.trial(channel)).collect();
-    if trials.is_empty() {
+    let linearisation = Linearisation::of(model, amplitude).ok_or(LocateError::Singular)?;
+    let noise = (0..noise.len()).map(|output| noise_of(output, noise[output], &trajectories)).collect();
+    let nonlinear_sizes = trajectories.iter().map(|t| rms_beyond_linear(&linearisation, t)).collect();
+    let context = Context { model, runs, linearisation, trajectories, nonlinear_sizes, noise, options };
+    let wanted = |channel: &Channel| options.only.as_ref().is_none_or(|place| context.acts_at(*channel, place));
+    let mut estimates: Vec<Estimate> =
+        channels(model).into_par_iter().filter(wanted).filter_map(|channel| context.estimate(channel)).collect();
+    if estimates.is_empty() {
         return Err(LocateError::Singular);
     }
-    trials.sort_by(|a, b| b.log_likelihood.total_cmp(&a.log_likelihood));
-    let mut ranking: Vec<(Candidate, usize)> =
-        trials.par_iter().enumerate().flat_map_iter(|(i, trial)| scene.candidates(trial).into_iter().map(move |c| (c, i))).collect();
+    estimates.sort_by(|a, b| b.log_likelihood.total_cmp(&a.log_likelihood));
+    let mut ranking: Vec<(Candidate, usize)> = estimates
+        .par_iter()
+        .enumerate()
+        .flat_map_iter(|(i, estimate)| context.candidates(estimate).into_iter().map(move |c| (c, i)))
+        .collect();
     ranking.sort_by(|a, b| b.0.evidence.total_cmp(&a.0.evidence));
     let leading: Vec<usize> = ranking.iter().take(options.jumps_at).map(|r| r.1).collect();
     ranking
         .par_iter_mut()
         .take(options.jumps_at)
         .zip(leading)
-        .for_each(|((candidate, _), trial)| scene.let_jump(candidate, &trials[trial]));
-    let channels: Vec<(Channel, usize)> = ranking.iter().map(|r| (trials[r.1].channel, trials[r.1].chain)).collect();
+        .for_each(|((candidate, _), estimate)| context.allow_jumps(candidate, &estimates[estimate]));
+    let channels: Vec<(Channel, usize)> = ranking.iter().map(|r| (estimates[r.1].channel, estimates[r.1].order)).collect();
     let ranking: Vec<Candidate> = ranking.into_iter().map(|r| r.0).collect();
-    let classes = scene.classes(&ranking, &channels);
+    let classes = context.classes(&ranking, &channels);
     Ok(Location {
-        log_likelihood_without: scene.log_likelihood_without(),
-        mismatch: scene.mismatch(),
-        shows: scene.shows(&ranking),
+        log_likelihood_without: context.log_likelihood_without(),
+        mismatch: context.mismatch(),
+        shows: context.shows(&ranking),
         ranking,
         classes,
     })
 }
 
-/// In which state the mismatch shows, in words, such as `reversals of drum-ground`; `None` where there is no mismatch to speak of.
+/// In which state the residual shows, in words, such as `with velocity, at drum-ground`; `None` where it does not exceed the noise.
 pub fn state(location: &Location) -> Option<String> {
     let best = location.ranking.first()?;
     let telling = location.mismatch > QUIET && best.log_likelihood > location.log_likelihood_without;
     (telling && !location.shows.state.is_empty()).then(|| location.shows.state.clone())
 }
 
-/// Mismatch, in noises, below which nothing shows.
+/// Normalised residual, in noise standard deviations, up to which nothing is said to show.
 const QUIET: f64 = 1.02;
