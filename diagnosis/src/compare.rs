@@ -1,4 +1,4 @@
-//! What a fitted structure says of recordings that it has not seen, beside what was measured.
+//! Predictions of a fitted structure for recordings that were not fitted, and their residuals.
 
 use crate::effort::Effort;
 use crate::fit::{Evaluator, measured};
@@ -53,16 +53,16 @@ pub fn predictions(problem: &Problem, records: &[Record], structure: &Structure,
     records.iter().enumerate().map(one).collect()
 }
 
-/// What a structure leaves over of recordings that no fit has seen.
+/// Residuals of a structure in recordings that were not fitted.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Unseen {
-    /// Its mean square, as fits compare it, squares of the floor.
+    /// Mean square of the normalised residuals, noise variances.
     pub mean_square: f64,
-    /// Its correlation time, samples: an amplitude or a drift that no law follows is off over thousands of them, and counts but once.
+    /// Their correlation time, samples: an error of amplitude or a drift correlates thousands of samples, which then count as one.
     pub correlation_time: f64,
 }
 
-/// What a structure with these values leaves over of `records`, in units of `floor`.
+/// Residuals of a structure with these values in `records`, normalised by the noise standard deviations `floor`.
 pub fn unseen(problem: &Problem, records: &[Record], structure: &Structure, values: &[f64], floor: &[f64]) -> Option<Unseen> {
     let ready = Ready::of(problem, records, structure, values)?;
     let evaluator = Evaluator { floor: floor.to_vec(), ..Evaluator::on(&ready.fixed, records) };
@@ -95,14 +95,14 @@ pub struct Quality {
     pub output: String,
     /// Root of the mean squared error over the standard deviation of what was measured.
     pub nrmse: f64,
-    /// Root of the mean squared error over the standard deviation of the measuring error; of a position that nothing holds back over its
-    /// displacement in a while, as fits compare it.
+    /// Root of the mean squared error over the noise standard deviation; of a position that no spring holds, that of its displacement over a lag, as fits
+    /// compare it.
     pub floors: f64,
     /// Whether fits saw this record.
     pub fitted: bool,
 }
 
-/// Quality of predictions of `records`. `floor` is the measuring error of each output, in its unit.
+/// Quality of predictions of `records`. `floor` is the noise standard deviation of each output, in its unit.
 pub fn qualities(problem: &Problem, records: &[Record], predicted: &[Predicted], floor: &[f64], fitted: bool) -> Vec<Quality> {
     let mut all = Vec::new();
     for (record, predicted) in records.iter().zip(predicted) {

@@ -1,4 +1,4 @@
-//! The force that gave a finding away: what the recordings ask for at its place when it alone is left out, beside what its law does there.
+//! Evidence of a finding: the force that the recordings require at its place when the model lacks it, beside the force of its law.
 
 use crate::candidate::Candidate;
 use crate::hypothesis::{Against, Hypothesis, Place};
@@ -29,7 +29,7 @@ pub struct Curve {
 pub struct Trace {
     /// The record.
     pub record: String,
-    /// As the recordings ask for it.
+    /// As estimated from the recordings.
     pub latent: Curve,
     /// Its standard deviation.
     pub deviation: Vec<f64>,
@@ -37,7 +37,7 @@ pub struct Trace {
     pub law: Curve,
 }
 
-/// What the recordings ask for at a finding's place, and what its law does.
+/// The force that the recordings require at the place of a finding, and the force of its law there.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Evidence {
     /// The finding's id.
@@ -63,8 +63,8 @@ pub struct Evidence {
 /// Samples that a force is estimated at, at most.
 const SAMPLES: usize = 8000;
 
-/// Evidence of one of the physics that a candidate adds; `None` where nothing can be located there. `floor` is the measuring error of
-/// each output, in its unit.
+/// Evidence of one of the physics that a candidate adds; `None` where nothing can be located there. `floor` is the noise
+/// standard deviation of each output, in its unit.
 pub fn evidence(problem: &Problem, best: &Candidate, floor: &[f64], which: usize) -> Option<Evidence> {
     let finding = best.structure.added.get(which)?;
     let values = &best.fit.values;

@@ -1,4 +1,4 @@
-//! What the recordings themselves say, before any physics: their clock, their sensors, and what that limits.
+//! Checks of the recordings before any fit: clock, sensors, units, closed loops, repeatability.
 
 mod rates;
 mod record;
@@ -17,8 +17,8 @@ use backdrive_plant::set::Initial;
 use remark::merged;
 use signals::is_constant;
 
-/// Looks at every recording of a problem, those held out included: nothing here fits anything. What matters most comes first; what is the
-/// same in several recordings is said once.
+/// Checks every recording of a problem, those held out included. Nothing is fitted. The weightiest remarks come first; a remark that holds for several
+/// recordings is made once.
 pub fn audit(problem: &Problem) -> Vec<Remark> {
     let mut all = Vec::new();
     for one in problem.fit.iter().chain(&problem.held_out) {

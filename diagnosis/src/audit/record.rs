@@ -63,7 +63,7 @@ fn constant(record: &Record, name: &str, samples: &[f64], all: &mut Vec<Remark>)
     }
 }
 
-/// Samples that stay at an extreme for longer than a smooth turn would.
+/// Samples that stay at an extreme for longer than a smooth signal does.
 fn clipped(record: &Record, name: &str, samples: &[f64], why: &str, all: &mut Vec<Remark>) {
     let (share, low, high) = clipped_share(samples);
     if share > CLIPPED {

@@ -8,7 +8,7 @@ use backdrive_plant::model::{InputKind, OutputKind};
 /// Correlation of a command's noise with a sensor's above which a controller closes the loop.
 const CLOSED: f64 = 0.5;
 
-/// Measuring error of each output.
+/// Noise standard deviation of each output.
 pub(super) fn noises(problem: &Problem) -> Vec<Remark> {
     let mut all = Vec::new();
     for (index, (output, floor)) in problem.model.outputs.iter().zip(&problem.floor).enumerate() {
@@ -52,7 +52,7 @@ pub(super) fn repeats(problem: &Problem) -> Vec<Remark> {
     all
 }
 
-/// Whether a force answers what is measured: noise of the output then shows in the input one sample later.
+/// Whether a force is fed back from an output: the noise of the output then shows in the force one sample later.
 pub(super) fn closed_loop(problem: &Problem, all: &mut Vec<Remark>) {
     for record in &problem.fit {
         for (input, u) in problem.model.inputs.iter().zip(&record.inputs).filter(|(i, _)| i.kind == InputKind::Force) {

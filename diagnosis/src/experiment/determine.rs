@@ -15,7 +15,7 @@ use backdrive_plant::model::Model;
 const KNOWN: f64 = 0.05;
 
 /// The excitation that determines numbers of a structure which the recordings do not: `numbers` are places among
-/// [`Structure::numbers`], `model` the structure's model with `values`. What the budget does not suffice for is left out.
+/// [`Structure::numbers`], `model` the structure's model with `values`. What exceeds the budget is not tried.
 ///
 /// # Errors
 /// Says why when no excitation would determine them.
@@ -36,7 +36,7 @@ pub fn excite<'a>(
     let mut evaluator = Evaluator::new(problem);
     (evaluator.floor, evaluator.substeps) = (planner.setup.sensors.floor.clone(), SUBSTEPS.0);
     let own: Vec<f64> = structure.numbers.iter().zip(values).map(|(n, v)| n.inward(*v)).collect();
-    let residuals = evaluator.residuals(structure, values).ok_or_else(|| Reason("the model runs away on the recordings".to_string()))?;
+    let residuals = evaluator.residuals(structure, values).ok_or_else(|| Reason("the model diverges on the recordings".to_string()))?;
     let known = Rival::with(structure, values, &evaluator.jacobian(structure, &own, &residuals), 1.0);
     let before = known.deviations(None);
     let whole = |j: usize| if structure.numbers[j].log { 1.0 } else { own[j].abs() };
@@ -45,7 +45,7 @@ pub fn excite<'a>(
         return Err(Reason(format!("the recordings determine all of these numbers to {} % or better", short(100.0 * KNOWN))));
     }
     let cases = planner.cases(std::slice::from_ref(&known));
-    // The size that a number must be seen with: all of it, or what the recordings leave open.
+    // What a standard deviation is compared with: the parameter itself, or its standard deviation from the recordings where that is smaller.
     let size = |j: usize| if whole(j) > 0.0 { whole(j).min(before[j]) } else { before[j] };
     let places: Vec<usize> = (0..cases.len()).collect();
     let determined = planner.setup.budget.abreast(&places, |budget, s| {
@@ -63,7 +63,7 @@ pub fn excite<'a>(
     let Some((case, separation, after)) = best.filter(|g| g.1 >= least) else {
         let list = names.join(", ");
         return Err(Reason(format!(
-            "no excitation within what the recordings show the device to stand determines {list}: it takes larger amplitudes, another sensor or another input"
+            "no excitation within the range of the recordings determines {list}: it takes larger amplitudes, another sensor or another input"
         )));
     };
     let case = &cases[*case];

@@ -1,4 +1,4 @@
-//! What could be played: excitations within what a device was shown to stand.
+//! The excitations that may be chosen, within the range that the recordings cover.
 //!
 //! Each shape is there for what it tells apart:
 //!
@@ -19,14 +19,14 @@ use backdrive_plant::model::InputKind;
 use backdrive_plant::write::round_significant;
 use std::f64::consts::TAU;
 
-/// What an input was shown to stand, over all recordings of a problem.
+/// The range of an input over all recordings of a problem.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct InputRange {
     /// Mean value, unit of the input; 0 where it is small against the peak.
     pub mean: f64,
     /// Largest departure from the mean, unit of the input.
     peak: f64,
-    /// Amplitude that it may keep up: twice the largest root mean square of a recording, at most the peak.
+    /// Amplitude that it may have throughout: twice the largest root mean square of a recording, at most the peak.
     lasting: f64,
     /// Largest rate of change, unit of the input per s; infinite for forces.
     rate: f64,
@@ -71,7 +71,7 @@ impl InputRange {
         let mut centres: Vec<f64> = columns.iter().filter_map(|(u, period)| crossings(u, *period)).collect();
         centres.sort_by(f64::total_cmp);
         let centre = centres.get(centres.len() / 2).copied().unwrap_or(1.0);
-        // What was reached for a moment only, in a knock, is nothing to hold.
+        // A peak of short duration, such as an impact, may not last.
         Some(InputRange { mean, peak, lasting: (peak / shown * 2.0 * strongest).min(peak), rate, curvature, centre })
     }
 
@@ -84,7 +84,7 @@ impl InputRange {
     }
 }
 
-/// Largest rate of change and second derivative but for one sample in a thousand: noise and jumps have no say.
+/// Rate of change and second derivative that only one sample in a thousand exceeds: noise and jumps do not count.
 fn rates(columns: &[(&[f64], f64)]) -> (f64, f64) {
     let high = |mut all: Vec<f64>| {
         let at = all.len().saturating_sub(1 + all.len() / 1000);

@@ -12,9 +12,9 @@ use crate::work::{Budget, Steps};
 use backdrive_plant::write::round_significant;
 use rayon::prelude::*;
 
-/// What it takes to set an experiment up, s: without it the shortest would always win.
+/// Time that it takes to set an experiment up, s: without it the shortest would always be chosen.
 pub(super) const SETTING_UP: f64 = 2.0;
-/// How far beyond the recorded peaks positions and speeds may go.
+/// Largest ratio of predicted to recorded peaks of positions and speeds.
 const REACH: f64 = 1.3;
 /// Share of the work for simulating everything, and for simulating and evaluating it.
 const SHARES: (f64, f64) = (0.4, 0.75);
@@ -38,7 +38,7 @@ pub(super) struct Case {
     pub predictions: Vec<Vec<f64>>,
 }
 
-/// How well an experiment separates each pair, standard deviations.
+/// How well a case, by its index, separates each pair of rivals, standard deviations.
 pub(super) struct Evaluated {
     pub case: usize,
     pub pairs: Vec<((usize, usize), f64)>,
@@ -49,7 +49,7 @@ impl Evaluated {
         self.pairs.iter().find(|p| p.0 == pair).map_or(0.0, |p| p.1)
     }
 
-    /// What it gives for the worst of some pairs per second. More than enough in twice the time is no gain, less is.
+    /// Squared separation of the worst of some pairs per second.
     pub(super) fn score(&self, pairs: &[(usize, usize)], cases: &[Case]) -> f64 {
         let worst = pairs.iter().map(|p| self.of(*p)).fold(f64::INFINITY, f64::min);
         worst * worst / (cases[self.case].trial.seconds() + SETTING_UP)
@@ -63,7 +63,7 @@ impl Trial {
     }
 }
 
-/// A problem with what its inputs were shown to stand.
+/// A problem with the recorded ranges of its inputs.
 pub(super) struct Planner<'a> {
     pub setup: Setup<'a>,
     ranges: Vec<Option<InputRange>>,
@@ -88,7 +88,7 @@ impl<'a> Planner<'a> {
         Ok(Planner { setup, ranges, rate_hz: round_significant(1.0 / period, 6), longest, ends })
     }
 
-    /// Every excitation that all rivals can be simulated on, within what the device was shown to stand.
+    /// Every excitation on which all rivals can be simulated, within the recorded ranges.
     pub(super) fn cases(&self, rivals: &[Rival]) -> Vec<Case> {
         let choices = choices(self.setup.problem, &self.ranges, 1.0 / self.rate_hz, self.longest);
         let one = |budget: &Budget<'a>, choice: &Choice| {
@@ -106,22 +106,22 @@ impl<'a> Planner<'a> {
         self.setup.budget.until(self.ends.0).abreast(&choices, one).into_iter().flatten().flatten().collect()
     }
 
-    /// How well experiments separate the rivals by first order. Those whose whole difference is no better than what others have left
-    /// need no evaluation. Sorts `shows` by what they promise.
+    /// How well experiments separate the rivals, to first order in their parameters. An experiment whose difference of predictions is smaller than what
+    /// another separates is not evaluated. Sorts `cases` by that difference, largest first.
     pub(super) fn evaluate(&self, rivals: &[Rival], cases: &mut [Case], pairs: &[(usize, usize)], least: f64) -> Vec<Evaluated> {
-        let promised = |case: &Case| {
+        let potential = |case: &Case| {
             let one = |(a, b): &(usize, usize)| {
                 let difference: f64 = case.predictions[*a].iter().zip(&case.predictions[*b]).map(|(x, y)| (x - y).powi(2)).sum();
                 difference / rivals[*a].unit.max(rivals[*b].unit)
             };
             pairs.iter().map(one).fold(f64::INFINITY, f64::min) / (case.trial.seconds() + SETTING_UP)
         };
-        cases.sort_by(|a, b| promised(b).total_cmp(&promised(a)));
+        cases.sort_by(|a, b| potential(b).total_cmp(&potential(a)));
         let mut all: Vec<Evaluated> = Vec::new();
         let mut at = 0;
         while at < cases.len() && (at == 0 || self.setup.budget.spent() < self.ends.1) {
             let best = all.iter().filter(|e| e.pairs.iter().all(|p| p.1 >= least)).map(|e| e.score(pairs, cases)).fold(0.0, f64::max);
-            if pairs.is_empty() || promised(&cases[at]) < best {
+            if pairs.is_empty() || potential(&cases[at]) < best {
                 break;
             }
             let next: Vec<usize> = (at..cases.len().min(at + 4)).collect();
@@ -151,7 +151,7 @@ impl<'a> Planner<'a> {
         } else {
             said.push_str(&format!(" (at most {} standard deviations)", short(reached)));
         }
-        // Of the excitations with most in them: the loud and the long ones.
+        // Some of the excitations, from the longest on.
         let mut trials: Vec<&Trial> = cases.iter().map(|s| &s.trial).collect();
         trials.sort_by(|x, y| y.seconds().total_cmp(&x.seconds()));
         let spread: Vec<&Trial> = trials.iter().step_by((trials.len() / 4).max(1)).take(4).copied().collect();
@@ -168,6 +168,7 @@ impl<'a> Planner<'a> {
         Reason(said)
     }
 
+    /// The experiment that separates a pair best; `inseparable` is a pair that it does not.
     pub(super) fn separating(
         &self,
         rivals: &[Rival],
@@ -184,7 +185,7 @@ impl<'a> Planner<'a> {
         let repeats = repeats(separation);
         let again = if repeats > 1 { format!(", {repeats} times") } else { String::new() };
         let mut sentence = format!(
-            "Play {}{again}: {one} and {other} then part by {} standard deviations ({} floors rms, most of it in {output}), each refitted to it",
+            "Play {}{again}: {one} and {other} then part by {} standard deviations ({} noise standard deviations rms, most of it in {output}), each refitted to it",
             words::described(&self.setup.problem.model, &case.trial),
             short(separation * f64::from(repeats).sqrt()),
             short(level)
@@ -201,7 +202,7 @@ impl<'a> Planner<'a> {
         self.experiment(case, sentence, between, separation, &difference, level)
     }
 
-    /// The output in which most of a change in floors shows.
+    /// The output with the largest share of a change, which is in noise standard deviations.
     fn most(&self, case: &Case, change: &[f64]) -> String {
         let size = |column: &[f64]| column.iter().map(|x| x * x).sum::<f64>();
         let columns = change.chunks_exact(case.trial.record.len.max(1)).zip(self.setup.outputs(&case.trial.record));

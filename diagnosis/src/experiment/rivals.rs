@@ -1,4 +1,4 @@
-//! Fitted structures on an experiment that was not made yet: what each predicts, and how far one can imitate another.
+//! Rival models: what each predicts for an experiment, and how much of the difference of two predictions a change of parameters cannot explain.
 
 use super::setup::{Setup, Trial};
 use crate::effort::Effort;
@@ -16,9 +16,9 @@ pub(super) struct Rival<'a> {
     pub structure: &'a Structure,
     /// Its numbers, in the fit's own unit.
     pub own: Vec<f64>,
-    /// What the recordings know of them: the curvature of half the cost, squared floors.
+    /// Fisher information of the recordings about them: the curvature of half the cost, with residuals in noise standard deviations.
     information: DMatrix<f64>,
-    /// What one squared floor of cost is worth, at least 1: what is left over and hangs together counts less.
+    /// Cost that counts as one squared standard deviation, at least 1: the mean square of the residuals times their correlation time.
     pub unit: f64,
 }
 
@@ -40,7 +40,7 @@ impl<'a> Rival<'a> {
         };
         for (j, number) in numbers.iter().enumerate() {
             let (low, high) = number.bounds();
-            // What nothing holds is somewhere in its range.
+            // A parameter without prior is somewhere in its range.
             let spread = number.prior.map_or(high - low, |(_, spread)| spread.min(high - low));
             information[(j, j)] += 1.0 / (spread * spread).max(f64::MIN_POSITIVE);
         }
@@ -58,7 +58,7 @@ impl<'a> Rival<'a> {
         self.model(problem, &self.own)
     }
 
-    /// What it predicts, in floors.
+    /// What it predicts, in noise standard deviations.
     pub(super) fn prediction(&self, setup: &Setup, trial: &Trial) -> Option<Vec<f64>> {
         setup.prediction(&self.as_fitted(setup.problem)?, trial)
     }
@@ -86,8 +86,8 @@ impl<'a> Rival<'a> {
         self.structure.numbers.par_iter().enumerate().map(column).collect()
     }
 
-    /// What is left of a difference d when the numbers may move as far as the recordings let them, were the structure linear in them,
-    /// squared floors: with derivatives J there and the recordings' information M, the least over s of |d - J s|² + s' M s.
+    /// Predicted cost of a difference d of predictions after a Gauss-Newton step that also keeps to the recordings, in noise variances: with the Jacobian J
+    /// of the experiment and the information M of the recordings, the minimum over s of |d - J s|² + s' M s.
     pub(super) fn unexplained(&self, jacobian: &[Vec<f64>], difference: &[f64]) -> f64 {
         let whole = dot(difference, difference);
         let (mut matrix, right) = normal_equations(jacobian, difference, None);
@@ -96,12 +96,12 @@ impl<'a> Rival<'a> {
         let scaled =
             DMatrix::from_fn(right.len(), right.len(), |a, b| matrix[(a, b)] / (scale[a] * scale[b]) + if a == b { 1e-12 } else { 0.0 });
         let short = DVector::from_fn(right.len(), |j, _| right[j] / scale[j]);
-        // Without a factor nothing is claimed.
+        // Without a Cholesky factor no separation is claimed.
         scaled.cholesky().map_or(0.0, |c| (whole - short.dot(&c.solve(&short))).clamp(0.0, whole))
     }
 
     /// The same by a true refit to the recordings and to what `other` predicts for the experiment: what the cost then is above its own
-    /// on the recordings alone, squared floors.
+    /// on the recordings alone, in noise variances.
     pub(super) fn refit(&self, setup: &Setup, trial: &Trial, other: &Rival) -> Option<f64> {
         let columns = setup.outputs_of(&other.as_fitted(setup.problem)?, trial)?;
         let mut record = trial.record.clone();

@@ -14,7 +14,7 @@ use backdrive_plant::set::Initial;
 /// What is measured: how well, and what is compared. One for each output of the models that are simulated.
 #[derive(Debug, Clone)]
 pub(super) struct Sensors {
-    /// Standard deviation of each output's measuring error, in its unit.
+    /// Noise standard deviation of each output, in its unit.
     pub floor: Vec<f64>,
     /// As [`Problem::lag`].
     pub lag: Vec<usize>,
@@ -27,29 +27,29 @@ impl Sensors {
     pub(super) fn of(problem: &Problem, floor: &[f64]) -> Sensors {
         let there = |o: usize| problem.fit.iter().any(|r| r.outputs.get(o).is_some_and(Option::is_some));
         let count = problem.model.outputs.len();
-        // An output without a floor says nothing.
+        // An output without a noise standard deviation is given no weight.
         let floor = (0..count).map(|o| floor.get(o).copied().filter(|f| *f > 0.0).unwrap_or(f64::INFINITY)).collect();
         Sensors { floor, lag: problem.lag.clone(), there: (0..count).map(there).collect() }
     }
 }
 
-/// Where experiments are played in thought: a problem, what is measured, and how finely is stepped.
+/// What an experiment is simulated with: a problem, its sensors, the solver steps and the work that is left.
 #[derive(Clone)]
 pub(super) struct Setup<'a> {
     pub problem: &'a Problem,
     pub sensors: Sensors,
-    /// Outputs that the model files do not have, put behind theirs. By the nominal model's places and names.
+    /// Outputs beyond those of the model file, with the indices of the nominal model; they come last in predictions.
     pub extra: Vec<OutputKind>,
     /// Substeps per sample, at most.
     pub substeps: usize,
-    /// Counts what is computed, and ends refits and searches.
+    /// Counts the work, and ends refits when it is used up.
     pub budget: Budget<'a>,
 }
 
-/// An excitation as a recording without outputs.
+/// An excitation as a recording whose outputs are still 0.
 pub(super) struct Trial {
     pub choice: Choice,
-    /// What other inputs keep.
+    /// Constant values of the other inputs.
     pub others: Vec<(usize, Excitation)>,
     pub record: Record,
 }
@@ -60,7 +60,7 @@ impl<'a> Setup<'a> {
         Setup { budget: budget.clone(), ..self.clone() }
     }
 
-    /// An excitation as a recording, made smaller until it stays within what the input was shown to stand.
+    /// An excitation as a recording, made smaller until it stays within the range of the input.
     pub(super) fn trial(&self, choice: &Choice, ranges: &[Option<InputRange>], rate_hz: f64) -> Option<Trial> {
         let range = ranges.get(choice.input)?.as_ref()?;
         let period = 1.0 / rate_hz;
@@ -105,7 +105,7 @@ impl<'a> Setup<'a> {
         self.trial_of(Choice { excitation, ..trial.choice.clone() }, ranges, rate_hz)
     }
 
-    /// What a model predicts, in floors, the recorded outputs one after the other; the same differences as a fit compares.
+    /// What a model predicts, in noise standard deviations: the recorded outputs one after the other, with the same lags as in a fit.
     pub(super) fn prediction(&self, model: &Model, trial: &Trial) -> Option<Vec<f64>> {
         let mut columns = self.outputs_of(model, trial)?;
         let length = trial.record.len;
@@ -117,7 +117,7 @@ impl<'a> Setup<'a> {
                     column[i] = (column[i] - column[i - lag]) * std::f64::consts::FRAC_1_SQRT_2;
                 }
             }
-            // Where a device starts is not known as a rule, and moves the whole of a position.
+            // The start is estimated in every recording, so a constant does not count.
             if self.problem.initial == Initial::Free {
                 let mean = column.iter().sum::<f64>() / length as f64;
                 column.iter_mut().for_each(|y| *y -= mean);
@@ -135,13 +135,13 @@ impl<'a> Setup<'a> {
         if self.extra.is_empty() {
             return predict_under(model, &trial.record, &self.conditions());
         }
-        let mut predictions = model.clone();
+        let mut extended = model.clone();
         let mut record = trial.record.clone();
         for kind in &self.extra {
-            predictions.outputs.push(output(&self.problem.model, model, kind)?);
+            extended.outputs.push(output(&self.problem.model, model, kind)?);
             record.outputs.push(Some(Vec::new()));
         }
-        predict_under(&predictions, &record, &self.conditions())
+        predict_under(&extended, &record, &self.conditions())
     }
 
     /// Indices of the outputs that predictions have.

@@ -47,7 +47,7 @@ impl Context<'_> {
             }
             (Channel::Motion(input), Place::Signal(name)) => self.model.inputs[input].name == *name,
             (Channel::Sensor(output), Place::Signal(name)) => self.model.outputs[output].name == *name,
-            _ => false,
+            (Channel::Force(_), Place::Signal(_)) | (Channel::Motion(_) | Channel::Sensor(_), Place::Between(..)) => false,
         }
     }
 

@@ -9,6 +9,7 @@ use super::smoother::Smoothed;
 /// tried once it is.
 const FIRST_FORCE_ERROR: f64 = 2.0;
 const FORCE_ERRORS: [f64; 3] = [0.01, 0.1, 0.5];
+
 /// What was estimated at a channel.
 pub(super) struct Estimate {
     pub channel: Channel,

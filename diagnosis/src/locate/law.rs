@@ -1,4 +1,4 @@
-//! What a latent force depends on: it is tabulated against everything that moves at its place.
+//! A law that an estimated force may follow: on which variable it depends, in which form, and how well it explains the force.
 
 use serde::Serialize;
 
@@ -71,7 +71,7 @@ pub struct Law {
     pub numbers: usize,
     /// Share of the force's mean square that it explains.
     pub share: f64,
-    /// The same on parts of the recordings that it was not drawn from.
+    /// The same on parts of the recordings that it was not fitted to.
     pub held_out_share: f64,
     /// F statistic against no law, with as many degrees of freedom as there are independent samples.
     pub f_statistic: f64,

@@ -1,4 +1,4 @@
-//! Where model and recording part: the unknown force at every place that would make the nominal model reproduce the recordings.
+//! Where the model deviates from the recordings: the unknown force at every place that would make the nominal model reproduce the recordings.
 //!
 //! For each place the deviation of the device from the simulated nominal model obeys linear equations driven by a latent force there
 //! (after Rogers & Friis 2022); a smoother finds the force, its standard deviation and the likelihood of the recordings. What is not linear in

@@ -34,7 +34,7 @@ impl Samples {
         if variance > 0.0 { n as f64 / (block as f64 * of_means / variance).clamp(1.0, n as f64) } else { n as f64 }
     }
 
-    /// All laws that could hold here, best first by what they explain of data they were not drawn from.
+    /// All laws that could hold here, best first by the share that they explain of parts they were not fitted to.
     pub fn laws(&self, ripple: Option<&Ripple>) -> Vec<Law> {
         let n = self.force.len();
         // The sign of a velocity near rest is noise; the direction since a turning point is not.
@@ -50,8 +50,8 @@ impl Samples {
             {
                 laws.push(self.proportional(variable, z));
             }
-            laws.push(self.smooth(Variable::Velocity, &self.v, |k, v| [1.0, direction[k], v, v * v.abs()]));
-            laws.push(self.smooth(Variable::Displacement, &self.x, |_, x| [1.0, x, x * x, x * x * x]));
+            laws.push(self.polynomial(Variable::Velocity, &self.v, |k, v| [1.0, direction[k], v, v * v.abs()]));
+            laws.push(self.polynomial(Variable::Displacement, &self.x, |_, x| [1.0, x, x * x, x * x * x]));
             laws.push(self.binned(Variable::Velocity, &speed, sides, Bins::Even(BINS / 2)));
             laws.push(self.binned(Variable::Displacement, &self.x, &none, Bins::Even(BINS)));
             laws.push(self.binned(Variable::Acceleration, &self.acceleration, &none, Bins::Even(BINS)));
@@ -66,8 +66,8 @@ impl Samples {
         if self.signal.len() == n {
             for (variable, z) in [(Variable::Signal, &self.signal), (Variable::SignalRate, &self.signal_rate)] {
                 laws.push(self.proportional(variable, z));
-                laws.push(self.smooth(variable, z, |_, z| [1.0, z, z * z, z * z * z]));
-                laws.push(self.binned(variable, z, &none, Bins::Bowed(BINS)));
+                laws.push(self.polynomial(variable, z, |_, z| [1.0, z, z * z, z * z * z]));
+                laws.push(self.binned(variable, z, &none, Bins::FinerAtZero(BINS)));
             }
         }
         laws.push(self.binned(Variable::Time, &self.time, &none, Bins::Even(BINS)));
@@ -88,12 +88,12 @@ impl Samples {
         let c = slope(&|_| true);
         let fitted: Vec<f64> = z.iter().map(|z| c * z).collect();
         let other: Vec<f64> = (0..z.len()).map(|k| halves[1 - self.half(k)] * z[k]).collect();
-        let mut law = self.judged(variable, Form::Proportional, 1, fitted, &other);
-        law.curve = self.bin_means(z, &vec![0; z.len()], Bins::Bowed(BINS)).0;
+        let mut law = self.tested(variable, Form::Proportional, 1, fitted, &other);
+        law.curve = self.bin_means(z, &vec![0; z.len()], Bins::FinerAtZero(BINS)).0;
         law
     }
 
-    fn smooth(&self, variable: Variable, z: &[f64], basis: impl Fn(usize, f64) -> [f64; 4]) -> Law {
+    fn polynomial(&self, variable: Variable, z: &[f64], basis: impl Fn(usize, f64) -> [f64; 4]) -> Law {
         let size = rms(z).max(f64::MIN_POSITIVE);
         let row = |k: usize| basis(k, z[k] / size);
         let fit = |half: Option<usize>| {
@@ -104,8 +104,8 @@ impl Samples {
         let (all, halves) = (fit(None), [fit(Some(0)), fit(Some(1))]);
         let fitted: Vec<f64> = (0..z.len()).map(|k| at(&all, k)).collect();
         let other: Vec<f64> = (0..z.len()).map(|k| at(&halves[1 - self.half(k)], k)).collect();
-        let mut law = self.judged(variable, Form::Smooth, 4, fitted, &other);
-        law.curve = self.bin_means(z, &vec![0; z.len()], Bins::Bowed(BINS)).0;
+        let mut law = self.tested(variable, Form::Smooth, 4, fitted, &other);
+        law.curve = self.bin_means(z, &vec![0; z.len()], Bins::FinerAtZero(BINS)).0;
         law
     }
 
@@ -121,7 +121,7 @@ impl Samples {
         let all: Vec<f64> = (0..count).map(|b| mean(&(sums[0][b].0 + sums[1][b].0, sums[0][b].1 + sums[1][b].1))).collect();
         let fitted = of_sample.iter().map(|bin| all[*bin]).collect();
         let other: Vec<f64> = of_sample.iter().enumerate().map(|(k, bin)| mean(&sums[1 - self.half(k)][*bin])).collect();
-        let mut law = self.judged(variable, Form::Binned, curve.len(), fitted, &other);
+        let mut law = self.tested(variable, Form::Binned, curve.len(), fitted, &other);
         law.curve = curve;
         if variable == Variable::Velocity {
             // Tabulated by speed and direction, shown over velocity.
@@ -147,7 +147,7 @@ impl Samples {
             match bins {
                 Bins::Even(_) => (z - low) / (high - low).max(f64::MIN_POSITIVE),
                 // Finer about zero, and with an edge at it.
-                Bins::Bowed(_) => 0.5 + 0.5 * (BOW * z / rms).asinh() / (BOW * peak / rms).asinh(),
+                Bins::FinerAtZero(_) => 0.5 + 0.5 * (BOW * z / rms).asinh() / (BOW * peak / rms).asinh(),
                 Bins::Log(_) => 1.0 + (z.abs() / peak).max(1e-3).log10() / 3.0,
             }
         };
@@ -174,7 +174,7 @@ impl Samples {
         (cells.iter().filter(|c| c.0 > 0).map(point).collect(), of_sample, 2 * n)
     }
 
-    fn judged(&self, variable: Variable, form: Form, numbers: usize, fitted: Vec<f64>, other: &[f64]) -> Law {
+    fn tested(&self, variable: Variable, form: Form, numbers: usize, fitted: Vec<f64>, other: &[f64]) -> Law {
         let all: f64 = self.force.iter().map(|f| f * f).sum();
         let left = |g: &[f64]| self.force.iter().zip(g).map(|(f, g)| (f - g) * (f - g)).sum::<f64>();
         let share_of = |g: &[f64]| if all > 0.0 { 1.0 - left(g) / all } else { 0.0 };
@@ -192,7 +192,7 @@ enum Bins {
     /// Evenly over the range.
     Even(usize),
     /// Finer about zero.
-    Bowed(usize),
+    FinerAtZero(usize),
     /// In decades below the largest, three of them.
     Log(usize),
 }
@@ -200,7 +200,7 @@ enum Bins {
 impl Bins {
     fn count(self) -> usize {
         match self {
-            Bins::Even(n) | Bins::Bowed(n) | Bins::Log(n) => n.max(1),
+            Bins::Even(n) | Bins::FinerAtZero(n) | Bins::Log(n) => n.max(1),
         }
     }
 }

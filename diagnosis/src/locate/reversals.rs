@@ -12,7 +12,7 @@ pub(super) struct Reversals {
 }
 
 impl Reversals {
-    /// Turning points of a path that leave it by more than `threshold`; `starts` are the first samples of the runs.
+    /// Turning points of a motion `x` from which it moves away by more than `threshold`; `starts` are the first samples of the runs.
     pub fn of(x: &[f64], starts: &[usize], period: f64, threshold: f64) -> Reversals {
         let n = x.len();
         let mut all = Reversals { at: Vec::new(), direction: vec![0; n], distance: vec![0.0; n], time: vec![0.0; n] };

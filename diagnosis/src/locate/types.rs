@@ -30,7 +30,7 @@ impl<'a> From<&'a crate::problem::Record> for Run<'a> {
     }
 }
 
-/// How to look.
+/// How much is tried.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Options {
     /// Laws of each form and place that are put to the test of the recordings.
@@ -43,7 +43,7 @@ pub struct Options {
     pub most_samples: usize,
     /// The only place to look at; all places where there is none.
     pub only: Option<Place>,
-    /// Whether filters are tuned on the run with the largest mismatch alone.
+    /// Whether filters are tuned on the run with the largest residual alone.
     pub tuned_on_one: bool,
 }
 
@@ -54,7 +54,7 @@ impl Default for Options {
 }
 
 impl Options {
-    /// Fast rather than fine: for a set of any length in a second or two.
+    /// Fast rather than accurate: a set of any length in a second or two.
     pub fn quick() -> Options {
         Options { laws_of_a_form: 1, jumps_at: 0, iterations: 1, most_samples: 30_000, only: None, tuned_on_one: true }
     }
@@ -129,7 +129,7 @@ pub struct Course {
     pub velocity: Vec<f64>,
 }
 
-/// What a place would have to do.
+/// The force that a place would need, and the laws that it may follow.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Candidate {
     /// Where.
@@ -139,7 +139,7 @@ pub struct Candidate {
     pub log_likelihood: f64,
     /// What a jump of the force at reversals adds to it; `None` where that was not tried.
     pub jump_gain: Option<f64>,
-    /// Log-likelihood with the force that follows the best law, its numbers paid for: what places compete by.
+    /// Log-likelihood with the force that follows the best law, less the penalty for its parameters: what places are ranked by.
     pub evidence: f64,
     /// Root of the force's mean square.
     pub rms: f64,
@@ -162,10 +162,10 @@ pub struct Class {
     pub members: Vec<usize>,
 }
 
-/// When, at which frequencies and in which state the mismatch shows, as `where` of a verdict has it.
+/// When, at which frequencies and in which state the residual shows, as `where` of a verdict has it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Where {
-    /// Spans with most of the mismatch, s; empty where it is everywhere.
+    /// Spans with most of the power of the residual, s; empty where it is everywhere.
     pub time: Vec<[f64; 2]>,
     /// Band with nine tenths of its power, Hz.
     pub band_hz: [f64; 2],
@@ -178,7 +178,7 @@ pub struct Where {
 pub struct Location {
     /// Log-likelihood of the recordings where nothing is missing.
     pub log_likelihood_without: f64,
-    /// Mismatch of the nominal model over the noise, root of the mean square over samples and outputs.
+    /// Normalised residual of the nominal model: root of the mean square over samples and outputs, in noise standard deviations.
     pub mismatch: f64,
     /// Places, best first.
     pub ranking: Vec<Candidate>,

@@ -1,4 +1,4 @@
-//! What is to be explained: a nominal model, recordings to fit and recordings to be kept aside, and the numbers that may be off.
+//! What a diagnosis starts from: a nominal model, the recordings to fit, the recordings held out, and the parameters that may be wrong.
 
 mod error;
 mod files;
@@ -30,17 +30,17 @@ pub struct Problem {
     pub model_path: PathBuf,
     /// The nominal model.
     pub model: Model,
-    /// Recordings that fits see.
+    /// Recordings that are fitted.
     pub fit: Vec<Record>,
-    /// Recordings that no fit sees.
+    /// Recordings that are held out from every fit.
     pub held_out: Vec<Record>,
-    /// Numbers that may be off.
+    /// Parameters that the model file states and that may be wrong.
     pub stated: Vec<Stated>,
     /// How the device starts in each file.
     pub initial: Initial,
-    /// Inputs that nobody measured.
+    /// Inputs that were not measured.
     pub unknown: Vec<Unknown>,
-    /// Standard deviation of the measuring error of each output, in its unit; see [`floor`].
+    /// Noise standard deviation of each output, in its unit; see [`floor`].
     pub floor: Vec<f64>,
     /// Samples over which each output's displacement is compared instead of its position; 0 where the position itself is.
     pub lag: Vec<usize>,
