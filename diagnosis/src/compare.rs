@@ -1,8 +1,9 @@
-//! What a fitted structure says of recordings that it has not seen, beside what was measured.
+//! Predictions of a fitted structure for recordings that were not fitted, and their residuals.
 
 use crate::effort::Effort;
 use crate::evaluator::{Evaluator, measured};
 use crate::problem::{Problem, Record};
+pub use crate::signal::{density, rms};
 use crate::statistics::correlation_time;
 use crate::structure::{Along, Structure};
 use crate::tuning::tuning;
@@ -52,16 +53,16 @@ pub fn predictions(problem: &Problem, records: &[Record], structure: &Structure,
     records.iter().enumerate().map(one).collect()
 }
 
-/// What a structure leaves over of recordings that no fit has seen.
+/// Residuals of a structure in recordings that were not fitted.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Unseen {
-    /// Its mean square, as fits compare it, squares of the floor.
+    /// Mean square of the normalised residuals, noise variances.
     pub mean_square: f64,
-    /// Its correlation time, samples: an amplitude or a drift that no law follows is off over thousands of them, and counts but once.
+    /// Their correlation time, samples: an error of amplitude or a drift correlates thousands of samples, which then count as one.
     pub correlation_time: f64,
 }
 
-/// What a structure with these values leaves over of `records`, in units of `floor`.
+/// Residuals of a structure with these values in `records`, normalised by the noise standard deviations `floor`.
 pub fn unseen(problem: &Problem, records: &[Record], structure: &Structure, values: &[f64], floor: &[f64]) -> Option<Unseen> {
     let ready = Ready::of(problem, records, structure, values)?;
     let evaluator = Evaluator { floor: floor.to_vec(), ..Evaluator::on(&ready.fixed, records) };
@@ -94,14 +95,14 @@ pub struct Quality {
     pub output: String,
     /// Root of the mean squared error over the standard deviation of what was measured.
     pub nrmse: f64,
-    /// Root of the mean squared error over the standard deviation of the measuring error; of a position that nothing holds back over its
-    /// displacement in a while, as fits compare it.
+    /// Root of the mean squared error over the noise standard deviation; of a position that no spring holds, that of its displacement over a lag, as fits
+    /// compare it.
     pub floors: f64,
     /// Whether fits saw this record.
     pub fitted: bool,
 }
 
-/// Quality of predictions of `records`. `floor` is the measuring error of each output, in its unit.
+/// Quality of predictions of `records`. `floor` is the noise standard deviation of each output, in its unit.
 pub fn qualities(problem: &Problem, records: &[Record], predicted: &[Predicted], floor: &[f64], fitted: bool) -> Vec<Quality> {
     let mut all = Vec::new();
     for (record, predicted) in records.iter().zip(predicted) {
@@ -123,57 +124,4 @@ pub fn qualities(problem: &Problem, records: &[Record], predicted: &[Predicted],
         }
     }
     all
-}
-
-/// Root mean square; 0 of nothing.
-pub fn rms(samples: &[f64]) -> f64 {
-    (samples.iter().map(|x| x * x).sum::<f64>() / samples.len().max(1) as f64).sqrt()
-}
-
-/// Power spectral density of samples `period` s apart, by Welch's method (Hann windows, half overlapping, about 16 of them): frequencies,
-/// Hz, and density in the unit squared per Hz. White noise of standard deviation s has the density 2 s² period. Empty for fewer than 32
-/// samples.
-pub fn density(samples: &[f64], period: f64) -> (Vec<f64>, Vec<f64>) {
-    let size = (samples.len() / 8).max(32);
-    if samples.len() < size || size < 32 {
-        return Default::default();
-    }
-    let window: Vec<f64> = (0..size).map(|i| (std::f64::consts::PI * (i as f64 + 0.5) / size as f64).sin().powi(2)).collect();
-    let scale = 2.0 * period / window.iter().map(|w| w * w).sum::<f64>();
-    let mut planner = realfft::RealFftPlanner::<f64>::new();
-    let transform = planner.plan_fft_forward(size);
-    let (mut output, mut sums, mut count) = (transform.make_output_vec(), vec![0.0; size / 2 + 1], 0.0);
-    let mut from = 0;
-    while from + size <= samples.len() {
-        let part = &samples[from..from + size];
-        let mean = part.iter().sum::<f64>() / size as f64;
-        let mut input: Vec<f64> = part.iter().zip(&window).map(|(x, w)| (x - mean) * w).collect();
-        if transform.process(&mut input, &mut output).is_err() {
-            return Default::default();
-        }
-        sums.iter_mut().zip(&output).for_each(|(s, c)| *s += c.norm_sqr() * scale);
-        count += 1.0;
-        from += (size / 2).max(1);
-    }
-    // The mean was taken off: its line says nothing.
-    (1..sums.len()).map(|k| (k as f64 / (size as f64 * period), sums[k] / count)).unzip()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use rand::SeedableRng;
-    use rand_distr::{Distribution, StandardNormal};
-
-    #[test]
-    fn white_noise_has_its_density() {
-        let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(5);
-        let noise: Vec<f64> =
-            (0..20_000).map(|_| 0.3 * <StandardNormal as Distribution<f64>>::sample(&StandardNormal, &mut random)).collect();
-        let (hz, density) = density(&noise, 1e-3);
-        let mean = density.iter().sum::<f64>() / density.len() as f64;
-        assert!((mean / (2.0 * 0.09 * 1e-3) - 1.0).abs() < 0.05, "{mean}");
-        assert!((hz[hz.len() - 1] - 500.0).abs() < 1.0);
-        assert!(super::density(&noise[..20], 1e-3).0.is_empty());
-    }
 }

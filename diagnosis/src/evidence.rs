@@ -1,9 +1,10 @@
-//! The force that gave a finding away: what the recordings ask for at its place when it alone is left out, beside what its law does there.
+//! Evidence of a finding: the force that the recordings require at its place when the model lacks it, beside the force of its law.
 
 use crate::candidate::Candidate;
 use crate::hypothesis::{Against, Hypothesis, Place};
 use crate::locate::{self, Course, force_along, locate};
 use crate::problem::{Problem, Record};
+use crate::signal::rate;
 use crate::structure::Structure;
 use backdrive_plant::describe::unit_for;
 use backdrive_plant::model::{Element, Input, InputKind, Model, Output, OutputKind};
@@ -28,7 +29,7 @@ pub struct Curve {
 pub struct Trace {
     /// The record.
     pub record: String,
-    /// As the recordings ask for it.
+    /// As estimated from the recordings.
     pub latent: Curve,
     /// Its standard deviation.
     pub deviation: Vec<f64>,
@@ -36,7 +37,7 @@ pub struct Trace {
     pub law: Curve,
 }
 
-/// What the recordings ask for at a finding's place, and what its law does.
+/// The force that the recordings require at the place of a finding, and the force of its law there.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Evidence {
     /// The finding's id.
@@ -62,8 +63,8 @@ pub struct Evidence {
 /// Samples that a force is estimated at, at most.
 const SAMPLES: usize = 8000;
 
-/// Evidence of one of the physics that a candidate adds; `None` where nothing can be located there. `floor` is the measuring error of
-/// each output, in its unit.
+/// Evidence of one of the physics that a candidate adds; `None` where nothing can be located there. `floor` is the noise
+/// standard deviation of each output, in its unit.
 pub fn evidence(problem: &Problem, best: &Candidate, floor: &[f64], which: usize) -> Option<Evidence> {
     let finding = best.structure.added.get(which)?;
     let values = &best.fit.values;
@@ -134,10 +135,10 @@ impl Scene<'_> {
         let unit = |u: &str| unit_for(problem.model.motion, u);
         let force = match (self.place, self.input()) {
             (Place::Between(..), _) => unit("N"),
-            (_, Some((_, input, _))) => unit(if input.kind == InputKind::Force { "N" } else { "m" }),
+            (_, Some((_, input, _))) => unit(input.kind.unit()),
             (Place::Signal(name), None) => {
                 let output = problem.model.outputs.iter().find(|o| o.name == *name);
-                output.map_or(String::new(), |o| crate::numbers::unit_of_output(problem, &o.kind))
+                output.map_or(String::new(), |o| unit(o.kind.unit()))
             }
         };
         let variable = match self.against {
@@ -304,14 +305,4 @@ fn arriving(input: &Input, samples: &[f64], period: f64) -> Vec<f64> {
 /// An output that adds nothing of its own.
 fn plain(kind: OutputKind) -> Output {
     Output { name: String::new(), kind, gain: 1.0, delay: 0.0, offset: 0.0, resolution: 0.0, noise: 0.0 }
-}
-
-/// Central differences.
-fn rate(column: &[f64], period: f64) -> Vec<f64> {
-    let last = column.len().saturating_sub(1);
-    let at = |k: usize| {
-        let (a, b) = (k.saturating_sub(1), (k + 1).min(last));
-        if b > a { (column[b] - column[a]) / ((b - a) as f64 * period) } else { 0.0 }
-    };
-    (0..column.len()).map(at).collect()
 }

@@ -1,11 +1,11 @@
-//! How much of a signal is measuring error: the part that no smooth motion explains.
+//! Noise standard deviation of a measured signal, from its differences of rising order.
 
 use crate::problem::Record;
 use backdrive_plant::model::Model;
 
-/// Orders of difference that are tried: a smooth signal vanishes from one of them, white noise from none.
+/// Orders of difference that are tried: a smooth signal vanishes in one of them, white noise in none.
 const ORDERS: usize = 6;
-/// Blocks of a signal; most of them are free of what is not smooth (a reversal of friction, a step).
+/// Blocks of a signal. Most of them hold no step and no reversal of friction, so their median is that of the noise.
 const BLOCKS: usize = 40;
 
 /// Standard deviation of the white part of a signal, in its unit: over differences of rising order, each scaled so that
@@ -14,7 +14,7 @@ pub fn white(samples: &[f64]) -> Option<f64> {
     blocks_of(samples).map(|blocks| median_of_orders(&[blocks]))
 }
 
-/// For each order, the mean square in each block.
+/// For each order of difference, the mean square in each block.
 fn blocks_of(samples: &[f64]) -> Option<Vec<Vec<f64>>> {
     if samples.len() < 40 {
         return None;
@@ -51,14 +51,15 @@ fn median(values: &mut [f64]) -> f64 {
     *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
-/// Measuring error of an output over all recordings of it: its white part, and at least the error of rounding.
+/// Noise standard deviation of an output over all recordings of it, in its unit: its white part, and at least the error of rounding.
 pub fn of_signal(model: &Model, records: &[Record], output: usize) -> f64 {
     let signals: Vec<&[f64]> = records.iter().filter_map(|r| r.outputs.get(output)?.as_deref()).collect();
     let spread = records.iter().filter_map(|r| r.spread.get(output)).fold(0.0f64, |a, b| a.max(*b));
     of(&signals, stated(model, output, &signals), spread)
 }
 
-/// The same of what a fit leaves over, which holds less that is not smooth.
+/// The same of the residuals of a fit, which hold fewer steps than the signal; `least` is that of rounding, `spread` the standard deviation of the
+/// signal.
 pub fn of_residuals(residuals: &[&[f64]], least: f64, spread: f64) -> f64 {
     of(residuals, least, spread)
 }
@@ -66,12 +67,13 @@ pub fn of_residuals(residuals: &[&[f64]], least: f64, spread: f64) -> f64 {
 fn of(signals: &[&[f64]], least: f64, spread: f64) -> f64 {
     let blocks: Vec<_> = signals.iter().filter_map(|s| blocks_of(s)).collect();
     let white = median_of_orders(&blocks);
-    // Without any error a fit would have no unit: a millionth of the signal.
+    // Residuals are divided by it, so it is never 0: at least a millionth of the signal.
     let white = if white.is_finite() { white } else { 0.0 };
     white.max(least).max(1e-6 * spread)
 }
 
-/// What the model file says of an output's error, or what the samples' steps show: rounding to a step errs by its twelfth part's root.
+/// Noise standard deviation that the model file states for an output, with that of rounding to its resolution q, q/√12; where the file states no
+/// resolution, the step of the samples is taken.
 pub fn stated(model: &Model, output: usize, signals: &[&[f64]]) -> f64 {
     let Some(o) = model.outputs.get(output) else { return 0.0 };
     let step = if o.resolution > 0.0 { o.resolution } else { signals.iter().find_map(|s| step_of(s)).unwrap_or(0.0) };

@@ -33,6 +33,7 @@ pub mod problem;
 pub mod race;
 pub mod screen;
 pub mod search;
+pub mod signal;
 pub mod simulate;
 pub mod statistics;
 pub mod structure;

@@ -6,7 +6,6 @@ use crate::problem::Problem;
 use crate::structure::Role;
 use crate::tuning::tuning;
 use backdrive_plant::describe::unit_for;
-use backdrive_plant::elements::KINDS;
 use backdrive_plant::model::{InputKind, OutputKind};
 use backdrive_plant::write::{Edit, PatchError, Value, patch, round_significant};
 use serde::Serialize;
@@ -137,46 +136,20 @@ fn unit_of(problem: &Problem, candidate: &Candidate, index: usize) -> String {
         Some(Role::Velocity(..)) => unit_for(motion, "m/s"),
         Some(Role::Knot(u, ..)) => {
             let input = problem.unknown.get(*u).and_then(|u| problem.model.inputs.get(u.input));
-            unit_for(motion, if input.is_some_and(|i| i.kind == InputKind::Motion) { "m" } else { "N" })
+            unit_for(motion, input.map_or(InputKind::Force, |i| i.kind).unit())
         }
         None => String::new(),
     }
 }
 
-/// Unit of a number of the model by its path.
+/// Unit of a number of the model by its path; empty where it has none.
 fn unit_of_path(problem: &Problem, path: &str) -> String {
-    let model = &problem.model;
-    let (owner, key) = path.rsplit_once('.').unwrap_or(("", path));
-    let unit = match owner.split_once('.') {
-        None if owner == "bodies" => "kg",
-        Some(("elements", name)) => {
-            let kind = model.elements.iter().find(|e| e.name == name).map(|e| e.law.kind().name);
-            let kind = KINDS.iter().find(|k| Some(k.name) == kind);
-            kind.and_then(|k| k.parameters.iter().find(|p| p.key == key)).map_or("", |p| p.unit)
-        }
-        Some((_, name)) => match key {
-            "delay" => "s",
-            "bandwidth" => "Hz",
-            "saturation" => "N",
-            "back_emf" => "N s/m",
-            "offset" if owner.starts_with("inputs.") => "m",
-            "offset" => return model.outputs.iter().find(|o| o.name == name).map_or(String::new(), |o| unit_of_output(problem, &o.kind)),
-            _ => "",
-        },
-        None => "",
-    };
-    if unit == "-" { String::new() } else { unit_for(model.motion, unit) }
+    problem.model.unit_at(path).ok().filter(|unit| unit != "-").unwrap_or_default()
 }
 
 /// Unit of what an output measures, such as `m` or `rad/s`.
 pub fn unit_of_output(problem: &Problem, kind: &OutputKind) -> String {
-    let unit = match kind {
-        OutputKind::Position(_) => "m",
-        OutputKind::Velocity(_) => "m/s",
-        OutputKind::Acceleration(_) => "m/s²",
-        OutputKind::Force(_) | OutputKind::Reaction(_) => "N",
-    };
-    unit_for(problem.model.motion, unit)
+    unit_for(problem.model.motion, kind.unit())
 }
 
 /// Edits that put the stated numbers as fitted into the nominal model's text; comments say what was given and the 95 % interval, or that

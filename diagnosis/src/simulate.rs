@@ -1,4 +1,4 @@
-//! A model run on a recording: what its sensors would have said before rounding.
+//! A model simulated on a recording: the readings of its sensors before rounding.
 
 use crate::guide::Guide;
 use crate::problem::Record;
@@ -28,7 +28,7 @@ pub struct Conditions<'r> {
     pub curves: &'r [Curve],
     /// Substeps per sample, at most; [`TWICE`] for twice as many as the model asks for.
     pub substeps: usize,
-    /// A guide that couples the model to what was measured, and the record's place in it.
+    /// Tracking (observer) coupling of the model to the measured data, and the index of the record in it.
     pub guide: Option<(&'r Guide, usize)>,
     /// Counts the work.
     pub budget: &'r Budget<'r>,
@@ -65,7 +65,7 @@ pub fn motion_at(model: &Model, record: &Record, conditions: &Conditions, at: us
     motion.iter().all(|(_, x, v)| x.is_finite() && v.is_finite()).then_some(motion)
 }
 
-/// Runs a model on the first samples of a record, and shows the plant at each.
+/// Simulates a model on the first samples of a record, and calls `show` with the plant at each.
 fn run(model: &Model, record: &Record, conditions: &Conditions, samples: usize, show: &mut dyn FnMut(&mut Plant, usize)) -> Option<()> {
     let Conditions { starts, curves, substeps, guide, budget } = *conditions;
     let conditioned;

@@ -1,10 +1,10 @@
-//! Correlated residuals: how many independent samples they are worth, and what an improvement among them says.
+//! Statistics of residuals: correlation time, whiteness, root mean square of each output, and model-order selection with correlated residuals.
 
 use crate::evaluator::Evaluator;
 use crate::tuning::tuning;
 
-/// Correlation time of residuals in samples, at least 1: one residual in so many counts. Lags up to the first correlation that is
-/// not positive, over each recording's output apart, weighed by what they cost.
+/// Correlation time of residuals in samples, at least 1: so many residuals count as one independent sample. The autocorrelation is summed up to the
+/// first lag at which it does not exceed that of white noise; the mean over outputs and recordings is weighted by their cost.
 pub fn correlation_time(evaluator: &Evaluator, residuals: &[f64]) -> f64 {
     let (mut total, mut weight) = (0.0, 0.0);
     for (_, _, range) in evaluator.layout() {
@@ -13,13 +13,13 @@ pub fn correlation_time(evaluator: &Evaluator, residuals: &[f64]) -> f64 {
         if energy <= 0.0 {
             continue;
         }
-        total += energy * time_of(part, energy);
+        total += energy * correlation_time_of(part, energy);
         weight += energy;
     }
     if weight > 0.0 { (total / weight).max(1.0) } else { 1.0 }
 }
 
-fn time_of(part: &[f64], energy: f64) -> f64 {
+fn correlation_time_of(part: &[f64], energy: f64) -> f64 {
     let longest = part.len() / 4;
     let noise = 2.0 / (part.len() as f64).sqrt();
     let (mut sum, mut lag) = (0.0, 1);
@@ -29,7 +29,7 @@ fn time_of(part: &[f64], energy: f64) -> f64 {
         if correlation < noise {
             break;
         }
-        // Long tails by strides: their sum does not need every lag.
+        // At long lags only every stride-th one is computed: the sum changes little.
         let stride = (lag / 16).max(1);
         sum += correlation * stride as f64;
         lag += stride;
@@ -37,16 +37,17 @@ fn time_of(part: &[f64], energy: f64) -> f64 {
     1.0 + 2.0 * sum
 }
 
-/// How far the residuals are from white noise, in standard deviations of what chance does: means over blocks of many samples show what
-/// is slow and small long before neighbours correlate. The most over the block lengths, 4 to 256 samples; 0 where all are too short for blocks.
+/// Whiteness statistic of residuals: by how many standard deviations the variance of block means exceeds that of white noise. A slow residual of
+/// small amplitude shows there long before it correlates neighbouring samples. The largest over the block lengths, 4 to 256 samples; 0 where all
+/// recordings are too short for blocks.
 pub fn slowness(evaluator: &Evaluator, residuals: &[f64]) -> f64 {
     let layout = evaluator.layout();
     let parts: Vec<&[f64]> = layout.iter().filter_map(|(_, _, range)| residuals.get(range.clone())).collect();
-    tuning().noise.blocks.into_iter().map(|length| slow_by(&parts, length)).fold(0.0, f64::max)
+    tuning().noise.blocks.into_iter().map(|length| block_statistic(&parts, length)).fold(0.0, f64::max)
 }
 
-/// How much larger sums over blocks of so many samples are than those of white noise, in standard deviations.
-fn slow_by(parts: &[&[f64]], length: usize) -> f64 {
+/// The same for one block length, samples.
+fn block_statistic(parts: &[&[f64]], length: usize) -> f64 {
     let (mut surplus, mut variance) = (0.0, 0.0);
     for part in parts {
         let blocks = part.len() / length;
@@ -67,7 +68,7 @@ pub fn deviation_by_median(sizes: &mut [f64]) -> f64 {
     if sizes.is_empty() { 0.0 } else { 1.4826 * *sizes.select_nth_unstable_by(middle, f64::total_cmp).1 }
 }
 
-/// Root mean square of the residuals of each output, in floors; 0 where none was measured.
+/// Root mean square of the residuals of each output, in noise standard deviations; 0 where it was not measured.
 pub fn levels(evaluator: &Evaluator, residuals: &[f64]) -> Vec<f64> {
     let outputs = evaluator.problem.model.outputs.len();
     let (mut sums, mut counts) = (vec![0.0; outputs], vec![0usize; outputs]);
@@ -80,8 +81,8 @@ pub fn levels(evaluator: &Evaluator, residuals: &[f64]) -> Vec<f64> {
     sums.iter().zip(&counts).map(|(s, n)| if *n > 0 { (s / *n as f64).sqrt() } else { 0.0 }).collect()
 }
 
-/// How much better the second of two fits is, as a difference of the information criterion with effective samples: positive where
-/// its lower cost is worth its additional numbers.
+/// Model-order selection: difference of the Bayesian information criteria of two fits, with the number of independent samples. Positive where the lower
+/// cost of the second is worth its additional parameters.
 pub fn advantage(cost: f64, numbers: usize, better_cost: f64, better_numbers: usize, samples: usize, correlation_time: f64) -> f64 {
     let effective = (samples as f64 / correlation_time).max(2.0);
     effective * (cost / better_cost).ln() - (better_numbers as f64 - numbers as f64) * effective.ln()
@@ -105,29 +106,29 @@ mod tests {
                     x
                 })
                 .collect();
-            let found = time_of(&y, y.iter().map(|x| x * x).sum());
+            let found = correlation_time_of(&y, y.iter().map(|x| x * x).sum());
             let exact = (1.0 + a) / (1.0 - a);
             assert!((found / exact - 1.0).abs() < 0.15, "{a}: {found} {exact}");
         }
     }
 
     #[test]
-    fn what_is_slow_and_small_shows_in_means_over_blocks() {
+    fn a_slow_residual_of_small_amplitude_is_not_white() {
         let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(2);
         let mut noise = |_: usize| -> f64 { StandardNormal.sample(&mut random) };
         let white: Vec<f64> = (0..20_000).map(&mut noise).collect();
-        assert!(slow_by(&[&white], 64).abs() < 4.0);
+        assert!(block_statistic(&[&white], 64).abs() < 4.0);
         // A slow wave of a hundredth of the power: neighbours correlate by 0.01 only, blocks of 64 by much more.
         let waving: Vec<f64> =
             white.iter().enumerate().map(|(i, e)| e + 0.141 * (i as f64 * std::f64::consts::TAU / 1000.0).sin()).collect();
         let energy = waving.iter().map(|x| x * x).sum();
-        assert!(time_of(&waving, energy) < 1.1);
-        assert!(slow_by(&[&waving], 64) > 4.0, "{}", slow_by(&[&waving], 64));
+        assert!(correlation_time_of(&waving, energy) < 1.1);
+        assert!(block_statistic(&[&waving], 64) > 4.0, "{}", block_statistic(&[&waving], 64));
         // Differences of noise are not slow.
         let differences: Vec<f64> = white.windows(2).map(|w| w[1] - w[0]).collect();
-        assert!(slow_by(&[&differences], 64) < 0.0);
+        assert!(block_statistic(&[&differences], 64) < 0.0);
         // Too short for blocks.
-        assert_eq!(slow_by(&[&white[..500]], 64), 0.0);
+        assert_eq!(block_statistic(&[&white[..500]], 64), 0.0);
     }
 
     #[test]

@@ -306,7 +306,7 @@ fn stated_number(index: usize, stated: &Stated) -> Number {
 /// The weights of the unknown inputs in a record.
 fn knots<'a>(problem: &'a Problem, record: &'a Record, r: usize) -> impl Iterator<Item = Number> + 'a {
     problem.unknown.iter().enumerate().flat_map(move |(index, unknown)| {
-        let size = unknown.scale(problem);
+        let size = unknown.scale(&problem.model, &problem.fit);
         (0..unknown.knots(record)).map(move |k| Number {
             role: Role::Knot(index, k, r),
             range: (-tuning().fit.unknown_range * size, tuning().fit.unknown_range * size),

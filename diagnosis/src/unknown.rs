@@ -1,11 +1,12 @@
-//! Inputs that nobody measured: the hand of a session, a slow force from outside. Each is a curve of its own in every recording, as fine as its
-//! bandwidth asks for, and is found together with the rest.
+//! Inputs that were not measured, such as the hand of a user or a slow external force. Each is estimated in every recording as a curve of limited
+//! bandwidth, together with the parameters.
 //!
 //! The curve is a uniform cubic B-spline (de Boor, A Practical Guide to Splines, ch. IX) with four knots per period of its bandwidth. The one nearest
-//! to a sine is off by 1.3 % of it at the bandwidth, by 0.05 % at half of it, and hardly follows it at twice the bandwidth.
+//! to a sine has a residual of 1.3 % of it at the bandwidth, of 0.05 % at half of it, and hardly follows it at twice the bandwidth.
 
-use crate::problem::{Problem, Record};
-use backdrive_plant::model::{InputKind, OutputKind};
+use crate::problem::Record;
+use crate::signal::rms;
+use backdrive_plant::model::{InputKind, Model, OutputKind};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -33,7 +34,7 @@ impl Unknown {
         (duration / self.spacing()).ceil() as usize + 3
     }
 
-    /// The samples from the first that a weight moves to the first that the weight `apart` knots on moves.
+    /// The samples from the first that a weight affects to the first that the weight `apart` knots later affects.
     pub fn window(&self, knot: usize, apart: usize, record: &Record) -> std::ops::Range<usize> {
         let sample =
             |k: usize| ((k.saturating_sub(3) as f64 * self.spacing() / record.period).ceil() as usize).saturating_sub(record.before);
@@ -57,12 +58,10 @@ impl Unknown {
             .collect()
     }
 
-    /// About how large it is, in its own unit: as the positions that were measured for a motion, as the other forces for a force; 1 where there are none.
-    pub fn scale(&self, problem: &Problem) -> f64 {
-        let model = &problem.model;
+    /// Its typical size, in its unit: for a motion the largest root mean square of the measured positions, for a force that of the other forces; 1 where
+    /// there are none.
+    pub fn scale(&self, model: &Model, records: &[Record]) -> f64 {
         let most = |sizes: &mut dyn Iterator<Item = f64>| sizes.filter(|x| x.is_finite()).fold(0.0, f64::max);
-        let rms = |x: &[f64]| (x.iter().map(|x| x * x).sum::<f64>() / x.len().max(1) as f64).sqrt();
-        let records = &problem.fit;
         let size = match model.inputs.get(self.input).map(|i| i.kind) {
             Some(InputKind::Motion) => most(&mut records.iter().flat_map(|r| {
                 let positions = model.outputs.iter().enumerate().filter(|(_, o)| matches!(o.kind, OutputKind::Position(_)));
@@ -77,12 +76,12 @@ impl Unknown {
     }
 }
 
-/// What a fit says of an input that nobody measured.
+/// What a fit says of an input that was not measured.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Estimated {
     /// Name of the input.
     pub input: String,
-    /// Hz, up to which it was let vary.
+    /// Bandwidth that it was allowed, Hz.
     pub bandwidth_hz: f64,
     /// Hz, below which 95 % of its power was found, its mean apart; 0 where it rests.
     pub found_bandwidth_hz: f64,
@@ -90,7 +89,7 @@ pub struct Estimated {
     pub deviation: f64,
 }
 
-/// Of the curves of one input in several recordings.
+/// From the estimated curves of one input in several recordings, each with its sample time, s.
 pub fn estimated(name: &str, unknown: &Unknown, curves: &[(Vec<f64>, f64)]) -> Estimated {
     let (mut squares, mut samples) = (0.0, 0);
     // Power by frequency: the lines of recordings of different length are sorted together.
@@ -149,8 +148,8 @@ mod tests {
         }
     }
 
-    /// What the nearest curve to a sine leaves over, as a share of it, its ends apart.
-    fn left_over(unknown: &Unknown, hz: f64) -> f64 {
+    /// Residual of the nearest curve to a sine, as a share of it, without both ends.
+    fn residual_of_sine(unknown: &Unknown, hz: f64) -> f64 {
         let record = record(0, 2000);
         let knots = unknown.knots(&record);
         let one = |k: usize| unknown.curve(&(0..knots).map(|i| if i == k { 1.0 } else { 0.0 }).collect::<Vec<_>>(), &record);
@@ -165,9 +164,9 @@ mod tests {
     #[test]
     fn it_is_as_fast_as_its_bandwidth() {
         let unknown = Unknown { input: 0, bandwidth_hz: 1.0 };
-        assert!(left_over(&unknown, 0.5) < 5e-4, "{}", left_over(&unknown, 0.5));
-        assert!((0.01..0.014).contains(&left_over(&unknown, 1.0)), "{}", left_over(&unknown, 1.0));
-        assert!(left_over(&unknown, 2.0) > 0.9, "{}", left_over(&unknown, 2.0));
+        assert!(residual_of_sine(&unknown, 0.5) < 5e-4, "{}", residual_of_sine(&unknown, 0.5));
+        assert!((0.01..0.014).contains(&residual_of_sine(&unknown, 1.0)), "{}", residual_of_sine(&unknown, 1.0));
+        assert!(residual_of_sine(&unknown, 2.0) > 0.9, "{}", residual_of_sine(&unknown, 2.0));
     }
 
     #[test]

@@ -80,6 +80,16 @@ pub enum InputKind {
     Motion,
 }
 
+impl InputKind {
+    /// Unit of what it applies, in a translation; [`crate::describe::unit_for`] gives that of a rotation.
+    pub fn unit(self) -> &'static str {
+        match self {
+            InputKind::Force => "N",
+            InputKind::Motion => "m",
+        }
+    }
+}
+
 /// A signal that drives the model.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Input {
@@ -118,6 +128,18 @@ pub enum OutputKind {
     Force(Vec<usize>),
     /// Force that the mover exerts on a prescribed body, that body's own inertia included.
     Reaction(usize),
+}
+
+impl OutputKind {
+    /// Unit of what it measures in a translation; [`crate::describe::unit_for`] gives that of a rotation.
+    pub fn unit(&self) -> &'static str {
+        match self {
+            OutputKind::Position(_) => "m",
+            OutputKind::Velocity(_) => "m/s",
+            OutputKind::Acceleration(_) => "m/s²",
+            OutputKind::Force(_) | OutputKind::Reaction(_) => "N",
+        }
+    }
 }
 
 /// A signal that a recording is compared with.

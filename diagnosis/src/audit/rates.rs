@@ -1,13 +1,13 @@
 //! Sample times that cannot be right: recordings of different rates in one set, and time in another unit than seconds.
 
-use super::file_name;
+use super::remark::file_name;
 use super::units::factor;
 use crate::evaluator::measured;
 use crate::problem::{Problem, Record};
 use crate::simulate::predict;
 use backdrive_plant::stepper::segments;
 
-/// Ratio of sample times from which on one recording shows what lies beyond the band of another: the faster one's upper octaves.
+/// Largest ratio of sample times in a set: beyond it the faster recording has octaves above the band of the slower one.
 const APART: f64 = 2.0;
 /// Units that time is recorded in, s, and how its values read.
 const UNITS: [(f64, &str); 3] = [(1e-3, "milliseconds"), (1e-6, "microseconds"), (1e-9, "nanoseconds")];
@@ -15,7 +15,7 @@ const UNITS: [(f64, &str); 3] = [(1e-3, "milliseconds"), (1e-6, "microseconds"),
 const NEAR: f64 = 1.3;
 /// Sample time above which a device of this kind is not sampled, s: from there on another unit is tried.
 const SLOW: f64 = 0.02;
-/// Share of the error's power that another unit of time must take away.
+/// Share of the residual's power that another unit of time must remove.
 const TAKEN: f64 = 0.75;
 /// Correlation of measured and predicted in that unit.
 const ALIKE: f64 = 0.85;
@@ -52,10 +52,10 @@ pub fn rates(problem: &Problem) -> Result<(), String> {
 /// Whether time is in seconds, as far as the nominal model can tell: a sentence where another unit makes measured and predicted agree.
 pub(super) fn unit_of_time(problem: &Problem) -> Option<String> {
     let record = problem.fit.iter().max_by(|a, b| a.period.total_cmp(&b.period)).filter(|r| r.period > SLOW)?;
-    let as_given = left_over(problem, record, record.period)?;
+    let as_given = unexplained_variance(problem, record, record.period)?;
     let (left, unit, word) = UNITS
         .iter()
-        .filter_map(|(unit, word)| Some((left_over(problem, record, record.period * unit)?, *unit, *word)))
+        .filter_map(|(unit, word)| Some((unexplained_variance(problem, record, record.period * unit)?, *unit, *word)))
         .min_by(|a, b| a.0.total_cmp(&b.0))?;
     let better = left < (1.0 - TAKEN) * as_given && left < 1.0 - ALIKE * ALIKE;
     better.then(|| {
@@ -70,9 +70,9 @@ pub(super) fn unit_of_time(problem: &Problem) -> Option<String> {
     })
 }
 
-/// Least share of a measured output's variance that the nominal model, scaled, leaves when samples come at this period; of differences over
-/// a lag where nothing holds the position.
-fn left_over(problem: &Problem, record: &Record, period: f64) -> Option<f64> {
+/// Smallest share of an output's variance that the scaled prediction of the nominal model does not explain when the samples are taken at this period; of
+/// differences over a lag where no spring holds the position.
+fn unexplained_variance(problem: &Problem, record: &Record, period: f64) -> Option<f64> {
     let mut record = record.clone();
     record.period = period;
     record.segments =

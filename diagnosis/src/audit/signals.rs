@@ -1,4 +1,4 @@
-//! What a column of samples shows by itself.
+//! Properties of one column of samples: constant, clipped, quantised, low-pass filtered, correlated with another.
 
 /// Smallest and largest sample.
 pub(super) fn extremes(samples: &[f64]) -> (f64, f64) {

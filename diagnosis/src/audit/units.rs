@@ -1,6 +1,6 @@
 //! Units and signs: what was measured beside what the nominal model, as given, says of the same.
 
-use super::{Remark, Weight, file_name};
+use super::remark::{Remark, Weight, file_name};
 use crate::problem::Problem;
 use crate::simulate::predict;
 use backdrive_plant::model::{Motion, OutputKind};

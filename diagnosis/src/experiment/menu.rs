@@ -1,4 +1,4 @@
-//! What could be played: excitations within what a device was shown to stand.
+//! The excitations that may be chosen, within the range that the recordings cover.
 //!
 //! Each shape is there for what it tells apart:
 //!
@@ -19,14 +19,14 @@ use backdrive_plant::model::InputKind;
 use backdrive_plant::write::round_significant;
 use std::f64::consts::TAU;
 
-/// What an input was shown to stand, over all recordings of a problem.
+/// The range of an input over all recordings of a problem.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Stand {
+pub(super) struct InputRange {
     /// Mean value, unit of the input; 0 where it is small against the peak.
     pub mean: f64,
     /// Largest departure from the mean, unit of the input.
     peak: f64,
-    /// Amplitude that it may keep up: twice the largest root mean square of a recording, at most the peak.
+    /// Amplitude that it may have throughout: twice the largest root mean square of a recording, at most the peak.
     lasting: f64,
     /// Largest rate of change, unit of the input per s; infinite for forces.
     rate: f64,
@@ -45,9 +45,9 @@ const BAND: f64 = 0.1;
 /// Samples of an excitation, at most.
 const LONGEST: f64 = 16_000.0;
 
-impl Stand {
+impl InputRange {
     /// What the recordings show of one input. `None` where it never moves.
-    pub(super) fn of(problem: &Problem, input: usize) -> Option<Stand> {
+    pub(super) fn of(problem: &Problem, input: usize) -> Option<InputRange> {
         let records = problem.fit.iter().chain(&problem.held_out);
         let columns: Vec<(&[f64], f64)> = records.filter_map(|r| Some((r.inputs.get(input)?.as_slice(), r.period))).collect();
         let count: usize = columns.iter().map(|c| c.0.len()).sum();
@@ -71,8 +71,8 @@ impl Stand {
         let mut centres: Vec<f64> = columns.iter().filter_map(|(u, period)| crossings(u, *period)).collect();
         centres.sort_by(f64::total_cmp);
         let centre = centres.get(centres.len() / 2).copied().unwrap_or(1.0);
-        // What was reached for a moment only, in a knock, is nothing to hold.
-        Some(Stand { mean, peak, lasting: (peak / shown * 2.0 * strongest).min(peak), rate, curvature, centre })
+        // A peak of short duration, such as an impact, may not last.
+        Some(InputRange { mean, peak, lasting: (peak / shown * 2.0 * strongest).min(peak), rate, curvature, centre })
     }
 
     /// By how much an excitation's samples have to be made smaller to stay within it, at most 1.
@@ -84,7 +84,7 @@ impl Stand {
     }
 }
 
-/// Largest rate of change and second derivative but for one sample in a thousand: noise and jumps have no say.
+/// Rate of change and second derivative that only one sample in a thousand exceeds: noise and jumps do not count.
 fn rates(columns: &[(&[f64], f64)]) -> (f64, f64) {
     let high = |mut all: Vec<f64>| {
         let at = all.len().saturating_sub(1 + all.len() / 1000);
@@ -104,7 +104,7 @@ fn crossings(u: &[f64], period: f64) -> Option<f64> {
 
 /// An excitation of one input that may be played.
 #[derive(Debug, Clone)]
-pub(super) struct Play {
+pub(super) struct Choice {
     /// The input.
     pub input: usize,
     /// What shakes it.
@@ -114,12 +114,12 @@ pub(super) struct Play {
 }
 
 /// Every excitation that is considered. `period` is the sample time, s, and `longest` the length of the longest recording, s.
-pub(super) fn plays(problem: &Problem, stands: &[Option<Stand>], period: f64, longest: f64) -> Vec<Play> {
+pub(super) fn choices(problem: &Problem, ranges: &[Option<InputRange>], period: f64, longest: f64) -> Vec<Choice> {
     let mut all = Vec::new();
-    for (input, stand) in stands.iter().enumerate() {
-        let (Some(stand), Some(own)) = (stand, problem.model.inputs.get(input)) else { continue };
+    for (input, range) in ranges.iter().enumerate() {
+        let (Some(range), Some(own)) = (range, problem.model.inputs.get(input)) else { continue };
         let highest = BAND / period;
-        let centre = stand.centre.clamp(2.0 / longest, 0.5 * highest);
+        let centre = range.centre.clamp(2.0 / longest, 0.5 * highest);
         let long = longest.min((8.0 / centre).max(3.0)).min(LONGEST * period);
         let mut spans = vec![(long, 12.0), (long / 3.0, 12.0)];
         if highest > 24.0 * centre {
@@ -133,10 +133,10 @@ pub(super) fn plays(problem: &Problem, stands: &[Option<Stand>], period: f64, lo
             if band.low >= band.high || band.centre >= band.high {
                 continue;
             }
-            let shapes = if own.kind == InputKind::Motion { motions(stand, &band) } else { forces(stand, &band, period) };
+            let shapes = if own.kind == InputKind::Motion { motions(range, &band) } else { forces(range, &band, period) };
             all.extend(shapes.into_iter().map(|(shape, bias)| {
                 let lasting = !matches!(shape, Shape::Impacts { .. });
-                Play { input, excitation: framed(shape, stand.mean + bias, length), lasting }
+                Choice { input, excitation: framed(shape, range.mean + bias, length), lasting }
             }));
         }
     }
@@ -182,8 +182,8 @@ fn sines(amplitude: &[f64], frequency: &[f64], length: f64) -> Shape {
 }
 
 /// Shapes for a force, each with a bias that it rides on. Their length is about that of the band.
-fn forces(stand: &Stand, band: &Band, period: f64) -> Vec<(Shape, f64)> {
-    let (a, peak, t) = (stand.lasting, stand.peak, band.length);
+fn forces(range: &InputRange, band: &Band, period: f64) -> Vec<(Shape, f64)> {
+    let (a, peak, t) = (range.lasting, range.peak, band.length);
     let middle = (band.low * band.centre).sqrt();
     let width = round((6.0 * period).max(0.25 / band.high));
     let interval = round(t / 4.0);
@@ -212,10 +212,10 @@ fn forces(stand: &Stand, band: &Band, period: f64) -> Vec<(Shape, f64)> {
 }
 
 /// Shapes for a prescribed motion: without corners, and within the speed and acceleration that were recorded.
-fn motions(stand: &Stand, band: &Band) -> Vec<(Shape, f64)> {
-    let (a, t) = (stand.lasting, band.length);
+fn motions(range: &InputRange, band: &Band) -> Vec<(Shape, f64)> {
+    let (a, t) = (range.lasting, band.length);
     // The amplitude that has the recorded speed at a frequency.
-    let at = |f: f64| a.min(stand.rate / (TAU * f));
+    let at = |f: f64| a.min(range.rate / (TAU * f));
     let one = |share: f64, f: f64| sines(&[share * at(f)], &[f], t);
     vec![
         (sweep(at(band.low), band, -1.0), 0.0),

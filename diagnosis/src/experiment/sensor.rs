@@ -1,7 +1,10 @@
 //! Which other sensor would tell explanations apart that no excitation separates with the sensors there are.
 
-use super::rivals::{Rival, Scene, Trial};
-use backdrive_plant::model::{InputKind, Model, Motion, Output, OutputKind};
+use super::extra_output::output;
+use super::rivals::Rival;
+use super::setup::{Setup, Trial};
+use backdrive_plant::describe::unit_for;
+use backdrive_plant::model::{InputKind, OutputKind};
 use backdrive_plant::write::round_significant;
 
 /// Error of a sensor that is not there, over the root mean square of what it would read, where no other of its kind is there.
@@ -19,47 +22,33 @@ pub(super) struct Sensor {
 }
 
 /// What a device could be asked beyond what it is: position and velocity of each body that moves freely, force of each element.
-fn extra(scene: &Scene) -> Vec<OutputKind> {
-    let model = &scene.problem.model;
-    let there = |kind: &OutputKind| model.outputs.iter().zip(&scene.sensors.there).any(|(o, there)| *there && o.kind == *kind);
+fn extra(setup: &Setup) -> Vec<OutputKind> {
+    let model = &setup.problem.model;
+    let there = |kind: &OutputKind| model.outputs.iter().zip(&setup.sensors.there).any(|(o, there)| *there && o.kind == *kind);
     let free = |b: &usize| !model.inputs.iter().any(|i| i.kind == InputKind::Motion && i.on == *b);
     let bodies = (0..model.bodies.len()).filter(free).flat_map(|b| [OutputKind::Position(b), OutputKind::Velocity(b)]);
     let forces = (0..model.elements.len()).map(|e| OutputKind::Force(vec![e]));
     bodies.chain(forces).filter(|kind| !there(kind)).collect()
 }
 
-/// An output of a kind in terms of the nominal model, in a model that was made from it. `None` where what it reads is gone.
-pub(super) fn output(nominal: &Model, model: &Model, kind: &OutputKind) -> Option<Output> {
-    let body = |b: usize| model.bodies.iter().position(|other| nominal.bodies.get(b).is_some_and(|n| n.name == other.name));
-    let element = |e: &usize| model.elements.iter().position(|other| nominal.elements.get(*e).is_some_and(|n| n.name == other.name));
-    let kind = match kind {
-        OutputKind::Position(b) => OutputKind::Position(body(*b)?),
-        OutputKind::Velocity(b) => OutputKind::Velocity(body(*b)?),
-        OutputKind::Acceleration(b) => OutputKind::Acceleration(body(*b)?),
-        OutputKind::Reaction(b) => OutputKind::Reaction(body(*b)?),
-        OutputKind::Force(list) => OutputKind::Force(list.iter().map(element).collect::<Option<_>>()?),
-    };
-    Some(Output { name: String::new(), kind, gain: 1.0, delay: 0.0, offset: 0.0, resolution: 0.0, noise: 0.0 })
-}
-
 /// The sensor that separates two rivals best on one of some experiments.
-pub(super) fn best(scene: &Scene, trials: &[&Trial], pair: [&Rival; 2]) -> Option<Sensor> {
-    let mut wide = scene.clone();
+pub(super) fn best(setup: &Setup, trials: &[&Trial], pair: [&Rival; 2]) -> Option<Sensor> {
+    let mut wide = setup.clone();
     // Each by itself, where both rivals have what it would read.
-    let kinds = extra(scene);
-    let lag = scene.sensors.lag.iter().copied().max().unwrap_or(0);
+    let kinds = extra(setup);
+    let lag = setup.sensors.lag.iter().copied().max().unwrap_or(0);
     let mut found: Option<Sensor> = None;
     for (index, trial) in trials.iter().enumerate() {
-        if index > 0 && scene.budget.is_over() {
+        if index > 0 && setup.budget.is_over() {
             break;
         }
-        let own = scene.outputs(&trial.record).len() * trial.record.len;
+        let own = setup.outputs(&trial.record).len() * trial.record.len;
         wide.extra = kinds.clone();
         wide.extra.retain(|kind| {
-            let alone = Scene { extra: vec![kind.clone()], ..scene.clone() };
+            let alone = Setup { extra: vec![kind.clone()], ..setup.clone() };
             pair.iter().all(|rival| alone.reads(rival))
         });
-        wide.sensors = scene.sensors.clone();
+        wide.sensors = setup.sensors.clone();
         for kind in &wide.extra {
             wide.sensors.floor.push(1.0);
             wide.sensors.lag.push(if matches!(kind, OutputKind::Position(_)) { lag } else { 0 });
@@ -67,32 +56,32 @@ pub(super) fn best(scene: &Scene, trials: &[&Trial], pair: [&Rival; 2]) -> Optio
         let Some(first) = pair[0].prediction(&wide, trial) else { continue };
         for (column, (at, kind)) in first[own..].chunks_exact(trial.record.len).zip(wide.extra.iter().enumerate()) {
             let rms = (column.iter().map(|y| y * y).sum::<f64>() / column.len() as f64).sqrt();
-            let at = scene.sensors.floor.len() + at;
-            wide.sensors.floor[at] = like(scene, kind).unwrap_or(ERROR * rms).max(f64::MIN_POSITIVE);
+            let at = setup.sensors.floor.len() + at;
+            wide.sensors.floor[at] = like(setup, kind).unwrap_or(ERROR * rms).max(f64::MIN_POSITIVE);
         }
-        let seen: Option<Vec<Vec<f64>>> = pair.iter().map(|r| r.prediction(&wide, trial)).collect();
-        let Some(seen) = seen else { continue };
-        let jacobians: Vec<Vec<Vec<f64>>> = pair.iter().zip(&seen).map(|(r, y)| r.jacobian(&wide, trial, &r.own, y)).collect();
+        let predictions: Option<Vec<Vec<f64>>> = pair.iter().map(|r| r.prediction(&wide, trial)).collect();
+        let Some(predictions) = predictions else { continue };
+        let jacobians: Vec<Vec<Vec<f64>>> = pair.iter().zip(&predictions).map(|(r, y)| r.jacobian(&wide, trial, &r.own, y)).collect();
         for (e, kind) in wide.extra.iter().enumerate() {
             let from = own + e * trial.record.len;
             let pick = |all: &[f64]| [&all[..own], &all[from..from + trial.record.len]].concat();
-            let apart: Vec<f64> = pick(&seen[1]).iter().zip(pick(&seen[0])).map(|(b, a)| b - a).collect();
+            let difference: Vec<f64> = pick(&predictions[1]).iter().zip(pick(&predictions[0])).map(|(b, a)| b - a).collect();
             let left = pair.iter().zip(&jacobians).map(|(rival, jacobian)| {
                 let columns: Vec<Vec<f64>> = jacobian.iter().map(|c| pick(c)).collect();
-                rival.remainder(&columns, &apart)
+                rival.unexplained(&columns, &difference)
             });
             let unit = pair[0].unit.max(pair[1].unit);
             let separation = (left.fold(f64::INFINITY, f64::min) / unit).sqrt();
             if found.as_ref().is_none_or(|f| separation > f.separation) {
-                let floor = wide.sensors.floor[scene.sensors.floor.len() + e];
-                found = Some(Sensor { words: words(scene, kind, floor), separation, trial: index });
+                let floor = wide.sensors.floor[setup.sensors.floor.len() + e];
+                found = Some(Sensor { words: words(setup, kind, floor), separation, trial: index });
             }
         }
     }
     found
 }
 
-impl Scene<'_> {
+impl Setup<'_> {
     /// Whether a rival's model has what the extra outputs read.
     fn reads(&self, rival: &Rival) -> bool {
         let nominal = &self.problem.model;
@@ -101,28 +90,25 @@ impl Scene<'_> {
 }
 
 /// The measuring error of a sensor of the same kind that is there.
-fn like(scene: &Scene, kind: &OutputKind) -> Option<f64> {
+fn like(setup: &Setup, kind: &OutputKind) -> Option<f64> {
     let same = |other: &OutputKind| std::mem::discriminant(other) == std::mem::discriminant(kind);
-    let outputs = scene.problem.model.outputs.iter().zip(&scene.sensors.floor).zip(&scene.sensors.there);
+    let outputs = setup.problem.model.outputs.iter().zip(&setup.sensors.floor).zip(&setup.sensors.there);
     outputs.filter(|((o, floor), there)| **there && same(&o.kind) && floor.is_finite()).map(|((_, floor), _)| *floor).reduce(f64::min)
 }
 
-fn words(scene: &Scene, kind: &OutputKind, floor: f64) -> String {
-    let model = &scene.problem.model;
+fn words(setup: &Setup, kind: &OutputKind, floor: f64) -> String {
+    let model = &setup.problem.model;
     let body = |b: &usize| model.bodies.get(*b).map_or("", |b| b.name.as_str());
-    let (length, force) = match model.motion {
-        Motion::Translation => ("m", "N"),
-        Motion::Rotation => ("rad", "N m"),
-    };
-    let (what, unit) = match kind {
-        OutputKind::Position(b) => (format!("the position of \"{}\"", body(b)), length.to_string()),
-        OutputKind::Velocity(b) => (format!("the velocity of \"{}\"", body(b)), format!("{length}/s")),
-        OutputKind::Acceleration(b) => (format!("the acceleration of \"{}\"", body(b)), format!("{length}/s²")),
-        OutputKind::Reaction(b) => (format!("the force that moves \"{}\"", body(b)), force.to_string()),
+    let what = match kind {
+        OutputKind::Position(b) => format!("the position of \"{}\"", body(b)),
+        OutputKind::Velocity(b) => format!("the velocity of \"{}\"", body(b)),
+        OutputKind::Acceleration(b) => format!("the acceleration of \"{}\"", body(b)),
+        OutputKind::Reaction(b) => format!("the force that moves \"{}\"", body(b)),
         OutputKind::Force(list) => {
             let names: Vec<&str> = list.iter().filter_map(|e| model.elements.get(*e)).map(|e| e.name.as_str()).collect();
-            (format!("the force in \"{}\"", names.join(", ")), force.to_string())
+            format!("the force in \"{}\"", names.join(", "))
         }
     };
+    let unit = unit_for(model.motion, kind.unit());
     format!("{what} to {} {unit}", round_significant(floor, 2))
 }

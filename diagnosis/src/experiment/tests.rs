@@ -1,12 +1,17 @@
 //! Experiments chosen for devices of known physics, and what they then show.
 
+use super::separate::separate_fitted;
 use super::*;
+use crate::evaluator::Evaluator;
 use crate::fit::Fit;
 use crate::hypothesis::{Hypothesis, Scales};
 use crate::physics;
-use crate::problem::Record;
+use crate::problem::{Problem, Record};
+use crate::structure::{Role, Structure};
 use crate::tuning::tuning;
+use crate::work::Budget;
 use backdrive_plant::excitation::load_experiments;
+use backdrive_plant::model::Model;
 use backdrive_plant::recording::Recording;
 use backdrive_plant::set::Initial;
 use backdrive_plant::stepper::{Options, simulate};

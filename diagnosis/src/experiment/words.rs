@@ -1,10 +1,11 @@
 //! An experiment in words and as a file.
 
-use super::rivals::Trial;
+use super::setup::Trial;
 use crate::hypothesis::{Hypothesis, Mark};
 use crate::structure::Structure;
+use backdrive_plant::describe::unit_for;
 use backdrive_plant::excitation::{Excitation, Shape};
-use backdrive_plant::model::{InputKind, Model, Motion};
+use backdrive_plant::model::{InputKind, Model};
 use backdrive_plant::write::round_significant;
 use std::fmt::Write;
 
@@ -15,9 +16,9 @@ pub(super) fn file(model: &Model, trial: &Trial, name: &str, about: &str, rate_h
         let _ = writeln!(text, "# {line}");
     }
     let _ = writeln!(text, "#\n#   backdrive simulate MODEL THIS_FILE --rate {rate_hz} --out predicted.csv\n#");
-    let _ = writeln!(text, "# or in a graph: exciter = {{ force = \"{}\" }}", trial.play.excitation);
+    let _ = writeln!(text, "# or in a graph: exciter = {{ force = \"{}\" }}", trial.choice.excitation);
     let others = trial.others.iter().map(|(input, excitation)| (*input, excitation));
-    for (input, excitation) in std::iter::once((trial.play.input, &trial.play.excitation)).chain(others) {
+    for (input, excitation) in std::iter::once((trial.choice.input, &trial.choice.excitation)).chain(others) {
         let input = model.inputs.get(input).map_or("", |i| i.name.as_str());
         let _ = writeln!(text, "\n[[excitations]]\nname = {}\ninput = {}", quoted(name), quoted(input));
         text.push_str(&table(excitation));
@@ -69,20 +70,15 @@ pub(super) fn short(x: f64) -> String {
 
 /// An excitation in words, such as `a triangle between reversals at 4 N, periods 3 and 1 s`.
 pub(super) fn described(model: &Model, trial: &Trial) -> String {
-    let input = model.inputs.get(trial.play.input);
-    let unit = match (input.map(|i| i.kind), model.motion) {
-        (Some(InputKind::Motion), Motion::Translation) => "m",
-        (Some(InputKind::Motion), Motion::Rotation) => "rad",
-        (_, Motion::Translation) => "N",
-        (_, Motion::Rotation) => "N m",
-    };
+    let input = model.inputs.get(trial.choice.input);
+    let unit = unit_for(model.motion, input.map_or(InputKind::Force, |i| i.kind).unit());
     let list = |values: &[f64]| match values {
         [rest @ .., last] if !rest.is_empty() => {
             format!("{} and {}", rest.iter().map(|x| short(*x)).collect::<Vec<_>>().join(", "), short(*last))
         }
         _ => values.iter().map(|x| short(*x)).collect(),
     };
-    let excitation = &trial.play.excitation;
+    let excitation = &trial.choice.excitation;
     let shape = match &excitation.shape {
         Shape::Sweep { amplitude, from, to, tilt, .. } if *tilt != 0.0 => {
             format!("a sweep from {} to {} Hz that begins with {} {unit} and gets smaller", short(*from), short(*to), short(*amplitude))

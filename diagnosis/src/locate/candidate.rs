@@ -1,26 +1,30 @@
-//! What the force at a place looks like: its course, and the laws that it follows.
+//! The force at a place over time, and the laws that it follows.
 
 use super::channel::Channel;
 use super::character::Character;
-use super::law::{Reversals, Samples, Variable};
-use super::nonlinear::rms;
+use super::context::Context;
+use super::estimate::Estimate;
+use super::law::Variable;
 use super::period::scan;
-use super::scene::{Scene, Trial};
+use super::regression::Samples;
+use super::reversals::Reversals;
+
 use super::smoother::Smoothed;
-use super::{Candidate, Course};
+use super::types::{Candidate, Course};
 use crate::hypothesis::Place;
+use crate::signal::{rate, rms};
 use backdrive_plant::model::InputKind;
 
 /// Displacement that makes a turning point, in rms displacements.
 const TURN: f64 = 0.05;
 
-impl Scene<'_> {
+impl Context<'_> {
     /// The places that a channel stands for: a force on a driven body against ground is an error of the input as well.
-    pub(super) fn candidates(&self, trial: &Trial) -> Vec<Candidate> {
+    pub(super) fn candidates(&self, estimate: &Estimate) -> Vec<Candidate> {
         let named = |end: Option<usize>| self.model.place_name(end).to_string();
         let signal = |name: &str| Place::Signal(name.to_string());
         let mut places: Vec<(Place, Vec<Vec<f64>>)> = Vec::new();
-        match trial.channel {
+        match estimate.channel {
             Channel::Force(ends) => {
                 places.push((Place::Between(named(ends[0]), named(ends[1])), Vec::new()));
                 if let [Some(body), None] | [None, Some(body)] = ends {
@@ -41,11 +45,11 @@ impl Scene<'_> {
                 places.push((signal(&self.model.outputs[output].name), readings.collect()));
             }
         }
-        places.into_iter().filter_map(|(place, signals)| self.candidate(trial, place, signals)).collect()
+        places.into_iter().filter_map(|(place, signals)| self.candidate(estimate, place, signals)).collect()
     }
 
-    fn courses(&self, trial: &Trial, smoothed: &[Smoothed]) -> Vec<Course> {
-        let ends = match trial.channel {
+    fn courses(&self, estimate: &Estimate, smoothed: &[Smoothed]) -> Vec<Course> {
+        let ends = match estimate.channel {
             Channel::Force(ends) => Some(ends),
             Channel::Motion(input) => Some([Some(self.model.inputs[input].on), None]),
             Channel::Sensor(_) => None,
@@ -54,7 +58,7 @@ impl Scene<'_> {
             let trajectory = &self.trajectories[run];
             let (displacement, velocity) = ends.map_or_else(Default::default, |ends| {
                 let (x, v) = trajectory.across(ends);
-                let (dx, dv) = self.motions(trial.channel, trial.chain, run, smoothed);
+                let (dx, dv) = self.motions(estimate.channel, estimate.order, run, smoothed);
                 let add = |of: Vec<f64>, columns: &[Vec<f64>]| {
                     let at = |end: Option<usize>, k: usize| end.map_or(0.0, |b| columns[b][k]);
                     of.iter().enumerate().map(|(k, x)| x + at(ends[0], k) - at(ends[1], k)).collect::<Vec<f64>>()
@@ -105,14 +109,16 @@ impl Scene<'_> {
         }
     }
 
-    fn candidate(&self, trial: &Trial, place: Place, signals: Vec<Vec<f64>>) -> Option<Candidate> {
-        let courses = self.courses(trial, &trial.smoothed);
+    fn candidate(&self, estimate: &Estimate, place: Place, signals: Vec<Vec<f64>>) -> Option<Candidate> {
+        let courses = self.courses(estimate, &estimate.smoothed);
         let samples = self.samples(&courses, &signals);
         let ripples = scan(&samples.x, &samples.v, &samples.force);
         let mut laws = samples.laws(ripples.first());
-        let scales = [self.scales(trial.channel)[0], self.scales(trial.channel)[1], trial.size];
+        let scales = [self.scales(estimate.channel)[0], self.scales(estimate.channel)[1], estimate.size];
         let runs = self.trajectories.len();
-        let systems = (0..runs).map(|run| self.system(trial.channel, trial.chain, run, scales, trial.loose)).collect::<Option<Vec<_>>>()?;
+        let systems = (0..runs)
+            .map(|run| self.system(estimate.channel, estimate.order, run, scales, estimate.force_error))
+            .collect::<Option<Vec<_>>>()?;
         let mut of_forms = [0usize; 3];
         for law in &mut laws {
             // The best of few numbers and the best of many.
@@ -122,10 +128,10 @@ impl Scene<'_> {
             }
             *form += 1;
             let known: Vec<&[f64]> = pieces(&law.fitted, &courses);
-            let (_, likelihood) = self.best_intensity(&systems, &trial.forces, &known, Some(trial.intensity));
+            let (_, likelihood) = self.most_likely_intensity(&systems, &estimate.forces, &known, Some(estimate.intensity));
             let remainder: Vec<f64> = samples.force.iter().zip(&law.fitted).map(|(f, g)| f - g).collect();
             let price = 0.5 * law.numbers as f64 * samples.independent(&remainder).max(2.0).ln();
-            law.evidence = Some(likelihood - trial.log_likelihood - price);
+            law.evidence = Some(likelihood - estimate.log_likelihood - price);
         }
         laws.sort_by(|a, b| match (a.evidence, b.evidence) {
             (Some(a), Some(b)) => b.total_cmp(&a),
@@ -137,9 +143,9 @@ impl Scene<'_> {
         let all: Vec<f64> = courses.iter().flat_map(|c| c.deviation.iter().copied()).collect();
         Some(Candidate {
             place,
-            log_likelihood: trial.log_likelihood,
+            log_likelihood: estimate.log_likelihood,
             jump_gain: None,
-            evidence: trial.log_likelihood + gain,
+            evidence: estimate.log_likelihood + gain,
             rms: rms(&samples.force),
             deviation: rms(&all),
             character: Character::of(&samples, &laws, courses.first().map_or(1.0, |c| c.period)),
@@ -150,12 +156,12 @@ impl Scene<'_> {
     }
 
     /// Lets the force of a leading place jump where its motion reverses, and keeps that where the recordings like it better.
-    pub(super) fn let_jump(&self, candidate: &mut Candidate, trial: &Trial) {
-        let Channel::Force(_) = trial.channel else { return };
+    pub(super) fn allow_jumps(&self, candidate: &mut Candidate, estimate: &Estimate) {
+        let Channel::Force(_) = estimate.channel else { return };
         if matches!(candidate.place, Place::Signal(_)) {
             return;
         }
-        let scales = self.scales(trial.channel);
+        let scales = self.scales(estimate.channel);
         let samples = self.samples(&candidate.courses, &[]);
         let mut offset = 0;
         let mut smoothed = Vec::new();
@@ -166,16 +172,16 @@ impl Scene<'_> {
             // The turning point is known to a sample or two.
             let jumps: Vec<usize> = at.flat_map(|k| k.saturating_sub(1)..(k + 3).min(len)).collect();
             offset += len;
-            let Some(system) = self.system(trial.channel, trial.chain, run, scales, trial.loose) else { return };
-            let data = self.data(&trial.forces, run, &[]);
-            let Some(state) = system.smooth(trial.intensity, data, &jumps, 2.0 * candidate.rms) else { return };
-            before += trial.smoothed[run].log_likelihood;
+            let Some(system) = self.system(estimate.channel, estimate.order, run, scales, estimate.force_error) else { return };
+            let data = self.data(&estimate.forces, run, &[]);
+            let Some(state) = system.smooth(estimate.intensity, data, &jumps, 2.0 * candidate.rms) else { return };
+            before += estimate.smoothed[run].log_likelihood;
             smoothed.push(state);
         }
         let gain = smoothed.iter().map(|s| s.log_likelihood).sum::<f64>() - before;
         candidate.jump_gain = Some(gain);
         if gain > 0.0 {
-            candidate.courses = self.courses(trial, &smoothed);
+            candidate.courses = self.courses(estimate, &smoothed);
             let all: Vec<f64> = candidate.courses.iter().flat_map(|c| c.deviation.iter().copied()).collect();
             candidate.deviation = rms(&all);
         }
@@ -193,14 +199,4 @@ fn pieces<'a>(column: &'a [f64], courses: &[Course]) -> Vec<&'a [f64]> {
             own
         })
         .collect()
-}
-
-/// Central differences.
-fn rate(column: &[f64], period: f64) -> Vec<f64> {
-    let last = column.len().saturating_sub(1);
-    let at = |k: usize| {
-        let (a, b) = (k.saturating_sub(1), (k + 1).min(last));
-        if b > a { (column[b] - column[a]) / ((b - a) as f64 * period) } else { 0.0 }
-    };
-    (0..column.len()).map(at).collect()
 }

@@ -1,6 +1,7 @@
 //! The class of a force: odd or even, with memory or without, dependent on rate or not, and what energy it takes.
 
-use super::law::{Law, Samples, Variable};
+use super::law::{Form, Law, Variable};
+use super::regression::Samples;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -86,7 +87,7 @@ fn exponent(energies: &[f64], amplitudes: &[f64]) -> Option<f64> {
 fn odd_share(laws: &[Law]) -> f64 {
     let best = laws
         .iter()
-        .filter(|l| matches!(l.variable, Variable::Velocity | Variable::Displacement) && l.form == super::law::Form::Binned)
+        .filter(|l| matches!(l.variable, Variable::Velocity | Variable::Displacement) && l.form == Form::Binned)
         .max_by(|a, b| a.held_out_share.total_cmp(&b.held_out_share));
     let Some(law) = best else { return 0.0 };
     // The curve at -z, by the nearest point of it.

@@ -1,33 +1,33 @@
-//! Places that the sensors cannot tell apart.
+//! Places that the sensors cannot tell apart: frequency responses of the outputs to a force at each.
 
-use super::channel::Equations;
+use super::equations::Equations;
 use nalgebra::{Complex, DMatrix, DVector};
 use std::f64::consts::TAU;
 
 /// Power of a force in a few bands: frequency, Hz, and mean square in the band.
 pub(super) type Spectrum = Vec<(f64, f64)>;
 
-/// Response of each output row to a unit force of a channel at a frequency, Hz; `None` where nothing holds the device.
+/// Response of each output row to a unit force of a channel at a frequency, Hz; `None` where the equations are singular at it.
 pub(super) fn response(equations: &Equations, frequency_hz: f64) -> Option<DVector<Complex<f64>>> {
-    let value = equations.value;
+    let unknown = equations.unknown;
     let s = Complex::new(0.0, TAU * frequency_hz);
     let complex = |x: f64| Complex::new(x, 0.0);
     // s x = A x + (column of the unknown and its derivatives), over the bodies' states alone.
-    let matrix = DMatrix::from_fn(value, value, |i, j| if i == j { s } else { complex(0.0) } - complex(equations.a[(i, j)]));
-    let chain = equations.chain;
+    let matrix = DMatrix::from_fn(unknown, unknown, |i, j| if i == j { s } else { complex(0.0) } - complex(equations.a[(i, j)]));
+    let order = equations.order;
     let derivative = |m: usize| s.powu(m as u32);
-    let right = DVector::from_fn(value, |i, _| (0..chain).map(|m| derivative(m) * equations.a[(i, value + m)]).sum::<Complex<f64>>());
-    let state = if value == 0 { right } else { matrix.lu().solve(&right)? };
+    let right = DVector::from_fn(unknown, |i, _| (0..order).map(|m| derivative(m) * equations.a[(i, unknown + m)]).sum::<Complex<f64>>());
+    let state = if unknown == 0 { right } else { matrix.lu().solve(&right)? };
     let row = |r: usize| {
-        let of_state: Complex<f64> = (0..value).map(|j| state[j] * equations.h[(r, j)]).sum();
-        of_state + (0..chain).map(|m| derivative(m) * equations.h[(r, value + m)]).sum::<Complex<f64>>()
+        let of_state: Complex<f64> = (0..unknown).map(|j| state[j] * equations.h[(r, j)]).sum();
+        of_state + (0..order).map(|m| derivative(m) * equations.h[(r, unknown + m)]).sum::<Complex<f64>>()
     };
     let read = DVector::from_fn(equations.h.nrows(), |r, _| row(r));
     read.iter().all(|c| c.re.is_finite() && c.im.is_finite()).then_some(read)
 }
 
-/// How far, in noises, the outputs of a force at one place are from those of the same course of force, of any size, at another: root of the
-/// mean square over samples and outputs. `own` and `other` are responses at the frequencies of the spectrum.
+/// Normalised residual that is left where a force at one place is explained by a force of the same course, of any size, at another: root of the mean
+/// square over samples and outputs, in noise standard deviations. `own` and `other` are responses at the frequencies of the spectrum.
 pub(super) fn distance(spectrum: &Spectrum, own: &[DVector<Complex<f64>>], other: &[DVector<Complex<f64>>], noise: &[f64]) -> f64 {
     let (mut both, mut square, mut all) = (Complex::new(0.0, 0.0), 0.0, 0.0);
     for ((_, power), (a, b)) in spectrum.iter().zip(own.iter().zip(other)) {

@@ -1,8 +1,8 @@
-//! Where model and recording part: the unknown force at every place that would make the nominal model reproduce the recordings.
+//! Where the model deviates from the recordings: the unknown force at every place that would make the nominal model reproduce the recordings.
 //!
 //! For each place the deviation of the device from the simulated nominal model obeys linear equations driven by a latent force there
 //! (after Rogers & Friis 2022); a smoother finds the force, its standard deviation and the likelihood of the recordings. What is not linear in
-//! the nominal model enters as known forces along the path that the device really took, found by iteration. Sign jumps survive because the
+//! the nominal model enters as known forces along the motion that the device really made, found by iteration. Sign jumps survive because the
 //! force may jump where the place's motion reverses (after Marino & Cicirello 2023). Each force is then tabulated against what moves
 //! at its place (`law`); the place whose force follows the simplest law explains the recordings best.
 
@@ -10,214 +10,37 @@ mod candidate;
 mod channel;
 mod character;
 mod classes;
+mod context;
+mod equations;
+mod estimate;
+mod filter;
 mod law;
 mod nonlinear;
 mod period;
-mod scene;
+mod regression;
+mod reversals;
 mod shows;
 mod smoother;
 #[cfg(test)]
 mod tests;
 mod trajectory;
+mod types;
 
 pub use character::Character;
 pub use law::{Form, Law, Point, Variable};
 pub use period::{Ripple, scan};
+pub use types::{Candidate, Class, Course, LocateError, Location, Options, Run, Where};
 
-use crate::hypothesis::Place;
+use crate::signal::rms;
 use backdrive_plant::model::Model;
-use backdrive_plant::stepper::CompileError;
-use channel::{Channel, Split, channels};
+use channel::{Channel, channels};
+use context::{Context, noise_of};
+use equations::Linearisation;
+use estimate::Estimate;
 pub(crate) use nonlinear::force_along;
-use nonlinear::{rms, sizes};
+use nonlinear::rms_beyond_linear;
 use rayon::prelude::*;
-use scene::{Scene, Trial, floor_of};
-use serde::{Serialize, Serializer};
 use trajectory::Trajectory;
-
-/// A recording, as columns.
-#[derive(Debug, Clone)]
-pub struct Run<'a> {
-    /// For messages and reports.
-    pub name: &'a str,
-    /// Sample time, s.
-    pub period: f64,
-    /// Samples of each input of the model.
-    pub inputs: &'a [Vec<f64>],
-    /// Samples of each output of the model; `None` where it was not recorded.
-    pub outputs: Vec<Option<&'a [f64]>>,
-    /// The model with the numbers that differ in this run; `None` where none do.
-    pub model: Option<&'a Model>,
-}
-
-impl<'a> From<&'a crate::problem::Record> for Run<'a> {
-    fn from(record: &'a crate::problem::Record) -> Run<'a> {
-        let outputs = record.outputs.iter().map(|column| column.as_deref()).collect();
-        Run { name: &record.name, period: record.period, inputs: &record.inputs, outputs, model: None }
-    }
-}
-
-/// How to look.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Options {
-    /// Laws of each form and place that are put to the test of the recordings.
-    pub laws_of_a_form: usize,
-    /// Places, best first, at which the force may jump at reversals.
-    pub jumps_at: usize,
-    /// Iterations for nonlinear elements of the nominal model.
-    pub iterations: usize,
-    /// Samples of all runs together, at most: of longer ones every second, third, ... is taken.
-    pub most_samples: usize,
-    /// The only place to look at; all places where there is none.
-    pub only: Option<Place>,
-    /// Whether filters are tuned on the run with the largest mismatch alone.
-    pub tuned_on_one: bool,
-}
-
-impl Default for Options {
-    fn default() -> Self {
-        Options { laws_of_a_form: 2, jumps_at: 4, iterations: 2, most_samples: usize::MAX, only: None, tuned_on_one: false }
-    }
-}
-
-impl Options {
-    /// Fast rather than fine: for a set of any length in a second or two.
-    pub fn quick() -> Options {
-        Options { laws_of_a_form: 1, jumps_at: 0, iterations: 1, most_samples: 30_000, only: None, tuned_on_one: true }
-    }
-}
-
-/// Why nothing can be located.
-#[derive(Debug, thiserror::Error)]
-pub enum LocateError {
-    /// The model cannot be simulated.
-    #[error("the model cannot be simulated: {0}")]
-    Model(#[from] CompileError),
-    /// Columns are missing.
-    #[error("{run}: has columns for {inputs} inputs and {outputs} outputs, fewer than the model")]
-    Columns {
-        /// The recording.
-        run: String,
-        /// Input columns.
-        inputs: usize,
-        /// Output columns.
-        outputs: usize,
-    },
-    /// No smoother has anything to do.
-    #[error("{run}: has {samples} samples; at least 16 are needed to locate a force")]
-    TooShort {
-        /// The recording.
-        run: String,
-        /// Samples.
-        samples: usize,
-    },
-    /// The model left all bounds.
-    #[error("{run}: the model's motion grows beyond all bounds; refit it first")]
-    Diverged {
-        /// The recording.
-        run: String,
-    },
-    /// None of the outputs was recorded.
-    #[error("{run}: none of the model's outputs was recorded")]
-    NothingMeasured {
-        /// The recording.
-        run: String,
-    },
-    /// There is nothing to look at.
-    #[error("there are no recordings to locate anything in")]
-    NoRuns,
-    /// A noise level is wrong.
-    #[error("there are {found} noise levels, the model has {expected} outputs; each must be a finite number, at least 0")]
-    Noise {
-        /// Levels.
-        found: usize,
-        /// Outputs.
-        expected: usize,
-    },
-    /// The linear part of the model has no finite equations.
-    #[error("the equations of the model's linear part are singular; a body has no inertia, or numbers are too far apart")]
-    Singular,
-}
-
-/// The force at a place over one run.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Course {
-    /// The run.
-    pub run: String,
-    /// Sample time, s.
-    pub period: f64,
-    /// Force as that of an element there, N or N m; the error in the signal's unit at a motion input or an output.
-    pub force: Vec<f64>,
-    /// Its standard deviation.
-    pub deviation: Vec<f64>,
-    /// Displacement and velocity across the place, deviation included; empty at an output.
-    pub displacement: Vec<f64>,
-    /// m/s.
-    pub velocity: Vec<f64>,
-}
-
-/// What a place would have to do.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Candidate {
-    /// Where.
-    #[serde(serialize_with = "shown")]
-    pub place: Place,
-    /// Log-likelihood of the recordings with any force here.
-    pub log_likelihood: f64,
-    /// What a jump of the force at reversals adds to it; `None` where that was not tried.
-    pub jump_gain: Option<f64>,
-    /// Log-likelihood with the force that follows the best law, its numbers paid for: what places compete by.
-    pub evidence: f64,
-    /// Root of the force's mean square.
-    pub rms: f64,
-    /// Root of its mean variance.
-    pub deviation: f64,
-    /// Laws, best first: by evidence where it was computed, then by what they explain on other parts of the recordings.
-    pub laws: Vec<Law>,
-    /// The strongest ripples over displacement, strongest first.
-    pub ripples: Vec<Ripple>,
-    /// Odd or even, memory, rate, energy; `None` at an output.
-    pub character: Option<Character>,
-    /// The force itself, one course for each run.
-    pub courses: Vec<Course>,
-}
-
-/// Places that no sensor tells apart: a force of the same course at one or the other gives the same readings within the noise.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Class {
-    /// Indices into [`Location::ranking`], best first.
-    pub members: Vec<usize>,
-}
-
-/// When, at which frequencies and in which state the mismatch shows, as `where` of a verdict has it.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Where {
-    /// Spans with most of the mismatch, s; empty where it is everywhere.
-    pub time: Vec<[f64; 2]>,
-    /// Band with nine tenths of its power, Hz.
-    pub band_hz: [f64; 2],
-    /// In words.
-    pub state: String,
-}
-
-/// What was found.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Location {
-    /// Log-likelihood of the recordings where nothing is missing.
-    pub log_likelihood_without: f64,
-    /// Mismatch of the nominal model over the noise, root of the mean square over samples and outputs.
-    pub mismatch: f64,
-    /// Places, best first.
-    pub ranking: Vec<Candidate>,
-    /// Classes of places that cannot be told apart; every place is in one.
-    pub classes: Vec<Class>,
-    /// When and in which state.
-    pub shows: Where,
-}
-
-fn shown<S: Serializer>(place: &Place, serializer: S) -> Result<S::Ok, S::Error> {
-    serializer.collect_str(place)
-}
 
 /// Finds the latent force at every place of a model. `noise` is the standard deviation of the measuring error of each output, in its unit.
 ///
@@ -241,43 +64,47 @@ pub fn locate(model: &Model, runs: &[Run], noise: &[f64], options: &Options) -> 
         let across = nonlinear.flat_map(|ends| trajectories.iter().map(move |t| rms(&t.across(ends).0)));
         across.fold(0.0, f64::max) * std::f64::consts::SQRT_2
     };
-    let split = Split::of(model, amplitude).ok_or(LocateError::Singular)?;
-    let noise = (0..noise.len()).map(|output| floor_of(output, noise[output], &trajectories)).collect();
-    let sizes = trajectories.iter().map(|t| sizes(&split, t)).collect();
-    let scene = Scene { model, runs, split, trajectories, sizes, noise, options };
-    let wanted = |channel: &Channel| options.only.as_ref().is_none_or(|place| scene.stands_for(*channel, place));
-    let mut trials: Vec<Trial> = channels(model).into_par_iter().filter(wanted).filter_map(|channel| scene.trial(channel)).collect();
-    if trials.is_empty() {
+    let linearisation = Linearisation::of(model, amplitude).ok_or(LocateError::Singular)?;
+    let noise = (0..noise.len()).map(|output| noise_of(output, noise[output], &trajectories)).collect();
+    let nonlinear_sizes = trajectories.iter().map(|t| rms_beyond_linear(&linearisation, t)).collect();
+    let context = Context { model, runs, linearisation, trajectories, nonlinear_sizes, noise, options };
+    let wanted = |channel: &Channel| options.only.as_ref().is_none_or(|place| context.acts_at(*channel, place));
+    let mut estimates: Vec<Estimate> =
+        channels(model).into_par_iter().filter(wanted).filter_map(|channel| context.estimate(channel)).collect();
+    if estimates.is_empty() {
         return Err(LocateError::Singular);
     }
-    trials.sort_by(|a, b| b.log_likelihood.total_cmp(&a.log_likelihood));
-    let mut ranking: Vec<(Candidate, usize)> =
-        trials.par_iter().enumerate().flat_map_iter(|(i, trial)| scene.candidates(trial).into_iter().map(move |c| (c, i))).collect();
+    estimates.sort_by(|a, b| b.log_likelihood.total_cmp(&a.log_likelihood));
+    let mut ranking: Vec<(Candidate, usize)> = estimates
+        .par_iter()
+        .enumerate()
+        .flat_map_iter(|(i, estimate)| context.candidates(estimate).into_iter().map(move |c| (c, i)))
+        .collect();
     ranking.sort_by(|a, b| b.0.evidence.total_cmp(&a.0.evidence));
     let leading: Vec<usize> = ranking.iter().take(options.jumps_at).map(|r| r.1).collect();
     ranking
         .par_iter_mut()
         .take(options.jumps_at)
         .zip(leading)
-        .for_each(|((candidate, _), trial)| scene.let_jump(candidate, &trials[trial]));
-    let channels: Vec<(Channel, usize)> = ranking.iter().map(|r| (trials[r.1].channel, trials[r.1].chain)).collect();
+        .for_each(|((candidate, _), estimate)| context.allow_jumps(candidate, &estimates[estimate]));
+    let channels: Vec<(Channel, usize)> = ranking.iter().map(|r| (estimates[r.1].channel, estimates[r.1].order)).collect();
     let ranking: Vec<Candidate> = ranking.into_iter().map(|r| r.0).collect();
-    let classes = scene.classes(&ranking, &channels);
+    let classes = context.classes(&ranking, &channels);
     Ok(Location {
-        log_likelihood_without: scene.log_likelihood_without(),
-        mismatch: scene.mismatch(),
-        shows: scene.shows(&ranking),
+        log_likelihood_without: context.log_likelihood_without(),
+        mismatch: context.mismatch(),
+        shows: context.shows(&ranking),
         ranking,
         classes,
     })
 }
 
-/// In which state the mismatch shows, in words, such as `reversals of drum-ground`; `None` where there is no mismatch to speak of.
+/// In which state the residual shows, in words, such as `with velocity, at drum-ground`; `None` where it does not exceed the noise.
 pub fn state(location: &Location) -> Option<String> {
     let best = location.ranking.first()?;
     let telling = location.mismatch > QUIET && best.log_likelihood > location.log_likelihood_without;
     (telling && !location.shows.state.is_empty()).then(|| location.shows.state.clone())
 }
 
-/// Mismatch, in noises, below which nothing shows.
+/// Normalised residual, in noise standard deviations, up to which nothing is said to show.
 const QUIET: f64 = 1.02;

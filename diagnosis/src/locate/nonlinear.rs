@@ -1,15 +1,21 @@
-//! What the nonlinear elements of the nominal model do along the path that the device really took.
+//! Forces of the nonlinear elements of the nominal model along a given motion.
 
-use super::channel::Split;
+use super::equations::Linearisation;
 use super::trajectory::Trajectory;
+use crate::signal::rms;
 use backdrive_plant::elements::{Law, Role, Rubbing, Side};
 
-/// Forces of the nonlinear elements along the simulated motion with the deviation added, less those along the simulated motion, less what
-/// the linear part already says: one column for each element of [`Split::nonlinear`].
-pub(super) fn extra_forces(split: &Split, trajectory: &Trajectory, position: &[Vec<f64>], velocity: &[Vec<f64>]) -> Vec<Vec<f64>> {
+/// What the deviation from the simulated motion adds to the forces of the nonlinear elements, beyond their linear part: one column for each element of
+/// [`Linearisation::nonlinear`].
+pub(super) fn forces_beyond_linear(
+    linearisation: &Linearisation,
+    trajectory: &Trajectory,
+    position: &[Vec<f64>],
+    velocity: &[Vec<f64>],
+) -> Vec<Vec<f64>> {
     let one = |index: &usize| {
-        let element = &split.model.elements[*index];
-        let linear = split.linear.elements[*index];
+        let element = &linearisation.model.elements[*index];
+        let linear = linearisation.linear.elements[*index];
         let (x, v) = trajectory.across(element.between);
         let of = |columns: &[Vec<f64>], k: usize| {
             let at = |end: Option<usize>| end.and_then(|b| columns.get(b)).and_then(|c| c.get(k)).copied().unwrap_or(0.0);
@@ -23,28 +29,28 @@ pub(super) fn extra_forces(split: &Split, trajectory: &Trajectory, position: &[V
             (along(&element.law, &x, &v, trajectory.period, slip), along(&element.law, &moved, &faster, trajectory.period, slip));
         (0..trajectory.len).map(|k| after[k] - before[k] - linear.stiffness * dx[k] - linear.damping * dv[k]).collect()
     };
-    split.nonlinear.iter().map(one).collect()
+    linearisation.nonlinear.iter().map(one).collect()
 }
 
-/// Root mean square of what each nonlinear element pushes beyond its linear part along the simulated motion, N.
-pub(super) fn sizes(split: &Split, trajectory: &Trajectory) -> Vec<f64> {
+/// Root mean square of the force of each nonlinear element beyond its linear part along the simulated motion, N.
+pub(super) fn rms_beyond_linear(linearisation: &Linearisation, trajectory: &Trajectory) -> Vec<f64> {
     let one = |index: &usize| {
-        let element = &split.model.elements[*index];
-        let linear = split.linear.elements[*index];
+        let element = &linearisation.model.elements[*index];
+        let linear = linearisation.linear.elements[*index];
         let (x, v) = trajectory.across(element.between);
         let force = along(&element.law, &x, &v, trajectory.period, SLIP * rms(&x));
         let rest: Vec<f64> = (0..x.len()).map(|k| force[k] - linear.stiffness * x[k] - linear.damping * v[k]).collect();
         rms(&rest).max(f64::MIN_POSITIVE.sqrt())
     };
-    split.nonlinear.iter().map(one).collect()
+    linearisation.nonlinear.iter().map(one).collect()
 }
 
-/// Force of a law along a path, N; of displacement, m, and velocity, m/s, at samples `period` s apart.
+/// Force of a law along a motion, N; of displacement, m, and velocity, m/s, at samples `period` s apart.
 pub(crate) fn force_along(law: &Law, x: &[f64], v: &[f64], period: f64) -> Vec<f64> {
     along(law, x, v, period, SLIP * rms(x))
 }
 
-/// Force of a law along a path. Dry friction builds up over the distance `slip`, so that noise about rest does not make it chatter.
+/// Force of a law along a motion. Dry friction builds up over the distance `slip`, so that noise about rest does not make it chatter.
 fn along(law: &Law, x: &[f64], v: &[f64], period: f64, slip: f64) -> Vec<f64> {
     let mut memory = vec![0.0; law.memory_len()];
     let (mut last, mut force) = (x.first().copied().unwrap_or(0.0), 0.0_f64);
@@ -64,10 +70,6 @@ fn along(law: &Law, x: &[f64], v: &[f64], period: f64, slip: f64) -> Vec<f64> {
         force
     };
     x.iter().zip(v).map(step).collect()
-}
-
-pub(super) fn rms(x: &[f64]) -> f64 {
-    (x.iter().map(|x| x * x).sum::<f64>() / x.len().max(1) as f64).sqrt()
 }
 
 /// Distance over which dry friction builds up, in rms displacements.

@@ -1,15 +1,17 @@
-//! Where the mismatch shows, and which places cannot be told apart.
+//! When, at which frequencies and in which state the residual shows, and which places cannot be told apart.
 
 use super::channel::Channel;
 use super::classes;
-use super::scene::Scene;
+use super::context::Context;
+use super::law::Variable;
 use super::trajectory::Trajectory;
-use super::{Candidate, Class, Variable, Where};
+use super::types::{Candidate, Class, Where};
 
-/// Places whose readings differ by less than this many noises are one.
+/// Normalised residual below which two places cannot be told apart, in noise standard deviations.
 const INDISTINCT: f64 = 0.3;
 
-impl Scene<'_> {
+impl Context<'_> {
+    /// Log-likelihood of the recordings with no unknown anywhere: white noise alone.
     pub(super) fn log_likelihood_without(&self) -> f64 {
         let of = |t: &Trajectory| {
             let column = |(row, r): (&usize, &Vec<f64>)| {
@@ -21,6 +23,7 @@ impl Scene<'_> {
         self.trajectories.iter().map(of).sum()
     }
 
+    /// Root mean square of the normalised residuals of the nominal model.
     pub(super) fn mismatch(&self) -> f64 {
         let squares = self.trajectories.iter().flat_map(|t| t.rows.iter().zip(&t.residual)).map(|(row, r)| {
             let noise = self.noise[*row];
@@ -34,8 +37,8 @@ impl Scene<'_> {
     pub(super) fn classes(&self, ranking: &[Candidate], channels: &[(Channel, usize)]) -> Vec<Class> {
         let Some(trajectory) = self.trajectories.first() else { return Vec::new() };
         let noise: Vec<f64> = trajectory.rows.iter().map(|r| self.noise[*r]).collect();
-        let responses = |spectrum: &classes::Spectrum, (channel, chain): (Channel, usize)| {
-            let equations = self.split.equations(channel, chain, &trajectory.rows);
+        let responses = |spectrum: &classes::Spectrum, (channel, order): (Channel, usize)| {
+            let equations = self.linearisation.equations(channel, order, &trajectory.rows);
             spectrum.iter().map(|(f, _)| classes::response(&equations, *f)).collect::<Option<Vec<_>>>()
         };
         let mut classes: Vec<Class> = Vec::new();
@@ -64,6 +67,7 @@ impl Scene<'_> {
         classes
     }
 
+    /// When, in which band and in which state the residual of the nominal model shows.
     pub(super) fn shows(&self, ranking: &[Candidate]) -> Where {
         let mut columns: Vec<(Vec<f64>, f64)> = Vec::new();
         for t in &self.trajectories {
@@ -85,7 +89,7 @@ impl Scene<'_> {
         Where { time: self.spans(), band_hz, state }
     }
 
-    /// Blocks that hold four fifths of the mismatch, where they are at most a third of the time.
+    /// Spans that hold four fifths of the power of the residual, where they are at most a third of the time.
     fn spans(&self) -> Vec<[f64; 2]> {
         let Some(longest) = self.trajectories.iter().map(|t| t.len).max() else { return Vec::new() };
         let block = (longest / 100).max(4);

@@ -1,8 +1,10 @@
 //! Devices with known hidden physics: simulated with it, located without.
 
-use super::smoother::{Data, System};
+use super::filter::{Data, System};
 use super::*;
+use crate::hypothesis::Place;
 use backdrive_plant::stepper::{Options as StepOptions, simulate};
+use nalgebra::{DMatrix, DVector};
 use rand::SeedableRng;
 use rand_distr::{Distribution, Normal};
 
@@ -156,11 +158,11 @@ fn friction_in_the_nominal_model_is_taken_along() {
 fn the_smoother_is_the_posterior_mean() {
     let friction = "[[elements]]\nname = 'n'\nkind = 'coulomb'\nbetween = ['handle', 'ground']\nforce = 0.2\n";
     let noise = [2e-6, 2e-4];
-    for (model, chain) in [(master("", ""), 1), (master("", ""), 2), (master(friction, ""), 1)] {
-        let split = Split::of(&model, 1e-3).expect("linear");
-        let mut equations = split.equations(Channel::Force([Some(1), None]), chain, &[0, 1]);
-        if !split.nonlinear.is_empty() {
-            equations = split.loosened(&equations, &[0.1], 200.0);
+    for (model, order) in [(master("", ""), 1), (master("", ""), 2), (master(friction, ""), 1)] {
+        let linearisation = Linearisation::of(&model, 1e-3).expect("linear");
+        let mut equations = linearisation.equations(Channel::Force([Some(1), None]), order, &[0, 1]);
+        if !linearisation.nonlinear.is_empty() {
+            equations = linearisation.with_force_errors(&equations, &[0.1], 200.0);
         }
         let system = System::of(&equations, PERIOD, [1e-3, 0.05, 0.3], &noise).expect("finite");
         let len = 25;
@@ -171,7 +173,7 @@ fn the_smoother_is_the_posterior_mean() {
             let smoothed = system.smooth(2.0, data, &jumps, jump).expect("smooths");
             let (mean, deviation, log_likelihood) = system.dense(2.0, &residual, &jumps, jump);
             for k in 0..len {
-                assert!((smoothed.value[k] - mean[k]).abs() < 1e-6 * mean.amax(), "{chain} {k}: {} {}", smoothed.value[k], mean[k]);
+                assert!((smoothed.value[k] - mean[k]).abs() < 1e-6 * mean.amax(), "{order} {k}: {} {}", smoothed.value[k], mean[k]);
             }
             assert!((smoothed.log_likelihood - log_likelihood).abs() < 1e-6 * log_likelihood.abs());
             if jumps.is_empty() {
@@ -190,10 +192,10 @@ fn a_known_part_and_known_forces_are_taken_off() {
     // A force known beforehand leaves nothing to be found, whether it comes as the unknown's own or as an element's.
     let friction = "[[elements]]\nname = 'n'\nkind = 'coulomb'\nbetween = ['drum', 'ground']\nforce = 0.2\n";
     let model = master(friction, "");
-    let split = Split::of(&model, 1e-3).expect("linear");
+    let linearisation = Linearisation::of(&model, 1e-3).expect("linear");
     let noise = [2e-6, 2e-4];
-    let system =
-        System::of(&split.equations(Channel::Force([Some(1), None]), 1, &[0, 1]), PERIOD, [1e-3, 0.05, 0.3], &noise).expect("finite");
+    let system = System::of(&linearisation.equations(Channel::Force([Some(1), None]), 1, &[0, 1]), PERIOD, [1e-3, 0.05, 0.3], &noise)
+        .expect("finite");
     let force: Vec<f64> = (0..2000).map(|k| 0.3 * (0.01 * k as f64).sin()).collect();
     // What the linear part does under that force, by the stepper, which holds the mean of two samples.
     let mut pushed = master("", "");
@@ -303,4 +305,47 @@ fn a_run_of_another_condition_takes_its_own_model() {
         locate(&nominal, &[run], &noise, &Options::default()).expect("locates").mismatch
     };
     assert!(of(None) > 10.0 && of(Some(&stiffer)) < 1.1, "{} {}", of(None), of(Some(&stiffer)));
+}
+
+impl System {
+    /// Posterior mean and standard deviation of the unknown, and log-likelihood, from the covariance of all samples at once.
+    pub fn dense(&self, intensity: f64, residual: &[Vec<f64>], jumps: &[usize], jump: f64) -> (DVector<f64>, Vec<f64>, f64) {
+        let (n, p, len) = (self.n, self.p, residual[0].len());
+        let q = self.process_noise(intensity);
+        // Each state is a sum of the initial state and the noises before it.
+        let mut state = vec![DMatrix::<f64>::zeros(n, n * len); len];
+        let mut prior = DMatrix::<f64>::zeros(n * len, n * len);
+        for k in 0..len {
+            let mut own = if k == 0 { self.steady(intensity).expect("steady").predicted } else { q.clone() };
+            if jumps.contains(&k) {
+                own[(self.unknown, self.unknown)] += (jump / self.scale[self.unknown]).powi(2);
+            }
+            prior.view_mut((k * n, k * n), (n, n)).copy_from(&own);
+            if k > 0 {
+                state[k] = &self.f * &state[k - 1];
+            }
+            state[k].view_mut((0, k * n), (n, n)).fill_with_identity();
+        }
+        let mut reads = DMatrix::<f64>::zeros(p * len, n * len);
+        let mut y = DVector::<f64>::zeros(p * len);
+        for k in 0..len {
+            reads.rows_mut(k * p, p).copy_from(&(&self.h * &state[k]));
+            for r in 0..p {
+                y[k * p + r] = residual[r][k] / self.noise[r];
+            }
+        }
+        let covariance = &reads * &prior * reads.transpose() + DMatrix::identity(p * len, p * len);
+        let factor = covariance.cholesky().expect("positive definite");
+        let weights = factor.solve(&y);
+        let scale = self.scale[self.unknown];
+        let row = |k: usize| state[k].row(self.unknown) * &prior;
+        let mean = DVector::from_fn(len, |k, _| (row(k) * reads.transpose() * &weights)[0] * scale);
+        let deviation = (0..len).map(|k| {
+            let cross = row(k) * reads.transpose();
+            let own = (row(k) * state[k].row(self.unknown).transpose())[0];
+            (own - (&cross * factor.solve(&cross.transpose()))[0]).max(0.0).sqrt() * scale
+        });
+        let log_det = 2.0 * factor.l().diagonal().iter().map(|d| d.ln()).sum::<f64>();
+        (mean, deviation.collect(), -0.5 * (y.dot(&weights) + log_det + len as f64 * self.log_likelihood_constant()))
+    }
 }

@@ -1,6 +1,6 @@
-//! What the nominal model does in a run, and how far the recording is from it.
+//! The nominal model simulated over a run, and the residual of the recording.
 
-use super::{LocateError, Run};
+use super::types::{LocateError, Run};
 use backdrive_plant::model::Model;
 use backdrive_plant::stepper::{Options, Plant, Segment, ahead, segments};
 
@@ -13,7 +13,7 @@ pub(super) struct Trajectory {
     pub velocity: Vec<Vec<f64>>,
     /// Inputs behind their gain.
     pub drive: Vec<Vec<f64>>,
-    /// Outputs that were recorded: index, and what the model says.
+    /// Outputs that were recorded: their indices, and what the model predicts.
     pub rows: Vec<usize>,
     pub predicted: Vec<Vec<f64>>,
     /// Recorded less predicted, one column for each of `rows`. That of a delayed output stands at the time that it measures.
@@ -74,7 +74,7 @@ impl Trajectory {
         Ok(Trajectory { period: run.period, len, position, velocity, drive, rows, predicted, residual })
     }
 
-    /// Leaves only every so many-th sample.
+    /// Keeps only every `stride`-th sample.
     pub fn thin(&mut self, stride: usize) {
         let all = [&mut self.position, &mut self.velocity, &mut self.drive, &mut self.predicted, &mut self.residual];
         for column in all.into_iter().flatten() {

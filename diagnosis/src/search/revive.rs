@@ -19,7 +19,7 @@ pub(super) fn revived(course: &Course, found: &[Candidate]) -> Vec<(Structure, V
             .filter(|i| problem.stated[*i].log && stated[*i] < tuning().search.vanished * problem.stated[*i].range.0)
             .collect();
         // A damper or a spring may vanish beside a law that was found; a body does not.
-        let is_mass = |i: &usize| problem.stated[*i].path.starts_with("bodies.");
+        let is_mass = |i: &usize| problem.stated[*i].body(&problem.model).is_some();
         if gone.iter().any(is_mass) {
             gone.retain(is_mass);
         }
@@ -45,11 +45,10 @@ pub(super) fn revived(course: &Course, found: &[Candidate]) -> Vec<(Structure, V
 /// Of the bodies joined to one whose mass is a stated number, the number of the mass that has grown most.
 fn heir(course: &Course, stated: &[f64], gone: usize) -> Option<usize> {
     let problem = course.evaluator.problem;
-    let body = problem.stated[gone].path.strip_prefix("bodies.")?;
-    let name = |end| problem.model.place_name(end);
-    let joined =
-        |other: &str| problem.model.elements.iter().any(|e| e.between.map(name).contains(&body) && e.between.map(name).contains(&other));
+    let body = problem.stated[gone].body(&problem.model);
+    body?;
+    let joined = |other: usize| problem.model.elements.iter().any(|e| e.between.contains(&body) && e.between.contains(&Some(other)));
     let growth = |i: &usize| stated[*i] / problem.stated[*i].given;
-    let others = (0..stated.len()).filter(|i| *i != gone && problem.stated[*i].path.strip_prefix("bodies.").is_some_and(joined));
+    let others = (0..stated.len()).filter(|i| *i != gone && problem.stated[*i].body(&problem.model).is_some_and(joined));
     others.filter(|i| growth(i) > 1.0).max_by(|a, b| growth(a).total_cmp(&growth(b)))
 }

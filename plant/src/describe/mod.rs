@@ -10,7 +10,7 @@ pub use diagram::diagram;
 pub use units::unit_for;
 
 use crate::linear::{LinearError, LinearModel, Operating, log_frequencies};
-use crate::model::{InputKind, Model, Motion, OutputKind};
+use crate::model::{Model, Motion};
 use serde::Serialize;
 
 /// All there is to show of a model. Displays as text; serialises as data.
@@ -200,16 +200,7 @@ fn frequencies_around(modes: impl Iterator<Item = f64>) -> Vec<f64> {
 }
 
 fn response_unit(model: &Model, input: usize, output: usize) -> String {
-    let from = match model.inputs[input].kind {
-        InputKind::Force => "N",
-        InputKind::Motion => "m",
-    };
-    let to = match model.outputs[output].kind {
-        OutputKind::Position(_) => "m",
-        OutputKind::Velocity(_) => "m/s",
-        OutputKind::Acceleration(_) => "m/s²",
-        OutputKind::Force(_) | OutputKind::Reaction(_) => "N",
-    };
+    let (from, to) = (model.inputs[input].kind.unit(), model.outputs[output].kind.unit());
     let (from, to) = (unit_for(model.motion, from), unit_for(model.motion, to));
     match (to == from, from.contains(' ')) {
         (true, _) => "-".to_string(),

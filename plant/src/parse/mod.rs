@@ -3,6 +3,8 @@
 mod paths;
 mod signals;
 
+pub use paths::{InputKey, NumberOf, OutputKey};
+
 use crate::elements::{KINDS, Kind, Law, Range, Role};
 use crate::model::{Body, Element, Fragment, InputKind, Model, Motion, Place};
 use crate::tomlfile::{self, FileError, Table};

@@ -1,0 +1,99 @@
+//! Checks of one recording: its clock, and each of its signals.
+
+use super::remark::{Remark, Weight, add};
+use super::signals::{clipped_share, is_constant, off_grid, quiet_top};
+use crate::problem::{Problem, Record};
+use backdrive_plant::model::{InputKind, OutputKind};
+
+/// Distance from the even grid, in sample periods, above which a clock is called uneven.
+const JITTER: f64 = 0.05;
+/// Share of samples at a signal's two extremes above which it looks clipped.
+const CLIPPED: f64 = 0.02;
+
+/// Every check of one recording.
+pub(super) fn record(problem: &Problem, record: &Record, all: &mut Vec<Remark>) {
+    clock(record, all);
+    for (index, (input, samples)) in problem.model.inputs.iter().zip(&record.inputs).enumerate() {
+        if problem.unknown.iter().any(|u| u.input == index) {
+            continue;
+        }
+        constant(record, &input.name, samples, all);
+        if input.kind == InputKind::Force {
+            clipped(record, &input.name, samples, "its source may be limited", all);
+        }
+    }
+    for (output, samples) in problem.model.outputs.iter().zip(&record.outputs) {
+        match samples {
+            None => add(all, Weight::Caution, record, &output.name, "missing", "was not recorded".to_string()),
+            Some(samples) => {
+                constant(record, &output.name, samples, all);
+                sensor(record, &output.name, output.resolution, samples, all);
+                if !matches!(output.kind, OutputKind::Position(_)) {
+                    clipped(record, &output.name, samples, "its sensor may be at the end of its range", all);
+                }
+            }
+        }
+    }
+}
+
+fn clock(record: &Record, all: &mut Vec<Remark>) {
+    let jitter = &record.jitter;
+    if !jitter.gaps.is_empty() {
+        let missing: usize = jitter.gaps.iter().map(|g| g.missing).sum();
+        let text = format!(
+            "{missing} samples are missing in {} gaps, the first after {:.4} s; they are filled in as the input's hold says",
+            jitter.gaps.len(),
+            jitter.gaps[0].after
+        );
+        add(all, Weight::Caution, record, "", "gaps", text);
+    } else if jitter.largest > JITTER * record.period {
+        let text = format!(
+            "the clock is off its grid by {:.1} % of a sample rms and {:.0} % at worst; delays below that are not claimed",
+            100.0 * jitter.rms / record.period,
+            100.0 * jitter.largest / record.period
+        );
+        add(all, Weight::Caution, record, "", "clock", text);
+    }
+}
+
+fn constant(record: &Record, name: &str, samples: &[f64], all: &mut Vec<Remark>) {
+    if is_constant(samples) {
+        let value = samples.first().copied().unwrap_or(0.0);
+        add(all, Weight::Caution, record, name, "constant", format!("is {value} throughout: it says nothing"));
+    }
+}
+
+/// Samples that stay at an extreme for longer than a smooth signal does.
+fn clipped(record: &Record, name: &str, samples: &[f64], why: &str, all: &mut Vec<Remark>) {
+    let (share, low, high) = clipped_share(samples);
+    if share > CLIPPED {
+        let text = format!("stays at {low:.4} or {high:.4} for {:.0} % of the time: {why}", 100.0 * share);
+        add(all, Weight::Note, record, name, "saturated", text);
+    }
+}
+
+fn sensor(record: &Record, name: &str, stated: f64, samples: &[f64], all: &mut Vec<Remark>) {
+    match crate::floor::step_of(samples) {
+        Some(step) if stated > 0.0 && ((step / stated) - (step / stated).round()).abs() > 0.02 => {
+            let text = format!("moves in steps of {step:.4e}, the model says {stated:.4e}");
+            add(all, Weight::Caution, record, name, "encoder", text);
+        }
+        Some(step) if stated == 0.0 => add(all, Weight::Note, record, name, "encoder", format!("moves in steps of {step:.4e}")),
+        Some(_) => {}
+        None => {
+            if stated > 0.0 && off_grid(samples, stated) {
+                let text =
+                    format!("is not on the grid of {stated:.4e} that the model says: it was filtered or converted before it was recorded");
+                add(all, Weight::Caution, record, name, "filtered", text);
+            }
+            if let Some(share) = quiet_top(samples)
+                && share < 1e-4
+            {
+                let text = "has nothing in the upper part of its band, not even noise: it was low-pass filtered before it was recorded, \
+                            or simulated; fast effects (delay, bandwidth) may be the filter's"
+                    .to_string();
+                add(all, Weight::Caution, record, name, "filtered", text);
+            }
+        }
+    }
+}

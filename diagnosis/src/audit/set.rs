@@ -1,0 +1,75 @@
+//! Checks that take more than one recording: noise of each output, how well the device repeats itself, whether a controller closes the loop.
+
+use super::remark::{Remark, Weight, add, file_name};
+use super::signals::answers;
+use crate::problem::Problem;
+use backdrive_plant::model::{InputKind, OutputKind};
+
+/// Correlation of a command's noise with a sensor's above which a controller closes the loop.
+const CLOSED: f64 = 0.5;
+
+/// Noise standard deviation of each output.
+pub(super) fn noises(problem: &Problem) -> Vec<Remark> {
+    let mut all = Vec::new();
+    for (index, (output, floor)) in problem.model.outputs.iter().zip(&problem.floor).enumerate() {
+        let spreads: Vec<f64> = problem.fit.iter().filter(|r| r.outputs[index].is_some()).map(|r| r.spread[index]).collect();
+        if spreads.is_empty() {
+            continue;
+        }
+        let spread = spreads.iter().sum::<f64>() / spreads.len() as f64;
+        let text = format!("its measuring error is {floor:.2e}, {:.3} % of what it moves", 100.0 * floor / spread);
+        let weight = if floor / spread > 0.3 { Weight::Caution } else { Weight::Note };
+        all.push(Remark { weight, records: Vec::new(), signal: output.name.clone(), about: "noise", text });
+    }
+    all
+}
+
+/// Recordings of the same excitation: how well the device repeats itself.
+pub(super) fn repeats(problem: &Problem) -> Vec<Remark> {
+    let mut all = Vec::new();
+    let square = |x: &[f64]| x.iter().map(|x| x * x).sum::<f64>();
+    let apart = |x: &[f64], y: &[f64]| x.iter().zip(y).map(|(x, y)| (x - y) * (x - y)).sum::<f64>();
+    for (i, a) in problem.fit.iter().enumerate() {
+        for b in &problem.fit[..i] {
+            let same = a.len == b.len && a.inputs.iter().zip(&b.inputs).all(|(x, y)| square(x) > 0.0 && apart(x, y) < 1e-6 * square(x));
+            if !same {
+                continue;
+            }
+            for (o, output) in problem.model.outputs.iter().enumerate() {
+                let (Some(Some(x)), Some(Some(y))) = (a.outputs.get(o), b.outputs.get(o)) else { continue };
+                let off = (apart(x, y) / (2 * x.len()) as f64).sqrt();
+                let floors = off / problem.floor[o];
+                let text = if floors > 3.0 {
+                    format!("repeats {} to {off:.2e} only, {floors:.1} times its noise: no model can do better", file_name(&b.name))
+                } else {
+                    format!("repeats {} to its noise", file_name(&b.name))
+                };
+                let weight = if floors > 3.0 { Weight::Caution } else { Weight::Note };
+                add(&mut all, weight, a, &output.name, "repeats", text);
+            }
+        }
+    }
+    all
+}
+
+/// Whether a force is fed back from an output: the noise of the output then shows in the force one sample later.
+pub(super) fn closed_loop(problem: &Problem, all: &mut Vec<Remark>) {
+    for record in &problem.fit {
+        for (input, u) in problem.model.inputs.iter().zip(&record.inputs).filter(|(i, _)| i.kind == InputKind::Force) {
+            for (output, y) in problem.model.outputs.iter().zip(&record.outputs) {
+                let Some(y) = y else { continue };
+                if !matches!(output.kind, OutputKind::Position(_) | OutputKind::Velocity(_)) {
+                    continue;
+                }
+                let found = answers(u, y);
+                if found > CLOSED {
+                    let text = format!(
+                        "follows the noise of {} (correlation {found:.2}): a controller closes the loop, and hides what it can reject",
+                        output.name
+                    );
+                    add(all, Weight::Note, record, &input.name, "loop", text);
+                }
+            }
+        }
+    }
+}

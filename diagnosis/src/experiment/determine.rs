@@ -1,0 +1,100 @@
+//! The experiment that determines numbers which the recordings leave open.
+
+use super::planner::{Planner, SETTING_UP, SUBSTEPS};
+use super::rivals::Rival;
+use super::types::{Experiment, MOST_REPEATS, Reason, WANTED};
+use super::words::{described, short};
+use crate::evaluator::Evaluator;
+use crate::problem::Problem;
+use crate::signal::rms;
+use crate::structure::{Role, Structure};
+use crate::work::Budget;
+use backdrive_plant::model::Model;
+
+/// Standard deviation over the number itself from which on [`excite`] takes it as open.
+const KNOWN: f64 = 0.05;
+
+/// The excitation that determines numbers of a structure which the recordings do not: `numbers` are places among
+/// [`Structure::numbers`], `model` the structure's model with `values`. What exceeds the budget is not tried.
+///
+/// # Errors
+/// Says why when no excitation would determine them.
+pub fn excite<'a>(
+    problem: &'a Problem,
+    model: &Model,
+    structure: &Structure,
+    values: &[f64],
+    numbers: &[usize],
+    floor: &[f64],
+    budget: &Budget<'a>,
+) -> Result<Experiment, Reason> {
+    let numbers: Vec<usize> = numbers.iter().copied().filter(|j| structure.numbers.get(*j).is_some_and(|n| n.records.is_none())).collect();
+    if numbers.is_empty() || values.len() != structure.numbers.len() {
+        return Err(Reason("there is no number to determine".to_string()));
+    }
+    let planner = Planner::new(problem, floor, budget)?;
+    let mut evaluator = Evaluator::new(problem);
+    (evaluator.floor, evaluator.substeps) = (planner.setup.sensors.floor.clone(), SUBSTEPS.0);
+    let own: Vec<f64> = structure.numbers.iter().zip(values).map(|(n, v)| n.inward(*v)).collect();
+    let residuals = evaluator.residuals(structure, values).ok_or_else(|| Reason("the model diverges on the recordings".to_string()))?;
+    let known = Rival::with(structure, values, &evaluator.jacobian(structure, &own, &residuals), 1.0);
+    let before = known.deviations(None);
+    let whole = |j: usize| if structure.numbers[j].log { 1.0 } else { own[j].abs() };
+    let numbers: Vec<usize> = numbers.into_iter().filter(|j| before[*j] > KNOWN * whole(*j)).collect();
+    if numbers.is_empty() {
+        return Err(Reason(format!("the recordings determine all of these numbers to {} % or better", short(100.0 * KNOWN))));
+    }
+    let cases = planner.cases(std::slice::from_ref(&known));
+    // What a standard deviation is compared with: the parameter itself, or its standard deviation from the recordings where that is smaller.
+    let size = |j: usize| if whole(j) > 0.0 { whole(j).min(before[j]) } else { before[j] };
+    let places: Vec<usize> = (0..cases.len()).collect();
+    let determined = planner.setup.budget.abreast(&places, |budget, s| {
+        let case = &cases[*s];
+        let jacobian = known.jacobian(&planner.setup.within(budget), &case.trial, &known.own, &case.predictions[0]);
+        let after = known.deviations(Some(&jacobian));
+        let worst = numbers.iter().map(|j| size(*j) / after[*j]).fold(f64::INFINITY, f64::min);
+        (*s, worst, after)
+    });
+    let gains: Vec<(usize, f64, Vec<f64>)> = determined.into_iter().flatten().filter(|g| g.1.is_finite()).collect();
+    let rate = |g: &(usize, f64, Vec<f64>)| g.1 * g.1 / (cases[g.0].trial.seconds() + SETTING_UP);
+    let best = gains.iter().max_by(|a, b| rate(a).total_cmp(&rate(b)));
+    let names: Vec<String> = numbers.iter().map(|j| name_of(problem, structure, *j)).collect();
+    let least = WANTED / f64::from(MOST_REPEATS).sqrt();
+    let Some((case, separation, after)) = best.filter(|g| g.1 >= least) else {
+        let list = names.join(", ");
+        return Err(Reason(format!(
+            "no excitation within the range of the recordings determines {list}: it takes larger amplitudes, another sensor or another input"
+        )));
+    };
+    let case = &cases[*case];
+    let accuracy = numbers.iter().map(|j| {
+        let number = &structure.numbers[*j];
+        let percent = 100.0 * if number.log { after[*j] } else { after[*j] / values[*j].abs().max(f64::MIN_POSITIVE) };
+        if values[*j] == 0.0 {
+            format!("{} to {}", name_of(problem, structure, *j), short(after[*j]))
+        } else {
+            format!("{} to {} %", name_of(problem, structure, *j), short(percent))
+        }
+    });
+    let sentence = format!(
+        "Play {}: it determines {}, which the recordings leave open.",
+        described(model, &case.trial),
+        accuracy.collect::<Vec<_>>().join(", ")
+    );
+    let jacobian = known.jacobian(&planner.setup, &case.trial, &known.own, &case.predictions[0]);
+    let change: Vec<f64> = jacobian.get(numbers[0]).map(|c| c.iter().map(|x| x * after[numbers[0]]).collect()).unwrap_or_default();
+    Ok(planner.experiment(case, sentence, names, *separation, &change, rms(&change)))
+}
+
+/// What a number is called.
+fn name_of(problem: &Problem, structure: &Structure, number: usize) -> String {
+    match structure.numbers.get(number).map(|n| &n.role) {
+        Some(Role::Stated(i)) => problem.stated.get(*i).map_or_else(String::new, |s| s.path.clone()),
+        Some(Role::Added(h, p)) => {
+            let hypothesis = structure.added.get(*h);
+            let key = hypothesis.and_then(|h| h.parameters.get(*p)).map_or("", |p| p.key.as_str());
+            format!("{key} of {}", hypothesis.map_or("", |h| h.id.as_str()))
+        }
+        _ => String::new(),
+    }
+}

@@ -1,0 +1,237 @@
+//! Every experiment that may be chosen, simulated with each rival, and how well each separates them.
+
+use super::menu::{Choice, InputRange, choices};
+use super::rivals::Rival;
+use super::sensor;
+use super::setup::{Sensors, Setup, Trial};
+use super::types::{Experiment, Reason, WANTED, repeats};
+use super::words::{self, short};
+use crate::problem::Problem;
+use crate::structure::Structure;
+use crate::work::{Budget, Steps};
+use backdrive_plant::write::round_significant;
+use rayon::prelude::*;
+
+/// Time that it takes to set an experiment up, s: without it the shortest would always be chosen.
+pub(super) const SETTING_UP: f64 = 2.0;
+/// Largest ratio of predicted to recorded peaks of positions and speeds.
+const REACH: f64 = 1.3;
+/// Share of the work for simulating everything, and for simulating and evaluating it.
+const SHARES: (f64, f64) = (0.4, 0.75);
+/// Substeps per sample for choosing, and for the figures of the best.
+pub(super) const SUBSTEPS: (usize, usize) = (4, 16);
+
+/// Whether no recording can tell two structures apart.
+pub(super) fn same(a: &Structure, b: &Structure) -> bool {
+    let classes = |s: &Structure| {
+        let mut all: Vec<String> = s.added.iter().map(|h| h.class.clone()).collect();
+        all.sort();
+        all
+    };
+    classes(a) == classes(b)
+}
+
+/// An experiment with what each rival predicts for it.
+pub(super) struct Case {
+    pub trial: Trial,
+    /// Of each rival, in noise standard deviations.
+    pub predictions: Vec<Vec<f64>>,
+}
+
+/// How well a case, by its index, separates each pair of rivals, standard deviations.
+pub(super) struct Evaluated {
+    pub case: usize,
+    pub pairs: Vec<((usize, usize), f64)>,
+}
+
+impl Evaluated {
+    pub(super) fn of(&self, pair: (usize, usize)) -> f64 {
+        self.pairs.iter().find(|p| p.0 == pair).map_or(0.0, |p| p.1)
+    }
+
+    /// Squared separation of the worst of some pairs per second.
+    pub(super) fn score(&self, pairs: &[(usize, usize)], cases: &[Case]) -> f64 {
+        let worst = pairs.iter().map(|p| self.of(*p)).fold(f64::INFINITY, f64::min);
+        worst * worst / (cases[self.case].trial.seconds() + SETTING_UP)
+    }
+}
+
+impl Trial {
+    /// Its length, s.
+    pub(super) fn seconds(&self) -> f64 {
+        self.record.len as f64 * self.record.period
+    }
+}
+
+/// A problem with the recorded ranges of its inputs.
+pub(super) struct Planner<'a> {
+    pub setup: Setup<'a>,
+    ranges: Vec<Option<InputRange>>,
+    rate_hz: f64,
+    longest: f64,
+    /// Counts at which simulating, and evaluating, come to an end.
+    ends: (Steps, Steps),
+}
+
+impl<'a> Planner<'a> {
+    pub(super) fn new(problem: &'a Problem, floor: &[f64], budget: &Budget<'a>) -> Result<Planner<'a>, Reason> {
+        let ranges: Vec<Option<InputRange>> = (0..problem.model.inputs.len()).map(|i| InputRange::of(problem, i)).collect();
+        let lengths = problem.fit.iter().map(|r| (r.len as f64 * r.period, r.period));
+        let longest = lengths.max_by(|a, b| a.0.total_cmp(&b.0));
+        let Some((longest, period)) = longest.filter(|_| ranges.iter().any(Option::is_some)) else {
+            return Err(Reason("no input moves in any recording, so nothing says what the device stands".to_string()));
+        };
+        let end = |share: f64| budget.spent() + (share * budget.left() as f64) as Steps;
+        let ends = (end(SHARES.0), end(SHARES.1));
+        let setup =
+            Setup { problem, sensors: Sensors::of(problem, floor), extra: Vec::new(), substeps: SUBSTEPS.0, budget: budget.clone() };
+        Ok(Planner { setup, ranges, rate_hz: round_significant(1.0 / period, 6), longest, ends })
+    }
+
+    /// Every excitation on which all rivals can be simulated, within the recorded ranges.
+    pub(super) fn cases(&self, rivals: &[Rival]) -> Vec<Case> {
+        let choices = choices(self.setup.problem, &self.ranges, 1.0 / self.rate_hz, self.longest);
+        let one = |budget: &Budget<'a>, choice: &Choice| {
+            let setup = self.setup.within(budget);
+            let mut trial = setup.trial(choice, &self.ranges, self.rate_hz)?;
+            let far = |trial: &Trial| rivals.first().and_then(|rival| rival.excursion(&setup, trial));
+            let reached = far(&trial)?;
+            if reached > REACH {
+                trial = setup.smaller(&trial, 0.9 * REACH / reached, &self.ranges, self.rate_hz)?;
+                far(&trial).filter(|reached| *reached <= 1.1 * REACH)?;
+            }
+            let predictions = rivals.iter().map(|r| r.prediction(&setup, &trial)).collect::<Option<Vec<_>>>()?;
+            Some(Case { trial, predictions })
+        };
+        self.setup.budget.until(self.ends.0).abreast(&choices, one).into_iter().flatten().flatten().collect()
+    }
+
+    /// How well experiments separate the rivals, to first order in their parameters. An experiment whose difference of predictions is smaller than what
+    /// another separates is not evaluated. Sorts `cases` by that difference, largest first.
+    pub(super) fn evaluate(&self, rivals: &[Rival], cases: &mut [Case], pairs: &[(usize, usize)], least: f64) -> Vec<Evaluated> {
+        let potential = |case: &Case| {
+            let one = |(a, b): &(usize, usize)| {
+                let difference: f64 = case.predictions[*a].iter().zip(&case.predictions[*b]).map(|(x, y)| (x - y).powi(2)).sum();
+                difference / rivals[*a].unit.max(rivals[*b].unit)
+            };
+            pairs.iter().map(one).fold(f64::INFINITY, f64::min) / (case.trial.seconds() + SETTING_UP)
+        };
+        cases.sort_by(|a, b| potential(b).total_cmp(&potential(a)));
+        let mut all: Vec<Evaluated> = Vec::new();
+        let mut at = 0;
+        while at < cases.len() && (at == 0 || self.setup.budget.spent() < self.ends.1) {
+            let best = all.iter().filter(|e| e.pairs.iter().all(|p| p.1 >= least)).map(|e| e.score(pairs, cases)).fold(0.0, f64::max);
+            if pairs.is_empty() || potential(&cases[at]) < best {
+                break;
+            }
+            let next: Vec<usize> = (at..cases.len().min(at + 4)).collect();
+            at += next.len();
+            all.par_extend(next.par_iter().map(|s| {
+                let case = &cases[*s];
+                let one = |(r, rival): (usize, &Rival)| rival.jacobian(&self.setup, &case.trial, &rival.own, &case.predictions[r]);
+                let jacobians: Vec<Vec<Vec<f64>>> = rivals.par_iter().enumerate().map(one).collect();
+                let left = |a: usize, b: usize| {
+                    let difference: Vec<f64> = case.predictions[b].iter().zip(&case.predictions[a]).map(|(x, y)| x - y).collect();
+                    rivals[a].unexplained(&jacobians[a], &difference).min(rivals[b].unexplained(&jacobians[b], &difference))
+                };
+                let sd = |p: &(usize, usize)| (*p, (left(p.0, p.1) / rivals[p.0].unit.max(rivals[p.1].unit)).sqrt());
+                Evaluated { case: *s, pairs: pairs.iter().map(sd).collect() }
+            }));
+        }
+        all
+    }
+
+    /// Why two rivals cannot be separated, and by which sensor they could.
+    pub(super) fn no_experiment(&self, rivals: &[Rival], cases: &[Case], (a, b): (usize, usize), reached: f64) -> Reason {
+        let (a, b) = (&rivals[a], &rivals[b]);
+        let [one, other] = words::names(a.structure, b.structure);
+        let mut said = format!("No excitation tells {one} and {other} apart with the sensors there are");
+        if same(a.structure, b.structure) {
+            said.push_str(&format!(": {}", words::same_force(a.structure, b.structure)));
+        } else {
+            said.push_str(&format!(" (at most {} standard deviations)", short(reached)));
+        }
+        // Some of the excitations, from the longest on.
+        let mut trials: Vec<&Trial> = cases.iter().map(|s| &s.trial).collect();
+        trials.sort_by(|x, y| y.seconds().total_cmp(&x.seconds()));
+        let spread: Vec<&Trial> = trials.iter().step_by((trials.len() / 4).max(1)).take(4).copied().collect();
+        let found = sensor::best(&self.setup, &spread, [a, b]).filter(|s| s.separation >= WANTED);
+        match found {
+            Some(sensor) => said.push_str(&format!(
+                "; measuring {} as well would ({} standard deviations with {}).",
+                sensor.words,
+                short(sensor.separation),
+                spread.get(sensor.trial).map_or(String::new(), |t| words::described(&self.setup.problem.model, t))
+            )),
+            None => said.push_str("; nor does any further sensor of position, velocity or element force."),
+        }
+        Reason(said)
+    }
+
+    /// The experiment that separates a pair best; `inseparable` is a pair that it does not.
+    pub(super) fn separating(
+        &self,
+        rivals: &[Rival],
+        case: &Case,
+        (a, b): (usize, usize),
+        separation: f64,
+        inseparable: Option<(usize, usize)>,
+    ) -> Experiment {
+        let difference: Vec<f64> = case.predictions[a].iter().zip(&case.predictions[b]).map(|(x, y)| x - y).collect();
+        let unit = rivals[a].unit.max(rivals[b].unit);
+        let level = separation * (unit / difference.len().max(1) as f64).sqrt();
+        let [one, other] = words::names(rivals[a].structure, rivals[b].structure);
+        let output = self.most(case, &difference);
+        let repeats = repeats(separation);
+        let again = if repeats > 1 { format!(", {repeats} times") } else { String::new() };
+        let mut sentence = format!(
+            "Play {}{again}: {one} and {other} then part by {} standard deviations ({} noise standard deviations rms, most of it in {output}), each refitted to it",
+            words::described(&self.setup.problem.model, &case.trial),
+            short(separation * f64::from(repeats).sqrt()),
+            short(level)
+        );
+        if let Some(why) = words::separator(rivals[a].structure, rivals[b].structure) {
+            sentence.push_str(&format!("; {why}"));
+        }
+        sentence.push('.');
+        if let Some((c, d)) = inseparable {
+            let [one, other] = words::names(rivals[c].structure, rivals[d].structure);
+            sentence.push_str(&format!(" It does not tell {one} and {other} apart."));
+        }
+        let between = rivals.iter().map(|r| r.structure.name()).collect();
+        self.experiment(case, sentence, between, separation, &difference, level)
+    }
+
+    /// The output with the largest share of a change, which is in noise standard deviations.
+    fn most(&self, case: &Case, change: &[f64]) -> String {
+        let size = |column: &[f64]| column.iter().map(|x| x * x).sum::<f64>();
+        let columns = change.chunks_exact(case.trial.record.len.max(1)).zip(self.setup.outputs(&case.trial.record));
+        let most = columns.max_by(|a, b| size(a.0).total_cmp(&size(b.0)));
+        most.and_then(|(_, o)| self.setup.problem.model.outputs.get(o)).map_or_else(String::new, |o| o.name.clone())
+    }
+
+    pub(super) fn experiment(
+        &self,
+        case: &Case,
+        sentence: String,
+        between: Vec<String>,
+        separation: f64,
+        change: &[f64],
+        level: f64,
+    ) -> Experiment {
+        let model = &self.setup.problem.model;
+        Experiment {
+            input: model.inputs.get(case.trial.choice.input).map_or_else(String::new, |i| i.name.clone()),
+            text: words::file(model, &case.trial, "next", &sentence, self.rate_hz),
+            excitation: case.trial.choice.excitation.to_string(),
+            sentence,
+            between,
+            separation,
+            level,
+            output: self.most(case, change),
+            repeats: repeats(separation),
+            duration: case.trial.seconds(),
+            rate_hz: self.rate_hz,
+        }
+    }
+}

@@ -1,0 +1,93 @@
+//! The experiment that separates rival structures.
+
+use super::planner::{Evaluated, Planner, SETTING_UP, SUBSTEPS, same};
+use super::rivals::Rival;
+use super::setup::{Setup, Trial};
+use super::types::{Experiment, MOST_REPEATS, Reason, WANTED};
+use crate::candidate::Candidate;
+use crate::fit::Fit;
+use crate::problem::Problem;
+use crate::structure::Structure;
+use crate::work::Budget;
+use rayon::prelude::*;
+
+/// Rivals, at most: those that come first are the likely ones.
+const MOST_RIVALS: usize = 4;
+/// Experiments that are compared by a true refit.
+const FINALISTS: usize = 3;
+
+/// The excitation that tells fitted structures apart, the likeliest first. `floor` is the noise standard deviation of each output, in its
+/// unit. What exceeds the budget is not tried.
+///
+/// # Errors
+/// Says why when no excitation would: fewer than two structures, none that can be simulated, or a difference too small; then also which sensor would help.
+pub fn separate<'a>(problem: &'a Problem, candidates: &[&Candidate], floor: &[f64], budget: &Budget<'a>) -> Result<Experiment, Reason> {
+    let fitted: Vec<(&Structure, &Fit)> = candidates.iter().map(|c| (&c.structure, &c.fit)).collect();
+    separate_fitted(problem, &fitted, floor, budget)
+}
+
+pub(super) fn separate_fitted<'a>(
+    problem: &'a Problem,
+    fitted: &[(&Structure, &Fit)],
+    floor: &[f64],
+    budget: &Budget<'a>,
+) -> Result<Experiment, Reason> {
+    let mut names = std::collections::HashSet::new();
+    let others = fitted.iter().filter(|(structure, _)| names.insert(ids(structure)));
+    let rivals: Vec<Rival> = others.take(MOST_RIVALS).map(|(structure, fit)| Rival::of(problem, structure, fit)).collect();
+    let all: Vec<(usize, usize)> = (0..rivals.len()).flat_map(|b| (0..b).map(move |a| (a, b))).collect();
+    let Some(first) = all.first() else { return Err(Reason("there is only one explanation".to_string())) };
+    let planner = Planner::new(problem, floor, budget)?;
+    let distinct: Vec<(usize, usize)> = all.iter().copied().filter(|(a, b)| !same(rivals[*a].structure, rivals[*b].structure)).collect();
+    let mut cases = planner.cases(&rivals);
+    if cases.is_empty() {
+        return Err(Reason("no excitation could be simulated with all of the explanations".to_string()));
+    }
+    let least = WANTED / f64::from(MOST_REPEATS).sqrt();
+    let evaluated = planner.evaluate(&rivals, &mut cases, &distinct, least);
+    let reached = |p: &(usize, usize)| evaluated.iter().any(|e| e.of(*p) >= least);
+    let separable: Vec<(usize, usize)> = distinct.iter().copied().filter(reached).collect();
+    if separable.is_empty() {
+        let pair = distinct.first().unwrap_or(first);
+        return Err(planner.no_experiment(&rivals, &cases, *pair, evaluated.iter().map(|e| e.of(*pair)).fold(0.0, f64::max)));
+    }
+    let mut ranked: Vec<&Evaluated> = evaluated.iter().collect();
+    ranked.sort_by(|a, b| b.score(&separable, &cases).total_cmp(&a.score(&separable, &cases)));
+    let fine = Setup { substeps: SUBSTEPS.1, ..planner.setup.clone() };
+    let refitted = |e: &&Evaluated| {
+        let trial = &cases[e.case].trial;
+        let left = |p: &(usize, usize)| {
+            let left = refitted(&fine, &rivals, trial, *p);
+            // A refit that was cut short gives too large a separation.
+            (*p, if budget.is_over() { left.min(e.of(*p)) } else { left })
+        };
+        let worst = separable.iter().map(left).min_by(|a, b| a.1.total_cmp(&b.1))?;
+        Some((e.case, worst.0, worst.1))
+    };
+    let finalists: Vec<(usize, (usize, usize), f64)> = ranked.iter().take(FINALISTS).filter_map(refitted).collect();
+    let rate = |f: &(usize, (usize, usize), f64)| f.2 * f.2 / (cases[f.0].trial.seconds() + SETTING_UP);
+    let best = finalists.iter().max_by(|a, b| rate(a).total_cmp(&rate(b)));
+    let Some((case, pair, separation)) = best.copied().filter(|f| f.2 >= least) else {
+        let pair = separable[0];
+        return Err(planner.no_experiment(&rivals, &cases, pair, best.map_or(0.0, |f| f.2)));
+    };
+    let inseparable = all.iter().copied().find(|p| !separable.contains(p));
+    Ok(planner.separating(&rivals, &cases[case], pair, separation, inseparable))
+}
+
+/// The physics that a structure adds, sorted, so that their order does not matter.
+fn ids(structure: &Structure) -> Vec<&str> {
+    let mut all: Vec<&str> = structure.added.iter().map(|h| h.id.as_str()).collect();
+    all.sort_unstable();
+    all
+}
+
+/// Separation of two rivals when each is refitted to the prediction of the other, standard deviations; infinite where the budget is used up.
+fn refitted(setup: &Setup, rivals: &[Rival], trial: &Trial, (a, b): (usize, usize)) -> f64 {
+    if setup.budget.is_over() {
+        return f64::INFINITY;
+    }
+    let unit = rivals[a].unit.max(rivals[b].unit);
+    let left = [(a, b), (b, a)].into_par_iter().map(|(one, other)| rivals[one].refit(setup, trial, &rivals[other]).unwrap_or(0.0));
+    (left.reduce(|| f64::INFINITY, f64::min) / unit).sqrt()
+}

@@ -1,0 +1,43 @@
+//! An experiment that was chosen, or why there is none.
+
+/// An experiment that was not made yet.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Experiment {
+    /// The input that it drives.
+    pub input: String,
+    /// What to play, and what would be seen.
+    pub sentence: String,
+    /// The excitation file.
+    pub text: String,
+    /// The excitation on one line, as command lines and graphs have it.
+    pub excitation: String,
+    /// What it tells apart, or the numbers that it determines.
+    pub between: Vec<String>,
+    /// Standard deviations between the two of them that it separates least, each refitted to it.
+    pub separation: f64,
+    /// Root mean square of that difference over all samples, noise standard deviations. For [`excite`] that of one standard deviation of the number.
+    pub level: f64,
+    /// The output in which most of it shows.
+    pub output: String,
+    /// How often it has to be played for [`WANTED`] standard deviations.
+    pub repeats: u32,
+    /// Length of one playing, s.
+    pub duration: f64,
+    /// Sampling rate that it was planned for, Hz.
+    pub rate_hz: f64,
+}
+
+/// Why there is no experiment, in one sentence that says what would help.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{0}")]
+pub struct Reason(pub String);
+
+/// Standard deviations at which explanations count as told apart.
+pub const WANTED: f64 = 5.0;
+/// An experiment that would have to be played more often is none.
+pub(super) const MOST_REPEATS: u32 = 10;
+
+/// How often an experiment is played for [`WANTED`] standard deviations.
+pub(super) fn repeats(separation: f64) -> u32 {
+    ((WANTED / separation).powi(2).ceil() as u32).clamp(1, MOST_REPEATS)
+}

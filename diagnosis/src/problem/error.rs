@@ -1,0 +1,26 @@
+//! Why there is nothing to diagnose.
+
+use backdrive_bags::BagError;
+use backdrive_plant::recording::RecordingError;
+use backdrive_plant::stepper::CompileError;
+use backdrive_plant::tomlfile::FileError;
+
+/// Why there is nothing to diagnose.
+#[derive(Debug, thiserror::Error)]
+pub enum ProblemError {
+    /// A file cannot be read, or says something impossible.
+    #[error(transparent)]
+    File(#[from] FileError),
+    /// A bag cannot be read.
+    #[error(transparent)]
+    Bag(#[from] BagError),
+    /// Samples are no recording of this model.
+    #[error(transparent)]
+    Recording(#[from] RecordingError),
+    /// The nominal model cannot be simulated.
+    #[error("the nominal model cannot be simulated: {0}")]
+    Model(#[from] CompileError),
+    /// The set does not say which model, or names nothing to fit.
+    #[error("{0}")]
+    Set(String),
+}
