@@ -6,6 +6,7 @@ use crate::locate::{self, Course, force_along, locate};
 use crate::problem::{Problem, Record};
 use crate::signal::rate;
 use crate::structure::Structure;
+use crate::tuning::tuning;
 use backdrive_plant::describe::unit_for;
 use backdrive_plant::model::{Element, Input, InputKind, Model, Output, OutputKind};
 use backdrive_plant::set::Condition;
@@ -60,9 +61,6 @@ pub struct Evidence {
     pub traces: Vec<Trace>,
 }
 
-/// Samples that a force is estimated at, at most.
-const SAMPLES: usize = 8000;
-
 /// Evidence of one of the physics that a candidate adds; `None` where nothing can be located there. `floor` is the noise
 /// standard deviation of each output, in its unit.
 pub fn evidence(problem: &Problem, best: &Candidate, floor: &[f64], which: usize) -> Option<Evidence> {
@@ -80,7 +78,7 @@ pub fn evidence(problem: &Problem, best: &Candidate, floor: &[f64], which: usize
     let changed: Vec<Model> = records.iter().map(|r| under(&without, r)).collect();
     let runs: Vec<locate::Run> =
         records.iter().zip(&changed).map(|(r, m)| locate::Run { model: Some(m), ..locate::Run::from(r) }).collect();
-    let options = locate::Options { most_samples: SAMPLES, only: Some(finding.place.clone()), ..locate::Options::quick() };
+    let options = locate::Options { most_samples: tuning().locate.samples, only: Some(finding.place.clone()), ..locate::Options::quick() };
     let location = locate(&without, &runs, floor, &options).ok()?;
     let found = location.ranking.into_iter().find(|c| c.place.same(&finding.place))?;
     let against = finding.physics.against;

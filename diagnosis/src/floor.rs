@@ -1,12 +1,8 @@
 //! Noise standard deviation of a measured signal, from its differences of rising order.
 
 use crate::problem::Record;
+use crate::tuning::tuning;
 use backdrive_plant::model::Model;
-
-/// Orders of difference that are tried: a smooth signal vanishes in one of them, white noise in none.
-const ORDERS: usize = 6;
-/// Blocks of a signal. Most of them hold no step and no reversal of friction, so their median is that of the noise.
-const BLOCKS: usize = 40;
 
 /// Standard deviation of the white part of a signal, in its unit: over differences of rising order, each scaled so that
 /// white noise keeps its size, the smallest of the medians over blocks. `None` for fewer than 40 samples.
@@ -22,14 +18,14 @@ fn blocks_of(samples: &[f64]) -> Option<Vec<Vec<f64>>> {
     let mut difference = samples.to_vec();
     let mut gain = 1.0;
     let mut all = Vec::new();
-    for order in 1..=ORDERS {
+    for order in 1..=tuning().recordings.noise_orders {
         for i in 0..difference.len() - 1 {
             difference[i] = difference[i + 1] - difference[i];
         }
         difference.pop();
         // The squares of binomial coefficients add up to C(2 order, order).
         gain *= 2.0 * (2 * order - 1) as f64 / order as f64;
-        let size = (difference.len() / BLOCKS).max(16);
+        let size = (difference.len() / tuning().recordings.noise_blocks).max(16);
         all.push(difference.chunks_exact(size).map(|b| b.iter().map(|x| x * x).sum::<f64>() / (gain * size as f64)).collect());
     }
     Some(all)
@@ -40,7 +36,7 @@ fn median_of_orders(signals: &[Vec<Vec<f64>>]) -> f64 {
         let mut all: Vec<f64> = signals.iter().filter_map(|s| s.get(order)).flatten().copied().collect();
         median(&mut all)
     };
-    (0..ORDERS).map(of_order).fold(f64::INFINITY, f64::min).sqrt()
+    (0..tuning().recordings.noise_orders).map(of_order).fold(f64::INFINITY, f64::min).sqrt()
 }
 
 fn median(values: &mut [f64]) -> f64 {
@@ -69,7 +65,7 @@ fn of(signals: &[&[f64]], least: f64, spread: f64) -> f64 {
     let white = median_of_orders(&blocks);
     // Residuals are divided by it, so it is never 0: at least a millionth of the signal.
     let white = if white.is_finite() { white } else { 0.0 };
-    white.max(least).max(1e-6 * spread)
+    white.max(least).max(tuning().recordings.least_noise * spread)
 }
 
 /// Noise standard deviation that the model file states for an output, with that of rounding to its resolution q, q/√12; where the file states no

@@ -5,20 +5,11 @@ use super::units::factor;
 use crate::evaluator::measured;
 use crate::problem::{Problem, Record};
 use crate::simulate::predict;
+use crate::tuning::tuning;
 use backdrive_plant::stepper::segments;
 
-/// Largest ratio of sample times in a set: beyond it the faster recording has octaves above the band of the slower one.
-const APART: f64 = 2.0;
 /// Units that time is recorded in, s, and how its values read.
 const UNITS: [(f64, &str); 3] = [(1e-3, "milliseconds"), (1e-6, "microseconds"), (1e-9, "nanoseconds")];
-/// How near a ratio of sample times must be to that of two units, as a factor.
-const NEAR: f64 = 1.3;
-/// Sample time above which a device of this kind is not sampled, s: from there on another unit is tried.
-const SLOW: f64 = 0.02;
-/// Share of the residual's power that another unit of time must remove.
-const TAKEN: f64 = 0.75;
-/// Correlation of measured and predicted in that unit.
-const ALIKE: f64 = 0.85;
 
 /// Whether the sample times of a set's recordings fit together: between samples an input runs as its hold says, so that a slow recording does not
 /// say what drives the device where a fast one shows that it does.
@@ -30,11 +21,11 @@ pub fn rates(problem: &Problem) -> Result<(), String> {
     let by_period = |a: &&&Record, b: &&&Record| a.period.total_cmp(&b.period);
     let (Some(fast), Some(slow)) = (all.iter().min_by(by_period), all.iter().max_by(by_period)) else { return Ok(()) };
     let ratio = slow.period / fast.period;
-    if ratio <= APART {
+    if ratio <= tuning().recordings.sample_times {
         return Ok(());
     }
     let (slow_name, fast_name) = (file_name(&slow.name), file_name(&fast.name));
-    let unit = UNITS.iter().find(|(unit, _)| (ratio * unit).max(1.0 / (ratio * unit)) < NEAR);
+    let unit = UNITS.iter().find(|(unit, _)| (ratio * unit).max(1.0 / (ratio * unit)) < tuning().recordings.unit_near);
     let advice = match unit {
         Some((unit, word)) => format!(
             "its time looks like {word}: say t = {{ column = \"t\", scale = {unit:e} }} under [columns] of a set.toml for these files, or convert it"
@@ -51,13 +42,14 @@ pub fn rates(problem: &Problem) -> Result<(), String> {
 
 /// Whether time is in seconds, as far as the nominal model can tell: a sentence where another unit makes measured and predicted agree.
 pub(super) fn unit_of_time(problem: &Problem) -> Option<String> {
-    let record = problem.fit.iter().max_by(|a, b| a.period.total_cmp(&b.period)).filter(|r| r.period > SLOW)?;
+    let record = problem.fit.iter().max_by(|a, b| a.period.total_cmp(&b.period)).filter(|r| r.period > tuning().recordings.slow)?;
     let as_given = unexplained_variance(problem, record, record.period)?;
     let (left, unit, word) = UNITS
         .iter()
         .filter_map(|(unit, word)| Some((unexplained_variance(problem, record, record.period * unit)?, *unit, *word)))
         .min_by(|a, b| a.0.total_cmp(&b.0))?;
-    let better = left < (1.0 - TAKEN) * as_given && left < 1.0 - ALIKE * ALIKE;
+    let better = left < (1.0 - tuning().recordings.time_unit_removes) * as_given
+        && left < 1.0 - tuning().recordings.time_unit_correlates * tuning().recordings.time_unit_correlates;
     better.then(|| {
         format!(
             "{}: has a sample every {:.4} s, and the model does not move like that; read as {word} it explains {:.0} % of the motion's variance \

@@ -3,12 +3,8 @@
 use super::remark::{Remark, Weight, add};
 use super::signals::{clipped_share, is_constant, off_grid, quiet_top};
 use crate::problem::{Problem, Record};
+use crate::tuning::tuning;
 use backdrive_plant::model::{InputKind, OutputKind};
-
-/// Distance from the even grid, in sample periods, above which a clock is called uneven.
-const JITTER: f64 = 0.05;
-/// Share of samples at a signal's two extremes above which it looks clipped.
-const CLIPPED: f64 = 0.02;
 
 /// Every check of one recording.
 pub(super) fn record(problem: &Problem, record: &Record, all: &mut Vec<Remark>) {
@@ -46,7 +42,7 @@ fn clock(record: &Record, all: &mut Vec<Remark>) {
             jitter.gaps[0].after
         );
         add(all, Weight::Caution, record, "", "gaps", text);
-    } else if jitter.largest > JITTER * record.period {
+    } else if jitter.largest > tuning().recordings.jitter * record.period {
         let text = format!(
             "the clock is off its grid by {:.1} % of a sample rms and {:.0} % at worst; delays below that are not claimed",
             100.0 * jitter.rms / record.period,
@@ -66,7 +62,7 @@ fn constant(record: &Record, name: &str, samples: &[f64], all: &mut Vec<Remark>)
 /// Samples that stay at an extreme for longer than a smooth signal does.
 fn clipped(record: &Record, name: &str, samples: &[f64], why: &str, all: &mut Vec<Remark>) {
     let (share, low, high) = clipped_share(samples);
-    if share > CLIPPED {
+    if share > tuning().recordings.clipped {
         let text = format!("stays at {low:.4} or {high:.4} for {:.0} % of the time: {why}", 100.0 * share);
         add(all, Weight::Note, record, name, "saturated", text);
     }

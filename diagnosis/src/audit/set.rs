@@ -3,10 +3,8 @@
 use super::remark::{Remark, Weight, add, file_name};
 use super::signals::answers;
 use crate::problem::Problem;
+use crate::tuning::tuning;
 use backdrive_plant::model::{InputKind, OutputKind};
-
-/// Correlation of a command's noise with a sensor's above which a controller closes the loop.
-const CLOSED: f64 = 0.5;
 
 /// Noise standard deviation of each output.
 pub(super) fn noises(problem: &Problem) -> Vec<Remark> {
@@ -62,7 +60,7 @@ pub(super) fn closed_loop(problem: &Problem, all: &mut Vec<Remark>) {
                     continue;
                 }
                 let found = answers(u, y);
-                if found > CLOSED {
+                if found > tuning().recordings.closed_loop {
                     let text = format!(
                         "follows the noise of {} (correlation {found:.2}): a controller closes the loop, and hides what it can reject",
                         output.name

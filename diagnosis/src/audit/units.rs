@@ -3,16 +3,8 @@
 use super::remark::{Remark, Weight, file_name};
 use crate::problem::Problem;
 use crate::simulate::predict;
+use crate::tuning::tuning;
 use backdrive_plant::model::{Motion, OutputKind};
-
-/// Correlation of measured and predicted from which on a factor between them means something.
-const ALIKE: f64 = 0.9;
-/// Factor beyond which a unit is wrong, and no number off.
-const FAR: f64 = 20.0;
-/// How near a factor must be to that of a known unit, as a factor.
-const NEAR: f64 = 1.3;
-/// How far, as a factor, the recordings may differ in it.
-const ALIKE_FACTORS: f64 = 1.5;
 
 /// Factors of measured over predicted that units make, and what the measured values then are in.
 fn known(kind: &OutputKind, motion: Motion) -> &'static [(f64, &'static str)] {
@@ -41,7 +33,7 @@ pub(super) fn remarks(problem: &Problem) -> Vec<Remark> {
             let lag = problem.lag.get(index).copied().unwrap_or(0);
             of_records.push((factor(samples, column, lag), record));
         }
-        let sure = |f: &(f64, f64)| f.1.abs() > ALIKE;
+        let sure = |f: &(f64, f64)| f.1.abs() > tuning().recordings.unit_correlates;
         if of_records.is_empty() || !of_records.iter().all(|(f, _)| sure(f)) {
             continue;
         }
@@ -49,7 +41,7 @@ pub(super) fn remarks(problem: &Problem) -> Vec<Remark> {
         let size = factors.iter().map(|f| f.abs().ln()).sum::<f64>() / factors.len() as f64;
         let size = size.exp();
         let least = of_records.iter().map(|(f, _)| f.1.abs()).fold(1.0, f64::min);
-        let alike = factors.iter().all(|f| (f.abs() / size).max(size / f.abs()) < ALIKE_FACTORS);
+        let alike = factors.iter().all(|f| (f.abs() / size).max(size / f.abs()) < tuning().recordings.unit_alike);
         let remark = |weight, about, text| Remark { weight, records: Vec::new(), signal: output.name.clone(), about, text };
         if factors.iter().all(|f| *f < 0.0) {
             let text = format!(
@@ -57,10 +49,10 @@ pub(super) fn remarks(problem: &Problem) -> Vec<Remark> {
             );
             all.push(remark(Weight::Caution, "sign", text));
         }
-        if !alike || size < FAR && size > 1.0 / FAR {
+        if !alike || size < tuning().recordings.unit_far && size > 1.0 / tuning().recordings.unit_far {
             continue;
         }
-        let near = |f: f64| (size / f).max(f / size) < NEAR;
+        let near = |f: f64| (size / f).max(f / size) < tuning().recordings.unit_near;
         let text = match known(&output.kind, problem.model.motion).iter().find(|k| near(k.0)) {
             Some((f, unit)) => format!(
                 "is {} times what the model says, at a correlation of {least:.2}: its values look like {unit}; say scale = {} for it under [columns] of set.toml",
@@ -73,7 +65,7 @@ pub(super) fn remarks(problem: &Problem) -> Vec<Remark> {
             ),
         };
         let found = of_records.first().map(|(_, r)| file_name(&r.name).to_string());
-        let far = !(0.1 / FAR..=10.0 * FAR).contains(&size);
+        let far = !(0.1 / tuning().recordings.unit_far..=10.0 * tuning().recordings.unit_far).contains(&size);
         let weight = if far { Weight::Unusable } else { Weight::Caution };
         all.push(Remark { records: found.filter(|_| of_records.len() == 1).into_iter().collect(), ..remark(weight, "unit", text) });
     }

@@ -1,18 +1,16 @@
 //! The experiment that determines numbers which the recordings leave open.
 
-use super::planner::{Planner, SETTING_UP, SUBSTEPS};
+use super::planner::Planner;
 use super::rivals::Rival;
-use super::types::{Experiment, MOST_REPEATS, Reason, WANTED};
+use super::types::{Experiment, Reason};
 use super::words::{described, short};
 use crate::evaluator::Evaluator;
 use crate::problem::Problem;
 use crate::signal::rms;
 use crate::structure::{Role, Structure};
+use crate::tuning::tuning;
 use crate::work::Budget;
 use backdrive_plant::model::Model;
-
-/// Standard deviation over the number itself from which on [`excite`] takes it as open.
-const KNOWN: f64 = 0.05;
 
 /// The excitation that determines numbers of a structure which the recordings do not: `numbers` are places among
 /// [`Structure::numbers`], `model` the structure's model with `values`. What exceeds the budget is not tried.
@@ -34,15 +32,18 @@ pub fn excite<'a>(
     }
     let planner = Planner::new(problem, floor, budget)?;
     let mut evaluator = Evaluator::new(problem);
-    (evaluator.floor, evaluator.substeps) = (planner.setup.sensors.floor.clone(), SUBSTEPS.0);
+    (evaluator.floor, evaluator.substeps) = (planner.setup.sensors.floor.clone(), tuning().experiment.substeps[0]);
     let own: Vec<f64> = structure.numbers.iter().zip(values).map(|(n, v)| n.inward(*v)).collect();
     let residuals = evaluator.residuals(structure, values).ok_or_else(|| Reason("the model diverges on the recordings".to_string()))?;
     let known = Rival::with(structure, values, &evaluator.jacobian(structure, &own, &residuals), 1.0);
     let before = known.deviations(None);
     let whole = |j: usize| if structure.numbers[j].log { 1.0 } else { own[j].abs() };
-    let numbers: Vec<usize> = numbers.into_iter().filter(|j| before[*j] > KNOWN * whole(*j)).collect();
+    let numbers: Vec<usize> = numbers.into_iter().filter(|j| before[*j] > tuning().experiment.open * whole(*j)).collect();
     if numbers.is_empty() {
-        return Err(Reason(format!("the recordings determine all of these numbers to {} % or better", short(100.0 * KNOWN))));
+        return Err(Reason(format!(
+            "the recordings determine all of these numbers to {} % or better",
+            short(100.0 * tuning().experiment.open)
+        )));
     }
     let cases = planner.cases(std::slice::from_ref(&known));
     // What a standard deviation is compared with: the parameter itself, or its standard deviation from the recordings where that is smaller.
@@ -56,10 +57,10 @@ pub fn excite<'a>(
         (*s, worst, after)
     });
     let gains: Vec<(usize, f64, Vec<f64>)> = determined.into_iter().flatten().filter(|g| g.1.is_finite()).collect();
-    let rate = |g: &(usize, f64, Vec<f64>)| g.1 * g.1 / (cases[g.0].trial.seconds() + SETTING_UP);
+    let rate = |g: &(usize, f64, Vec<f64>)| g.1 * g.1 / (cases[g.0].trial.seconds() + tuning().experiment.setting_up);
     let best = gains.iter().max_by(|a, b| rate(a).total_cmp(&rate(b)));
     let names: Vec<String> = numbers.iter().map(|j| name_of(problem, structure, *j)).collect();
-    let least = WANTED / f64::from(MOST_REPEATS).sqrt();
+    let least = tuning().experiment.wanted / f64::from(tuning().experiment.most_repeats as u32).sqrt();
     let Some((case, separation, after)) = best.filter(|g| g.1 >= least) else {
         let list = names.join(", ");
         return Err(Reason(format!(

@@ -14,6 +14,7 @@
 //! | a bias with little on it | lopsided laws from offsets; a bias closes a gap |
 
 use crate::problem::Problem;
+use crate::tuning::tuning;
 use backdrive_plant::excitation::{Excitation, Grid, Shape, Spacing};
 use backdrive_plant::model::InputKind;
 use backdrive_plant::write::round_significant;
@@ -36,15 +37,6 @@ pub(super) struct InputRange {
     centre: f64,
 }
 
-/// Means below this share of the peak are none.
-const SMALL_MEAN: f64 = 0.3;
-/// How far beyond what was recorded a force may go where the device's own limit allows it.
-const BEYOND: f64 = 1.5;
-/// Share of the sampling rate that excitations keep below.
-const BAND: f64 = 0.1;
-/// Samples of an excitation, at most.
-const LONGEST: f64 = 16_000.0;
-
 impl InputRange {
     /// What the recordings show of one input. `None` where it never moves.
     pub(super) fn of(problem: &Problem, input: usize) -> Option<InputRange> {
@@ -53,7 +45,7 @@ impl InputRange {
         let count: usize = columns.iter().map(|c| c.0.len()).sum();
         let mean = columns.iter().flat_map(|c| c.0).sum::<f64>() / count.max(1) as f64;
         let largest = |mean: f64| columns.iter().flat_map(|c| c.0).fold(0.0f64, |a, u| a.max((u - mean).abs()));
-        let mean = if mean.abs() < SMALL_MEAN * largest(mean) { 0.0 } else { mean };
+        let mean = if mean.abs() < tuning().experiment.small_mean * largest(mean) { 0.0 } else { mean };
         let shown = largest(mean);
         if !(shown > 0.0 && shown.is_finite()) {
             return None;
@@ -64,7 +56,7 @@ impl InputRange {
         let is_motion = own.kind == InputKind::Motion;
         let limit = problem.model.axes.iter().filter(|a| a.feedback == input).filter_map(|a| a.force).reduce(f64::min);
         let peak = match limit {
-            Some(limit) if !is_motion => (BEYOND * shown).min(limit - mean.abs()).max(shown.min(limit)),
+            Some(limit) if !is_motion => (tuning().experiment.force * shown).min(limit - mean.abs()).max(shown.min(limit)),
             _ => shown,
         };
         let (rate, curvature) = if is_motion { rates(&columns) } else { (f64::INFINITY, f64::INFINITY) };
@@ -118,9 +110,9 @@ pub(super) fn choices(problem: &Problem, ranges: &[Option<InputRange>], period: 
     let mut all = Vec::new();
     for (input, range) in ranges.iter().enumerate() {
         let (Some(range), Some(own)) = (range, problem.model.inputs.get(input)) else { continue };
-        let highest = BAND / period;
+        let highest = tuning().experiment.band / period;
         let centre = range.centre.clamp(2.0 / longest, 0.5 * highest);
-        let long = longest.min((8.0 / centre).max(3.0)).min(LONGEST * period);
+        let long = longest.min((8.0 / centre).max(3.0)).min(tuning().experiment.longest * period);
         let mut spans = vec![(long, 12.0), (long / 3.0, 12.0)];
         if highest > 24.0 * centre {
             // Much faster than what was recorded, too: a drive's lag shows there, and stiff joints.

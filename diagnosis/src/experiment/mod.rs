@@ -23,4 +23,4 @@ mod words;
 
 pub use determine::excite;
 pub use separate::separate;
-pub use types::{Experiment, Reason, WANTED};
+pub use types::{Experiment, Reason};

@@ -4,22 +4,14 @@ use super::menu::{Choice, InputRange, choices};
 use super::rivals::Rival;
 use super::sensor;
 use super::setup::{Sensors, Setup, Trial};
-use super::types::{Experiment, Reason, WANTED, repeats};
+use super::types::{Experiment, Reason, repeats};
 use super::words::{self, short};
 use crate::problem::Problem;
 use crate::structure::Structure;
+use crate::tuning::tuning;
 use crate::work::{Budget, Steps};
 use backdrive_plant::write::round_significant;
 use rayon::prelude::*;
-
-/// Time that it takes to set an experiment up, s: without it the shortest would always be chosen.
-pub(super) const SETTING_UP: f64 = 2.0;
-/// Largest ratio of predicted to recorded peaks of positions and speeds.
-const REACH: f64 = 1.3;
-/// Share of the work for simulating everything, and for simulating and evaluating it.
-const SHARES: (f64, f64) = (0.4, 0.75);
-/// Substeps per sample for choosing, and for the figures of the best.
-pub(super) const SUBSTEPS: (usize, usize) = (4, 16);
 
 /// Whether no recording can tell two structures apart.
 pub(super) fn same(a: &Structure, b: &Structure) -> bool {
@@ -52,7 +44,7 @@ impl Evaluated {
     /// Squared separation of the worst of some pairs per second.
     pub(super) fn score(&self, pairs: &[(usize, usize)], cases: &[Case]) -> f64 {
         let worst = pairs.iter().map(|p| self.of(*p)).fold(f64::INFINITY, f64::min);
-        worst * worst / (cases[self.case].trial.seconds() + SETTING_UP)
+        worst * worst / (cases[self.case].trial.seconds() + tuning().experiment.setting_up)
     }
 }
 
@@ -82,9 +74,14 @@ impl<'a> Planner<'a> {
             return Err(Reason("no input moves in any recording, so nothing says what the device stands".to_string()));
         };
         let end = |share: f64| budget.spent() + (share * budget.left() as f64) as Steps;
-        let ends = (end(SHARES.0), end(SHARES.1));
-        let setup =
-            Setup { problem, sensors: Sensors::of(problem, floor), extra: Vec::new(), substeps: SUBSTEPS.0, budget: budget.clone() };
+        let ends = (end(tuning().experiment.shares[0]), end(tuning().experiment.shares[1]));
+        let setup = Setup {
+            problem,
+            sensors: Sensors::of(problem, floor),
+            extra: Vec::new(),
+            substeps: tuning().experiment.substeps[0],
+            budget: budget.clone(),
+        };
         Ok(Planner { setup, ranges, rate_hz: round_significant(1.0 / period, 6), longest, ends })
     }
 
@@ -96,9 +93,9 @@ impl<'a> Planner<'a> {
             let mut trial = setup.trial(choice, &self.ranges, self.rate_hz)?;
             let far = |trial: &Trial| rivals.first().and_then(|rival| rival.excursion(&setup, trial));
             let reached = far(&trial)?;
-            if reached > REACH {
-                trial = setup.smaller(&trial, 0.9 * REACH / reached, &self.ranges, self.rate_hz)?;
-                far(&trial).filter(|reached| *reached <= 1.1 * REACH)?;
+            if reached > tuning().experiment.reach {
+                trial = setup.smaller(&trial, 0.9 * tuning().experiment.reach / reached, &self.ranges, self.rate_hz)?;
+                far(&trial).filter(|reached| *reached <= 1.1 * tuning().experiment.reach)?;
             }
             let predictions = rivals.iter().map(|r| r.prediction(&setup, &trial)).collect::<Option<Vec<_>>>()?;
             Some(Case { trial, predictions })
@@ -114,7 +111,7 @@ impl<'a> Planner<'a> {
                 let difference: f64 = case.predictions[*a].iter().zip(&case.predictions[*b]).map(|(x, y)| (x - y).powi(2)).sum();
                 difference / rivals[*a].unit.max(rivals[*b].unit)
             };
-            pairs.iter().map(one).fold(f64::INFINITY, f64::min) / (case.trial.seconds() + SETTING_UP)
+            pairs.iter().map(one).fold(f64::INFINITY, f64::min) / (case.trial.seconds() + tuning().experiment.setting_up)
         };
         cases.sort_by(|a, b| potential(b).total_cmp(&potential(a)));
         let mut all: Vec<Evaluated> = Vec::new();
@@ -155,7 +152,7 @@ impl<'a> Planner<'a> {
         let mut trials: Vec<&Trial> = cases.iter().map(|s| &s.trial).collect();
         trials.sort_by(|x, y| y.seconds().total_cmp(&x.seconds()));
         let spread: Vec<&Trial> = trials.iter().step_by((trials.len() / 4).max(1)).take(4).copied().collect();
-        let found = sensor::best(&self.setup, &spread, [a, b]).filter(|s| s.separation >= WANTED);
+        let found = sensor::best(&self.setup, &spread, [a, b]).filter(|s| s.separation >= tuning().experiment.wanted);
         match found {
             Some(sensor) => said.push_str(&format!(
                 "; measuring {} as well would ({} standard deviations with {}).",

@@ -3,12 +3,10 @@
 use super::extra_output::output;
 use super::rivals::Rival;
 use super::setup::{Setup, Trial};
+use crate::tuning::tuning;
 use backdrive_plant::describe::unit_for;
 use backdrive_plant::model::{InputKind, OutputKind};
 use backdrive_plant::write::round_significant;
-
-/// Error of a sensor that is not there, over the root mean square of what it would read, where no other of its kind is there.
-const ERROR: f64 = 0.01;
 
 /// A sensor that a device does not have.
 #[derive(Debug, Clone, PartialEq)]
@@ -57,7 +55,7 @@ pub(super) fn best(setup: &Setup, trials: &[&Trial], pair: [&Rival; 2]) -> Optio
         for (column, (at, kind)) in first[own..].chunks_exact(trial.record.len).zip(wide.extra.iter().enumerate()) {
             let rms = (column.iter().map(|y| y * y).sum::<f64>() / column.len() as f64).sqrt();
             let at = setup.sensors.floor.len() + at;
-            wide.sensors.floor[at] = like(setup, kind).unwrap_or(ERROR * rms).max(f64::MIN_POSITIVE);
+            wide.sensors.floor[at] = like(setup, kind).unwrap_or(tuning().experiment.sensor_noise * rms).max(f64::MIN_POSITIVE);
         }
         let predictions: Option<Vec<Vec<f64>>> = pair.iter().map(|r| r.prediction(&wide, trial)).collect();
         let Some(predictions) = predictions else { continue };

@@ -1,20 +1,16 @@
 //! The experiment that separates rival structures.
 
-use super::planner::{Evaluated, Planner, SETTING_UP, SUBSTEPS, same};
+use super::planner::{Evaluated, Planner, same};
 use super::rivals::Rival;
 use super::setup::{Setup, Trial};
-use super::types::{Experiment, MOST_REPEATS, Reason, WANTED};
+use super::types::{Experiment, Reason};
 use crate::candidate::Candidate;
 use crate::fit::Fit;
 use crate::problem::Problem;
 use crate::structure::Structure;
+use crate::tuning::tuning;
 use crate::work::Budget;
 use rayon::prelude::*;
-
-/// Rivals, at most: those that come first are the likely ones.
-const MOST_RIVALS: usize = 4;
-/// Experiments that are compared by a true refit.
-const FINALISTS: usize = 3;
 
 /// The excitation that tells fitted structures apart, the likeliest first. `floor` is the noise standard deviation of each output, in its
 /// unit. What exceeds the budget is not tried.
@@ -34,7 +30,7 @@ pub(super) fn separate_fitted<'a>(
 ) -> Result<Experiment, Reason> {
     let mut names = std::collections::HashSet::new();
     let others = fitted.iter().filter(|(structure, _)| names.insert(ids(structure)));
-    let rivals: Vec<Rival> = others.take(MOST_RIVALS).map(|(structure, fit)| Rival::of(problem, structure, fit)).collect();
+    let rivals: Vec<Rival> = others.take(tuning().experiment.rivals).map(|(structure, fit)| Rival::of(problem, structure, fit)).collect();
     let all: Vec<(usize, usize)> = (0..rivals.len()).flat_map(|b| (0..b).map(move |a| (a, b))).collect();
     let Some(first) = all.first() else { return Err(Reason("there is only one explanation".to_string())) };
     let planner = Planner::new(problem, floor, budget)?;
@@ -43,7 +39,7 @@ pub(super) fn separate_fitted<'a>(
     if cases.is_empty() {
         return Err(Reason("no excitation could be simulated with all of the explanations".to_string()));
     }
-    let least = WANTED / f64::from(MOST_REPEATS).sqrt();
+    let least = tuning().experiment.wanted / f64::from(tuning().experiment.most_repeats as u32).sqrt();
     let evaluated = planner.evaluate(&rivals, &mut cases, &distinct, least);
     let reached = |p: &(usize, usize)| evaluated.iter().any(|e| e.of(*p) >= least);
     let separable: Vec<(usize, usize)> = distinct.iter().copied().filter(reached).collect();
@@ -53,7 +49,7 @@ pub(super) fn separate_fitted<'a>(
     }
     let mut ranked: Vec<&Evaluated> = evaluated.iter().collect();
     ranked.sort_by(|a, b| b.score(&separable, &cases).total_cmp(&a.score(&separable, &cases)));
-    let fine = Setup { substeps: SUBSTEPS.1, ..planner.setup.clone() };
+    let fine = Setup { substeps: tuning().experiment.substeps[1], ..planner.setup.clone() };
     let refitted = |e: &&Evaluated| {
         let trial = &cases[e.case].trial;
         let left = |p: &(usize, usize)| {
@@ -64,8 +60,8 @@ pub(super) fn separate_fitted<'a>(
         let worst = separable.iter().map(left).min_by(|a, b| a.1.total_cmp(&b.1))?;
         Some((e.case, worst.0, worst.1))
     };
-    let finalists: Vec<(usize, (usize, usize), f64)> = ranked.iter().take(FINALISTS).filter_map(refitted).collect();
-    let rate = |f: &(usize, (usize, usize), f64)| f.2 * f.2 / (cases[f.0].trial.seconds() + SETTING_UP);
+    let finalists: Vec<(usize, (usize, usize), f64)> = ranked.iter().take(tuning().experiment.finalists).filter_map(refitted).collect();
+    let rate = |f: &(usize, (usize, usize), f64)| f.2 * f.2 / (cases[f.0].trial.seconds() + tuning().experiment.setting_up);
     let best = finalists.iter().max_by(|a, b| rate(a).total_cmp(&rate(b)));
     let Some((case, pair, separation)) = best.copied().filter(|f| f.2 >= least) else {
         let pair = separable[0];

@@ -1,6 +1,7 @@
 //! An experiment that was chosen, or why there is none.
 
 /// An experiment that was not made yet.
+use crate::tuning::tuning;
 #[derive(Debug, Clone, PartialEq)]
 pub struct Experiment {
     /// The input that it drives.
@@ -19,7 +20,7 @@ pub struct Experiment {
     pub level: f64,
     /// The output in which most of it shows.
     pub output: String,
-    /// How often it has to be played for [`WANTED`] standard deviations.
+    /// How often it has to be played for `experiment.wanted` standard deviations.
     pub repeats: u32,
     /// Length of one playing, s.
     pub duration: f64,
@@ -32,12 +33,7 @@ pub struct Experiment {
 #[error("{0}")]
 pub struct Reason(pub String);
 
-/// Standard deviations at which explanations count as told apart.
-pub const WANTED: f64 = 5.0;
-/// An experiment that would have to be played more often is none.
-pub(super) const MOST_REPEATS: u32 = 10;
-
-/// How often an experiment is played for [`WANTED`] standard deviations.
+/// How often an experiment is played for `experiment.wanted` standard deviations.
 pub(super) fn repeats(separation: f64) -> u32 {
-    ((WANTED / separation).powi(2).ceil() as u32).clamp(1, MOST_REPEATS)
+    ((tuning().experiment.wanted / separation).powi(2).ceil() as u32).clamp(1, tuning().experiment.most_repeats as u32)
 }

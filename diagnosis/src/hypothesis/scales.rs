@@ -1,5 +1,6 @@
 //! How far, how fast and how hard things move: what parameters are measured against.
 
+use crate::tuning::tuning;
 use backdrive_plant::model::{InputKind, Model, OutputKind};
 use backdrive_plant::stepper::{CompileError, Options, Plant, Segment, ahead, segments};
 
@@ -45,11 +46,6 @@ impl Sum {
     }
 }
 
-/// What a nominal model can fall short of the measured travel; a sensor's offset may look like more.
-const FURTHEST: f64 = 4.0;
-/// Magnitude beyond which a simulation counts as having left the device behind.
-const RUNAWAY: f64 = 1e9;
-
 impl Scales {
     /// Scales of a model on runs: the samples of each input in the model's order, and the sample time, s.
     ///
@@ -82,7 +78,7 @@ impl Scales {
             for k in 0..samples {
                 let at: Vec<[f64; 3]> =
                     (0..=n).map(|b| if b < n { [plant.position(b), plant.velocity(b), plant.acceleration(b)] } else { [0.0; 3] }).collect();
-                if at.iter().flatten().any(|x| x.is_nan() || x.abs() > RUNAWAY) {
+                if at.iter().flatten().any(|x| x.is_nan() || x.abs() > tuning().recordings.runaway) {
                     break;
                 }
                 for a in 0..=n {
@@ -125,7 +121,7 @@ impl Scales {
         let positions =
             model.outputs.iter().zip(measured).zip(&self.outputs).filter(|((o, _), _)| matches!(o.kind, OutputKind::Position(_)));
         let ratios = positions.map(|((_, measured), simulated)| measured / simulated.peak).filter(|r| r.is_finite());
-        Scales { reach: ratios.fold(1.0, f64::max).min(FURTHEST), ..self }
+        Scales { reach: ratios.fold(1.0, f64::max).min(tuning().recordings.travel), ..self }
     }
 
     /// Displacement, speed and acceleration of one place against another, ground being `None`.

@@ -8,15 +8,13 @@ use super::law::Variable;
 use super::period::scan;
 use super::regression::Samples;
 use super::reversals::Reversals;
+use crate::tuning::tuning;
 
 use super::smoother::Smoothed;
 use super::types::{Candidate, Course};
 use crate::hypothesis::Place;
 use crate::signal::{rate, rms};
 use backdrive_plant::model::InputKind;
-
-/// Displacement that makes a turning point, in rms displacements.
-const TURN: f64 = 0.05;
 
 impl Context<'_> {
     /// The places that a channel stands for: a force on a driven body against ground is an error of the input as well.
@@ -95,7 +93,7 @@ impl Context<'_> {
             run.extend(std::iter::repeat_n(index, course.force.len()));
         }
         let period = courses.first().map_or(1.0, |c| c.period);
-        let reversals = Reversals::of(&x, &starts, period, TURN * rms(&x));
+        let reversals = Reversals::of(&x, &starts, period, tuning().locate.turn * rms(&x));
         Samples {
             force: joined(|c| &c.force),
             x,

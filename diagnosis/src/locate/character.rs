@@ -2,6 +2,7 @@
 
 use super::law::{Form, Law, Variable};
 use super::regression::Samples;
+use crate::tuning::tuning;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -22,11 +23,6 @@ pub struct Character {
     pub cycles: usize,
 }
 
-/// How much better a law must explain to count as another.
-const CLEARLY: f64 = 0.03;
-/// Ratio of amplitudes below which no exponent is told.
-const RANGE: f64 = 1.5;
-
 impl Character {
     /// `None` where nothing moves across the place.
     pub(super) fn of(samples: &Samples, laws: &[Law], period: f64) -> Option<Character> {
@@ -44,8 +40,8 @@ impl Character {
         sorted.sort_by(f64::total_cmp);
         Some(Character {
             odd_share: odd_share(laws),
-            memory: with_memory > without_memory + CLEARLY,
-            rate_dependent: share(Variable::Velocity) > by_direction + CLEARLY,
+            memory: with_memory > without_memory + tuning().locate.clearly,
+            rate_dependent: share(Variable::Velocity) > by_direction + tuning().locate.clearly,
             dissipated_per_cycle: sorted.get(sorted.len() / 2).copied().unwrap_or(0.0),
             energy_exponent: exponent(&cycles, &amplitudes),
             cycles: cycles.len(),
@@ -80,7 +76,7 @@ fn exponent(energies: &[f64], amplitudes: &[f64]) -> Option<f64> {
     let (ma, me) = (mean(|p| p.0), mean(|p| p.1));
     let var = points.iter().map(|p| (p.0 - ma).powi(2) * p.2).sum::<f64>() / all;
     let cov = points.iter().map(|p| (p.0 - ma) * (p.1 - me) * p.2).sum::<f64>() / all;
-    (var.sqrt() > 0.5 * RANGE.ln()).then(|| cov / var)
+    (var.sqrt() > 0.5 * tuning().locate.range.ln()).then(|| cov / var)
 }
 
 /// Of the curve that explains most among those over velocity and displacement: how much of it turns its sign with its variable.

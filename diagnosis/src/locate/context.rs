@@ -9,12 +9,8 @@ use super::trajectory::Trajectory;
 use super::types::{Options, Run};
 use crate::hypothesis::Place;
 use crate::signal::rms;
+use crate::tuning::tuning;
 use backdrive_plant::model::{InputKind, Model};
-
-/// Least noise standard deviation of an output, as a share of its signal: the simulation itself is not more exact.
-const SMALLEST_NOISE: f64 = 1e-5;
-/// Correlation time of the force error of a nonlinear element, samples.
-const ERROR_SAMPLES: f64 = 20.0;
 
 /// What all channels share.
 pub(super) struct Context<'a> {
@@ -33,7 +29,7 @@ pub(super) struct Context<'a> {
 pub(super) fn noise_of(output: usize, given: f64, trajectories: &[Trajectory]) -> f64 {
     let columns = trajectories.iter().filter_map(|t| t.rows.iter().position(|r| *r == output).map(|row| (t, row)));
     let largest = columns.map(|(t, row)| rms(&t.predicted[row]).max(rms(&t.residual[row]))).fold(0.0, f64::max);
-    given.max(SMALLEST_NOISE * largest).max(f64::MIN_POSITIVE.sqrt())
+    given.max(tuning().locate.least_noise * largest).max(f64::MIN_POSITIVE.sqrt())
 }
 
 impl Context<'_> {
@@ -60,7 +56,11 @@ impl Context<'_> {
             let here = |ends: [Option<usize>; 2]| matches!(channel, Channel::Force([a, b]) if ends == [a, b] || ends == [b, a]);
             let share = |element: &usize| if here(self.model.elements[*element].between) { 1e-3 * force_error } else { force_error };
             let errors: Vec<f64> = self.linearisation.nonlinear.iter().zip(&self.nonlinear_sizes[run]).map(|(e, s)| share(e) * s).collect();
-            equations = self.linearisation.with_force_errors(&equations, &errors, 1.0 / (ERROR_SAMPLES * trajectory.period));
+            equations = self.linearisation.with_force_errors(
+                &equations,
+                &errors,
+                1.0 / (tuning().locate.force_error_correlation * trajectory.period),
+            );
         }
         let noise: Vec<f64> = trajectory.rows.iter().map(|r| self.noise[*r]).collect();
         System::of(&equations, trajectory.period, scales, &noise)

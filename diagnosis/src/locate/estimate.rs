@@ -4,11 +4,7 @@ use super::channel::Channel;
 use super::context::Context;
 use super::filter::System;
 use super::smoother::Smoothed;
-
-/// Standard error of the forces of the nonlinear elements, as a share of them: while the motion of the device is not known, and the values that are
-/// tried once it is.
-const FIRST_FORCE_ERROR: f64 = 2.0;
-const FORCE_ERRORS: [f64; 3] = [0.01, 0.1, 0.5];
+use crate::tuning::tuning;
 
 /// What was estimated at a channel.
 pub(super) struct Estimate {
@@ -88,14 +84,14 @@ impl Context<'_> {
         // then with the forces along the motion that was estimated.
         let nonlinear = !self.linearisation.nonlinear.is_empty() && !matches!(channel, Channel::Sensor(_));
         let (first_orders, first_error, iterations) =
-            if nonlinear { (&orders[..1], FIRST_FORCE_ERROR, self.options.iterations) } else { (orders, 0.0, 0) };
+            if nonlinear { (&orders[..1], tuning().locate.first_force_error, self.options.iterations) } else { (orders, 0.0, 0) };
         let mut found = self.tuned(channel, scales, &[], first_orders, &[first_error])?;
         let mut smoothed = self.smoothed(&found, &[])?;
         let mut forces: Vec<Vec<Vec<f64>>> = Vec::new();
         for _ in 0..iterations {
             let next: Vec<_> =
                 smoothed.iter().enumerate().map(|(run, smoothed)| self.forces_along(channel, found.order, run, smoothed)).collect();
-            let Some(tighter) = self.tuned(channel, scales, &next, orders, &FORCE_ERRORS) else { break };
+            let Some(tighter) = self.tuned(channel, scales, &next, orders, &tuning().locate.force_errors) else { break };
             if !forces.is_empty() && tighter.log_likelihood <= found.log_likelihood {
                 break;
             }

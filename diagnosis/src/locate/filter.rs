@@ -3,6 +3,7 @@
 //! The gain is the steady one (by doubling of the Riccati equation), so a sample costs two small matrix-vector products.
 
 use super::equations::Equations;
+use crate::tuning::tuning;
 use nalgebra::{DMatrix, DVector};
 
 /// The deviation of a channel in discrete time, in scaled states and outputs divided by their noise standard deviation.
@@ -66,7 +67,7 @@ impl System {
         let scale = DVector::from_fn(n, |i, _| match i {
             i if i < bodies => scales[0],
             i if i < 2 * bodies => scales[1],
-            i if i < 2 * bodies + order => scales[2] / (period * SLOW).powi((i - 2 * bodies) as i32),
+            i if i < 2 * bodies + order => scales[2] / (period * tuning().locate.slow).powi((i - 2 * bodies) as i32),
             i => equations.force_errors[i - 2 * bodies - order],
         });
         let a = DMatrix::from_fn(n, n, |i, j| equations.a[(i, j)] * scale[j] / scale[i]);
@@ -85,7 +86,7 @@ impl System {
         let gamma = solution.view((0, n), (n, b.ncols())).into_owned();
         let gamma_unknown = solution.column(n + b.ncols()).rows(0, n).into_owned();
         let d_unknown = h.column(equations.unknown) / scale[equations.unknown];
-        // Van Loan 1978: the noise that a white last derivative leaves after a sample. Intensity 1 moves the unknown by its scale in SLOW samples.
+        // Van Loan 1978: the noise that a white last derivative leaves after a sample. Intensity 1 moves the unknown by its scale in tuning().locate.slow samples.
         let last = equations.unknown + order - 1;
         let noise_of = |power: &dyn Fn(usize) -> f64| {
             let mut loan = DMatrix::zeros(2 * n, 2 * n);
@@ -96,7 +97,7 @@ impl System {
             let q = loan.view((n, n), (n, n)).transpose() * loan.view((0, n), (n, n));
             (&q + q.transpose()) * 0.5
         };
-        let q = noise_of(&|i| if i == last { 1.0 / SLOW } else { 0.0 });
+        let q = noise_of(&|i| if i == last { 1.0 / tuning().locate.slow } else { 0.0 });
         // An error of standard deviation 1 that is forgotten at a rate needs twice that rate of noise.
         let q_force_errors = noise_of(&|i| if i > last { -2.0 * a[(i, i)] * period } else { 0.0 });
         let good = f.iter().chain(q.iter()).chain(q_force_errors.iter()).chain(gamma.iter()).chain(h.iter()).all(|x| x.is_finite());
@@ -257,7 +258,5 @@ pub(super) fn quadratic(m: &DMatrix<f64>, v: &[f64]) -> f64 {
     }
 }
 
-/// Samples in which the unknown moves by its scale at unit intensity.
-const SLOW: f64 = 100.0;
 /// Doublings at most: 2^18 samples.
 pub(super) const DOUBLINGS: usize = 18;

@@ -26,6 +26,7 @@ mod tests;
 mod trajectory;
 mod types;
 
+use crate::tuning::tuning;
 pub use character::Character;
 pub use law::{Form, Law, Point, Variable};
 pub use period::{Ripple, scan};
@@ -102,9 +103,6 @@ pub fn locate(model: &Model, runs: &[Run], noise: &[f64], options: &Options) -> 
 /// In which state the residual shows, in words, such as `with velocity, at drum-ground`; `None` where it does not exceed the noise.
 pub fn state(location: &Location) -> Option<String> {
     let best = location.ranking.first()?;
-    let telling = location.mismatch > QUIET && best.log_likelihood > location.log_likelihood_without;
+    let telling = location.mismatch > tuning().locate.quiet && best.log_likelihood > location.log_likelihood_without;
     (telling && !location.shows.state.is_empty()).then(|| location.shows.state.clone())
 }
-
-/// Normalised residual, in noise standard deviations, up to which nothing is said to show.
-const QUIET: f64 = 1.02;

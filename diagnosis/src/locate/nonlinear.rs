@@ -3,6 +3,7 @@
 use super::equations::Linearisation;
 use super::trajectory::Trajectory;
 use crate::signal::rms;
+use crate::tuning::tuning;
 use backdrive_plant::elements::{Law, Role, Rubbing, Side};
 
 /// What the deviation from the simulated motion adds to the forces of the nonlinear elements, beyond their linear part: one column for each element of
@@ -24,7 +25,7 @@ pub(super) fn forces_beyond_linear(
         let (dx, dv): (Vec<f64>, Vec<f64>) = (0..trajectory.len).map(|k| (of(position, k), of(velocity, k))).unzip();
         let moved: Vec<f64> = x.iter().zip(&dx).map(|(a, b)| a + b).collect();
         let faster: Vec<f64> = v.iter().zip(&dv).map(|(a, b)| a + b).collect();
-        let slip = SLIP * rms(&x);
+        let slip = tuning().locate.slip * rms(&x);
         let (before, after) =
             (along(&element.law, &x, &v, trajectory.period, slip), along(&element.law, &moved, &faster, trajectory.period, slip));
         (0..trajectory.len).map(|k| after[k] - before[k] - linear.stiffness * dx[k] - linear.damping * dv[k]).collect()
@@ -38,7 +39,7 @@ pub(super) fn rms_beyond_linear(linearisation: &Linearisation, trajectory: &Traj
         let element = &linearisation.model.elements[*index];
         let linear = linearisation.linear.elements[*index];
         let (x, v) = trajectory.across(element.between);
-        let force = along(&element.law, &x, &v, trajectory.period, SLIP * rms(&x));
+        let force = along(&element.law, &x, &v, trajectory.period, tuning().locate.slip * rms(&x));
         let rest: Vec<f64> = (0..x.len()).map(|k| force[k] - linear.stiffness * x[k] - linear.damping * v[k]).collect();
         rms(&rest).max(f64::MIN_POSITIVE.sqrt())
     };
@@ -47,7 +48,7 @@ pub(super) fn rms_beyond_linear(linearisation: &Linearisation, trajectory: &Traj
 
 /// Force of a law along a motion, N; of displacement, m, and velocity, m/s, at samples `period` s apart.
 pub(crate) fn force_along(law: &Law, x: &[f64], v: &[f64], period: f64) -> Vec<f64> {
-    along(law, x, v, period, SLIP * rms(x))
+    along(law, x, v, period, tuning().locate.slip * rms(x))
 }
 
 /// Force of a law along a motion. Dry friction builds up over the distance `slip`, so that noise about rest does not make it chatter.
@@ -71,6 +72,3 @@ fn along(law: &Law, x: &[f64], v: &[f64], period: f64, slip: f64) -> Vec<f64> {
     };
     x.iter().zip(v).map(step).collect()
 }
-
-/// Distance over which dry friction builds up, in rms displacements.
-const SLIP: f64 = 1e-3;

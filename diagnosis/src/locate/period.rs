@@ -1,5 +1,6 @@
 //! Does a force repeat with position? A spectrum over displacement.
 
+use crate::tuning::tuning;
 use realfft::RealFftPlanner;
 use serde::Serialize;
 
@@ -22,11 +23,7 @@ pub struct Ripple {
 const CELLS: usize = 4096;
 /// Cells of the transform: padded, so that peaks between two lines are not missed.
 const PADDED: usize = 4 * CELLS;
-/// Passes over the travel that a ripple must make at least to be told from a trend.
-const FEWEST_TURNS: f64 = 2.0;
 
-/// Ripples that are told apart at most.
-const MOST: usize = 3;
 /// Lines of the transform about a peak that are the peak's own.
 const OWN_LINES: usize = 6;
 
@@ -72,8 +69,12 @@ fn strongest(x: &[f64], v: &[f64], force: &[f64]) -> Option<Vec<Ripple>> {
     let middle = steps.len() / 2;
     let step = *steps.select_nth_unstable_by(middle, f64::total_cmp).1;
     let most = (travel / (4.0 * step).max(travel / (CELLS / 8) as f64)).min(CELLS as f64 / 8.0);
-    let mut lines: Vec<(usize, f64)> =
-        spectrum.iter().enumerate().map(|(i, c)| (i, c.norm_sqr())).filter(|(i, _)| (FEWEST_TURNS..=most).contains(&turns(*i))).collect();
+    let mut lines: Vec<(usize, f64)> = spectrum
+        .iter()
+        .enumerate()
+        .map(|(i, c)| (i, c.norm_sqr()))
+        .filter(|(i, _)| (tuning().locate.ripple_turns..=most).contains(&turns(*i)))
+        .collect();
     let mut powers: Vec<f64> = lines.iter().map(|l| l.1).collect();
     let half = powers.len() / 2;
     if powers.is_empty() {
@@ -89,7 +90,7 @@ fn strongest(x: &[f64], v: &[f64], force: &[f64]) -> Option<Vec<Ripple>> {
         Some((1.0 - left / power, c))
     };
     let mut all: Vec<Ripple> = Vec::new();
-    while all.len() < MOST {
+    while all.len() < tuning().locate.ripples {
         let Some(peak) = lines.iter().max_by(|a, b| a.1.total_cmp(&b.1)).copied() else { break };
         lines.retain(|line| line.0.abs_diff(peak.0) > OWN_LINES);
         let (mut best, mut width) = (turns(peak.0), 0.5 * turns(1));

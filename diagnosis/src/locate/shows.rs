@@ -6,9 +6,7 @@ use super::context::Context;
 use super::law::Variable;
 use super::trajectory::Trajectory;
 use super::types::{Candidate, Class, Where};
-
-/// Normalised residual below which two places cannot be told apart, in noise standard deviations.
-const INDISTINCT: f64 = 0.3;
+use crate::tuning::tuning;
 
 impl Context<'_> {
     /// Log-likelihood of the recordings with no unknown anywhere: white noise alone.
@@ -51,7 +49,7 @@ impl Context<'_> {
                     return true;
                 }
                 let (Some(own), Some(other)) = (own, responses(spectrum, channels[index])) else { return false };
-                classes::distance(spectrum, own, &other, &noise) < INDISTINCT
+                classes::distance(spectrum, own, &other, &noise) < tuning().locate.indistinct
             });
             match alike {
                 Some(class) => classes[class].members.push(index),

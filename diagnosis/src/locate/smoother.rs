@@ -4,6 +4,7 @@
 //! unknown may jump, the covariance is carried along instead of the steady one.
 
 use super::filter::{DOUBLINGS, Data, FilterPass, Gains, Steady, System, dot, quadratic, row_major};
+use crate::tuning::tuning;
 use nalgebra::{DMatrix, DVector};
 
 /// The smoothed state.
@@ -48,7 +49,7 @@ impl System {
     pub fn smooth(&self, intensity: f64, data: Data, jumps: &[usize], jump: f64) -> Option<Smoothed> {
         let steady = self.steady(intensity)?;
         let len = data.residual.first()?.len();
-        if jumps.is_empty() || len * self.n * self.n > LARGEST {
+        if jumps.is_empty() || len * self.n * self.n > tuning().locate.covariances {
             self.smooth_with_steady_gain(&steady, data, len)
         } else {
             let mut may_jump = vec![false; len];
@@ -193,7 +194,7 @@ impl System {
                     steady_since = 0;
                 }
                 None => {
-                    at(&steady.predicted, &steady_l, &steady_h, steady_since > SETTLED);
+                    at(&steady.predicted, &steady_l, &steady_h, steady_since > tuning().locate.settled);
                     steady_since += 1;
                 }
             }
@@ -210,8 +211,3 @@ impl System {
         Smoothed { value, deviation, states, n: self.n, log_likelihood }
     }
 }
-
-/// Numbers that the covariances of a run may take; longer runs are smoothed with the steady gain alone.
-const LARGEST: usize = 8_000_000;
-/// Samples after which a backward covariance counts as settled.
-const SETTLED: usize = 400;

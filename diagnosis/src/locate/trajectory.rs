@@ -1,6 +1,7 @@
 //! The nominal model simulated over a run, and the residual of the recording.
 
 use super::types::{LocateError, Run};
+use crate::tuning::tuning;
 use backdrive_plant::model::Model;
 use backdrive_plant::stepper::{Options, Plant, Segment, ahead, segments};
 
@@ -28,7 +29,7 @@ impl Trajectory {
             let (inputs, outputs) = (run.inputs.len(), run.outputs.len());
             return Err(LocateError::Columns { run: run.name.to_string(), inputs, outputs });
         }
-        if len < SHORTEST {
+        if len < tuning().locate.fewest_samples {
             return Err(LocateError::TooShort { run: run.name.to_string(), samples: len });
         }
         let caught_up = ahead(model, run.inputs, run.period);
@@ -93,6 +94,3 @@ impl Trajectory {
         (of(&self.position), of(&self.velocity))
     }
 }
-
-/// Samples of a run at least.
-const SHORTEST: usize = 16;

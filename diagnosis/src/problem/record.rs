@@ -1,6 +1,7 @@
 //! One recording on a regular grid, with the signals that the model names.
 
 use super::error::ProblemError;
+use crate::tuning::tuning;
 use backdrive_plant::model::Model;
 use backdrive_plant::recording::{Jitter, Recording};
 use backdrive_plant::set::Condition;
@@ -35,9 +36,6 @@ pub struct Record {
     pub before: usize,
 }
 
-/// Fewest samples that say anything about a device.
-const FEWEST_SAMPLES: usize = 50;
-
 impl Record {
     /// A recording as the model needs it.
     ///
@@ -56,10 +54,10 @@ impl Record {
     ) -> Result<Record, ProblemError> {
         let jitter = recording.jitter.clone();
         let recording = recording.regular_for(model)?;
-        if recording.len() < FEWEST_SAMPLES {
-            let count = recording.len();
+        let (count, fewest) = (recording.len(), tuning().recordings.fewest_samples);
+        if count < fewest {
             return Err(ProblemError::Set(format!(
-                "{}: has {count} samples; a diagnosis needs at least {FEWEST_SAMPLES} per recording",
+                "{}: has {count} samples; a diagnosis needs at least {fewest} per recording",
                 recording.name
             )));
         }

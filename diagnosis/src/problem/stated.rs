@@ -1,5 +1,6 @@
 //! The numbers that the nominal file states, each of which may be off.
 
+use crate::tuning::tuning;
 use backdrive_plant::model::{InputKind, Model, OutputKind};
 use backdrive_plant::parse::{InputKey, NumberOf, OutputKey};
 
@@ -28,9 +29,6 @@ impl Stated {
     }
 }
 
-/// How far a positive number may be off, as a factor.
-const FACTOR: f64 = 50.0;
-
 /// Numbers that the file states. Those that are 0 have no scale: what they would add is physics, not a number.
 pub(super) fn stated_numbers(model: &Model, text: &str) -> Vec<Stated> {
     let keys = stated_keys(text);
@@ -50,7 +48,7 @@ pub(super) fn stated_numbers(model: &Model, text: &str) -> Vec<Stated> {
             }
             let key = path.rsplit('.').next().unwrap_or("");
             // A shape, not a size: moved a little only.
-            let factor = if ["exponent", "ratio"].contains(&key) { 2.0 } else { FACTOR };
+            let factor = if ["exponent", "ratio"].contains(&key) { 2.0 } else { tuning().recordings.stated_range };
             let signed = ["phase", "offset", "rest", "gap", "force"].contains(&key) && given < 0.0 || key == "phase";
             let (range, log) = match () {
                 () if signed && key == "phase" => ((given - std::f64::consts::PI, given + std::f64::consts::PI), false),

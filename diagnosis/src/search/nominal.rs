@@ -251,7 +251,11 @@ fn floors(evaluator: &Evaluator, residuals: &[f64]) -> Vec<f64> {
             let own = evaluator.floor[output];
             let least = floor::stated(&problem.model, output, &signals);
             let spread = problem.fit.iter().filter_map(|r| r.spread.get(output)).fold(0.0f64, |a, b| a.max(*b));
-            if parts.is_empty() { own } else { (own * floor::of_residuals(&parts, least / own, 0.0)).max(1e-6 * spread).min(own) }
+            if parts.is_empty() {
+                own
+            } else {
+                (own * floor::of_residuals(&parts, least / own, 0.0)).max(tuning().recordings.least_noise * spread).min(own)
+            }
         })
         .collect()
 }

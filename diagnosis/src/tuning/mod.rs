@@ -5,18 +5,24 @@
 
 mod claim;
 mod coupling;
+mod experiment;
 mod fit;
 mod intervals;
+mod locate;
 mod noise;
+mod recordings;
 mod screening;
 mod search;
 mod table;
 
 pub use claim::Claim;
 pub use coupling::Coupling;
+pub use experiment::Experiment;
 pub use fit::Fit;
 pub use intervals::Intervals;
+pub use locate::Locate;
 pub use noise::Noise;
+pub use recordings::Recordings;
 pub use screening::Screening;
 pub use search::Search;
 use std::sync::OnceLock;
@@ -25,6 +31,8 @@ pub use table::{Evidence, Group, Quantity, Row};
 /// All of it.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Tuning {
+    /// What recordings are taken for.
+    pub recordings: Recordings,
     /// When residuals count as noise.
     pub noise: Noise,
     /// How a structure is fitted.
@@ -39,6 +47,10 @@ pub struct Tuning {
     pub intervals: Intervals,
     /// What is claimed.
     pub claim: Claim,
+    /// How the missing force is estimated at every place.
+    pub locate: Locate,
+    /// How the next experiment is chosen.
+    pub experiment: Experiment,
 }
 
 static IN_USE: OnceLock<Tuning> = OnceLock::new();
@@ -49,8 +61,9 @@ pub fn tuning() -> &'static Tuning {
 }
 
 impl Tuning {
-    fn groups(&mut self) -> [(&'static str, &mut dyn Group); 7] {
+    fn groups(&mut self) -> [(&'static str, &mut dyn Group); 10] {
         [
+            ("recordings", &mut self.recordings),
             ("noise", &mut self.noise),
             ("fit", &mut self.fit),
             ("coupling", &mut self.coupling),
@@ -58,6 +71,8 @@ impl Tuning {
             ("search", &mut self.search),
             ("intervals", &mut self.intervals),
             ("claim", &mut self.claim),
+            ("locate", &mut self.locate),
+            ("experiment", &mut self.experiment),
         ]
     }
 

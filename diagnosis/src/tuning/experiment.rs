@@ -1,0 +1,37 @@
+//! How the next experiment is chosen.
+
+use super::table::group;
+
+group! {
+    /// How the next experiment is chosen. Its menu of excitations is in `experiment/menu.rs`.
+    Experiment {
+        /// Separation at which explanations count as told apart.
+        wanted: f64 = 5.0, "standard deviations", Statistics("its square is the difference of costs; half of it beyond claim.alike's doubt");
+        /// Repeats of an experiment, at most.
+        most_repeats: u64 = 10, "repeats", Judgement("nobody plays more");
+        /// Rivals that are told apart, at most.
+        rivals: usize = 4, "structures", Cost("each pair is simulated for each excitation");
+        /// Experiments that are compared by a true refit.
+        finalists: usize = 3, "experiments", Cost("two fits each");
+        /// Time that it takes to set an experiment up.
+        setting_up: f64 = 2.0, "s", Judgement("without it the shortest would always be chosen");
+        /// Largest ratio of predicted to recorded peaks of positions and speeds.
+        reach: f64 = 1.3, "-", Judgement("the device was shown to stand what was recorded");
+        /// Largest ratio of a planned to a recorded force, where the device's own limit allows it.
+        force: f64 = 1.5, "-", Judgement("as reach");
+        /// Mean of a force, as a share of its peak, below which it counts as none.
+        small_mean: f64 = 0.3, "-", Judgement("what is larger is weight or preload, and is kept");
+        /// Share of the sampling rate that excitations keep below.
+        band: f64 = 0.1, "-", Numerics("ten samples per period: a zero-order hold is then off by 5 %");
+        /// Samples of an excitation, at most.
+        longest: f64 = 16_000.0, "samples", Cost("as long as the recordings");
+        /// Share of the work for simulating everything, and for simulating and evaluating it.
+        shares: [f64; 2] = [0.4, 0.75], "of the work", Cost("the rest is for refits");
+        /// Substeps per sample for choosing, and for the figures of the best, at most.
+        substeps: [usize; 2] = [4, 16], "substeps", Cost("as fit.middle_substeps");
+        /// Standard deviation of a parameter, as a share of it, from which it is taken as open.
+        open: f64 = 0.05, "-", Judgement("5 % is what a data sheet says");
+        /// Noise of a sensor that is not there, as a share of what it would read, where no other of its kind is.
+        sensor_noise: f64 = 0.01, "-", Judgement("a common sensor");
+    }
+}
