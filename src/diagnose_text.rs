@@ -2,8 +2,8 @@
 
 use backdrive_diagnosis::audit::Weight;
 use backdrive_diagnosis::diagnose::Diagnosis;
-use backdrive_diagnosis::intervals::Spread;
-use backdrive_diagnosis::numbers::rows;
+use backdrive_diagnosis::intervals::Uncertainty;
+use backdrive_diagnosis::parameters::rows;
 use backdrive_diagnosis::verdict::{Alternative, Estimate, Finding, HeldOut, Interval, NextExperiment, Parameter, Remaining, Where};
 use backdrive_diagnosis::words;
 use backdrive_report::{number, si};
@@ -71,11 +71,11 @@ fn recordings(found: &Diagnosis) -> String {
         .model
         .outputs
         .iter()
-        .zip(&found.search.floor)
+        .zip(&found.search.noise_sd)
         .enumerate()
         .filter(|(index, _)| measured(*index))
         .map(|(_, (output, floor))| {
-            format!("{} {}", output.name, si(*floor, &backdrive_diagnosis::numbers::unit_of_output(problem, &output.kind)))
+            format!("{} {}", output.name, si(*floor, &backdrive_diagnosis::parameters::unit_of_output(problem, &output.kind)))
         })
         .collect();
     format!(
@@ -91,7 +91,7 @@ fn recordings(found: &Diagnosis) -> String {
 fn refit(found: &Diagnosis) -> String {
     let search = &found.search;
     let level = |levels: &[f64]| levels.iter().fold(0.0f64, |a, b| a.max(*b));
-    let spread = Spread::of(&search.nominal);
+    let spread = Uncertainty::of(&search.nominal);
     let mut moved = rows(&found.problem, &search.nominal, &spread);
     moved.retain(|r| r.determined && r.moved_sd.is_some_and(f64::is_finite));
     moved.sort_by(|a, b| b.moved_sd.unwrap_or(0.0).abs().total_cmp(&a.moved_sd.unwrap_or(0.0).abs()));

@@ -8,13 +8,13 @@ use crate::output;
 use crate::progress;
 use crate::recordings::{self, file_name};
 use backdrive_diagnosis::compare::{Quality, predictions, qualities};
-use backdrive_diagnosis::intervals::Spread;
-use backdrive_diagnosis::numbers::{Pair, Row, correlated, refitted_text, rows};
+use backdrive_diagnosis::intervals::Uncertainty;
+use backdrive_diagnosis::parameters::{Pair, Row, correlated, refitted_text, rows};
 use backdrive_diagnosis::per_record::{PerRecord, fit_each};
 use backdrive_diagnosis::physics::PHYSICS;
 use backdrive_diagnosis::problem::Problem;
 use backdrive_diagnosis::search::{Search, Settings, search};
-use backdrive_diagnosis::structure::{Number, Role, Structure};
+use backdrive_diagnosis::structure::{FreeParameter, Role, Structure};
 use backdrive_diagnosis::work::{Budget, Limit};
 use backdrive_report::{number, percent};
 use serde_json::json;
@@ -94,23 +94,23 @@ const ROUNDS: usize = 3;
 
 fn fitted(problem: &Problem, settings: &Settings, limit: Limit, report: &(dyn Fn(&str) + Sync)) -> Result<Fitted, Failure> {
     let refit = |problem: &Problem| search(problem, settings, limit, report).map_err(Failure::input);
-    let Search { mut nominal, floor, .. } = refit(problem)?;
+    let Search { mut nominal, noise_sd, .. } = refit(problem)?;
     report("fitting each record by itself");
-    let per_record = fit_each(problem, &nominal, &floor, &Budget::new(settings.work(), limit));
+    let per_record = fit_each(problem, &nominal, &noise_sd, &Budget::new(settings.work(), limit));
     let stated: Vec<f64> = problem.stated.iter().map(|s| s.given).collect();
-    let given = quality(problem, &nominal.structure, &nominal.structure.values(problem, &stated, &[], &[]), &floor);
+    let given = quality(problem, &nominal.structure, &nominal.structure.values(problem, &stated, &[], &[]), &noise_sd);
     // What the recordings do not determine keeps its nominal value, and the rest is fitted around it: written as fitted, such parameters
     // would be arbitrary, and put back alone they would take the fit of the others along.
     let (mut free, mut kept) = (problem.clone(), Vec::new());
-    let mut spread = Spread::of(&nominal);
+    let mut spread = Uncertainty::of(&nominal);
     for _ in 0..ROUNDS {
         let found = rows(&free, &nominal, &spread);
-        let loose = |(number, row): (&Number, &Row)| match number.role {
+        let loose = |(number, row): (&FreeParameter, &Row)| match number.role {
             Role::Stated(i) if !row.determined => Some((i, row.clone())),
             _ => None,
         };
-        let loose: Vec<(usize, Row)> = nominal.structure.numbers.iter().zip(&found).filter_map(loose).collect();
-        if loose.is_empty() || loose.len() == free.stated.len() && free.stated.len() == nominal.structure.numbers.len() {
+        let loose: Vec<(usize, Row)> = nominal.structure.free.iter().zip(&found).filter_map(loose).collect();
+        if loose.is_empty() || loose.len() == free.stated.len() && free.stated.len() == nominal.structure.free.len() {
             kept.extend(loose.into_iter().map(|l| l.1));
             break;
         }
@@ -122,7 +122,7 @@ fn fitted(problem: &Problem, settings: &Settings, limit: Limit, report: &(dyn Fn
         kept.extend(loose.into_iter().map(|l| l.1));
         report("fitting what is determined");
         nominal = refit(&free)?.nominal;
-        spread = Spread::of(&nominal);
+        spread = Uncertainty::of(&nominal);
     }
     let mut all: Vec<Row> = rows(&free, &nominal, &spread).into_iter().filter(|r| !kept.iter().any(|k| k.name == r.name)).collect();
     all.extend(kept.iter().map(|row| Row { value: row.given.unwrap_or(row.value), at_bound: false, moved_sd: None, ..row.clone() }));
@@ -136,7 +136,7 @@ fn fitted(problem: &Problem, settings: &Settings, limit: Limit, report: &(dyn Fn
         rows: all,
         pairs: correlated(&free, &nominal, &spread, CORRELATED),
         given,
-        fitted: quality(&free, &nominal.structure, &nominal.fit.values, &floor),
+        fitted: quality(&free, &nominal.structure, &nominal.fit.values, &noise_sd),
         per_record,
         kept: kept.into_iter().map(|k| k.name).collect(),
         model,
@@ -144,9 +144,9 @@ fn fitted(problem: &Problem, settings: &Settings, limit: Limit, report: &(dyn Fn
 }
 
 /// How well a structure with these values does on every recording.
-fn quality(problem: &Problem, structure: &Structure, values: &[f64], floor: &[f64]) -> Vec<Quality> {
+fn quality(problem: &Problem, structure: &Structure, values: &[f64], noise_sd: &[f64]) -> Vec<Quality> {
     let of = |records: &[_], seen| {
-        predictions(problem, records, structure, values).map(|p| qualities(problem, records, &p, floor, seen)).unwrap_or_default()
+        predictions(problem, records, structure, values).map(|p| qualities(problem, records, &p, noise_sd, seen)).unwrap_or_default()
     };
     let mut all = of(&problem.fit, true);
     all.extend(of(&problem.held_out, false));

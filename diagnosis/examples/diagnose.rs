@@ -54,8 +54,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     if talk {
         let n = found.samples as f64;
         eprintln!(
-            "{} hypotheses, {} simulations; floor {:.3?}, as given {:.3?}",
-            found.hypotheses, found.simulations, found.floor, found.levels_given
+            "{} hypotheses, {} simulations; noise_sd {:.3?}, as given {:.3?}",
+            found.hypotheses, found.simulations, found.noise_sd, found.levels_given
         );
         let nominal = &found.nominal;
         eprintln!(
@@ -63,7 +63,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             nominal.fit.cost / n,
             nominal.levels,
             nominal.correlation_time,
-            nominal.slowness
+            nominal.whiteness_statistic
         );
         for t in found.tried.iter().take(10) {
             eprintln!("   promised {:.3} taken {:.3?} {}", t.promised, t.taken, t.id);
@@ -72,13 +72,13 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             let (cost, ahead) = (c.fit.cost / n, advantage_over(nominal, c, found.samples));
             let values = c.structure.added_of(&c.fit.values);
             eprintln!(
-                "{:<62} {cost:.4} {:.3?} correlation {:.1} slow {:.1} ahead {ahead:.1} steps {} foreseen {:.2} {values:.4?}",
+                "{:<62} {cost:.4} {:.3?} correlation {:.1} slow {:.1} ahead {ahead:.1} steps {} predicted_decrease {:.2} {values:.4?}",
                 c.structure.name(),
                 c.levels,
                 c.correlation_time,
-                c.slowness,
+                c.whiteness_statistic,
                 c.fit.steps,
-                c.fit.foreseen
+                c.fit.predicted_decrease
             );
         }
     }

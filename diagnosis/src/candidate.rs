@@ -1,10 +1,10 @@
 //! A structure, fitted, and what tells a good one: the data that fitting, proposals, schedule and verdict speak of.
 
-use crate::compare::Unseen;
+use crate::compare::HeldOut;
 use crate::evaluator::Evaluator;
 use crate::fit::Fit;
 use crate::hypothesis::Hypothesis;
-use crate::statistics::{advantage, correlation_time, levels, slowness};
+use crate::statistics::{advantage, correlation_time, levels, whiteness_statistic};
 use crate::structure::Structure;
 use crate::tuning::tuning;
 use std::collections::HashSet;
@@ -18,29 +18,29 @@ pub struct Candidate {
     pub fit: Fit,
     /// Correlation time of what it leaves over, samples.
     pub correlation_time: f64,
-    /// How far what it leaves over is from white noise at longer spans, see [`slowness`].
-    pub slowness: f64,
-    /// Root mean square of what it leaves over at each output, floors.
+    /// How far what it leaves over is from white noise at longer spans, see [`whiteness_statistic`].
+    pub whiteness_statistic: f64,
+    /// Root mean square of what it leaves over at each output, noise standard deviations.
     pub levels: Vec<f64>,
     /// What it leaves over of the recordings that no fit has seen; `None` where it was not held against them.
-    pub unseen: Option<Unseen>,
+    pub unseen: Option<HeldOut>,
 }
 
 impl Candidate {
     /// Whether what it leaves over is white noise, as far as chance can tell.
     pub fn is_white(&self) -> bool {
-        white(self.correlation_time, self.slowness)
+        white(self.correlation_time, self.whiteness_statistic)
     }
 }
 
-pub(crate) fn white(correlation_time: f64, slowness: f64) -> bool {
-    correlation_time < tuning().noise.white_correlation && slowness < tuning().noise.white_statistic
+pub(crate) fn white(correlation_time: f64, whiteness_statistic: f64) -> bool {
+    correlation_time < tuning().noise.white_correlation && whiteness_statistic < tuning().noise.white_statistic
 }
 
 /// How good a candidate is beside others of the same search: what it costs with a price on each number, the lower the better.
 pub fn price(candidate: &Candidate, samples: usize, correlation_time: f64) -> f64 {
     let effective = (samples as f64 / correlation_time).max(2.0);
-    effective * (candidate.fit.cost.max(1e-300) / samples.max(1) as f64).ln() + candidate.structure.numbers.len() as f64 * effective.ln()
+    effective * (candidate.fit.cost.max(1e-300) / samples.max(1) as f64).ln() + candidate.structure.free.len() as f64 * effective.ln()
 }
 
 /// The ids of a structure's effects, whatever their order.
@@ -58,8 +58,8 @@ pub(crate) fn distinct_structures(found: &[Candidate], effects: usize) -> impl I
 
 pub(crate) fn candidate(evaluator: &Evaluator, structure: Structure, fit: Fit) -> Candidate {
     let correlation_time = correlation_time(evaluator, &fit.residuals);
-    let (levels, slowness) = (levels(evaluator, &fit.residuals), slowness(evaluator, &fit.residuals));
-    Candidate { structure, fit, correlation_time, slowness, levels, unseen: None }
+    let (levels, whiteness_statistic) = (levels(evaluator, &fit.residuals), whiteness_statistic(evaluator, &fit.residuals));
+    Candidate { structure, fit, correlation_time, whiteness_statistic, levels, unseen: None }
 }
 
 /// Sorts by price, with the correlation time of the one that costs least.
@@ -76,7 +76,7 @@ pub(crate) fn done(found: &[Candidate], nominal: &Candidate, samples: usize) -> 
 
 /// How much better a candidate is than another one, with the correlation time of the better.
 pub fn advantage_over(base: &Candidate, better: &Candidate, samples: usize) -> f64 {
-    let (a, b) = (base.structure.numbers.len(), better.structure.numbers.len());
+    let (a, b) = (base.structure.free.len(), better.structure.free.len());
     advantage(base.fit.cost, a, better.fit.cost.max(1e-300), b, samples, better.correlation_time)
 }
 
@@ -93,5 +93,5 @@ pub(crate) fn simplest_of<'c>(candidates: impl Iterator<Item = &'c Candidate>, s
     if best.fit.cost < tuning().noise.near * samples as f64 {
         return Some(best);
     }
-    candidates.filter(|c| c.fit.cost < tuning().claim.twice * best.fit.cost).min_by_key(|c| c.structure.numbers.len())
+    candidates.filter(|c| c.fit.cost < tuning().claim.twice * best.fit.cost).min_by_key(|c| c.structure.free.len())
 }

@@ -25,9 +25,9 @@ impl Ready {
     fn of(problem: &Problem, records: &[Record], structure: &Structure, values: &[f64]) -> Option<Ready> {
         let fixed = Problem { model: structure.model(problem, values)?, stated: Vec::new(), ..problem.clone() };
         let mut own = Structure::new(&fixed, records, Vec::new());
-        own.numbers.retain(|n| n.records.is_some());
+        own.free.retain(|n| n.records.is_some());
         let mut values = own.values(&fixed, &[], &[], &[]);
-        if !own.numbers.is_empty()
+        if !own.free.is_empty()
             && let Some(fit) = Evaluator::on(&fixed, records).fit(&own, &values, Effort { steps: 15, tolerance: 1.0 })
         {
             values = fit.values;
@@ -55,20 +55,20 @@ pub fn predictions(problem: &Problem, records: &[Record], structure: &Structure,
 
 /// Residuals of a structure in recordings that were not fitted.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Unseen {
+pub struct HeldOut {
     /// Mean square of the normalised residuals, noise variances.
     pub mean_square: f64,
     /// Their correlation time, samples: an error of amplitude or a drift correlates thousands of samples, which then count as one.
     pub correlation_time: f64,
 }
 
-/// Residuals of a structure with these values in `records`, normalised by the noise standard deviations `floor`.
-pub fn unseen(problem: &Problem, records: &[Record], structure: &Structure, values: &[f64], floor: &[f64]) -> Option<Unseen> {
+/// Residuals of a structure with these values in `records`, normalised by the noise standard deviations `noise_sd`.
+pub fn unseen(problem: &Problem, records: &[Record], structure: &Structure, values: &[f64], noise_sd: &[f64]) -> Option<HeldOut> {
     let ready = Ready::of(problem, records, structure, values)?;
-    let evaluator = Evaluator { floor: floor.to_vec(), ..Evaluator::on(&ready.fixed, records) };
+    let evaluator = Evaluator { noise_sd: noise_sd.to_vec(), ..Evaluator::on(&ready.fixed, records) };
     let residuals = evaluator.residuals(&ready.own, &ready.values).filter(|r| !r.is_empty())?;
     let mean_square = residuals.iter().map(|r| r * r).sum::<f64>() / residuals.len() as f64;
-    Some(Unseen { mean_square, correlation_time: correlation_time(&evaluator, &residuals) })
+    Some(HeldOut { mean_square, correlation_time: correlation_time(&evaluator, &residuals) })
 }
 
 /// Mean squared error of a structure with these values at every output measured in every record, in the unit squared: record by record, outputs
@@ -102,8 +102,8 @@ pub struct Quality {
     pub fitted: bool,
 }
 
-/// Quality of predictions of `records`. `floor` is the noise standard deviation of each output, in its unit.
-pub fn qualities(problem: &Problem, records: &[Record], predicted: &[Predicted], floor: &[f64], fitted: bool) -> Vec<Quality> {
+/// Quality of predictions of `records`. `noise_sd` is the noise standard deviation of each output, in its unit.
+pub fn qualities(problem: &Problem, records: &[Record], predicted: &[Predicted], noise_sd: &[f64], fitted: bool) -> Vec<Quality> {
     let mut all = Vec::new();
     for (record, predicted) in records.iter().zip(predicted) {
         for (index, output) in problem.model.outputs.iter().enumerate() {
@@ -118,7 +118,7 @@ pub fn qualities(problem: &Problem, records: &[Record], predicted: &[Predicted],
                 record: record.name.clone(),
                 output: output.name.clone(),
                 nrmse: rms(&error) / record.spread.get(index).copied().unwrap_or(1.0),
-                floors: rms(&lagged) / floor.get(index).copied().unwrap_or(1.0).max(f64::MIN_POSITIVE),
+                floors: rms(&lagged) / noise_sd.get(index).copied().unwrap_or(1.0).max(f64::MIN_POSITIVE),
                 fitted,
             });
         }

@@ -1,7 +1,7 @@
 //! Derivatives of the residuals by the parameters of a fit, by differences of simulations, in parallel.
 
 use crate::evaluator::{Evaluator, residuals_in};
-use crate::structure::{Number, Role, Structure};
+use crate::structure::{FreeParameter, Role, Structure};
 use crate::tuning::tuning;
 use backdrive_plant::model::Model;
 use nalgebra::DMatrix;
@@ -29,7 +29,7 @@ impl Evaluator<'_> {
         // Weights of unknown inputs that are far from each other are moved at the same time.
         let mut together: BTreeMap<Set, Vec<usize>> = BTreeMap::new();
         for (at, j) in which.iter().enumerate() {
-            match (&structure.numbers[*j].role, &structure.numbers[*j].records) {
+            match (&structure.free[*j].role, &structure.free[*j].records) {
                 (Role::Knot(unknown, knot, r), _) => together.entry((*unknown, *r, knot % tuning().fit.knots_apart)).or_default().push(at),
                 (_, Some(of)) => jobs.extend(of.iter().map(|r| (at, *r))),
                 (_, None) => jobs.extend((0..self.records.len()).map(|r| (at, r))),
@@ -75,7 +75,7 @@ impl Evaluator<'_> {
 
     /// One parameter moved; `None` for a weight of an unknown input, which are moved together, and where no model can be made.
     fn moved(&self, structure: &Structure, own: &[f64], j: usize, stretch: f64) -> Option<Moved> {
-        if matches!(structure.numbers[j].role, Role::Knot(..)) {
+        if matches!(structure.free[j].role, Role::Knot(..)) {
             return None;
         }
         let (values, step) = moved_values(structure, own, j, stretch);
@@ -93,14 +93,14 @@ impl Evaluator<'_> {
         (together, spans): (&[(Set, Vec<usize>)], &[Range<usize>]),
         stretch: f64,
     ) -> Vec<Option<Vec<Vec<f64>>>> {
-        let Some(model) = structure.model(self.problem, &outward(structure, own)).filter(|_| !together.is_empty()) else {
+        let Some(model) = structure.model(self.problem, &to_external(structure, own)).filter(|_| !together.is_empty()) else {
             return Vec::new();
         };
         let one = |((unknown, r, _), ats): &(Set, Vec<usize>)| {
             if self.budget.is_halted() {
                 return None;
             }
-            let (mut values, mut steps) = (outward(structure, own), Vec::new());
+            let (mut values, mut steps) = (to_external(structure, own), Vec::new());
             for at in ats.iter() {
                 let (changed, step) = moved_values(structure, own, which[*at], stretch);
                 values[which[*at]] = changed[which[*at]];
@@ -111,7 +111,7 @@ impl Evaluator<'_> {
             let before = residuals.get(spans[*r].clone())?;
             let mut columns = vec![vec![0.0; part.len()]; ats.len()];
             for ((at, step), column) in ats.iter().zip(&steps).zip(&mut columns) {
-                let Role::Knot(_, knot, _) = structure.numbers[which[*at]].role else { continue };
+                let Role::Knot(_, knot, _) = structure.free[which[*at]].role else { continue };
                 let window = self.problem.unknown.get(*unknown)?.window(knot, tuning().fit.knots_apart, record);
                 for from in (0..part.len()).step_by(record.len.max(1)) {
                     for i in window.start + from..window.end + from {
@@ -125,7 +125,7 @@ impl Evaluator<'_> {
     }
 
     /// Whether a parameter moves in this fit.
-    pub(crate) fn moves(&self, number: &Number) -> bool {
+    pub(crate) fn moves(&self, number: &FreeParameter) -> bool {
         !self.own_only || number.records.is_some()
     }
 
@@ -148,13 +148,13 @@ impl Evaluator<'_> {
 }
 
 /// The values in the model of a fit's own.
-pub(crate) fn outward(structure: &Structure, own: &[f64]) -> Vec<f64> {
-    structure.numbers.iter().zip(own).map(|(n, x)| n.outward(*x)).collect()
+pub(crate) fn to_external(structure: &Structure, own: &[f64]) -> Vec<f64> {
+    structure.free.iter().zip(own).map(|(n, x)| n.to_external(*x)).collect()
 }
 
 /// Values with one parameter moved by its difference, away from a bound, and the difference taken in the fit's own unit.
 fn moved_values(structure: &Structure, own: &[f64], j: usize, stretch: f64) -> (Vec<f64>, f64) {
-    let number = &structure.numbers[j];
+    let number = &structure.free[j];
     let (low, high) = number.bounds();
     // What already spans a sample has no need of more.
     let longer = if number.coarse { stretch.clamp(-1.0, 2.0) } else { stretch };
@@ -163,7 +163,7 @@ fn moved_values(structure: &Structure, own: &[f64], j: usize, stretch: f64) -> (
         step = -step;
     }
     let moved = (own[j] + step).clamp(low, high);
-    let values = structure.numbers.iter().enumerate().map(|(i, n)| n.outward(if i == j { moved } else { own[i] })).collect();
+    let values = structure.free.iter().enumerate().map(|(i, n)| n.to_external(if i == j { moved } else { own[i] })).collect();
     let taken = moved - own[j];
     (values, if taken == 0.0 { 1.0 } else { taken })
 }

@@ -58,7 +58,7 @@ pub fn diagnose(
     report("deciding");
     let (verdict, files) = verdict(&problem, &search, &remarks, location.as_ref(), limit)?;
     report("fitting each record by itself");
-    let per_record = fit_each(&problem, &search.nominal, &search.floor, &Budget::new(tuning().search.per_record, limit));
+    let per_record = fit_each(&problem, &search.nominal, &search.noise_sd, &Budget::new(tuning().search.per_record, limit));
     Ok(Diagnosis { problem, remarks, search, location, verdict, files, per_record })
 }
 
@@ -68,5 +68,5 @@ fn located(problem: &Problem, search: &Search) -> Option<Location> {
     let model = nominal.structure.model(problem, &nominal.fit.values)?;
     let records = nominal.structure.with_unknown(problem, &problem.fit, &nominal.fit.values);
     let runs: Vec<locate::Run> = records.iter().map(locate::Run::from).collect();
-    locate(&model, &runs, &search.floor, &locate::Options::quick()).ok()
+    locate(&model, &runs, &search.noise_sd, &locate::Options::quick()).ok()
 }

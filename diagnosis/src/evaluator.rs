@@ -1,6 +1,6 @@
 //! Residuals: what a structure predicts held against recordings, divided by the noise standard deviation of each output.
 
-use crate::guide::Guide;
+use crate::coupling::Coupling;
 use crate::problem::{Problem, Record};
 use crate::structure::{Along, Structure};
 use crate::tuning::tuning;
@@ -17,7 +17,7 @@ pub struct Evaluator<'a> {
     /// The recordings.
     pub records: &'a [Record],
     /// Noise standard deviation of each output, in its unit.
-    pub floor: Vec<f64>,
+    pub noise_sd: Vec<f64>,
     /// Normalised residuals beyond this count linearly, not by their square (Huber's loss); infinite for none.
     pub robust: f64,
     /// Counts what is computed; every fit ends after its present step once it is used up.
@@ -25,7 +25,7 @@ pub struct Evaluator<'a> {
     /// Substeps per sample, at most: fewer are faster, and err more where the model is very stiff.
     pub substeps: usize,
     /// What couples the simulations to the measured motion; `None` for free simulations.
-    pub guide: Option<Guide>,
+    pub guide: Option<Coupling>,
     /// Factor on the difference by which derivatives are taken, at first.
     pub stretch: f64,
     /// Largest such factor, where derivatives over narrow differences mislead.
@@ -45,7 +45,7 @@ impl<'a> Evaluator<'a> {
         Evaluator {
             problem,
             records,
-            floor: problem.floor.clone(),
+            noise_sd: problem.noise_sd.clone(),
             robust: f64::INFINITY,
             budget: Budget::default(),
             substeps: tuning().fit.fine_substeps,
@@ -61,7 +61,7 @@ impl<'a> Evaluator<'a> {
         Evaluator { budget, ..self.clone() }
     }
 
-    /// Number of residuals.
+    /// FreeParameter of residuals.
     pub fn len(&self) -> usize {
         self.records.iter().map(residuals_in).sum()
     }
@@ -100,10 +100,10 @@ impl<'a> Evaluator<'a> {
         let mut columns = structure.predict(self.problem, model, values, (record, r), along)?;
         for (column, output) in columns.chunks_exact_mut(record.len).zip(measured(record)) {
             let samples = record.outputs.get(output)?.as_deref()?;
-            let floor = self.floor.get(output).copied()?;
+            let noise_sd = self.noise_sd.get(output).copied()?;
             let lag = if self.guide.is_some() { 0 } else { self.problem.lag.get(output).copied().unwrap_or(0) };
             for (prediction, sample) in column.iter_mut().zip(samples) {
-                *prediction = (sample - *prediction) / floor;
+                *prediction = (sample - *prediction) / noise_sd;
             }
             if lag > 0 {
                 // From the end, so that what is taken off is still the position's.
@@ -136,7 +136,7 @@ pub fn measured(record: &Record) -> impl Iterator<Item = usize> + '_ {
     record.outputs.iter().enumerate().filter(|(_, samples)| samples.is_some()).map(|(output, _)| output)
 }
 
-/// Number of residuals of a record.
+/// FreeParameter of residuals of a record.
 pub(crate) fn residuals_in(record: &Record) -> usize {
     measured(record).count() * record.len
 }

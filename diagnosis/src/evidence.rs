@@ -61,9 +61,9 @@ pub struct Evidence {
     pub traces: Vec<Trace>,
 }
 
-/// Evidence of one of the physics that a candidate adds; `None` where nothing can be located there. `floor` is the noise
+/// Evidence of one of the physics that a candidate adds; `None` where nothing can be located there. `noise_sd` is the noise
 /// standard deviation of each output, in its unit.
-pub fn evidence(problem: &Problem, best: &Candidate, floor: &[f64], which: usize) -> Option<Evidence> {
+pub fn evidence(problem: &Problem, best: &Candidate, noise_sd: &[f64], which: usize) -> Option<Evidence> {
     let finding = best.structure.added.get(which)?;
     let values = &best.fit.values;
     let rest = |i: &usize| *i != which;
@@ -79,7 +79,7 @@ pub fn evidence(problem: &Problem, best: &Candidate, floor: &[f64], which: usize
     let runs: Vec<locate::Run> =
         records.iter().zip(&changed).map(|(r, m)| locate::Run { model: Some(m), ..locate::Run::from(r) }).collect();
     let options = locate::Options { most_samples: tuning().locate.samples, only: Some(finding.place.clone()), ..locate::Options::quick() };
-    let location = locate(&without, &runs, floor, &options).ok()?;
+    let location = locate(&without, &runs, noise_sd, &options).ok()?;
     let found = location.ranking.into_iter().find(|c| c.place.same(&finding.place))?;
     let against = finding.physics.against;
     let scene = Scene { without: &without, with: &with, finding, place: &found.place, against };

@@ -1,10 +1,10 @@
 //! Fits by simulation error: bounded, damped Gauss-Newton steps (Levenberg-Marquardt) with secant updates of the derivatives.
 
-use crate::derivatives::{outward, secant};
+use crate::derivatives::{to_external, secant};
 use crate::effort::Effort;
 use crate::evaluator::Evaluator;
 use crate::normal_equations::normal_equations;
-use crate::structure::{Number, Role, Structure};
+use crate::structure::{FreeParameter, Role, Structure};
 use crate::tuning::tuning;
 use crate::work::Steps;
 use nalgebra::{DMatrix, DVector};
@@ -12,7 +12,7 @@ use nalgebra::{DMatrix, DVector};
 /// A fitted structure.
 #[derive(Debug, Clone)]
 pub struct Fit {
-    /// Values of [`Structure::numbers`], as they stand in the model.
+    /// Values of [`Structure::free`], as they stand in the model.
     pub values: Vec<f64>,
     /// Sum of the squared normalised residuals (linear beyond a bound, where robust), and of the priors.
     pub cost: f64,
@@ -21,7 +21,7 @@ pub struct Fit {
     /// Derivatives of the residuals by each parameter in the fit's own unit, where the last step began.
     pub jacobian: Vec<Vec<f64>>,
     /// Predicted decrease of the cost by the next Gauss-Newton step.
-    pub foreseen: f64,
+    pub predicted_decrease: f64,
     /// Steps taken.
     pub steps: usize,
 }
@@ -29,31 +29,31 @@ pub struct Fit {
 impl Evaluator<'_> {
     /// Fits a structure from `start` on; `None` where it cannot be simulated there.
     pub fn fit(&self, structure: &Structure, start: &[f64], effort: Effort) -> Option<Fit> {
-        self.fit_knowing(structure, start, effort, None)
+        self.fit_from_derivatives(structure, start, effort, None)
     }
 
     /// The same with derivatives that another fit found, of this structure or of one that shares its first parameters: good enough for the first steps.
     ///
     /// Derivatives are carried along by secant updates, and computed anew when a step disappoints, every few steps, and before the fit says that it
     /// has converged.
-    pub fn fit_knowing(&self, structure: &Structure, start: &[f64], effort: Effort, known: Option<(&Structure, &Fit)>) -> Option<Fit> {
+    pub fn fit_from_derivatives(&self, structure: &Structure, start: &[f64], effort: Effort, known: Option<(&Structure, &Fit)>) -> Option<Fit> {
         let mut descent = Descent::from(self, structure, start, known)?;
         loop {
             let next = descent.next_step();
             self.budget.count(algebra(descent.residuals.len(), descent.own.len()));
             if self.budget.is_over() || descent.steps >= effort.steps || descent.weak >= tuning().fit.weak_steps {
-                return Some(descent.end(next.foreseen));
+                return Some(descent.end(next.predicted_decrease));
             }
-            if next.foreseen < descent.enough(effort) {
+            if next.predicted_decrease < descent.enough(effort) {
                 if descent.age == 0 || effort.tolerance > 1.0 {
-                    return Some(descent.end(next.foreseen));
+                    return Some(descent.end(next.predicted_decrease));
                 }
                 descent.renew();
                 continue;
             }
             match descent.try_steps(&next) {
                 Some(trial) => descent.take(trial, &next, effort),
-                None if !descent.widen() => return Some(descent.end(next.foreseen)),
+                None if !descent.widen() => return Some(descent.end(next.predicted_decrease)),
                 None => {}
             }
         }
@@ -62,20 +62,20 @@ impl Evaluator<'_> {
     /// Derivatives at the start, those by parameters that another fit has in common from that one.
     fn first_jacobian(&self, structure: &Structure, own: &[f64], residuals: &[f64], known: Option<(&Structure, &Fit)>) -> Vec<Vec<f64>> {
         let Some((other, fit)) = known else {
-            let moving: Vec<usize> = (0..own.len()).filter(|j| self.moves(&structure.numbers[*j])).collect();
+            let moving: Vec<usize> = (0..own.len()).filter(|j| self.moves(&structure.free[*j])).collect();
             return self.all_columns(structure, own, residuals, &moving, self.stretch);
         };
         let still = vec![0.0; residuals.len()];
-        let column = |number: &Number| {
+        let column = |number: &FreeParameter| {
             if !self.moves(number) {
                 return Some(&still);
             }
-            let place = other.numbers.iter().position(|n| n.role == number.role);
+            let place = other.free.iter().position(|n| n.role == number.role);
             place.and_then(|p| fit.jacobian.get(p)).filter(|c| c.len() == residuals.len())
         };
-        let missing: Vec<usize> = (0..own.len()).filter(|j| column(&structure.numbers[*j]).is_none()).collect();
+        let missing: Vec<usize> = (0..own.len()).filter(|j| column(&structure.free[*j]).is_none()).collect();
         let mut new = self.columns(structure, own, residuals, &missing, self.stretch).into_iter();
-        structure.numbers.iter().map(|n| column(n).cloned().or_else(|| new.next()).unwrap_or_else(|| vec![0.0; residuals.len()])).collect()
+        structure.free.iter().map(|n| column(n).cloned().or_else(|| new.next()).unwrap_or_else(|| vec![0.0; residuals.len()])).collect()
     }
 
     /// The best of fits from several starts.
@@ -114,7 +114,7 @@ struct Next {
     /// Parameters that have an effect and are not pushed against a bound.
     free: Vec<usize>,
     /// Predicted decrease of the cost by the undamped step.
-    foreseen: f64,
+    predicted_decrease: f64,
 }
 
 /// Where a step that lowers the cost leads.
@@ -131,13 +131,13 @@ impl<'e, 'a> Descent<'e, 'a> {
         start: &[f64],
         known: Option<(&Structure, &Fit)>,
     ) -> Option<Descent<'e, 'a>> {
-        let numbers = &structure.numbers;
-        let own: Vec<f64> = numbers.iter().zip(start).map(|(n, v)| n.inward(*v)).collect();
+        let numbers = &structure.free;
+        let own: Vec<f64> = numbers.iter().zip(start).map(|(n, v)| n.to_internal(*v)).collect();
         // A weight that a part of a recording says nothing of stays where it is.
         let centred =
-            |(n, x): (&Number, &f64)| n.prior.map(|(centre, spread)| (if matches!(n.role, Role::Knot(..)) { *x } else { centre }, spread));
+            |(n, x): (&FreeParameter, &f64)| n.prior.map(|(centre, spread)| (if matches!(n.role, Role::Knot(..)) { *x } else { centre }, spread));
         let priors: Vec<Option<(f64, f64)>> = numbers.iter().zip(&own).map(centred).collect();
-        let residuals = evaluator.residuals(structure, &outward(structure, &own))?;
+        let residuals = evaluator.residuals(structure, &to_external(structure, &own))?;
         let cost = evaluator.cost(&residuals) + cost_of_priors(&priors, &own);
         let jacobian = evaluator.first_jacobian(structure, &own, &residuals, known);
         let moving = (0..own.len()).filter(|j| evaluator.moves(&numbers[*j])).collect();
@@ -155,11 +155,11 @@ impl<'e, 'a> Descent<'e, 'a> {
                 slope[j] += (self.own[j] - centre) / (spread * spread);
             }
         }
-        let is_free = |j: &usize| may_move(&self.structure.numbers[*j], self.own[*j], slope[*j], matrix[(*j, *j)]);
+        let is_free = |j: &usize| may_move(&self.structure.free[*j], self.own[*j], slope[*j], matrix[(*j, *j)]);
         let free: Vec<usize> = self.moving.iter().copied().filter(is_free).collect();
         let step = step_of(&matrix, &slope, &free, 1e-9);
-        let foreseen = step.map_or(0.0, |step| free.iter().zip(&step).map(|(j, s)| -slope[*j] * s).sum());
-        Next { matrix, slope, free, foreseen }
+        let predicted_decrease = step.map_or(0.0, |step| free.iter().zip(&step).map(|(j, s)| -slope[*j] * s).sum());
+        Next { matrix, slope, free, predicted_decrease }
     }
 
     /// Mean squared residual.
@@ -190,12 +190,12 @@ impl<'e, 'a> Descent<'e, 'a> {
             let step = step_of(&next.matrix, &next.slope, &next.free, self.lambda)?;
             let mut own = self.own.clone();
             for (j, s) in next.free.iter().zip(&step) {
-                let number = &self.structure.numbers[*j];
+                let number = &self.structure.free[*j];
                 let (low, high) = number.bounds();
                 let longest = if number.log { tuning().fit.longest_log } else { tuning().fit.longest * (high - low) };
                 own[*j] = (self.own[*j] + s.clamp(-longest, longest)).clamp(low, high);
             }
-            if let Some(residuals) = self.evaluator.residuals(self.structure, &outward(self.structure, &own)) {
+            if let Some(residuals) = self.evaluator.residuals(self.structure, &to_external(self.structure, &own)) {
                 let cost = self.evaluator.cost(&residuals) + cost_of_priors(&self.priors, &own);
                 if cost < self.cost {
                     return Some(Trial { own, residuals, cost });
@@ -210,7 +210,7 @@ impl<'e, 'a> Descent<'e, 'a> {
     fn take(&mut self, trial: Trial, next: &Next, effort: Effort) {
         let tuning = &tuning().fit;
         let decrease = self.cost - trial.cost;
-        let ratio = decrease / next.foreseen.max(1e-300);
+        let ratio = decrease / next.predicted_decrease.max(1e-300);
         self.lambda = if ratio > 0.5 { self.lambda * tuning.less_damping } else { self.lambda * tuning.keep_damping }.max(1e-9);
         // Far from the noise and hardly moving: other structures deserve the work.
         self.weak = if decrease < tuning.weak_decrease * self.cost && self.is_far() { self.weak + 1 } else { 0 };
@@ -240,9 +240,9 @@ impl<'e, 'a> Descent<'e, 'a> {
         true
     }
 
-    fn end(self, foreseen: f64) -> Fit {
-        let values = outward(self.structure, &self.own);
-        Fit { values, cost: self.cost, residuals: self.residuals, jacobian: self.jacobian, foreseen, steps: self.steps }
+    fn end(self, predicted_decrease: f64) -> Fit {
+        let values = to_external(self.structure, &self.own);
+        Fit { values, cost: self.cost, residuals: self.residuals, jacobian: self.jacobian, predicted_decrease, steps: self.steps }
     }
 }
 
@@ -257,7 +257,7 @@ fn algebra(residuals: usize, numbers: usize) -> Steps {
 }
 
 /// Whether a parameter has an effect and is not pushed against its bound.
-fn may_move(number: &Number, own: f64, slope: f64, curvature: f64) -> bool {
+fn may_move(number: &FreeParameter, own: f64, slope: f64, curvature: f64) -> bool {
     let (low, high) = number.bounds();
     let edge = tuning().fit.pushed * (high - low);
     curvature > 0.0 && !(own <= low + edge && slope > 0.0) && !(own >= high - edge && slope < 0.0)

@@ -12,7 +12,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 /// Standard deviations of a fit's numbers, in the fit's own unit (logarithms where it steps in them), and their correlations. Residuals
 /// that hang together count as fewer, and what is left over counts as error.
 #[derive(Debug, Clone)]
-pub struct Spread {
+pub struct Uncertainty {
     /// One for each number; infinite where the recordings do not determine it.
     pub deviation: Vec<f64>,
     /// How far each number may be off beside that, whatever the noise: what the fit's last step and finer simulation steps would move it.
@@ -24,9 +24,9 @@ pub struct Spread {
 /// 97.5 % of a normal distribution.
 const NORMAL_975: f64 = 1.959_964;
 
-impl Spread {
+impl Uncertainty {
     /// From the curvature where the fit ended.
-    pub fn of(candidate: &Candidate) -> Spread {
+    pub fn of(candidate: &Candidate) -> Uncertainty {
         let fit = &candidate.fit;
         let n = fit.values.len();
         let matrix = curvature(candidate, &fit.jacobian, &fit.residuals);
@@ -43,15 +43,15 @@ impl Spread {
                 }
             }
         }
-        Spread { deviation, bias: vec![0.0; n], correlation }
+        Uncertainty { deviation, bias: vec![0.0; n], correlation }
     }
 
     /// The same, measured where the fit ended: derivatives from both sides, the scatter of the scores over blocks of the recordings
     /// (what is left over hangs together, and differs from place to place: Huber's sandwich by blocks), and what finer steps of the simulation would change.
-    pub fn measured(evaluator: &Evaluator, candidate: &Candidate) -> Spread {
-        let mut spread = Spread::of(candidate);
+    pub fn measured(evaluator: &Evaluator, candidate: &Candidate) -> Uncertainty {
+        let mut spread = Uncertainty::of(candidate);
         let structure = &candidate.structure;
-        let own: Vec<f64> = structure.numbers.iter().zip(&candidate.fit.values).map(|(n, v)| n.inward(*v)).collect();
+        let own: Vec<f64> = structure.free.iter().zip(&candidate.fit.values).map(|(n, v)| n.to_internal(*v)).collect();
         let counted = evaluator.within(Budget::new(Steps::MAX, Limit::default()));
         let Some(residuals) = counted.residuals(structure, &candidate.fit.values) else { return spread };
         // Where simulations are slow, derivatives come from fewer substeps, and finer ones are not tried.
@@ -97,7 +97,7 @@ impl Spread {
             if variance.is_finite() && variance > 0.0 {
                 spread.deviation[j] = variance.sqrt();
             }
-            let prior = structure.numbers[j].prior.is_none() || spread.deviation[j] < 1.0;
+            let prior = structure.free[j].prior.is_none() || spread.deviation[j] < 1.0;
             let moved = if prior { last[j].abs().min(tuning().intervals.last_step * spread.deviation[j]) } else { 0.0 };
             spread.bias[j] = moved + numerical.as_ref().map_or(0.0, |d| d[j].abs());
         }
@@ -108,9 +108,9 @@ impl Spread {
     /// they stand in the model. All together, for numbers that go together may each lie in its own interval.
     pub fn is_far(&self, candidate: &Candidate, others: &[(usize, f64)]) -> bool {
         let away = |(number, other): &(usize, f64)| {
-            let (n, value) = (candidate.structure.numbers.get(*number)?, candidate.fit.values.get(*number)?);
+            let (n, value) = (candidate.structure.free.get(*number)?, candidate.fit.values.get(*number)?);
             let (deviation, bias) = (self.deviation.get(*number)?, self.bias.get(*number)?);
-            let off = n.inward(*other) - n.inward(*value);
+            let off = n.to_internal(*other) - n.to_internal(*value);
             let beyond = (off.abs() - bias).max(0.0).copysign(off);
             deviation.is_finite().then_some((*number, beyond / deviation))
         };
@@ -128,13 +128,13 @@ impl Spread {
 
     /// 95 % interval of a number, as it stands in the model.
     pub fn interval(&self, candidate: &Candidate, number: usize) -> [f64; 2] {
-        let (Some(n), Some(value)) = (candidate.structure.numbers.get(number), candidate.fit.values.get(number)) else {
+        let (Some(n), Some(value)) = (candidate.structure.free.get(number), candidate.fit.values.get(number)) else {
             return [f64::NAN; 2];
         };
         let (low, high) = n.bounds();
-        let own = n.inward(*value);
+        let own = n.to_internal(*value);
         let half = self.half(number);
-        [n.outward((own - half).max(low)), n.outward((own + half).min(high))]
+        [n.to_external((own - half).max(low)), n.to_external((own + half).min(high))]
     }
 }
 
@@ -149,7 +149,7 @@ fn distance_square(off: &[f64], correlation: DMatrix<f64>) -> f64 {
 /// Curvature of half the cost, priors included.
 fn curvature(candidate: &Candidate, jacobian: &[Vec<f64>], residuals: &[f64]) -> DMatrix<f64> {
     let (mut matrix, _) = normal_equations(jacobian, residuals, None);
-    for (j, number) in candidate.structure.numbers.iter().enumerate() {
+    for (j, number) in candidate.structure.free.iter().enumerate() {
         if let Some((_, spread)) = number.prior {
             matrix[(j, j)] += 1.0 / (spread * spread);
         }

@@ -3,8 +3,8 @@
 
 use crate::candidate::{Candidate, candidate};
 use crate::evaluator::Evaluator;
-use crate::intervals::Spread;
-use crate::numbers::name_of;
+use crate::intervals::Uncertainty;
+use crate::parameters::name_of;
 use crate::problem::{Problem, Record};
 use crate::structure::{Role, Structure};
 use crate::tuning::tuning;
@@ -41,49 +41,49 @@ pub struct Across {
 pub struct PerRecord {
     /// The records, in order; those whose fit failed are left out.
     pub records: Vec<String>,
-    /// Root mean square of what each record's own fit leaves over at each output, floors.
+    /// Root mean square of what each record's own fit leaves over at each output, noise standard deviations.
     pub levels: Vec<Vec<f64>>,
     /// Every number that all records share.
     pub numbers: Vec<Across>,
 }
 
-/// Fits the structure of `joint` to each record by itself, from the joint values on. `floor` is the measuring error of each output, in
+/// Fits the structure of `joint` to each record by itself, from the joint values on. `noise_sd` is the measuring error of each output, in
 /// its unit. Fits end early once the budget is used up.
-pub fn fit_each<'a>(problem: &'a Problem, joint: &Candidate, floor: &[f64], budget: &Budget<'a>) -> PerRecord {
+pub fn fit_each<'a>(problem: &'a Problem, joint: &Candidate, noise_sd: &[f64], budget: &Budget<'a>) -> PerRecord {
     let stated = joint.structure.stated_of(problem, &joint.fit.values);
     let added = joint.structure.added_of(&joint.fit.values);
     let own = joint.structure.of_records(&joint.fit.values);
-    let one = |budget: &Budget<'a>, (index, record): &(usize, &'a Record)| -> Option<(String, Candidate, Spread)> {
+    let one = |budget: &Budget<'a>, (index, record): &(usize, &'a Record)| -> Option<(String, Candidate, Uncertainty)> {
         let records = std::slice::from_ref(*record);
         let mut evaluator = Evaluator::on(problem, records);
-        (evaluator.floor, evaluator.budget) = (floor.to_vec(), budget.clone());
+        (evaluator.noise_sd, evaluator.budget) = (noise_sd.to_vec(), budget.clone());
         let structure = Structure::new(problem, records, joint.structure.added.clone());
         let here: Vec<(Role, f64)> =
             own.iter().filter(|(role, _)| role.in_record(*index) == *role).map(|(role, value)| (role.in_record(0), *value)).collect();
         let start = structure.values(problem, &stated, &added, &here);
         let fit = evaluator.fit(&structure, &start, tuning().fit.per_record)?;
         let candidate = candidate(&evaluator, structure, fit);
-        let spread = Spread::of(&candidate);
+        let spread = Uncertainty::of(&candidate);
         Some((record.name.clone(), candidate, spread))
     };
     let records: Vec<(usize, &'a Record)> = problem.fit.iter().enumerate().collect();
     let fits: Vec<_> = budget.abreast(&records, one).into_iter().flatten().flatten().collect();
-    let shared = joint.structure.numbers.iter().enumerate().filter(|(_, n)| matches!(n.role, Role::Stated(_) | Role::Added(..)));
+    let shared = joint.structure.free.iter().enumerate().filter(|(_, n)| matches!(n.role, Role::Stated(_) | Role::Added(..)));
     let numbers = shared.filter_map(|(index, number)| across(problem, joint, index, &number.role, &fits)).collect();
     PerRecord { records: fits.iter().map(|f| f.0.clone()).collect(), levels: fits.iter().map(|f| f.1.levels.clone()).collect(), numbers }
 }
 
-fn across(problem: &Problem, joint: &Candidate, index: usize, role: &Role, fits: &[(String, Candidate, Spread)]) -> Option<Across> {
+fn across(problem: &Problem, joint: &Candidate, index: usize, role: &Role, fits: &[(String, Candidate, Uncertainty)]) -> Option<Across> {
     let mut own = Vec::new();
     let mut points: Vec<(f64, f64)> = Vec::new();
     for (_, candidate, spread) in fits {
-        let place = candidate.structure.numbers.iter().position(|n| n.role == *role)?;
-        let (number, value) = (candidate.structure.numbers.get(place)?, *candidate.fit.values.get(place)?);
+        let place = candidate.structure.free.iter().position(|n| n.role == *role)?;
+        let (number, value) = (candidate.structure.free.get(place)?, *candidate.fit.values.get(place)?);
         let deviation = spread.deviation.get(place).copied().unwrap_or(f64::INFINITY);
         let scale = if number.log { 1.0 } else { value.abs() };
         let determined = deviation > 0.0 && deviation < tuning().claim.undetermined_alone * scale;
         if determined {
-            points.push((number.inward(value), deviation));
+            points.push((number.to_internal(value), deviation));
         }
         own.push(Own { value, ci95: spread.interval(candidate, place), determined });
     }

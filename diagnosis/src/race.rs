@@ -80,7 +80,7 @@ struct Lead {
 
 impl Lead {
     fn of(running: &[Running]) -> Lead {
-        running.first().map_or(Lead { cost: 0.0, noise: 0.0 }, |(_, f)| Lead { cost: hopeful(f), noise: f.residuals.len() as f64 })
+        running.first().map_or(Lead { cost: 0.0, noise: 0.0 }, |(_, f)| Lead { cost: predicted_cost(f), noise: f.residuals.len() as f64 })
     }
 
     /// Cost over the best's up to which others have a chance.
@@ -111,7 +111,7 @@ impl Course<'_> {
                 drop_those_behind(&mut running);
                 running.truncate(count);
                 self.go_on(&mut running, |budget, structure, fit| {
-                    held_against.within(budget).fit_knowing(structure, &fit.values, effort, Some((structure, fit)))
+                    held_against.within(budget).fit_from_derivatives(structure, &fit.values, effort, Some((structure, fit)))
                 });
             }
         }
@@ -140,8 +140,8 @@ impl Course<'_> {
                 let start = if problem.unknown.is_empty() { start } else { anew() };
                 own_first(&coarse, Some(nominal), structure, start)
             });
-            let fits = starts.filter_map(|start| coarse.fit_knowing(structure, &start, tuning().fit.first, known));
-            let best = fits.min_by(|a, b| hopeful(a).total_cmp(&hopeful(b)))?;
+            let fits = starts.filter_map(|start| coarse.fit_from_derivatives(structure, &start, tuning().fit.first, known));
+            let best = fits.min_by(|a, b| predicted_cost(a).total_cmp(&predicted_cost(b)))?;
             Some((structure.clone(), best))
         });
         begun.into_iter().flatten().flatten().collect()
@@ -151,14 +151,14 @@ impl Course<'_> {
     fn to_their_ends(&self, running: &mut Vec<Running>, count: usize) {
         let (lead, late) = (Lead::of(running), tuning().fit.late);
         let rest = running.split_off(count.min(running.len()));
-        let is_beaten = |fit: &Fit| lead.cost < tuning().search.best_ends * lead.noise && hopeful(fit) > lead.cost;
+        let is_beaten = |fit: &Fit| lead.cost < tuning().search.best_ends * lead.noise && predicted_cost(fit) > lead.cost;
         self.go_on(running, |budget, structure, fit| {
             // Beside one that leaves noise, others only have to show that they do no better; those far behind have.
-            if is_beaten(fit) && hopeful(fit) > lead.margin() * lead.cost {
+            if is_beaten(fit) && predicted_cost(fit) > lead.margin() * lead.cost {
                 return None;
             }
             let steps = if is_beaten(fit) { tuning().fit.beaten_steps } else { late.steps };
-            self.evaluator.within(budget).fit_knowing(structure, &fit.values, Effort { steps, ..late }, Some((structure, fit)))
+            self.evaluator.within(budget).fit_from_derivatives(structure, &fit.values, Effort { steps, ..late }, Some((structure, fit)))
         });
         running.extend(rest);
     }
@@ -177,7 +177,7 @@ pub(crate) fn own_first(evaluator: &Evaluator, known: Option<(&Structure, &Fit)>
         return start;
     }
     let only = Evaluator { own_only: true, ..evaluator.clone() };
-    only.fit_knowing(structure, &start, tuning().fit.of_records, known).map_or(start, |fit| fit.values)
+    only.fit_from_derivatives(structure, &start, tuning().fit.of_records, known).map_or(start, |fit| fit.values)
 }
 
 /// Whether first steps may be taken on some of the recordings only: nothing belongs to single ones.
@@ -187,13 +187,13 @@ fn can_be_cut(problem: &Problem) -> bool {
 
 /// Best first, each structure once, without those that have no chance against the best.
 fn drop_those_behind(running: &mut Vec<Running>) {
-    running.sort_by(|a, b| hopeful(&a.1).total_cmp(&hopeful(&b.1)));
+    running.sort_by(|a, b| predicted_cost(&a.1).total_cmp(&predicted_cost(&b.1)));
     distinct_fits(running);
     let lead = Lead::of(running);
     let is_open = lead.cost > tuning().search.behind_far * lead.noise;
     let mut place = 0..;
     running
-        .retain(|(_, f)| place.next() < Some(tuning().search.always) || hopeful(f) < lead.margin() * lead.cost.max(lead.noise) || is_open);
+        .retain(|(_, f)| place.next() < Some(tuning().search.always) || predicted_cost(f) < lead.margin() * lead.cost.max(lead.noise) || is_open);
 }
 
 /// Keeps the first fit of each structure.
@@ -212,6 +212,6 @@ fn restricted(evaluator: &Evaluator, fit: &Fit, records: &[usize]) -> Fit {
 }
 
 /// What a fit would cost if most of what its next step foresees came true.
-pub fn hopeful(fit: &Fit) -> f64 {
-    fit.cost - fit.foreseen.min(tuning().search.may_gain * fit.cost)
+pub fn predicted_cost(fit: &Fit) -> f64 {
+    fit.cost - fit.predicted_decrease.min(tuning().search.may_gain * fit.cost)
 }

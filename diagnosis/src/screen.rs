@@ -90,7 +90,7 @@ struct Effect {
     hypothesis: usize,
     values: [Vec<f64>; 2],
     columns: [Option<Vec<f64>>; 2],
-    /// Length of the weakened effect before it was brought to 1, floors.
+    /// Length of the weakened effect before it was brought to 1, noise standard deviations.
     length: f64,
 }
 
@@ -228,7 +228,7 @@ impl Screen {
         Screen { stride: beside.stride, effects: effects.into_iter().flatten().collect() }
     }
 
-    /// For each start (hypothesis, values of the weakened effect) the length of what its effect adds beyond all that the fit's numbers can do, floors.
+    /// For each start (hypothesis, values of the weakened effect) the length of what its effect adds beyond all that the fit's numbers can do, noise standard deviations.
     pub fn lengths(&self, fit: &Fit) -> Vec<((usize, Vec<f64>), f64)> {
         let projector = Projector::new(&fit.jacobian, self.stride);
         let one = |effect: &Effect| {

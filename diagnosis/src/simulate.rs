@@ -1,6 +1,6 @@
 //! A model simulated on a recording: the readings of its sensors before rounding.
 
-use crate::guide::Guide;
+use crate::coupling::Coupling;
 use crate::problem::Record;
 use crate::work::{Budget, Steps};
 use backdrive_plant::model::Model;
@@ -29,7 +29,7 @@ pub struct Conditions<'r> {
     /// Substeps per sample, at most; [`TWICE`] for twice as many as the model asks for.
     pub substeps: usize,
     /// Tracking (observer) coupling of the model to the measured data, and the index of the record in it.
-    pub guide: Option<(&'r Guide, usize)>,
+    pub guide: Option<(&'r Coupling, usize)>,
     /// Counts the work.
     pub budget: &'r Budget<'r>,
 }

@@ -40,7 +40,7 @@ fn correlation_time_of(part: &[f64], energy: f64) -> f64 {
 /// Whiteness statistic of residuals: by how many standard deviations the variance of block means exceeds that of white noise. A slow residual of
 /// small amplitude shows there long before it correlates neighbouring samples. The largest over the block lengths, 4 to 256 samples; 0 where all
 /// recordings are too short for blocks.
-pub fn slowness(evaluator: &Evaluator, residuals: &[f64]) -> f64 {
+pub fn whiteness_statistic(evaluator: &Evaluator, residuals: &[f64]) -> f64 {
     let layout = evaluator.layout();
     let parts: Vec<&[f64]> = layout.iter().filter_map(|(_, _, range)| residuals.get(range.clone())).collect();
     tuning().noise.blocks.into_iter().map(|length| block_statistic(&parts, length)).fold(0.0, f64::max)

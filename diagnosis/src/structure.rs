@@ -1,6 +1,6 @@
 //! A nominal model with some physics added, and every number of it that a fit may move.
 
-use crate::guide::Guide;
+use crate::coupling::Coupling;
 use crate::hypothesis::Hypothesis;
 use crate::problem::{Problem, Record, Stated};
 use crate::simulate::{Conditions, Curve, Start, predict_under};
@@ -43,7 +43,7 @@ impl Role {
 
 /// A number that a fit may move.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Number {
+pub struct FreeParameter {
     /// What it is.
     pub role: Role,
     /// Lowest and highest value, as it stands in the model.
@@ -60,15 +60,15 @@ pub struct Number {
     pub prior: Option<(f64, f64)>,
 }
 
-impl Number {
+impl FreeParameter {
     /// From the value in the model to the fit's own unit.
-    pub fn inward(&self, value: f64) -> f64 {
+    pub fn to_internal(&self, value: f64) -> f64 {
         let inside = value.clamp(self.range.0, self.range.1);
         if self.log { inside.max(f64::MIN_POSITIVE).ln() } else { inside }
     }
 
     /// Back.
-    pub fn outward(&self, own: f64) -> f64 {
+    pub fn to_external(&self, own: f64) -> f64 {
         let value = if self.log { own.exp() } else { own };
         value.clamp(self.range.0, self.range.1)
     }
@@ -90,7 +90,7 @@ pub struct Along<'r> {
     /// Substeps per sample, at most.
     pub substeps: usize,
     /// A guide along the records, if it is to be coupled to what was measured.
-    pub guide: Option<&'r Guide>,
+    pub guide: Option<&'r Coupling>,
     /// Counts the work.
     pub budget: &'r Budget<'r>,
 }
@@ -101,13 +101,13 @@ pub struct Structure {
     /// What is added, in the order in which it is applied.
     pub added: Vec<Hypothesis>,
     /// What a fit may move.
-    pub numbers: Vec<Number>,
+    pub free: Vec<FreeParameter>,
 }
 
 impl Structure {
     /// The nominal model with `added`. Numbers of elements that it replaces, and numbers that it stands for, are no longer free.
     pub fn new(problem: &Problem, records: &[Record], added: Vec<Hypothesis>) -> Structure {
-        let mut numbers = Vec::new();
+        let mut free = Vec::new();
         for (index, stated) in problem.stated.iter().enumerate() {
             let element = stated.path.strip_prefix("elements.").and_then(|p| p.rsplit_once('.')).map(|p| p.0);
             let conditioned = |r: &Record| r.conditions.iter().any(|(path, c)| *path == stated.path && estimated(c));
@@ -116,7 +116,7 @@ impl Structure {
             if replaced || all_conditioned {
                 continue;
             }
-            numbers.push(stated_number(index, stated));
+            free.push(stated_number(index, stated));
         }
         for (h, hypothesis) in added.iter().enumerate() {
             for (p, parameter) in hypothesis.parameters.iter().enumerate() {
@@ -129,7 +129,7 @@ impl Structure {
                     () if size > 0.0 && size.is_finite() => tuning().fit.difference * size,
                     () => 1e-5 * width,
                 };
-                numbers.push(Number {
+                free.push(FreeParameter {
                     role: Role::Added(h, p),
                     range: parameter.range,
                     log: parameter.log,
@@ -155,7 +155,7 @@ impl Structure {
                 let given = problem.model.values_at(path).ok().and_then(|v| v.first().copied()).unwrap_or(0.0);
                 let (range, log) = if given > 0.0 { ((given / 1e3, given * 1e3), true) } else { ((-1e6, 1e6), false) };
                 let step = if log { tuning().fit.difference } else { 1e-6 };
-                numbers.push(Number {
+                free.push(FreeParameter {
                     role: Role::Condition(path.clone(), r),
                     range,
                     log,
@@ -166,36 +166,36 @@ impl Structure {
                 });
             }
             if problem.initial == Initial::Free {
-                numbers.extend(start_numbers(problem, record, r));
+                free.extend(start_numbers(problem, record, r));
             }
-            numbers.extend(knots(problem, record, r));
+            free.extend(knots(problem, record, r));
         }
-        Structure { added, numbers }
+        Structure { added, free }
     }
 
     /// Values to start from, as they stand in the model: the stated numbers as given, for each hypothesis the values given, and what belongs to
     /// single records, such as the curve of a hand that nobody measured, as another fit found it.
     pub fn values(&self, problem: &Problem, stated: &[f64], added: &[Vec<f64>], of_records: &[(Role, f64)]) -> Vec<f64> {
         let own = |role: &Role| of_records.iter().find(|(other, _)| other == role).map(|(_, value)| *value);
-        let value = |number: &Number| match &number.role {
+        let value = |number: &FreeParameter| match &number.role {
             Role::Stated(i) => stated.get(*i).copied().or_else(|| problem.stated.get(*i).map(|s| s.given)),
             Role::Added(h, p) => added.get(*h).and_then(|values| values.get(*p)).copied(),
             Role::Condition(path, _) => own(&number.role).or_else(|| problem.model.values_at(path).ok().and_then(|v| v.first().copied())),
             Role::Position(..) | Role::Velocity(..) | Role::Knot(..) => own(&number.role),
         };
-        self.numbers.iter().map(|n| value(n).unwrap_or(0.0).clamp(n.range.0, n.range.1)).collect()
+        self.free.iter().map(|n| value(n).unwrap_or(0.0).clamp(n.range.0, n.range.1)).collect()
     }
 
     /// The numbers among `values` that belong to single records.
     pub fn of_records(&self, values: &[f64]) -> Vec<(Role, f64)> {
-        let numbers = self.numbers.iter().zip(values).filter(|(n, _)| n.records.is_some());
+        let numbers = self.free.iter().zip(values).filter(|(n, _)| n.records.is_some());
         numbers.map(|(n, value)| (n.role.clone(), *value)).collect()
     }
 
     /// The stated numbers among `values`, in the order of [`Problem::stated`]; those that are not free as given.
     pub fn stated_of(&self, problem: &Problem, values: &[f64]) -> Vec<f64> {
         let mut all: Vec<f64> = problem.stated.iter().map(|s| s.given).collect();
-        for (number, value) in self.numbers.iter().zip(values) {
+        for (number, value) in self.free.iter().zip(values) {
             if let Role::Stated(i) = number.role {
                 all[i] = *value;
             }
@@ -206,7 +206,7 @@ impl Structure {
     /// The parameters of each hypothesis among `values`.
     pub fn added_of(&self, values: &[f64]) -> Vec<Vec<f64>> {
         let mut all: Vec<Vec<f64>> = self.added.iter().map(|h| vec![0.0; h.parameters.len()]).collect();
-        for (number, value) in self.numbers.iter().zip(values) {
+        for (number, value) in self.free.iter().zip(values) {
             if let Role::Added(h, p) = number.role
                 && let Some(slot) = all.get_mut(h).and_then(|v| v.get_mut(p))
             {
@@ -241,7 +241,7 @@ impl Structure {
     ) -> Option<Vec<f64>> {
         let mut starts: Vec<Start> = Vec::new();
         let mut changed: Option<Model> = None;
-        for (number, value) in self.numbers.iter().zip(values).filter(|(n, _)| n.records.is_some() && n.is_of(index)) {
+        for (number, value) in self.free.iter().zip(values).filter(|(n, _)| n.records.is_some() && n.is_of(index)) {
             match &number.role {
                 Role::Condition(path, _) => changed.get_or_insert_with(|| model.clone()).set_values_at(path, &[*value]).ok()?,
                 Role::Position(body, _) => starts.push((*body, *value, 0.0)),
@@ -277,8 +277,8 @@ impl Structure {
 
     /// Weights of an unknown input in a record, in order.
     fn weights<'a>(&'a self, values: &'a [f64], unknown: usize, record: usize) -> impl Iterator<Item = f64> + 'a {
-        let here = move |n: &Number| matches!(n.role, Role::Knot(u, _, r) if u == unknown && r == record);
-        self.numbers.iter().zip(values).filter(move |(n, _)| here(n)).map(|(_, value)| *value)
+        let here = move |n: &FreeParameter| matches!(n.role, Role::Knot(u, _, r) if u == unknown && r == record);
+        self.free.iter().zip(values).filter(move |(n, _)| here(n)).map(|(_, value)| *value)
     }
 
     /// What the structure adds, such as `coulomb@drum-ground`; `nominal` where it adds nothing.
@@ -295,19 +295,19 @@ fn estimated(condition: &Condition) -> bool {
     matches!(condition, Condition::Free | Condition::Shared(_))
 }
 
-fn stated_number(index: usize, stated: &Stated) -> Number {
+fn stated_number(index: usize, stated: &Stated) -> FreeParameter {
     let (range, log) = (stated.range, stated.log);
     let centre = if log { stated.given.ln() } else { stated.given };
     let spread = if log { tuning().fit.prior } else { 2.0 * stated.given.abs() };
     let step = if log { tuning().fit.difference } else { tuning().fit.difference * stated.given.abs() };
-    Number { role: Role::Stated(index), range, log, step, coarse: false, records: None, prior: Some((centre, spread)) }
+    FreeParameter { role: Role::Stated(index), range, log, step, coarse: false, records: None, prior: Some((centre, spread)) }
 }
 
 /// The weights of the unknown inputs in a record.
-fn knots<'a>(problem: &'a Problem, record: &'a Record, r: usize) -> impl Iterator<Item = Number> + 'a {
+fn knots<'a>(problem: &'a Problem, record: &'a Record, r: usize) -> impl Iterator<Item = FreeParameter> + 'a {
     problem.unknown.iter().enumerate().flat_map(move |(index, unknown)| {
         let size = unknown.scale(&problem.model, &problem.fit);
-        (0..unknown.knots(record)).map(move |k| Number {
+        (0..unknown.knots(record)).map(move |k| FreeParameter {
             role: Role::Knot(index, k, r),
             range: (-tuning().fit.unknown_range * size, tuning().fit.unknown_range * size),
             log: false,
@@ -320,7 +320,7 @@ fn knots<'a>(problem: &'a Problem, record: &'a Record, r: usize) -> impl Iterato
 }
 
 /// Positions and velocities of the free bodies at a record's start, in the range of what the record shows.
-fn start_numbers(problem: &Problem, record: &Record, r: usize) -> Vec<Number> {
+fn start_numbers(problem: &Problem, record: &Record, r: usize) -> Vec<FreeParameter> {
     use backdrive_plant::model::{InputKind, OutputKind};
     let model = &problem.model;
     let mut size: f64 = 0.0;
@@ -335,7 +335,7 @@ fn start_numbers(problem: &Problem, record: &Record, r: usize) -> Vec<Number> {
     let size = if size > 0.0 { size } else { 1.0 };
     let free = (0..model.bodies.len()).filter(|b| !model.inputs.iter().any(|i| i.kind == InputKind::Motion && i.on == *b));
     free.flat_map(|body| {
-        let number = |role, width: f64| Number {
+        let number = |role, width: f64| FreeParameter {
             role,
             range: (-width, width),
             log: false,

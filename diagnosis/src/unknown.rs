@@ -1,7 +1,7 @@
 //! Inputs that were not measured, such as the hand of a user or a slow external force. Each is estimated in every recording as a curve of limited
 //! bandwidth, together with the parameters.
 //!
-//! The curve is a uniform cubic B-spline (de Boor, A Practical Guide to Splines, ch. IX) with four knots per period of its bandwidth. The one nearest
+//! The curve is a uniform cubic B-spline (de Boor, A Practical Coupling to Splines, ch. IX) with four knots per period of its bandwidth. The one nearest
 //! to a sine has a residual of 1.3 % of it at the bandwidth, of 0.05 % at half of it, and hardly follows it at twice the bandwidth.
 
 use crate::problem::Record;

@@ -3,7 +3,7 @@
 use backdrive_diagnosis::compare::unseen;
 use backdrive_diagnosis::evaluator::Evaluator;
 use backdrive_diagnosis::hypothesis::Place;
-use backdrive_diagnosis::intervals::Spread;
+use backdrive_diagnosis::intervals::Uncertainty;
 use backdrive_diagnosis::problem::{Problem, Record};
 use backdrive_diagnosis::search::{Settings, search};
 use backdrive_diagnosis::structure::Structure;
@@ -103,11 +103,11 @@ fn refitted_numbers_lie_in_their_intervals() {
         structure,
         fit,
         correlation_time: 1.0,
-        slowness: 0.0,
+        whiteness_statistic: 0.0,
         levels: vec![level],
         unseen: None,
     };
-    let spread = Spread::measured(&evaluator, &candidate);
+    let spread = Uncertainty::measured(&evaluator, &candidate);
     for (path, true_value) in [("elements.belt.stiffness", 1100.0), ("elements.air.damping", 1.0), ("bodies.load", 0.4)] {
         let index = problem.stated.iter().position(|s| s.path == path).unwrap();
         let value = candidate.fit.values[index];
@@ -213,14 +213,14 @@ fn a_drift_in_what_no_fit_has_seen_counts_but_once() {
     let given: Vec<f64> = problem.stated.iter().map(|s| s.given).collect();
     let values = structure.values(&problem, &given, &[], &[]);
     // As noise and encoder steps make it.
-    let floor = vec![2.02e-5];
-    let held = |problem: &Problem| unseen(problem, &problem.held_out, &structure, &values, &floor).unwrap();
+    let noise_sd = vec![2.02e-5];
+    let held = |problem: &Problem| unseen(problem, &problem.held_out, &structure, &values, &noise_sd).unwrap();
     let noise = held(&problem);
     assert!(noise.mean_square < 1.2 && noise.correlation_time < 1.3, "{noise:?}");
     // Half a period of a wave of six floors over the whole of the recording: one observation, or a few.
     let samples = problem.held_out[0].outputs[0].as_mut().unwrap();
     let length = samples.len() as f64;
-    samples.iter_mut().enumerate().for_each(|(i, y)| *y += 6.0 * floor[0] * (std::f64::consts::PI * i as f64 / length).cos());
+    samples.iter_mut().enumerate().for_each(|(i, y)| *y += 6.0 * noise_sd[0] * (std::f64::consts::PI * i as f64 / length).cos());
     let drifting = held(&problem);
     assert!((drifting.mean_square / 19.0 - 1.0).abs() < 0.1, "{drifting:?}");
     let independent = length / drifting.correlation_time;
@@ -292,6 +292,6 @@ fn where_an_encoder_counts_from_is_a_number_of_its_session() {
     for (condition, own) in [(Condition::Shared(0), 1), (Condition::Free, 2)] {
         let problem = switched_on_again(Some(condition));
         let structure = Structure::new(&problem, &problem.held_out, Vec::new());
-        assert_eq!(structure.numbers.iter().filter(|n| n.records.is_some()).count(), own);
+        assert_eq!(structure.free.iter().filter(|n| n.records.is_some()).count(), own);
     }
 }

@@ -22,7 +22,7 @@ pub(super) fn section(page: &mut Page, found: &Diagnosis, best: &Candidate) {
     let mut drawn = false;
     if adds(best) {
         for which in 0..best.structure.added.len() {
-            match evidence(&found.problem, best, &found.search.floor, which) {
+            match evidence(&found.problem, best, &found.search.noise_sd, which) {
                 Some(evidence) => {
                     finding(page, &evidence, &in_words(best, which));
                     drawn = true;

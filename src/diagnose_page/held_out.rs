@@ -5,7 +5,7 @@ use crate::recordings::file_name;
 use backdrive_diagnosis::candidate::Candidate;
 use backdrive_diagnosis::compare::{Predicted, density, predictions, qualities};
 use backdrive_diagnosis::diagnose::Diagnosis;
-use backdrive_diagnosis::numbers::unit_of_output;
+use backdrive_diagnosis::parameters::unit_of_output;
 use backdrive_diagnosis::problem::Record;
 use backdrive_report::{Cell, Colour, Dash, Figure, Page, Plot, Series, Table, Tone, number, percent};
 
@@ -49,7 +49,7 @@ pub(super) fn section(page: &mut Page, found: &Diagnosis, best: &Candidate) {
     let sets = [(problem.fit.as_slice(), true), (problem.held_out.as_slice(), false)];
     for (records, fitted) in sets {
         let quality = |structure, values: &[f64]| {
-            predictions(problem, records, structure, values).map(|p| qualities(problem, records, &p, &search.floor, fitted))
+            predictions(problem, records, structure, values).map(|p| qualities(problem, records, &p, &search.noise_sd, fitted))
         };
         let given = quality(nominal, &nominal.values(problem, &stated, &[], &[]));
         let refitted = quality(nominal, &search.nominal.fit.values);
@@ -119,7 +119,7 @@ fn figures(page: &mut Page, found: &Diagnosis, three: &Three, output: usize) {
     zoom = zoom.series(Series::line("measured", &near, &part(measured)).colour(Colour::Ink).dash(Dash::Dotted));
     page.figure(zoom, "");
 
-    let floor = found.search.floor.get(output).copied().unwrap_or(0.0);
+    let floor = found.search.noise_sd.get(output).copied().unwrap_or(0.0);
     let error = |p: &Option<Vec<f64>>| p.as_ref().map(|p| measured.iter().zip(p).map(|(y, p)| y - p).collect::<Vec<f64>>());
     let (e_given, e_refitted, e_diagnosed) = (error(&given), error(&refitted), error(&diagnosed));
     let mut left = Plot::new("Residual, in time").x_axis("time", "s").y_axis("measured less predicted", &unit);

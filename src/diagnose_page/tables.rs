@@ -4,8 +4,8 @@ use super::adds;
 use backdrive_diagnosis::audit::Weight;
 use backdrive_diagnosis::candidate::{Candidate, advantage_over};
 use backdrive_diagnosis::diagnose::Diagnosis;
-use backdrive_diagnosis::intervals::Spread;
-use backdrive_diagnosis::numbers::{Row, correlated, rows};
+use backdrive_diagnosis::intervals::Uncertainty;
+use backdrive_diagnosis::parameters::{Row, correlated, rows};
 use backdrive_report::{Cell, Page, Table, Tone, number, percent, si};
 
 /// Hypotheses that are shown at once.
@@ -38,7 +38,7 @@ pub(super) fn hypotheses(page: &mut Page, found: &Diagnosis, best: &Candidate) {
         let (why, tone) = match () {
             () if c.structure.name() == best.structure.name() => ("chosen".to_string(), Tone::Good),
             () if c.structure.added.len() < best.structure.added.len() && behind > ALIKE => ("too simple".to_string(), Tone::Neutral),
-            () if behind.abs() <= ALIKE && c.structure.numbers.len() > best.structure.numbers.len() => {
+            () if behind.abs() <= ALIKE && c.structure.free.len() > best.structure.free.len() => {
                 ("as good, more parameters".to_string(), Tone::Unsure)
             }
             () if behind.abs() <= ALIKE => ("as good".to_string(), Tone::Unsure),
@@ -48,7 +48,7 @@ pub(super) fn hypotheses(page: &mut Page, found: &Diagnosis, best: &Candidate) {
         let behind = if c.structure.name() == best.structure.name() { "–".to_string() } else { number(behind) };
         fitted.push([
             Cell::tone(structure_in_words(c), tone),
-            c.structure.numbers.len().to_string().into(),
+            c.structure.free.len().to_string().into(),
             number(level(c)).into(),
             behind.into(),
             Cell::tone(why, tone),
@@ -100,7 +100,7 @@ pub(super) fn hypotheses(page: &mut Page, found: &Diagnosis, best: &Candidate) {
 pub(super) fn numbers(page: &mut Page, found: &Diagnosis, best: &Candidate) {
     let problem = &found.problem;
     let nominal = &found.search.nominal;
-    let (before_spread, after_spread) = (Spread::of(nominal), Spread::of(best));
+    let (before_spread, after_spread) = (Uncertainty::of(nominal), Uncertainty::of(best));
     let (before, after) = (rows(problem, nominal, &before_spread), rows(problem, best, &after_spread));
     let added = adds(best);
     let mut header = vec!["parameter", "unit", "nominal", "refitted alone", "change", "moved, in sd"];

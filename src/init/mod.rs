@@ -14,7 +14,7 @@ use crate::recordings as sets;
 use ask::{Asker, Question, usage};
 use backdrive_bags::Reader;
 use backdrive_diagnosis::audit::{self, Weight};
-use backdrive_diagnosis::floor::step_of;
+use backdrive_diagnosis::noise::step_of;
 use backdrive_diagnosis::verdict::Remark;
 use backdrive_plant::model::Hold;
 use backdrive_plant::recording::{Piece, Recording, Source, read_csv};

@@ -247,7 +247,7 @@ fn with_own_friction(context: &Context, model: &Model, file: &str) -> Result<([f
     let failed = || StudyError::Diagnosis(format!("{file}: the model cannot be simulated"));
     let fit = Evaluator::on(&fixed, &fixed.held_out).fit(&own, &start, tuning().fit.to_the_end).ok_or_else(failed)?;
     let value = |path: &str| {
-        let at = own.numbers.iter().position(|n| matches!(&n.role, Role::Condition(p, _) if p == path));
+        let at = own.free.iter().position(|n| matches!(&n.role, Role::Condition(p, _) if p == path));
         at.and_then(|i| fit.values.get(i).copied()).unwrap_or(f64::NAN)
     };
     let nrmse = each(&fixed, &fixed.held_out)?.first().map_or(f64::NAN, |e| e.1);
@@ -260,7 +260,7 @@ fn each(problem: &Problem, records: &[Record]) -> Result<Vec<(String, f64)>, Stu
     let structure = Structure::new(problem, &problem.fit, Vec::new());
     let predicted = predictions(problem, records, &structure, &structure.values(problem, &given, &[], &[]))
         .ok_or_else(|| StudyError::Diagnosis("the diagnosed model cannot be simulated".to_string()))?;
-    let all = qualities(problem, records, &predicted, &problem.floor, false);
+    let all = qualities(problem, records, &predicted, &problem.noise_sd, false);
     let name = |record: &str| backdrive::recordings::file_name(record).to_string();
     Ok(all.into_iter().map(|q| (name(&q.record), q.nrmse)).collect())
 }

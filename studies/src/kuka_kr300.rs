@@ -92,7 +92,7 @@ fn unseen(found: &Diagnosis, structure: &Structure, values: &[f64]) -> Result<Ve
     let records = &found.problem.held_out;
     let failed = || StudyError::Diagnosis("the model cannot be simulated on the unseen runs".to_string());
     let predicted = predictions(&found.problem, records, structure, values).ok_or_else(failed)?;
-    let all = qualities(&found.problem, records, &predicted, &found.search.floor, false);
+    let all = qualities(&found.problem, records, &predicted, &found.search.noise_sd, false);
     let mean = |name: &String| {
         let own: Vec<f64> = all.iter().filter(|q| q.output == *name).map(|q| q.nrmse).collect();
         own.iter().sum::<f64>() / own.len().max(1) as f64

@@ -69,7 +69,7 @@ fn clipped(record: &Record, name: &str, samples: &[f64], why: &str, all: &mut Ve
 }
 
 fn sensor(record: &Record, name: &str, stated: f64, samples: &[f64], all: &mut Vec<Remark>) {
-    match crate::floor::step_of(samples) {
+    match crate::noise::step_of(samples) {
         Some(step) if stated > 0.0 && ((step / stated) - (step / stated).round()).abs() > 0.02 => {
             let text = format!("moves in steps of {step:.4e}, the model says {stated:.4e}");
             add(all, Weight::Caution, record, name, "encoder", text);

@@ -9,14 +9,14 @@ use backdrive_plant::model::{InputKind, OutputKind};
 /// Noise standard deviation of each output.
 pub(super) fn noises(problem: &Problem) -> Vec<Remark> {
     let mut all = Vec::new();
-    for (index, (output, floor)) in problem.model.outputs.iter().zip(&problem.floor).enumerate() {
+    for (index, (output, noise_sd)) in problem.model.outputs.iter().zip(&problem.noise_sd).enumerate() {
         let spreads: Vec<f64> = problem.fit.iter().filter(|r| r.outputs[index].is_some()).map(|r| r.spread[index]).collect();
         if spreads.is_empty() {
             continue;
         }
         let spread = spreads.iter().sum::<f64>() / spreads.len() as f64;
-        let text = format!("its measuring error is {floor:.2e}, {:.3} % of what it moves", 100.0 * floor / spread);
-        let weight = if floor / spread > 0.3 { Weight::Caution } else { Weight::Note };
+        let text = format!("its measuring error is {noise_sd:.2e}, {:.3} % of what it moves", 100.0 * noise_sd / spread);
+        let weight = if noise_sd / spread > 0.3 { Weight::Caution } else { Weight::Note };
         all.push(Remark { weight, records: Vec::new(), signal: output.name.clone(), about: "noise", text });
     }
     all
@@ -36,7 +36,7 @@ pub(super) fn repeats(problem: &Problem) -> Vec<Remark> {
             for (o, output) in problem.model.outputs.iter().enumerate() {
                 let (Some(Some(x)), Some(Some(y))) = (a.outputs.get(o), b.outputs.get(o)) else { continue };
                 let off = (apart(x, y) / (2 * x.len()) as f64).sqrt();
-                let floors = off / problem.floor[o];
+                let floors = off / problem.noise_sd[o];
                 let text = if floors > 3.0 {
                     format!("repeats {} to {off:.2e} only, {floors:.1} times its noise: no model can do better", file_name(&b.name))
                 } else {

@@ -33,7 +33,7 @@ pub(super) fn off_grid(samples: &[f64], step: f64) -> bool {
     off as f64 > 0.2 * samples.len() as f64
 }
 
-/// Power above three quarters of the Nyquist frequency over that of a floor of white noise at the level of the quarter below it;
+/// Power above three quarters of the Nyquist frequency over that of a level of white noise at the level of the quarter below it;
 /// `None` for short signals. A sensor's own noise reaches up to the end.
 pub(super) fn quiet_top(samples: &[f64]) -> Option<f64> {
     if samples.len() < 256 {

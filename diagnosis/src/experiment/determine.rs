@@ -23,21 +23,21 @@ pub fn excite<'a>(
     structure: &Structure,
     values: &[f64],
     numbers: &[usize],
-    floor: &[f64],
+    noise_sd: &[f64],
     budget: &Budget<'a>,
 ) -> Result<Experiment, Reason> {
-    let numbers: Vec<usize> = numbers.iter().copied().filter(|j| structure.numbers.get(*j).is_some_and(|n| n.records.is_none())).collect();
-    if numbers.is_empty() || values.len() != structure.numbers.len() {
+    let numbers: Vec<usize> = numbers.iter().copied().filter(|j| structure.free.get(*j).is_some_and(|n| n.records.is_none())).collect();
+    if numbers.is_empty() || values.len() != structure.free.len() {
         return Err(Reason("there is no number to determine".to_string()));
     }
-    let planner = Planner::new(problem, floor, budget)?;
+    let planner = Planner::new(problem, noise_sd, budget)?;
     let mut evaluator = Evaluator::new(problem);
-    (evaluator.floor, evaluator.substeps) = (planner.setup.sensors.floor.clone(), tuning().experiment.substeps[0]);
-    let own: Vec<f64> = structure.numbers.iter().zip(values).map(|(n, v)| n.inward(*v)).collect();
+    (evaluator.noise_sd, evaluator.substeps) = (planner.setup.sensors.noise_sd.clone(), tuning().experiment.substeps[0]);
+    let own: Vec<f64> = structure.free.iter().zip(values).map(|(n, v)| n.to_internal(*v)).collect();
     let residuals = evaluator.residuals(structure, values).ok_or_else(|| Reason("the model diverges on the recordings".to_string()))?;
     let known = Rival::with(structure, values, &evaluator.jacobian(structure, &own, &residuals), 1.0);
     let before = known.deviations(None);
-    let whole = |j: usize| if structure.numbers[j].log { 1.0 } else { own[j].abs() };
+    let whole = |j: usize| if structure.free[j].log { 1.0 } else { own[j].abs() };
     let numbers: Vec<usize> = numbers.into_iter().filter(|j| before[*j] > tuning().experiment.open * whole(*j)).collect();
     if numbers.is_empty() {
         return Err(Reason(format!(
@@ -69,7 +69,7 @@ pub fn excite<'a>(
     };
     let case = &cases[*case];
     let accuracy = numbers.iter().map(|j| {
-        let number = &structure.numbers[*j];
+        let number = &structure.free[*j];
         let percent = 100.0 * if number.log { after[*j] } else { after[*j] / values[*j].abs().max(f64::MIN_POSITIVE) };
         if values[*j] == 0.0 {
             format!("{} to {}", name_of(problem, structure, *j), short(after[*j]))
@@ -89,7 +89,7 @@ pub fn excite<'a>(
 
 /// What a number is called.
 fn name_of(problem: &Problem, structure: &Structure, number: usize) -> String {
-    match structure.numbers.get(number).map(|n| &n.role) {
+    match structure.free.get(number).map(|n| &n.role) {
         Some(Role::Stated(i)) => problem.stated.get(*i).map_or_else(String::new, |s| s.path.clone()),
         Some(Role::Added(h, p)) => {
             let hypothesis = structure.added.get(*h);

@@ -66,7 +66,7 @@ pub(super) struct Planner<'a> {
 }
 
 impl<'a> Planner<'a> {
-    pub(super) fn new(problem: &'a Problem, floor: &[f64], budget: &Budget<'a>) -> Result<Planner<'a>, Reason> {
+    pub(super) fn new(problem: &'a Problem, noise_sd: &[f64], budget: &Budget<'a>) -> Result<Planner<'a>, Reason> {
         let ranges: Vec<Option<InputRange>> = (0..problem.model.inputs.len()).map(|i| InputRange::of(problem, i)).collect();
         let lengths = problem.fit.iter().map(|r| (r.len as f64 * r.period, r.period));
         let longest = lengths.max_by(|a, b| a.0.total_cmp(&b.0));
@@ -77,7 +77,7 @@ impl<'a> Planner<'a> {
         let ends = (end(tuning().experiment.shares[0]), end(tuning().experiment.shares[1]));
         let setup = Setup {
             problem,
-            sensors: Sensors::of(problem, floor),
+            sensors: Sensors::of(problem, noise_sd),
             extra: Vec::new(),
             substeps: tuning().experiment.substeps[0],
             budget: budget.clone(),

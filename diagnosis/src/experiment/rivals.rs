@@ -7,7 +7,7 @@ use crate::fit::{Fit, dot};
 use crate::normal_equations::normal_equations;
 use crate::problem::Problem;
 use crate::statistics::correlation_time;
-use crate::structure::{Number, Structure};
+use crate::structure::{FreeParameter, Structure};
 use backdrive_plant::model::{Model, OutputKind};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -34,7 +34,7 @@ impl<'a> Rival<'a> {
 
     /// From values and the derivatives of the recordings' residuals.
     pub(super) fn with(structure: &'a Structure, values: &[f64], jacobian: &[Vec<f64>], unit: f64) -> Rival<'a> {
-        let numbers = &structure.numbers;
+        let numbers = &structure.free;
         let mut information = match jacobian.len() == numbers.len() && !numbers.is_empty() {
             true => normal_equations(jacobian, &vec![0.0; jacobian[0].len()], None).0,
             false => DMatrix::zeros(numbers.len(), numbers.len()),
@@ -45,12 +45,12 @@ impl<'a> Rival<'a> {
             let spread = number.prior.map_or(high - low, |(_, spread)| spread.min(high - low));
             information[(j, j)] += 1.0 / (spread * spread).max(f64::MIN_POSITIVE);
         }
-        let own = numbers.iter().zip(values).map(|(n, v)| n.inward(*v)).collect();
+        let own = numbers.iter().zip(values).map(|(n, v)| n.to_internal(*v)).collect();
         Rival { structure, own, information, unit: if unit.is_finite() { unit.max(1.0) } else { 1.0 } }
     }
 
     fn model(&self, problem: &Problem, own: &[f64]) -> Option<Model> {
-        let values: Vec<f64> = self.structure.numbers.iter().zip(own).map(|(n, x)| n.outward(*x)).collect();
+        let values: Vec<f64> = self.structure.free.iter().zip(own).map(|(n, x)| n.to_external(*x)).collect();
         self.structure.model(problem, &values)
     }
 
@@ -66,7 +66,7 @@ impl<'a> Rival<'a> {
 
     /// Derivatives of what it predicts, by each number in its own unit; all 0 for what belongs to a recording.
     pub(super) fn jacobian(&self, setup: &Setup, trial: &Trial, own: &[f64], at: &[f64]) -> Vec<Vec<f64>> {
-        let column = |(j, number): (usize, &Number)| {
+        let column = |(j, number): (usize, &FreeParameter)| {
             let none = || vec![0.0; at.len()];
             if number.records.is_some() {
                 return none();
@@ -84,7 +84,7 @@ impl<'a> Rival<'a> {
                 None => none(),
             }
         };
-        self.structure.numbers.par_iter().enumerate().map(column).collect()
+        self.structure.free.par_iter().enumerate().map(column).collect()
     }
 
     /// Predicted cost of a difference d of predictions after a Gauss-Newton step that also keeps to the recordings, in noise variances: with the Jacobian J
@@ -112,13 +112,13 @@ impl<'a> Rival<'a> {
         let mut wider = setup.problem.clone();
         wider.fit.push(record);
         let mut evaluator = Evaluator::new(&wider);
-        (evaluator.floor, evaluator.substeps, evaluator.budget) = (setup.sensors.floor.clone(), setup.substeps, setup.budget.clone());
-        let values: Vec<f64> = self.structure.numbers.iter().zip(&self.own).map(|(n, x)| n.outward(*x)).collect();
+        (evaluator.noise_sd, evaluator.substeps, evaluator.budget) = (setup.sensors.noise_sd.clone(), setup.substeps, setup.budget.clone());
+        let values: Vec<f64> = self.structure.free.iter().zip(&self.own).map(|(n, x)| n.to_external(*x)).collect();
         let fit = evaluator.fit(self.structure, &values, Effort { steps: 20, tolerance: 1.0 })?;
         evaluator.records = &setup.problem.fit;
         let before = evaluator.cost(&evaluator.residuals(self.structure, &values)?);
-        let pulled = |(n, x): (&Number, &f64)| n.prior.map_or(0.0, |(centre, spread)| ((x - centre) / spread).powi(2));
-        let priors: f64 = self.structure.numbers.iter().zip(&self.own).map(pulled).sum();
+        let pulled = |(n, x): (&FreeParameter, &f64)| n.prior.map_or(0.0, |(centre, spread)| ((x - centre) / spread).powi(2));
+        let priors: f64 = self.structure.free.iter().zip(&self.own).map(pulled).sum();
         Some((fit.cost - before - priors).max(0.0))
     }
 

@@ -48,14 +48,14 @@ pub(super) fn best(setup: &Setup, trials: &[&Trial], pair: [&Rival; 2]) -> Optio
         });
         wide.sensors = setup.sensors.clone();
         for kind in &wide.extra {
-            wide.sensors.floor.push(1.0);
+            wide.sensors.noise_sd.push(1.0);
             wide.sensors.lag.push(if matches!(kind, OutputKind::Position(_)) { lag } else { 0 });
         }
         let Some(first) = pair[0].prediction(&wide, trial) else { continue };
         for (column, (at, kind)) in first[own..].chunks_exact(trial.record.len).zip(wide.extra.iter().enumerate()) {
             let rms = (column.iter().map(|y| y * y).sum::<f64>() / column.len() as f64).sqrt();
-            let at = setup.sensors.floor.len() + at;
-            wide.sensors.floor[at] = like(setup, kind).unwrap_or(tuning().experiment.sensor_noise * rms).max(f64::MIN_POSITIVE);
+            let at = setup.sensors.noise_sd.len() + at;
+            wide.sensors.noise_sd[at] = like(setup, kind).unwrap_or(tuning().experiment.sensor_noise * rms).max(f64::MIN_POSITIVE);
         }
         let predictions: Option<Vec<Vec<f64>>> = pair.iter().map(|r| r.prediction(&wide, trial)).collect();
         let Some(predictions) = predictions else { continue };
@@ -71,8 +71,8 @@ pub(super) fn best(setup: &Setup, trials: &[&Trial], pair: [&Rival; 2]) -> Optio
             let unit = pair[0].unit.max(pair[1].unit);
             let separation = (left.fold(f64::INFINITY, f64::min) / unit).sqrt();
             if found.as_ref().is_none_or(|f| separation > f.separation) {
-                let floor = wide.sensors.floor[setup.sensors.floor.len() + e];
-                found = Some(Sensor { words: words(setup, kind, floor), separation, trial: index });
+                let noise_sd = wide.sensors.noise_sd[setup.sensors.noise_sd.len() + e];
+                found = Some(Sensor { words: words(setup, kind, noise_sd), separation, trial: index });
             }
         }
     }
@@ -90,11 +90,11 @@ impl Setup<'_> {
 /// The measuring error of a sensor of the same kind that is there.
 fn like(setup: &Setup, kind: &OutputKind) -> Option<f64> {
     let same = |other: &OutputKind| std::mem::discriminant(other) == std::mem::discriminant(kind);
-    let outputs = setup.problem.model.outputs.iter().zip(&setup.sensors.floor).zip(&setup.sensors.there);
-    outputs.filter(|((o, floor), there)| **there && same(&o.kind) && floor.is_finite()).map(|((_, floor), _)| *floor).reduce(f64::min)
+    let outputs = setup.problem.model.outputs.iter().zip(&setup.sensors.noise_sd).zip(&setup.sensors.there);
+    outputs.filter(|((o, noise_sd), there)| **there && same(&o.kind) && noise_sd.is_finite()).map(|((_, noise_sd), _)| *noise_sd).reduce(f64::min)
 }
 
-fn words(setup: &Setup, kind: &OutputKind, floor: f64) -> String {
+fn words(setup: &Setup, kind: &OutputKind, noise_sd: f64) -> String {
     let model = &setup.problem.model;
     let body = |b: &usize| model.bodies.get(*b).map_or("", |b| b.name.as_str());
     let what = match kind {
@@ -108,5 +108,5 @@ fn words(setup: &Setup, kind: &OutputKind, floor: f64) -> String {
         }
     };
     let unit = unit_for(model.motion, kind.unit());
-    format!("{what} to {} {unit}", round_significant(floor, 2))
+    format!("{what} to {} {unit}", round_significant(noise_sd, 2))
 }

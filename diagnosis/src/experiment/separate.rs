@@ -12,20 +12,20 @@ use crate::tuning::tuning;
 use crate::work::Budget;
 use rayon::prelude::*;
 
-/// The excitation that tells fitted structures apart, the likeliest first. `floor` is the noise standard deviation of each output, in its
+/// The excitation that tells fitted structures apart, the likeliest first. `noise_sd` is the noise standard deviation of each output, in its
 /// unit. What exceeds the budget is not tried.
 ///
 /// # Errors
 /// Says why when no excitation would: fewer than two structures, none that can be simulated, or a difference too small; then also which sensor would help.
-pub fn separate<'a>(problem: &'a Problem, candidates: &[&Candidate], floor: &[f64], budget: &Budget<'a>) -> Result<Experiment, Reason> {
+pub fn separate<'a>(problem: &'a Problem, candidates: &[&Candidate], noise_sd: &[f64], budget: &Budget<'a>) -> Result<Experiment, Reason> {
     let fitted: Vec<(&Structure, &Fit)> = candidates.iter().map(|c| (&c.structure, &c.fit)).collect();
-    separate_fitted(problem, &fitted, floor, budget)
+    separate_fitted(problem, &fitted, noise_sd, budget)
 }
 
 pub(super) fn separate_fitted<'a>(
     problem: &'a Problem,
     fitted: &[(&Structure, &Fit)],
-    floor: &[f64],
+    noise_sd: &[f64],
     budget: &Budget<'a>,
 ) -> Result<Experiment, Reason> {
     let mut names = std::collections::HashSet::new();
@@ -33,7 +33,7 @@ pub(super) fn separate_fitted<'a>(
     let rivals: Vec<Rival> = others.take(tuning().experiment.rivals).map(|(structure, fit)| Rival::of(problem, structure, fit)).collect();
     let all: Vec<(usize, usize)> = (0..rivals.len()).flat_map(|b| (0..b).map(move |a| (a, b))).collect();
     let Some(first) = all.first() else { return Err(Reason("there is only one explanation".to_string())) };
-    let planner = Planner::new(problem, floor, budget)?;
+    let planner = Planner::new(problem, noise_sd, budget)?;
     let distinct: Vec<(usize, usize)> = all.iter().copied().filter(|(a, b)| !same(rivals[*a].structure, rivals[*b].structure)).collect();
     let mut cases = planner.cases(&rivals);
     if cases.is_empty() {

@@ -15,7 +15,7 @@ use backdrive_plant::set::Initial;
 #[derive(Debug, Clone)]
 pub(super) struct Sensors {
     /// Noise standard deviation of each output, in its unit.
-    pub floor: Vec<f64>,
+    pub noise_sd: Vec<f64>,
     /// As [`Problem::lag`].
     pub lag: Vec<usize>,
     /// Which outputs are recorded.
@@ -24,12 +24,12 @@ pub(super) struct Sensors {
 
 impl Sensors {
     /// The outputs that some recording of the problem has.
-    pub(super) fn of(problem: &Problem, floor: &[f64]) -> Sensors {
+    pub(super) fn of(problem: &Problem, noise_sd: &[f64]) -> Sensors {
         let there = |o: usize| problem.fit.iter().any(|r| r.outputs.get(o).is_some_and(Option::is_some));
         let count = problem.model.outputs.len();
         // An output without a noise standard deviation is given no weight.
-        let floor = (0..count).map(|o| floor.get(o).copied().filter(|f| *f > 0.0).unwrap_or(f64::INFINITY)).collect();
-        Sensors { floor, lag: problem.lag.clone(), there: (0..count).map(there).collect() }
+        let noise_sd = (0..count).map(|o| noise_sd.get(o).copied().filter(|f| *f > 0.0).unwrap_or(f64::INFINITY)).collect();
+        Sensors { noise_sd, lag: problem.lag.clone(), there: (0..count).map(there).collect() }
     }
 }
 
@@ -110,8 +110,8 @@ impl<'a> Setup<'a> {
         let mut columns = self.outputs_of(model, trial)?;
         let length = trial.record.len;
         for (column, output) in columns.chunks_exact_mut(length).zip(self.outputs(&trial.record)) {
-            let (floor, lag) = (*self.sensors.floor.get(output)?, *self.sensors.lag.get(output)?);
-            column.iter_mut().for_each(|y| *y /= floor);
+            let (noise_sd, lag) = (*self.sensors.noise_sd.get(output)?, *self.sensors.lag.get(output)?);
+            column.iter_mut().for_each(|y| *y /= noise_sd);
             if lag > 0 {
                 for i in (lag..length).rev() {
                     column[i] = (column[i] - column[i - lag]) * std::f64::consts::FRAC_1_SQRT_2;

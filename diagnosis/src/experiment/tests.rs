@@ -76,7 +76,7 @@ fn problem(nominal: &str, truth: &str, column: Vec<f64>, noise: f64) -> Problem 
     let truth = Model::from_toml(truth, "truth").unwrap();
     let record = record(&truth, &model, &[column], noise, 1);
     let mut problem = Problem::new(nominal.to_string(), "nominal.toml".into(), model, vec![record], Vec::new(), Initial::Rest).unwrap();
-    problem.floor = vec![noise; problem.model.outputs.len()];
+    problem.noise_sd = vec![noise; problem.model.outputs.len()];
     problem
 }
 
@@ -119,7 +119,7 @@ fn dry_and_viscous_friction_are_told_apart_by_as_much_as_was_said() {
         let (right, wrong) = (fitted(&problem, &[truth]), fitted(&problem, &[rival]));
         let alike = (right.1.cost - wrong.1.cost).abs();
         let began = std::time::Instant::now();
-        let found = separate_fitted(&problem, &[(&right.0, &right.1), (&wrong.0, &wrong.1)], &problem.floor, &soon()).unwrap();
+        let found = separate_fitted(&problem, &[(&right.0, &right.1), (&wrong.0, &wrong.1)], &problem.noise_sd, &soon()).unwrap();
         println!("{:.2} s, costs apart by {alike:.1}: {found:#?}", began.elapsed().as_secs_f64());
         assert!(alike < 0.3 * found.separation.powi(2), "the recording tells them apart already: {alike} of {}", found.separation.powi(2));
         assert!(found.separation > 5.0, "{found:?}");
@@ -143,7 +143,7 @@ fn dry_and_viscous_friction_are_told_apart_by_as_much_as_was_said() {
 fn the_file_plays_and_stays_within_what_was_recorded() {
     let problem = problem(MASS, &format!("{MASS}{RUB}"), sine(0.7, 1.0, 4.0), 1e-3);
     let (a, b) = (fitted(&problem, &["coulomb@mass-ground"]), fitted(&problem, &["damper@mass-ground"]));
-    let found = separate_fitted(&problem, &[(&a.0, &a.1), (&b.0, &b.1)], &problem.floor, &soon()).unwrap();
+    let found = separate_fitted(&problem, &[(&a.0, &a.1), (&b.0, &b.1)], &problem.noise_sd, &soon()).unwrap();
     let model = a.0.model(&problem, &a.1.values).unwrap();
     let driven = columns(&found.text, &model);
     assert!((driven[0].len() as f64 * PERIOD - found.duration).abs() < 2.0 * PERIOD);
@@ -161,10 +161,10 @@ fn what_is_mechanically_the_same_has_no_experiment() {
     let damped = format!("{MASS}\n[[elements]]\nname = \"oil\"\nkind = \"damper\"\nbetween = [\"mass\", \"ground\"]\ndamping = 0.8\n");
     let problem = problem(MASS, &damped, sine(0.7, 2.0, 3.0), 1e-5);
     let (a, b) = (fitted(&problem, &["back_emf@force"]), fitted(&problem, &["damper@mass-ground"]));
-    let said = separate_fitted(&problem, &[(&a.0, &a.1), (&b.0, &b.1)], &problem.floor, &soon()).unwrap_err().to_string();
+    let said = separate_fitted(&problem, &[(&a.0, &a.1), (&b.0, &b.1)], &problem.noise_sd, &soon()).unwrap_err().to_string();
     println!("{said}");
     assert!(said.contains("the motor's current would tell") && said.contains("nor does any further sensor"), "{said}");
-    assert!(separate_fitted(&problem, &[(&a.0, &a.1)], &problem.floor, &soon()).is_err());
+    assert!(separate_fitted(&problem, &[(&a.0, &a.1)], &problem.noise_sd, &soon()).is_err());
 }
 
 const TWO: &str = r#"
@@ -203,7 +203,7 @@ fn the_sensor_that_would_help_is_named() {
     let late = TWO.replace("on = \"motor\"", "on = \"motor\"\ndelay = 0.004");
     let problem = problem(TWO, &late, (0..4000).map(|k| (1e-5 * f64::from(k * k)).sin() * 2.0).collect(), 2e-5);
     let (a, b) = (fitted(&problem, &["delay@force"]), fitted(&problem, &["delay@position"]));
-    let said = separate_fitted(&problem, &[(&a.0, &a.1), (&b.0, &b.1)], &problem.floor, &soon()).unwrap_err().to_string();
+    let said = separate_fitted(&problem, &[(&a.0, &a.1), (&b.0, &b.1)], &problem.noise_sd, &soon()).unwrap_err().to_string();
     println!("{said}");
     assert!(said.contains("measuring the"), "{said}");
 }
@@ -213,8 +213,8 @@ fn what_slow_motion_hides_is_excited() {
     let problem = problem(MASS, MASS, sine(0.7, 0.4, 5.0), 3e-3);
     let (structure, fit) = fitted(&problem, &["damper@mass-ground"]);
     let model = structure.model(&problem, &fit.values).unwrap();
-    let mass = structure.numbers.iter().position(|n| matches!(n.role, Role::Stated(i) if problem.stated[i].path == "bodies.mass")).unwrap();
-    let found = excite(&problem, &model, &structure, &fit.values, &[mass], &problem.floor, &soon()).unwrap();
+    let mass = structure.free.iter().position(|n| matches!(n.role, Role::Stated(i) if problem.stated[i].path == "bodies.mass")).unwrap();
+    let found = excite(&problem, &model, &structure, &fit.values, &[mass], &problem.noise_sd, &soon()).unwrap();
     println!("{found:#?}");
     assert!(found.separation > 8.0 && found.sentence.contains("bodies.mass"), "{found:?}");
     // A refit to it knows the mass as well as was said.
@@ -223,7 +223,7 @@ fn what_slow_motion_hides_is_excited() {
     let again = fitted(&wider, &[]);
     let value = again.1.values[mass];
     assert!((value / 0.2 - 1.0).abs() < 4.0 / found.separation, "{value}");
-    assert!(excite(&problem, &model, &structure, &fit.values, &[], &problem.floor, &soon()).is_err());
+    assert!(excite(&problem, &model, &structure, &fit.values, &[], &problem.noise_sd, &soon()).is_err());
 }
 
 const MOVED: &str = r#"
@@ -258,7 +258,7 @@ fn a_motion_is_smooth_and_no_faster_than_recorded() {
     let column = sine(0.01, 1.5, 4.0);
     let problem = problem(MOVED, &truth, column.clone(), 0.15);
     let (a, b) = (fitted(&problem, &["coulomb@load-ground"]), fitted(&problem, &["damper@load-ground"]));
-    let found = separate_fitted(&problem, &[(&a.0, &a.1), (&b.0, &b.1)], &problem.floor, &soon()).unwrap();
+    let found = separate_fitted(&problem, &[(&a.0, &a.1), (&b.0, &b.1)], &problem.noise_sd, &soon()).unwrap();
     println!("{found:#?}");
     let driven = columns(&found.text, &problem.model).remove(0);
     let fastest = |u: &[f64]| u.windows(2).fold(0.0f64, |a, w| a.max((w[1] - w[0]).abs() / PERIOD));

@@ -1,7 +1,8 @@
 //! An experiment that was chosen, or why there is none.
 
-/// An experiment that was not made yet.
 use crate::tuning::tuning;
+
+/// An experiment that was not made yet.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Experiment {
     /// The input that it drives.

@@ -10,7 +10,7 @@ pub use error::ProblemError;
 pub use record::Record;
 pub use stated::Stated;
 
-use crate::floor;
+use crate::noise;
 use crate::unknown::Unknown;
 use backdrive_plant::model::Model;
 use backdrive_plant::set::{Initial, RecordingSet};
@@ -40,8 +40,8 @@ pub struct Problem {
     pub initial: Initial,
     /// Inputs that were not measured.
     pub unknown: Vec<Unknown>,
-    /// Noise standard deviation of each output, in its unit; see [`floor`].
-    pub floor: Vec<f64>,
+    /// Noise standard deviation of each output, in its unit; see [`noise_sd`].
+    pub noise_sd: Vec<f64>,
     /// Samples over which each output's displacement is compared instead of its position; 0 where the position itself is.
     pub lag: Vec<usize>,
 }
@@ -103,8 +103,8 @@ impl Problem {
             )));
         }
         let stated = stated_numbers(&model, &text);
-        let floor = (0..model.outputs.len()).map(|output| floor::of_signal(&model, &fit, output)).collect();
+        let noise_sd = (0..model.outputs.len()).map(|output| noise::of_signal(&model, &fit, output)).collect();
         let lag = (0..model.outputs.len()).map(|output| lag_of(&model, &fit, output)).collect();
-        Ok(Problem { text, model_path, model, fit, held_out, stated, initial, unknown: Vec::new(), floor, lag })
+        Ok(Problem { text, model_path, model, fit, held_out, stated, initial, unknown: Vec::new(), noise_sd, lag })
     }
 }

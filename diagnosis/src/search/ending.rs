@@ -42,8 +42,8 @@ pub(super) fn bring_to_their_ends(evaluator: &Evaluator, found: &mut [Candidate]
     let best = found.first().map_or(f64::INFINITY, |c| c.fit.cost);
     let unit = best / samples as f64;
     let open = |c: &Candidate| {
-        c.fit.foreseen > tuning().search.open_tolerance * unit
-            && c.fit.cost - 2.0 * c.fit.foreseen < best + tuning().search.open_advantage * unit * c.correlation_time
+        c.fit.predicted_decrease > tuning().search.open_tolerance * unit
+            && c.fit.cost - 2.0 * c.fit.predicted_decrease < best + tuning().search.open_advantage * unit * c.correlation_time
     };
     let near: Vec<usize> =
         (0..found.len().min(tuning().search.last_fits)).filter(|i| found[*i].fit.cost < tuning().search.last_cost * best).collect();
@@ -103,7 +103,7 @@ pub(super) fn hold_against_unseen(evaluator: &Evaluator, found: &mut [Candidate]
     });
     let mut finalists: Vec<&mut Candidate> = finalists.chain(std::iter::once(nominal)).collect();
     finalists.par_iter_mut().for_each(|c| {
-        c.unseen = unseen(problem, &problem.held_out, &c.structure, &c.fit.values, &evaluator.floor);
+        c.unseen = unseen(problem, &problem.held_out, &c.structure, &c.fit.values, &evaluator.noise_sd);
     });
     Evaluator::on(problem, &problem.held_out).len()
 }

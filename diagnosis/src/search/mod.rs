@@ -16,7 +16,7 @@ use crate::candidate::key_of;
 use crate::effort::Effort;
 use crate::evaluator::Evaluator;
 use crate::hypothesis::Hypothesis;
-use crate::parts::Parts;
+use crate::excerpts::Excerpts;
 use crate::physics;
 use crate::problem::Problem;
 use crate::race::Course;
@@ -43,7 +43,7 @@ pub fn search(problem: &Problem, settings: &Settings, limit: Limit, report: &(dy
     let samples = refitted.fit.residuals.len();
     let mut hypotheses = hypotheses_for(&nominal, settings);
     report("looking for ripples");
-    let ripples = view::ripples(&nominal.seen, &nominal.model, &evaluator.floor, &mut hypotheses);
+    let ripples = view::ripples(&nominal.seen, &nominal.model, &evaluator.noise_sd, &mut hypotheses);
     report("screening");
     let led = &nominal.led;
     let seeing = work.share(if nominal.far { tuning().screening.share_far } else { tuning().screening.share_near });
@@ -54,7 +54,7 @@ pub fn search(problem: &Problem, settings: &Settings, limit: Limit, report: &(dy
     let free = Evaluator { guide: None, ..led.coarse.clone() };
     let (from, steps) = if nominal.held { (&refitted.fit.values, tuning().fit.nominal_view.steps) } else { (&nominal.start, 0) };
     let other = if nominal.far { free.fit(&refitted.structure, from, Effort { steps, ..tuning().fit.nominal_view }) } else { None };
-    let free_parts = other.as_ref().and_then(|fit| Parts::of(&free, &refitted.structure, fit, tuning().screening.samples));
+    let free_parts = other.as_ref().and_then(|fit| Excerpts::of(&free, &refitted.structure, fit, tuning().screening.samples));
     if let Some(fit) = other {
         views.push(View::of(&free, free_parts.as_ref(), (&refitted.structure, fit), &hypotheses, seeing, false));
     }
@@ -84,7 +84,7 @@ pub fn search(problem: &Problem, settings: &Settings, limit: Limit, report: &(dy
         t.taken = single.map(|c| 1.0 - c.fit.cost / refitted.fit.cost);
     }
     Ok(Search {
-        floor: evaluator.floor.clone(),
+        noise_sd: evaluator.noise_sd.clone(),
         levels_given: nominal.levels_given.clone(),
         found,
         tried,

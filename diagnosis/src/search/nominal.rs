@@ -6,13 +6,13 @@ use crate::candidate::{Candidate, candidate, white};
 use crate::effort::Effort;
 use crate::evaluator::Evaluator;
 use crate::fit::Fit;
-use crate::floor;
-use crate::guide::Guide;
+use crate::noise;
+use crate::coupling::Coupling;
 use crate::hypothesis::Scales;
-use crate::parts::Parts;
+use crate::excerpts::Excerpts;
 use crate::problem::{Problem, Record};
 use crate::screen::worst_records;
-use crate::statistics::{correlation_time, deviation_by_median, levels, slowness};
+use crate::statistics::{correlation_time, deviation_by_median, levels, whiteness_statistic};
 use crate::structure::Structure;
 use crate::tuning::tuning;
 use backdrive_plant::model::{InputKind, Model};
@@ -27,7 +27,7 @@ pub(super) struct Nominal<'a> {
     pub start: Vec<f64>,
     /// The refit.
     pub refitted: Candidate,
-    /// Level of each output with the numbers as given, floors.
+    /// Level of each output with the numbers as given, noise standard deviations.
     pub levels_given: Vec<f64>,
     /// The refitted model, before it was led.
     pub model: Model,
@@ -51,8 +51,8 @@ pub(super) struct Nominal<'a> {
 pub(super) struct Led<'a> {
     /// What it is held against, whole.
     pub coarse: Evaluator<'a>,
-    /// Parts of the recordings that are enough.
-    pub parts: Option<Parts>,
+    /// Excerpts of the recordings that are enough.
+    pub parts: Option<Excerpts>,
     /// Its numbers there.
     pub fit: Fit,
 }
@@ -63,7 +63,7 @@ struct Path<'p, 'a> {
     middle: &'p Evaluator<'a>,
     structure: &'p Structure,
     /// The coupling at its full strength.
-    firm: &'p Guide,
+    firm: &'p Coupling,
     far: bool,
     held: bool,
     guided: bool,
@@ -78,7 +78,7 @@ impl<'a> Path<'_, 'a> {
         let view = if self.held { Effort { steps: 0, ..fit.nominal_view } } else { fit.nominal_view };
         let at = coarse.fit(structure, from, view)?;
         // The parts with the largest residuals are enough for screening; coupled, they begin as they were measured.
-        let parts = if self.far && in_parts { Parts::of(&coarse, structure, &at, tuning().screening.samples) } else { None };
+        let parts = if self.far && in_parts { Excerpts::of(&coarse, structure, &at, tuning().screening.samples) } else { None };
         let base = match &parts {
             _ if !self.guided => None,
             Some(parts) => parts.evaluator(&coarse).fit(structure, &at.values, fit.nominal_coupled),
@@ -133,7 +133,7 @@ impl<'a> Nominal<'a> {
         let scales = scales(problem, &model, &seen)?;
         let level = levels(&evaluator, &refitted.residuals).into_iter().fold(0.0, f64::max);
         let strength = if level > tuning().coupling.full_above * tuning().noise.far { 1.0 } else { tuning().coupling.weak };
-        let firm = Guide::new(problem, &problem.fit, &scales, &evaluator.floor, strength);
+        let firm = Coupling::new(problem, &problem.fit, &scales, &evaluator.noise_sd, strength);
         let far = level > tuning().noise.far;
         let held = far && !firm.is_empty();
         // A prescribed motion couples the device by itself.
@@ -174,14 +174,14 @@ impl<'a> FirstFit<'a> {
         let middle = at_middle(&evaluator);
         let fit = worst_first(&middle, structure, start, &first, tuning().fit.nominal_first)?;
         // The residuals of a fit show the noise better than the signal does.
-        let before = evaluator.floor.clone();
-        evaluator.floor = floors(&evaluator, &fit.residuals);
+        let before = evaluator.noise_sd.clone();
+        evaluator.noise_sd = floors(&evaluator, &fit.residuals);
         if evaluator.robust.is_finite() {
             // Large is what is large beside the rest, which far from the noise is far from the noise itself.
             evaluator.robust = tuning().fit.robust * bulk(&fit.residuals, &before, &evaluator).max(1.0);
         }
         let rescaled = |residuals: &[f64]| -> Vec<f64> {
-            levels(&evaluator, residuals).iter().zip(before.iter().zip(&evaluator.floor)).map(|(l, (b, f))| l * b / f).collect()
+            levels(&evaluator, residuals).iter().zip(before.iter().zip(&evaluator.noise_sd)).map(|(l, (b, f))| l * b / f).collect()
         };
         let levels_given = rescaled(&first);
         let is_far = rescaled(&fit.residuals).iter().any(|l| *l > tuning().noise.very_far);
@@ -208,7 +208,7 @@ fn scales(problem: &Problem, model: &Model, seen: &[Record]) -> Result<Scales, S
 /// the residuals at the start.
 fn worst_first(evaluator: &Evaluator, structure: &Structure, start: &[f64], there: &[f64], steps: [usize; 2]) -> Option<Fit> {
     let problem = evaluator.problem;
-    let own_numbers = structure.numbers.iter().any(|n| n.records.is_some());
+    let own_numbers = structure.free.iter().any(|n| n.records.is_some());
     let worst = worst_records(evaluator, there, 2);
     let effort = |steps: usize| Effort { steps, ..tuning().fit.nominal_far };
     if own_numbers || there.len() < tuning().screening.samples || 2 * worst.len() > problem.fit.len() {
@@ -224,7 +224,7 @@ fn worst_first(evaluator: &Evaluator, structure: &Structure, start: &[f64], ther
 fn bulk(residuals: &[f64], before: &[f64], evaluator: &Evaluator) -> f64 {
     let mut sizes: Vec<f64> = Vec::with_capacity(residuals.len());
     for (_, output, range) in evaluator.layout() {
-        let scale = before[output] / evaluator.floor[output];
+        let scale = before[output] / evaluator.noise_sd[output];
         sizes.extend(residuals.get(range).unwrap_or(&[]).iter().map(|r| scale * r.abs()));
     }
     if sizes.is_empty() { 1.0 } else { deviation_by_median(&mut sizes) }
@@ -248,13 +248,13 @@ fn floors(evaluator: &Evaluator, residuals: &[f64]) -> Vec<f64> {
         .map(|output| {
             let parts: Vec<&[f64]> = layout.iter().filter(|l| l.1 == output).filter_map(|l| residuals.get(l.2.clone())).collect();
             let signals: Vec<&[f64]> = problem.fit.iter().filter_map(|r| r.outputs.get(output)?.as_deref()).collect();
-            let own = evaluator.floor[output];
-            let least = floor::stated(&problem.model, output, &signals);
+            let own = evaluator.noise_sd[output];
+            let least = noise::stated(&problem.model, output, &signals);
             let spread = problem.fit.iter().filter_map(|r| r.spread.get(output)).fold(0.0f64, |a, b| a.max(*b));
             if parts.is_empty() {
                 own
             } else {
-                (own * floor::of_residuals(&parts, least / own, 0.0)).max(tuning().recordings.least_noise * spread).min(own)
+                (own * noise::of_residuals(&parts, least / own, 0.0)).max(tuning().recordings.least_noise * spread).min(own)
             }
         })
         .collect()
@@ -263,9 +263,9 @@ fn floors(evaluator: &Evaluator, residuals: &[f64]) -> Vec<f64> {
 /// Near the noise the end of a fit counts: what is left over short of it looks like missing physics.
 pub(super) fn to_its_end(evaluator: &Evaluator, structure: &Structure, fit: Fit) -> Fit {
     let near = levels(evaluator, &fit.residuals).iter().all(|l| *l < tuning().noise.far);
-    if !near || white(correlation_time(evaluator, &fit.residuals), slowness(evaluator, &fit.residuals)) {
+    if !near || white(correlation_time(evaluator, &fit.residuals), whiteness_statistic(evaluator, &fit.residuals)) {
         return fit;
     }
-    let ended = evaluator.fit_knowing(structure, &fit.values, tuning().fit.to_the_end, Some((structure, &fit)));
+    let ended = evaluator.fit_from_derivatives(structure, &fit.values, tuning().fit.to_the_end, Some((structure, &fit)));
     ended.filter(|e| e.cost < fit.cost).unwrap_or(fit)
 }

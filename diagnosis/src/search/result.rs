@@ -35,8 +35,8 @@ pub struct Detectable {
 #[derive(Debug)]
 pub struct Search {
     /// Standard deviation of each output's measuring error, in its unit.
-    pub floor: Vec<f64>,
-    /// Level of each output with the numbers as given, floors.
+    pub noise_sd: Vec<f64>,
+    /// Level of each output with the numbers as given, noise standard deviations.
     pub levels_given: Vec<f64>,
     /// The nominal model refitted.
     pub nominal: Candidate,
@@ -46,9 +46,9 @@ pub struct Search {
     pub tried: Vec<Tried>,
     /// How many hypotheses there were.
     pub hypotheses: usize,
-    /// Number of residuals.
+    /// FreeParameter of residuals.
     pub samples: usize,
-    /// Number of residuals of the recordings that no fit has seen.
+    /// FreeParameter of residuals of the recordings that no fit has seen.
     pub unseen_samples: usize,
     /// What would have been seen beside the refitted nominal model, each physics at the place where it shows best.
     pub detectable: Vec<Detectable>,

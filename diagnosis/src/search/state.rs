@@ -79,7 +79,7 @@ impl<'s, 'a> State<'s, 'a> {
         all
     }
 
-    /// At the floor only what promises more than chance is worth a fit.
+    /// At the noise only what promises more than chance is worth a fit.
     pub fn is_quiet(&self) -> bool {
         self.course.nominal.is_white() || self.course.nominal.levels.iter().all(|l| *l < tuning().noise.at_noise)
     }
@@ -89,7 +89,7 @@ impl<'s, 'a> State<'s, 'a> {
         tuning().screening.chance * self.course.nominal.correlation_time / self.samples() as f64
     }
 
-    /// Number of residuals.
+    /// FreeParameter of residuals.
     pub fn samples(&self) -> usize {
         self.course.nominal.fit.residuals.len()
     }

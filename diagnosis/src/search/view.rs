@@ -7,7 +7,7 @@ use crate::evaluator::Evaluator;
 use crate::fit::Fit;
 use crate::hypothesis::{Family, Hypothesis};
 use crate::locate::{self, Ripple};
-use crate::parts::Parts;
+use crate::excerpts::Excerpts;
 use crate::problem::Record;
 use crate::race::Seed;
 use crate::screen::{Promise, Screen, pairs};
@@ -36,7 +36,7 @@ pub(super) struct View<'a> {
 impl<'a> View<'a> {
     pub fn of(
         evaluator: &Evaluator<'a>,
-        parts: Option<&'a Parts>,
+        parts: Option<&'a Excerpts>,
         (structure, fit): (&Structure, Fit),
         hypotheses: &[Hypothesis],
         work: Steps,
@@ -75,11 +75,11 @@ impl<'a> View<'a> {
 
 /// A ripple shows in a force over displacement, at whatever period, but fits only start from a few: where locating finds one, a fit starts there.
 /// Those that stand alone in the spectrum of their force, with what makes them, are given back, the largest share first: gaps and friction make many lines.
-pub(super) fn ripples(records: &[Record], model: &Model, floor: &[f64], hypotheses: &mut [Hypothesis]) -> Vec<(usize, Vec<f64>)> {
+pub(super) fn ripples(records: &[Record], model: &Model, noise_sd: &[f64], hypotheses: &mut [Hypothesis]) -> Vec<(usize, Vec<f64>)> {
     let runs: Vec<locate::Run> = records.iter().map(locate::Run::from).collect();
     let options = locate::Options { most_samples: tuning().screening.ripple_samples, laws_of_a_form: 0, ..locate::Options::quick() };
     // Where the model cannot be located in, fits start from the usual periods.
-    let Ok(location) = locate::locate(model, &runs, floor, &options) else { return Vec::new() };
+    let Ok(location) = locate::locate(model, &runs, noise_sd, &options) else { return Vec::new() };
     let mut alone: Vec<(f64, usize, Vec<f64>)> = Vec::new();
     for place in &location.ranking {
         for (index, h) in

@@ -89,7 +89,7 @@ group! {
         revived: usize = 3, "structures", Cost("one fit each");
         /// Value over a parameter's least one below which it has vanished.
         vanished: f64 = 2.0, "-", Numerics("a parameter that is fitted as its logarithm has no gradient near its lower bound");
-        /// Parts of a stated parameter that a law beside it may take over.
+        /// Excerpts of a stated parameter that a law beside it may take over.
         taken_over: [f64; 3] = [0.25, 0.5, 0.9], "-", Judgement("two dampers in a row are told apart along a narrow valley: starts along it");
         /// Steps to something simpler at the end, at most.
         simpler: usize = 3, "steps", Cost("one fit for each effect and law");

@@ -55,14 +55,14 @@ pub fn beaten(search: &Search) -> Vec<Beaten> {
         let (by_fits, by_unseen) = (advantage_over(c, best, search.samples), unseen_evidence(search, c, best));
         let why = match () {
             () if std::ptr::eq(c, best) => Why::Claimed,
-            () if evidence(search, c, best) <= 0.0 && c.structure.numbers.len() >= best.structure.numbers.len() => Why::NotWorthIts,
+            () if evidence(search, c, best) <= 0.0 && c.structure.free.len() >= best.structure.free.len() => Why::NotWorthIts,
             () if c.fit.cost < best.fit.cost && by_unseen > 0.0 => Why::PredictsWorse,
             () if c.fit.cost < best.fit.cost => Why::NotWorthIts,
             () => Why::ExplainsLess,
         };
         Beaten {
             name: c.structure.name(),
-            parameters: c.structure.numbers.len(),
+            parameters: c.structure.free.len(),
             residual: (c.fit.cost / search.samples.max(1) as f64).sqrt(),
             unseen: c.unseen.map(|u| u.mean_square.sqrt()),
             by_fits,

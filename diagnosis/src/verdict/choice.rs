@@ -23,7 +23,7 @@ pub fn chosen(search: &Search) -> &Candidate {
             .found
             .iter()
             .filter(|c| c.structure.added.len() == effects && evidence(search, c, next) < tuning().claim.tie)
-            .min_by_key(|c| (c.structure.numbers.len(), c.structure.added.iter().map(order).sum::<usize>()))
+            .min_by_key(|c| (c.structure.free.len(), c.structure.added.iter().map(order).sum::<usize>()))
             .unwrap_or(next);
         if worth(search, best, simplest) {
             best = simplest;
@@ -45,7 +45,7 @@ fn order(h: &Hypothesis) -> usize {
 pub(super) fn evidence(search: &Search, base: &Candidate, better: &Candidate) -> f64 {
     let (fits, unseen) = (advantage_over(base, better, search.samples), unseen_evidence(search, base, better));
     let (simple, rich) = if unseen > 0.0 { (better, base) } else { (base, better) };
-    let is_overfit = simple.structure.numbers.len() < rich.structure.numbers.len()
+    let is_overfit = simple.structure.free.len() < rich.structure.free.len()
         && simple.fit.cost < tuning().claim.twice * rich.fit.cost
         && unseen.abs() > tuning().claim.tie
         && fits * unseen < 0.0;

@@ -6,11 +6,11 @@ use super::signals::bursts;
 use super::types::{Finding, Word};
 use crate::candidate::Candidate;
 use crate::evaluator::Evaluator;
-use crate::intervals::Spread;
+use crate::intervals::Uncertainty;
 use crate::problem::Problem;
 use crate::search::Search;
 use crate::statistics::advantage;
-use crate::structure::{Number, Role, Structure};
+use crate::structure::{FreeParameter, Role, Structure};
 use crate::tuning::tuning;
 
 /// What is claimed.
@@ -20,7 +20,7 @@ pub(super) struct Decision<'s> {
     /// The structure that explains best what it may.
     pub(super) best: &'s Candidate,
     /// How sure its numbers are.
-    pub(super) spread: Spread,
+    pub(super) spread: Uncertainty,
     /// What it adds, most important first.
     pub(super) findings: Vec<Finding>,
     /// Structures that cannot be told from it.
@@ -34,8 +34,8 @@ pub(super) struct Decision<'s> {
 /// Decides.
 pub(super) fn decide<'s>(problem: &Problem, search: &'s Search) -> Decision<'s> {
     let best = chosen(search);
-    let evaluator = Evaluator { floor: search.floor.clone(), ..Evaluator::new(problem) };
-    let spread = Spread::measured(&evaluator, best);
+    let evaluator = Evaluator { noise_sd: search.noise_sd.clone(), ..Evaluator::new(problem) };
+    let spread = Uncertainty::measured(&evaluator, best);
     let at_floor = best.levels.iter().all(|l| *l < tuning().noise.unexplained);
     let nominal_cost = search.nominal.fit.cost;
     let excess = |c: f64| (c / search.samples as f64 - 1.0).max(0.0);
@@ -45,7 +45,7 @@ pub(super) fn decide<'s>(problem: &Problem, search: &'s Search) -> Decision<'s> 
     let alike = alike(search, best);
     let nominal = &search.nominal;
     let off = given_is_off(problem, search) && (added || spread.is_far(nominal, &stated_in(problem, &nominal.structure)));
-    let wanders = nominal.slowness > tuning().claim.wanders && nominal.levels.iter().any(|l| *l > tuning().noise.at_noise);
+    let wanders = nominal.whiteness_statistic > tuning().claim.wanders && nominal.levels.iter().any(|l| *l > tuning().noise.at_noise);
     let findings = findings(search, best, &spread, adequacy(best));
     let is_outdone = findings.first().is_some_and(Finding::has_likelier_rival);
     let word = match () {
@@ -72,23 +72,23 @@ fn given_is_off(problem: &Problem, search: &Search) -> bool {
         }
     }
     let refit = &search.nominal;
-    let numbers = refit.structure.numbers.len();
+    let numbers = refit.structure.free.len();
     advantage(cost, 0, refit.fit.cost, numbers, total, refit.correlation_time) > 0.0 && refit.fit.cost < tuning().claim.refit_gains * cost
 }
 
 /// Where the stated numbers are among a structure's, and what the nominal file says.
 fn stated_in(problem: &Problem, structure: &Structure) -> Vec<(usize, f64)> {
-    let one = |(place, number): (usize, &Number)| match number.role {
+    let one = |(place, number): (usize, &FreeParameter)| match number.role {
         Role::Stated(i) => Some((place, problem.stated.get(i)?.given)),
         _ => None,
     };
-    structure.numbers.iter().enumerate().filter_map(one).collect()
+    structure.free.iter().enumerate().filter_map(one).collect()
 }
 
 /// Whether the recordings move the device by more than the measuring error.
 fn is_excited(problem: &Problem, search: &Search) -> bool {
-    let moves = |(output, floor): (usize, &f64)| {
-        problem.fit.iter().any(|r| r.outputs.get(output).is_some_and(Option::is_some) && r.spread[output] > tuning().claim.excited * floor)
+    let moves = |(output, noise_sd): (usize, &f64)| {
+        problem.fit.iter().any(|r| r.outputs.get(output).is_some_and(Option::is_some) && r.spread[output] > tuning().claim.excited * noise_sd)
     };
-    search.floor.iter().enumerate().any(moves)
+    search.noise_sd.iter().enumerate().any(moves)
 }

@@ -31,11 +31,11 @@ fn planned<'a>(problem: &'a Problem, search: &Search, decision: &Decision, budge
     match decision.word {
         Word::Ambiguous => {
             let rivals = if decision.alike.is_empty() { nearest(search, best) } else { decision.alike.clone() };
-            Some(separate(problem, &[&[best], rivals.as_slice()].concat(), &search.floor, budget))
+            Some(separate(problem, &[&[best], rivals.as_slice()].concat(), &search.noise_sd, budget))
         }
         Word::CannotTell => best.structure.model(problem, &best.fit.values).map(|model| {
-            let all: Vec<usize> = (0..best.structure.numbers.len()).collect();
-            excite(problem, &model, &best.structure, &best.fit.values, &all, &search.floor, budget)
+            let all: Vec<usize> = (0..best.structure.free.len()).collect();
+            excite(problem, &model, &best.structure, &best.fit.values, &all, &search.noise_sd, budget)
         }),
         Word::Missing | Word::Parameters | Word::NothingMissing | Word::Unexplained => None,
     }

@@ -5,7 +5,7 @@ use super::rounded::rounded;
 use super::types::{Alternative, Detectable, Estimate, Estimates, Finding, Moved, Parameter};
 use crate::candidate::Candidate;
 use crate::hypothesis::Hypothesis;
-use crate::intervals::Spread;
+use crate::intervals::Uncertainty;
 use crate::problem::Problem;
 use crate::search::Search;
 use crate::structure::Role;
@@ -24,14 +24,14 @@ pub(super) fn adequacy(best: &Candidate) -> f64 {
 }
 
 /// Each physics of a structure with its rivals, most important first.
-pub(super) fn findings(search: &Search, best: &Candidate, spread: &Spread, adequacy: f64) -> Vec<Finding> {
+pub(super) fn findings(search: &Search, best: &Candidate, spread: &Uncertainty, adequacy: f64) -> Vec<Finding> {
     let one = |which| (cost_without(search, best, which), finding(search, best, spread, adequacy, which));
     let mut all: Vec<(f64, Finding)> = (0..best.structure.added.len()).map(one).collect();
     all.sort_by(|a, b| b.0.total_cmp(&a.0));
     all.into_iter().map(|(_, finding)| finding).collect()
 }
 
-fn finding(search: &Search, best: &Candidate, spread: &Spread, adequacy: f64, which: usize) -> Finding {
+fn finding(search: &Search, best: &Candidate, spread: &Uncertainty, adequacy: f64, which: usize) -> Finding {
     let hypothesis = &best.structure.added[which];
     let rivals = rivals(search, best, which);
     // The weight of each, softened: a simulator is never the device.
@@ -94,10 +94,10 @@ fn rivals(search: &Search, best: &Candidate, which: usize) -> Vec<(Hypothesis, f
     each
 }
 
-fn parameters_of(best: &Candidate, spread: &Spread, which: usize) -> BTreeMap<String, Parameter> {
+fn parameters_of(best: &Candidate, spread: &Uncertainty, which: usize) -> BTreeMap<String, Parameter> {
     let hypothesis = &best.structure.added[which];
     let mut all = BTreeMap::new();
-    for (index, number) in best.structure.numbers.iter().enumerate() {
+    for (index, number) in best.structure.free.iter().enumerate() {
         let Role::Added(h, p) = number.role else { continue };
         let Some(parameter) = hypothesis.parameters.get(p).filter(|_| h == which) else { continue };
         let value = round_significant(best.fit.values[index], 5);
@@ -117,14 +117,14 @@ fn parameters_of(best: &Candidate, spread: &Spread, which: usize) -> BTreeMap<St
 }
 
 /// Numbers of the nominal model as the fit has them, by their path.
-pub(super) fn moved(problem: &Problem, best: &Candidate, spread: &Spread) -> BTreeMap<String, Moved> {
+pub(super) fn moved(problem: &Problem, best: &Candidate, spread: &Uncertainty) -> BTreeMap<String, Moved> {
     let mut all = BTreeMap::new();
-    for (index, number) in best.structure.numbers.iter().enumerate() {
+    for (index, number) in best.structure.free.iter().enumerate() {
         let Role::Stated(i) = number.role else { continue };
         let (stated, value) = (&problem.stated[i], best.fit.values[index]);
         let list = problem.stated.iter().filter(|s| s.path == stated.path).count() > 1;
         let key = if list { format!("{}[{}]", stated.path, stated.index) } else { stated.path.clone() };
-        let away = (number.inward(value) - number.inward(stated.given)) / spread.deviation[index];
+        let away = (number.to_internal(value) - number.to_internal(stated.given)) / spread.deviation[index];
         let moved = Moved {
             value: round_significant(value, 5),
             ci95: spread.interval(best, index).map(|end| rounded(end, 5)),

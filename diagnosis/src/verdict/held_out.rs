@@ -22,7 +22,7 @@ pub(super) fn held_out(problem: &Problem, search: &Search, best: &Candidate, use
     let refit = mean_squares(problem, records, nominal, &search.nominal.fit.values);
     let after = if use_best { mean_squares(problem, records, &best.structure, &best.fit.values) } else { before.clone() };
     let pairs: Vec<Pair> = records.iter().flat_map(|record| measured(record).map(move |output| (record, output))).collect();
-    let floor: Vec<f64> = pairs.iter().map(|(_, output)| search.floor[*output] * search.floor[*output]).collect();
+    let noise_sd: Vec<f64> = pairs.iter().map(|(_, output)| search.noise_sd[*output] * search.noise_sd[*output]).collect();
     let mean = |squares: &Option<Vec<f64>>| squares.as_ref().and_then(|s| averaged(&pairs, s)).and_then(|x| rounded(x, 6));
     let pooled = |squares: &[f64]| pooled(problem, &pairs, squares);
     let one = |(i, (record, output)): (usize, &Pair)| {
@@ -33,18 +33,18 @@ pub(super) fn held_out(problem: &Problem, search: &Search, best: &Candidate, use
             nrmse_before: nrmse(&before),
             nrmse_refit: nrmse(&refit),
             nrmse_after: nrmse(&after),
-            noise_floor: rounded(floor[i].sqrt() / record.spread[*output], 6),
+            noise_floor: rounded(noise_sd[i].sqrt() / record.spread[*output], 6),
         }
     };
     HeldOut {
         nrmse_before: mean(&before),
         nrmse_refit: mean(&refit),
         nrmse_after: mean(&after),
-        noise_floor: rounded(averaged(&pairs, &floor).unwrap_or(0.0), 6),
+        noise_floor: rounded(averaged(&pairs, &noise_sd).unwrap_or(0.0), 6),
         pooled_before: before.as_deref().map(pooled),
         pooled_refit: refit.as_deref().map(pooled),
         pooled_after: after.as_deref().map(pooled),
-        pooled_floor: Some(pooled(&floor)),
+        pooled_floor: Some(pooled(&noise_sd)),
         per_record: pairs.iter().enumerate().map(one).collect(),
     }
 }

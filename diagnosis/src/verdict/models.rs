@@ -2,8 +2,8 @@
 
 use crate::candidate::Candidate;
 use crate::hypothesis::apply_edits;
-use crate::intervals::Spread;
-use crate::numbers::stated_edits;
+use crate::intervals::Uncertainty;
+use crate::parameters::stated_edits;
 use crate::problem::Problem;
 use crate::search::Search;
 use crate::tuning::tuning;
@@ -24,7 +24,7 @@ pub enum VerdictError {
 }
 
 /// The nominal model's text with the fitted numbers and what was found.
-pub(super) fn model_text(problem: &Problem, best: &Candidate, spread: &Spread, use_best: bool) -> Result<String, VerdictError> {
+pub(super) fn model_text(problem: &Problem, best: &Candidate, spread: &Uncertainty, use_best: bool) -> Result<String, VerdictError> {
     if !use_best {
         return Ok(problem.text.clone());
     }

@@ -11,13 +11,13 @@ use crate::words;
 
 /// What the explanation that is claimed leaves over; `None` where nothing was held against anything.
 pub(super) fn remaining(problem: &Problem, search: &Search, best: &Candidate, held_out: &HeldOut) -> Option<Remaining> {
-    let (refit, after, floor) = (held_out.nrmse_refit?, held_out.nrmse_after?, held_out.noise_floor?);
+    let (refit, after, noise_sd) = (held_out.nrmse_refit?, held_out.nrmse_after?, held_out.noise_floor?);
     let share = |x: f64| if refit > 0.0 { rounded(x / refit, 3) } else { None };
     let level = best.levels.iter().fold(0.0f64, |a, b| a.max(*b));
     let left = level >= tuning().noise.unexplained;
     Some(Remaining {
         share: share(after),
-        floor_share: share(floor),
+        floor_share: share(noise_sd),
         noise_sd: rounded(level, 3),
         shows: if left { place_in_signals(problem, &best.fit.residuals, &[]) } else { None },
         looks_like: if left { looks_like(search, best) } else { None },

@@ -37,7 +37,7 @@ impl Step for Anew {
         let late = state.work.is_past(tuning().search.last_other_base);
         let other = best.and_then(|b| b.structure.added.first()).filter(|_| !late).and_then(without);
         // And far from the noise from what does nearly as well with fewer numbers: it leaves more open.
-        let has_fewer = |c: &&Candidate| best.is_some_and(|b| c.structure.numbers.len() < b.structure.numbers.len());
+        let has_fewer = |c: &&Candidate| best.is_some_and(|b| c.structure.free.len() < b.structure.free.len());
         let is_other = |c: &Candidate| other.is_some_and(|o| std::ptr::eq(o, c));
         let plain = simplest_of(fewer(), samples).filter(has_fewer).filter(|c| !is_other(c));
         let mut seeds = Vec::new();

@@ -18,8 +18,8 @@ impl Step for Plain {
 
     fn is_for_rivals(&self, state: &State) -> bool {
         // They are rivals of a best that took more parameters.
-        let nominal = state.course.nominal.structure.numbers.len();
-        state.found.first().is_some_and(|c| c.structure.numbers.len() > nominal + 1)
+        let nominal = state.course.nominal.structure.free.len();
+        state.found.first().is_some_and(|c| c.structure.free.len() > nominal + 1)
     }
 
     fn propose(&self, state: &mut State) -> Vec<Seed> {

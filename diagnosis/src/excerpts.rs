@@ -1,11 +1,11 @@
-//! Parts of recordings that show enough: where many structures are tried, each is simulated only where what is left over is largest.
+//! Excerpts of recordings that show enough: where many structures are tried, each is simulated only where what is left over is largest.
 //!
 //! A part is the recording's beginning where that shows enough. Others begin with the motion that the base of the search has there when it
 //! is led firmly; their first samples do not count, for laws with a memory begin without one.
 
 use crate::evaluator::Evaluator;
 use crate::fit::{Fit, dot};
-use crate::guide::Guide;
+use crate::coupling::Coupling;
 use crate::problem::Record;
 use crate::simulate::{Conditions, motion_at};
 use crate::structure::Structure;
@@ -14,19 +14,19 @@ use backdrive_plant::set::Initial;
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// Parts of recordings, ready to be simulated, and what leads along them.
+/// Excerpts of recordings, ready to be simulated, and what leads along them.
 #[derive(Debug, Clone)]
-pub struct Parts {
+pub struct Excerpts {
     /// The parts.
     pub records: Vec<Record>,
     /// The guide of the evaluator they were taken for, along them.
-    pub guide: Option<Guide>,
+    pub guide: Option<Coupling>,
 }
 
-impl Parts {
+impl Excerpts {
     /// The part of each recording where a fit leaves most over, all together about so many samples. `None` where the recordings are no
     /// longer than that, or cannot be cut: they start freely, or have numbers of their own.
-    pub fn of(evaluator: &Evaluator, structure: &Structure, fit: &Fit, samples: usize) -> Option<Parts> {
+    pub fn of(evaluator: &Evaluator, structure: &Structure, fit: &Fit, samples: usize) -> Option<Excerpts> {
         let (problem, records) = (evaluator.problem, evaluator.records);
         let total: usize = records.iter().map(|r| r.len).sum();
         let own_numbers = problem.initial == Initial::Free || records.iter().any(|r| !r.conditions.is_empty());
@@ -75,7 +75,7 @@ impl Parts {
         };
         let parts = ranges.par_iter().enumerate().map(cut).collect::<Vec<_>>().into_iter().collect::<Option<Vec<Record>>>()?;
         let of: Vec<(usize, Range<usize>, f64)> = ranges.into_iter().enumerate().map(|(r, range)| (r, range, records[r].period)).collect();
-        Some(Parts { records: parts, guide: evaluator.guide.as_ref().map(|g| g.of_parts(&of)) })
+        Some(Excerpts { records: parts, guide: evaluator.guide.as_ref().map(|g| g.of_parts(&of)) })
     }
 
     /// An evaluator on these parts.

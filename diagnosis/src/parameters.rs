@@ -1,7 +1,7 @@
 //! The numbers of a fit beside those that the file gives: how far each had to move, how sure it is, and which hang together.
 
 use crate::candidate::Candidate;
-use crate::intervals::Spread;
+use crate::intervals::Uncertainty;
 use crate::problem::Problem;
 use crate::structure::Role;
 use crate::tuning::tuning;
@@ -45,18 +45,18 @@ pub struct Pair {
 }
 
 /// Every number of a fit.
-pub fn rows(problem: &Problem, candidate: &Candidate, spread: &Spread) -> Vec<Row> {
+pub fn rows(problem: &Problem, candidate: &Candidate, spread: &Uncertainty) -> Vec<Row> {
     // The weights of a curve that nobody measured are no numbers of the device.
-    let numbers = candidate.structure.numbers.iter().zip(&candidate.fit.values).enumerate();
+    let numbers = candidate.structure.free.iter().zip(&candidate.fit.values).enumerate();
     let numbers = numbers.filter(|(_, (number, _))| !matches!(number.role, Role::Knot(..)));
-    let row = |(index, (number, value)): (usize, (&crate::structure::Number, &f64))| {
+    let row = |(index, (number, value)): (usize, (&crate::structure::FreeParameter, &f64))| {
         let given = match &number.role {
             Role::Stated(i) => problem.stated.get(*i).map(|s| s.given),
             _ => None,
         };
         let deviation = spread.deviation.get(index).copied().unwrap_or(f64::INFINITY);
         let (low, high) = number.bounds();
-        let own = number.inward(*value);
+        let own = number.to_internal(*value);
         let edge = tuning().fit.at_bound * (high - low);
         let sure = match (number.log, given) {
             (true, _) => deviation < tuning().claim.undetermined,
@@ -70,7 +70,7 @@ pub fn rows(problem: &Problem, candidate: &Candidate, spread: &Spread) -> Vec<Ro
             value: *value,
             standard_error: if number.log { deviation * value.abs() } else { deviation },
             ci95: spread.interval(candidate, index),
-            moved_sd: given.map(|given| (own - number.inward(given)) / deviation),
+            moved_sd: given.map(|given| (own - number.to_internal(given)) / deviation),
             determined: sure,
             at_bound: own <= low + edge || own >= high - edge,
         }
@@ -79,8 +79,8 @@ pub fn rows(problem: &Problem, candidate: &Candidate, spread: &Spread) -> Vec<Ro
 }
 
 /// Pairs of numbers whose correlation is at least `least` in size, the strongest first.
-pub fn correlated(problem: &Problem, candidate: &Candidate, spread: &Spread, least: f64) -> Vec<Pair> {
-    let n = spread.correlation.nrows().min(candidate.structure.numbers.len());
+pub fn correlated(problem: &Problem, candidate: &Candidate, spread: &Uncertainty, least: f64) -> Vec<Pair> {
+    let n = spread.correlation.nrows().min(candidate.structure.free.len());
     let mut all = Vec::new();
     for a in 0..n {
         for b in 0..a {
@@ -97,7 +97,7 @@ pub fn correlated(problem: &Problem, candidate: &Candidate, spread: &Spread, lea
 
 /// Name of a number of a fit, as [`Row::name`].
 pub fn name_of(problem: &Problem, candidate: &Candidate, index: usize) -> String {
-    let Some(number) = candidate.structure.numbers.get(index) else { return String::new() };
+    let Some(number) = candidate.structure.free.get(index) else { return String::new() };
     let record = |r: usize| problem.fit.get(r).map_or("?", |r| r.name.as_str());
     let body = |b: usize| problem.model.bodies.get(b).map_or("?", |b| b.name.as_str());
     match &number.role {
@@ -125,7 +125,7 @@ pub fn name_of(problem: &Problem, candidate: &Candidate, index: usize) -> String
 fn unit_of(problem: &Problem, candidate: &Candidate, index: usize) -> String {
     let motion = problem.model.motion;
     let of_path = |path: &str| unit_of_path(problem, path);
-    match candidate.structure.numbers.get(index).map(|n| &n.role) {
+    match candidate.structure.free.get(index).map(|n| &n.role) {
         Some(Role::Stated(i)) => problem.stated.get(*i).map_or(String::new(), |s| of_path(&s.path)),
         Some(Role::Added(h, p)) => {
             let parameter = candidate.structure.added.get(*h).and_then(|h| h.parameters.get(*p));
@@ -154,7 +154,7 @@ pub fn unit_of_output(problem: &Problem, kind: &OutputKind) -> String {
 
 /// Edits that put the stated numbers as fitted into the nominal model's text; comments say what was given and the 95 % interval, or that
 /// the recordings do not determine it.
-pub fn stated_edits(problem: &Problem, candidate: &Candidate, spread: &Spread) -> Vec<Edit> {
+pub fn stated_edits(problem: &Problem, candidate: &Candidate, spread: &Uncertainty) -> Vec<Edit> {
     let rows = rows(problem, candidate, spread);
     let mut edits = Vec::new();
     let mut done: Vec<&str> = Vec::new();
@@ -166,7 +166,7 @@ pub fn stated_edits(problem: &Problem, candidate: &Candidate, spread: &Spread) -
         let Ok(mut list) = problem.model.values_at(&stated.path) else { continue };
         let before = list.clone();
         let mut said = Vec::new();
-        for (number, row) in candidate.structure.numbers.iter().zip(&rows) {
+        for (number, row) in candidate.structure.free.iter().zip(&rows) {
             let Role::Stated(i) = number.role else { continue };
             let Some(own) = problem.stated.get(i).filter(|s| s.path == stated.path) else { continue };
             if let Some(slot) = list.get_mut(own.index) {
@@ -194,6 +194,6 @@ pub fn stated_edits(problem: &Problem, candidate: &Candidate, spread: &Spread) -
 ///
 /// # Errors
 /// When the text cannot be edited.
-pub fn refitted_text(problem: &Problem, candidate: &Candidate, spread: &Spread) -> Result<String, PatchError> {
+pub fn refitted_text(problem: &Problem, candidate: &Candidate, spread: &Uncertainty) -> Result<String, PatchError> {
     patch(&problem.text, &stated_edits(problem, candidate, spread))
 }

@@ -5,7 +5,7 @@ use crate::effort::Effort;
 use crate::evaluator::Evaluator;
 use crate::fit::Fit;
 use crate::hypothesis::{Hypothesis, Place, inherited};
-use crate::race::{Course, Entry, Seed, distinct_fits, hopeful, own_first};
+use crate::race::{Course, Entry, Seed, distinct_fits, predicted_cost, own_first};
 use crate::structure::Structure;
 use crate::tuning::tuning;
 use crate::work::{Budget, Steps};
@@ -18,7 +18,7 @@ impl Course<'_> {
         }
         let mut led = self.lead(self.first_steps(seeds, None), count);
         // Where one law helps another one may be the right one: the places first, then the laws.
-        if led.first().is_some_and(|(_, f)| hopeful(f) > tuning().coupling.complete * f.residuals.len() as f64) {
+        if led.first().is_some_and(|(_, f)| predicted_cost(f) > tuning().coupling.complete * f.residuals.len() as f64) {
             let mut places: Vec<Vec<&Place>> = Vec::new();
             let mut laws = Vec::new();
             for (structure, fit) in &led {
@@ -61,7 +61,7 @@ impl Course<'_> {
             let (structure, starts) = self.entry(seed);
             let known = Some((&base.structure, &base.fit));
             let start = own_first(&held, known, &structure, starts.first()?.clone());
-            let fit = held.fit_knowing(&structure, &start, tuning().fit.first_coupled, known)?;
+            let fit = held.fit_from_derivatives(&structure, &start, tuning().fit.first_coupled, known)?;
             Some((structure, fit))
         });
         begun.into_iter().flatten().flatten().collect()
@@ -74,7 +74,7 @@ impl Course<'_> {
             rank(&mut led, keep);
             let effort = Effort { steps, ..tuning().fit.first_coupled };
             self.go_on(&mut led, |budget, structure, fit| {
-                held.within(budget).fit_knowing(structure, &fit.values, effort, Some((structure, fit)))
+                held.within(budget).fit_from_derivatives(structure, &fit.values, effort, Some((structure, fit)))
             });
         }
         rank(&mut led, count);
@@ -135,11 +135,11 @@ impl Course<'_> {
 
 /// The best of each structure, best first, without those that are far behind; at most so many.
 fn rank(led: &mut Vec<(Structure, Fit)>, keep: usize) {
-    led.sort_by(|a, b| hopeful(&a.1).total_cmp(&hopeful(&b.1)));
+    led.sort_by(|a, b| predicted_cost(&a.1).total_cmp(&predicted_cost(&b.1)));
     distinct_fits(led);
-    let best = led.first().map_or(0.0, |(_, f)| hopeful(f).max(f.residuals.len() as f64));
+    let best = led.first().map_or(0.0, |(_, f)| predicted_cost(f).max(f.residuals.len() as f64));
     // One that is still on its way is not behind yet, if its next step foresees that it comes near.
-    let on_its_way = |f: &Fit| f.cost - f.foreseen.min(tuning().search.may_gain_coupled * f.cost);
+    let on_its_way = |f: &Fit| f.cost - f.predicted_decrease.min(tuning().search.may_gain_coupled * f.cost);
     led.retain(|(_, f)| on_its_way(f) < tuning().search.behind * best);
     led.truncate(keep);
 }

@@ -31,7 +31,7 @@ struct Link {
 
 /// A guide along the recordings of a problem.
 #[derive(Debug, Clone)]
-pub struct Guide {
+pub struct Coupling {
     links: Vec<Link>,
     /// Factor on all of its elements; 0 for none.
     pub strength: f64,
@@ -39,10 +39,10 @@ pub struct Guide {
     gains: Vec<f64>,
 }
 
-impl Guide {
+impl Coupling {
     /// Guides every measured position, velocity and acceleration of a body that no input prescribes. A strength of 1 pulls, at the rms of the motion,
-    /// as hard as the forces that act there; `floor` is each output's measuring error.
-    pub fn new(problem: &Problem, records: &[Record], scales: &Scales, floor: &[f64], strength: f64) -> Guide {
+    /// as hard as the forces that act there; `noise_sd` is each output's measuring error.
+    pub fn new(problem: &Problem, records: &[Record], scales: &Scales, noise_sd: &[f64], strength: f64) -> Coupling {
         let model = &problem.model;
         let mut links: Vec<Link> = Vec::new();
         for (output, o) in model.outputs.iter().enumerate() {
@@ -64,13 +64,13 @@ impl Guide {
                 _ => vec![("inerter", force / a)],
             };
             let smoothed =
-                |r: &Record| r.outputs.get(output).and_then(Option::as_deref).map_or_else(Vec::new, |y| smooth(y, floor[output]));
+                |r: &Record| r.outputs.get(output).and_then(Option::as_deref).map_or_else(Vec::new, |y| smooth(y, noise_sd[output]));
             let samples: Vec<Arc<Vec<f64>>> = records.par_iter().map(|r| Arc::new(smoothed(r))).collect();
             let sensor = [o.gain, o.delay, o.offset];
             let paths = samples.iter().zip(records).map(|(s, r)| Arc::new(path(s, sensor, integrations, r.period))).collect();
             links.push(Link { output, body, elements, integrations, samples, sensor, paths });
         }
-        Guide { links, strength, gains: model.inputs.iter().map(|i| i.gain).collect() }
+        Coupling { links, strength, gains: model.inputs.iter().map(|i| i.gain).collect() }
     }
 
     /// Whether there is nothing to hold on to.
@@ -79,12 +79,12 @@ impl Guide {
     }
 
     /// The same guide, another factor.
-    pub fn with(&self, strength: f64) -> Guide {
-        Guide { strength, ..self.clone() }
+    pub fn with(&self, strength: f64) -> Coupling {
+        Coupling { strength, ..self.clone() }
     }
 
     /// The same guide for parts of the records: which record, from which sample to which, and its sample time.
-    pub fn of_parts(&self, parts: &[(usize, std::ops::Range<usize>, f64)]) -> Guide {
+    pub fn of_parts(&self, parts: &[(usize, std::ops::Range<usize>, f64)]) -> Coupling {
         let cut = |link: &Link| {
             let part = |(r, range, _): &(usize, std::ops::Range<usize>, f64)| {
                 let samples = link.samples.get(*r).and_then(|s| s.get(range.clone()));
@@ -94,7 +94,7 @@ impl Guide {
             let paths = samples.iter().zip(parts).map(|(s, p)| Arc::new(path(s, link.sensor, link.integrations, p.2))).collect();
             Link { samples, paths, ..link.clone() }
         };
-        Guide { links: self.links.iter().map(cut).collect(), ..self.clone() }
+        Coupling { links: self.links.iter().map(cut).collect(), ..self.clone() }
     }
 
     /// The model with the guide of a record, and how the bodies that lead are moved: inputs behind those of the model.
@@ -185,10 +185,10 @@ fn integral(samples: &[f64], period: f64) -> Vec<f64> {
         .collect()
 }
 
-/// The smoothest signal (by third differences, Whittaker 1923) whose distance from the samples is their error `floor`, rms.
-pub fn smooth(samples: &[f64], floor: f64) -> Vec<f64> {
+/// The smoothest signal (by third differences, Whittaker 1923) whose distance from the samples is their error `noise_sd`, rms.
+pub fn smooth(samples: &[f64], noise_sd: f64) -> Vec<f64> {
     let n = samples.len();
-    if n < 8 || floor <= 0.0 {
+    if n < 8 || noise_sd <= 0.0 {
         return samples.to_vec();
     }
     let rms = |x: &[f64]| (x.iter().zip(samples).map(|(a, b)| (a - b) * (a - b)).sum::<f64>() / n as f64).sqrt();
@@ -197,7 +197,7 @@ pub fn smooth(samples: &[f64], floor: f64) -> Vec<f64> {
     for _ in 0..12 {
         let middle = 0.5 * (low + high);
         let tried = penalised(samples, 10f64.powf(middle));
-        if rms(&tried) < floor {
+        if rms(&tried) < noise_sd {
             best = tried;
             low = middle;
         } else {
