@@ -16,18 +16,18 @@ pub struct Candidate {
     pub structure: Structure,
     /// How it fits.
     pub fit: Fit,
-    /// Correlation time of what it leaves over, samples.
+    /// Correlation time of its residual, samples.
     pub correlation_time: f64,
-    /// How far what it leaves over is from white noise at longer spans, see [`whiteness_statistic`].
+    /// How far its residual is from white noise at longer spans, see [`whiteness_statistic`].
     pub whiteness_statistic: f64,
-    /// Root mean square of what it leaves over at each output, noise standard deviations.
+    /// Root mean square of its residual at each output, noise standard deviations.
     pub levels: Vec<f64>,
-    /// What it leaves over of the recordings that no fit has seen; `None` where it was not held against them.
+    /// Its residual on the held-out recordings; `None` where it was not held against them.
     pub unseen: Option<HeldOut>,
 }
 
 impl Candidate {
-    /// Whether what it leaves over is white noise, as far as chance can tell.
+    /// Whether its residual is white noise, as far as chance can tell.
     pub fn is_white(&self) -> bool {
         white(self.correlation_time, self.whiteness_statistic)
     }
@@ -80,7 +80,7 @@ pub fn advantage_over(base: &Candidate, better: &Candidate, samples: usize) -> f
     advantage(base.fit.cost, a, better.fit.cost.max(1e-300), b, samples, better.correlation_time)
 }
 
-/// The best, or far from the noise, where the law is open as well as its place, what does nearly as well with the fewest numbers.
+/// The best, or far from the noise, where the law is open as well as its place, what does nearly as well with the fewest parameters.
 pub(crate) fn simplest(found: &[Candidate], samples: usize) -> Option<&Candidate> {
     let effects = found.first()?.structure.added.len();
     simplest_of(found.iter().filter(|c| c.structure.added.len() == effects), samples)

@@ -13,7 +13,7 @@ use serde::Serialize;
 /// Predictions of each output of the model in one record, in the output's unit, before rounding; `None` where it was not recorded.
 pub type Predicted = Vec<Option<Vec<f64>>>;
 
-/// A structure with these values, ready for recordings that no fit has seen: where a record starts freely, or a number is free in it, that
+/// A structure with these values, ready for held-out recordings: where a record starts freely, or a number is free in it, that
 /// is fitted to the record, and nothing else.
 struct Ready {
     fixed: Problem,
@@ -41,7 +41,7 @@ impl Ready {
 pub fn predictions(problem: &Problem, records: &[Record], structure: &Structure, values: &[f64]) -> Option<Vec<Predicted>> {
     let Ready { fixed, own, values } = Ready::of(problem, records, structure, values)?;
     let budget = Budget::default();
-    let along = Along { substeps: tuning().fit.fine_substeps, guide: None, budget: &budget };
+    let along = Along { substeps: tuning().fit.fine_substeps, coupling: None, budget: &budget };
     let one = |(r, record): (usize, &Record)| {
         let columns = own.predict(&fixed, &fixed.model, &values, (record, r), along)?;
         let mut of_outputs: Predicted = vec![None; record.outputs.len()];

@@ -1,27 +1,27 @@
-//! The first part of a race, along the measured path: simulations are short there, fits go far in a step, and what is left over tells laws
+//! The first part of a race, coupled to the measured motion: simulations are short there, fits go far in a step, and the residual tells laws
 //! apart that a free simulation does not show until all else is right.
 
 use crate::effort::Effort;
 use crate::evaluator::Evaluator;
 use crate::fit::Fit;
 use crate::hypothesis::{Hypothesis, Place, inherited};
-use crate::race::{Course, Entry, Seed, distinct_fits, predicted_cost, own_first};
+use crate::race::{Course, Entry, Seed, distinct_fits, own_first, predicted_cost};
 use crate::structure::Structure;
 use crate::tuning::tuning;
 use crate::work::{Budget, Steps};
 
 impl Course<'_> {
-    /// Structures to fit and where from. Where a measured path leads, all are fitted along it first, and only so many go on.
+    /// Structures to fit and where from. Where fits are coupled to the measured motion, all are fitted so first, and only so many go on.
     pub(crate) fn entries(&self, seeds: &[Seed], count: usize) -> Vec<Entry> {
         if self.along.is_none() {
             return seeds.iter().map(|seed| self.entry(seed)).collect();
         }
-        let mut led = self.lead(self.first_steps(seeds, None), count);
+        let mut begun = self.rank_and_go_on(self.first_steps(seeds, None), count);
         // Where one law helps another one may be the right one: the places first, then the laws.
-        if led.first().is_some_and(|(_, f)| predicted_cost(f) > tuning().coupling.complete * f.residuals.len() as f64) {
+        if begun.first().is_some_and(|(_, f)| predicted_cost(f) > tuning().coupling.complete * f.residuals.len() as f64) {
             let mut places: Vec<Vec<&Place>> = Vec::new();
             let mut laws = Vec::new();
-            for (structure, fit) in &led {
+            for (structure, fit) in &begun {
                 let at: Vec<&Place> = structure.added.iter().map(|h| &h.place).collect();
                 if places.len() < tuning().search.places && !places.contains(&at) {
                     laws.extend(self.ranked_laws(structure, &fit.values));
@@ -30,13 +30,13 @@ impl Course<'_> {
             }
             laws.sort_by_key(|(rank, _)| *rank);
             let laws: Vec<Seed> = laws.into_iter().map(|(_, seed)| seed).collect();
-            led.extend(self.first_steps(&laws, Some(tuning().search.laws)));
-            led = self.lead(led, count);
+            begun.extend(self.first_steps(&laws, Some(tuning().search.laws)));
+            begun = self.rank_and_go_on(begun, count);
         }
-        led = self.loosen(led, count);
-        // What shows best on a free simulation may show little along the path, and several may show there nearly as well.
-        let others = seeds.iter().filter(|s| !s.guided).take(tuning().search.uncoupled).map(|seed| self.entry(seed));
-        led.into_iter().map(|(structure, fit)| (structure, vec![fit.values])).chain(others).collect()
+        begun = self.loosen(begun, count);
+        // What shows best on a free simulation may show little where it is coupled, and several physics may show there nearly as well.
+        let others = seeds.iter().filter(|s| !s.coupled_first).take(tuning().search.uncoupled).map(|seed| self.entry(seed));
+        begun.into_iter().map(|(structure, fit)| (structure, vec![fit.values])).chain(others).collect()
     }
 
     fn entry(&self, seed: &Seed) -> Entry {
@@ -45,7 +45,7 @@ impl Course<'_> {
         let structure = Structure::new(problem, &problem.fit, added);
         let values: Vec<Vec<f64>> = seed.effects.iter().map(|(_, v)| v.clone()).collect();
         let mut starts = vec![structure.values(problem, &seed.stated, &values, &seed.of_records)];
-        if seed.effects.len() == 1 && !seed.guided {
+        if seed.effects.len() == 1 && !seed.coupled_first {
             starts.push(structure.values(problem, self.given, &values, &seed.of_records));
         }
         (structure, starts)
@@ -53,43 +53,43 @@ impl Course<'_> {
 
     /// One step of each, as far as there is time.
     fn first_steps(&self, seeds: &[Seed], work: Option<Steps>) -> Vec<(Structure, Fit)> {
-        let Some((held, base)) = self.along else { return Vec::new() };
+        let Some((coupled, base)) = self.along else { return Vec::new() };
         let budget = &self.evaluator.budget;
         let budget = work.map_or_else(|| budget.clone(), |work| budget.next(work));
         let begun = budget.abreast(seeds, |budget, seed| {
-            let held = held.within(budget.clone());
+            let coupled = coupled.within(budget.clone());
             let (structure, starts) = self.entry(seed);
             let known = Some((&base.structure, &base.fit));
-            let start = own_first(&held, known, &structure, starts.first()?.clone());
-            let fit = held.fit_from_derivatives(&structure, &start, tuning().fit.first_coupled, known)?;
+            let start = own_first(&coupled, known, &structure, starts.first()?.clone());
+            let fit = coupled.fit_from_derivatives(&structure, &start, tuning().fit.first_coupled, known)?;
             Some((structure, fit))
         });
         begun.into_iter().flatten().flatten().collect()
     }
 
     /// More steps of fewer; in the end so many, best first.
-    fn lead(&self, mut led: Vec<(Structure, Fit)>, count: usize) -> Vec<(Structure, Fit)> {
-        let Some((held, _)) = self.along else { return led };
+    fn rank_and_go_on(&self, mut begun: Vec<(Structure, Fit)>, count: usize) -> Vec<(Structure, Fit)> {
+        let Some((coupled, _)) = self.along else { return begun };
         for (keep, steps) in [3 * count, 2 * count, count + 2].into_iter().zip(tuning().fit.coupled_steps) {
-            rank(&mut led, keep);
+            rank(&mut begun, keep);
             let effort = Effort { steps, ..tuning().fit.first_coupled };
-            self.go_on(&mut led, |budget, structure, fit| {
-                held.within(budget).fit_from_derivatives(structure, &fit.values, effort, Some((structure, fit)))
+            self.go_on(&mut begun, |budget, structure, fit| {
+                coupled.within(budget).fit_from_derivatives(structure, &fit.values, effort, Some((structure, fit)))
             });
         }
-        rank(&mut led, count);
-        led
+        rank(&mut begun, count);
+        begun
     }
 
-    /// The same led more loosely: what is left over is less and less the force at hand, more and more the simulation error.
-    fn loosen(&self, mut led: Vec<(Structure, Fit)>, count: usize) -> Vec<(Structure, Fit)> {
-        let Some((held, _)) = self.along else { return led };
-        let guide = held.guide.as_ref().map(|g| g.with(tuning().coupling.looser * g.strength));
-        let held = Evaluator { guide, ..held.clone() };
+    /// The same with a looser coupling: the residual is less and less the force at hand, more and more the simulation error.
+    fn loosen(&self, mut begun: Vec<(Structure, Fit)>, count: usize) -> Vec<(Structure, Fit)> {
+        let Some((coupled, _)) = self.along else { return begun };
+        let coupling = coupled.coupling.as_ref().map(|g| g.with(tuning().coupling.looser * g.strength));
+        let coupled = Evaluator { coupling, ..coupled.clone() };
         let effort = tuning().fit.looser;
-        self.go_on(&mut led, |budget, structure, fit| held.within(budget).fit(structure, &fit.values, effort));
-        rank(&mut led, count);
-        led
+        self.go_on(&mut begun, |budget, structure, fit| coupled.within(budget).fit(structure, &fit.values, effort));
+        rank(&mut begun, count);
+        begun
     }
 
     /// Fits go on side by side; those that cannot stay as they are.
@@ -134,12 +134,12 @@ impl Course<'_> {
 }
 
 /// The best of each structure, best first, without those that are far behind; at most so many.
-fn rank(led: &mut Vec<(Structure, Fit)>, keep: usize) {
-    led.sort_by(|a, b| predicted_cost(&a.1).total_cmp(&predicted_cost(&b.1)));
-    distinct_fits(led);
-    let best = led.first().map_or(0.0, |(_, f)| predicted_cost(f).max(f.residuals.len() as f64));
+fn rank(begun: &mut Vec<(Structure, Fit)>, keep: usize) {
+    begun.sort_by(|a, b| predicted_cost(&a.1).total_cmp(&predicted_cost(&b.1)));
+    distinct_fits(begun);
+    let best = begun.first().map_or(0.0, |(_, f)| predicted_cost(f).max(f.residuals.len() as f64));
     // One that is still on its way is not behind yet, if its next step foresees that it comes near.
     let on_its_way = |f: &Fit| f.cost - f.predicted_decrease.min(tuning().search.may_gain_coupled * f.cost);
-    led.retain(|(_, f)| on_its_way(f) < tuning().search.behind * best);
-    led.truncate(keep);
+    begun.retain(|(_, f)| on_its_way(f) < tuning().search.behind * best);
+    begun.truncate(keep);
 }

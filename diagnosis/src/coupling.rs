@@ -1,8 +1,8 @@
-//! A model held loosely to what was measured: a soft spring, damper or inerter leads each measured body along its recording.
+//! A model coupled to what was measured (a tracking observer): a soft spring, damper or inerter pulls each measured body along its recording.
 //!
-//! Under a force that the model leaves out a free simulation wanders off; what is then compared has little to do with the place where
-//! the physics acts, and how it depends on the numbers is rough (a slip a moment later, another basin). Along the measured path the
-//! missing force shows where and when it acts, effects of several add up, and fits start from far. The stronger the guide, the more
+//! Under a force that the model leaves out a free simulation diverges from the recording. Its residuals then have little to do with the place where
+//! the physics acts, and they depend on the parameters roughly: a slip a moment later is another valley. Coupled to the measured motion, the residuals
+//! show where and when the missing force acts, the effects of several physics add up, and fits converge from far. The stronger the coupling, the more
 //! the residuals are forces; without it they are simulation errors. Fits go from one to the other.
 
 use crate::hypothesis::Scales;
@@ -13,7 +13,7 @@ use backdrive_plant::stepper::{Segment, segments};
 use rayon::prelude::*;
 use std::sync::Arc;
 
-/// What leads a body.
+/// What pulls a body.
 #[derive(Debug, Clone)]
 struct Link {
     output: usize,
@@ -29,18 +29,18 @@ struct Link {
     paths: Vec<Arc<Vec<Segment>>>,
 }
 
-/// A guide along the recordings of a problem.
+/// A coupling to the recordings of a problem.
 #[derive(Debug, Clone)]
 pub struct Coupling {
     links: Vec<Link>,
     /// Factor on all of its elements; 0 for none.
     pub strength: f64,
-    /// Gain of each force input in the nominal model: a model scaled down is led as much more softly.
+    /// Gain of each force input in the nominal model: a model scaled down is coupled as much more softly.
     gains: Vec<f64>,
 }
 
 impl Coupling {
-    /// Guides every measured position, velocity and acceleration of a body that no input prescribes. A strength of 1 pulls, at the rms of the motion,
+    /// Couples every measured position, velocity and acceleration of a body that no input prescribes. A strength of 1 pulls, at the rms of the motion,
     /// as hard as the forces that act there; `noise_sd` is each output's measuring error.
     pub fn new(problem: &Problem, records: &[Record], scales: &Scales, noise_sd: &[f64], strength: f64) -> Coupling {
         let model = &problem.model;
@@ -78,12 +78,12 @@ impl Coupling {
         self.links.is_empty() || self.strength <= 0.0
     }
 
-    /// The same guide, another factor.
+    /// The same coupling, another factor.
     pub fn with(&self, strength: f64) -> Coupling {
         Coupling { strength, ..self.clone() }
     }
 
-    /// The same guide for parts of the records: which record, from which sample to which, and its sample time.
+    /// The same coupling for parts of the records: which record, from which sample to which, and its sample time.
     pub fn of_parts(&self, parts: &[(usize, std::ops::Range<usize>, f64)]) -> Coupling {
         let cut = |link: &Link| {
             let part = |(r, range, _): &(usize, std::ops::Range<usize>, f64)| {
@@ -97,20 +97,20 @@ impl Coupling {
         Coupling { links: self.links.iter().map(cut).collect(), ..self.clone() }
     }
 
-    /// The model with the guide of a record, and how the bodies that lead are moved: inputs behind those of the model.
+    /// The model with the coupling of a record, and how the bodies that pull are moved: inputs behind those of the model.
     pub fn attach(&self, model: &Model, record: usize, period: f64) -> Option<(Model, Vec<Arc<Vec<Segment>>>)> {
-        let mut guided = model.clone();
+        let mut coupled = model.clone();
         let mut moved = Vec::new();
         let forces = model.inputs.iter().zip(&self.gains).filter(|(i, g)| i.kind == InputKind::Force && **g != 0.0);
         let (sum, count) = forces.fold((0.0, 0.0), |(sum, count), (i, g)| (sum + (i.gain / g).abs(), count + 1.0));
         let scale = if count > 0.0 { sum / count } else { 1.0 };
         for link in &self.links {
             let Some(samples) = link.samples.get(record).filter(|s| !s.is_empty()) else { continue };
-            let name = format!("guide of {}", model.outputs.get(link.output)?.name);
-            let body = guided.bodies.len();
+            let name = format!("coupling to {}", model.outputs.get(link.output)?.name);
+            let body = coupled.bodies.len();
             let sensor = model.outputs.get(link.output)?;
             let strength = self.strength * scale * (sensor.gain / link.sensor[0]).abs();
-            guided.bodies.push(Body { name: name.clone(), inertia: 0.0 });
+            coupled.bodies.push(Body { name: name.clone(), inertia: 0.0 });
             for (kind, size) in &link.elements {
                 let kind = kind_named(kind)?;
                 let values: Vec<Vec<f64>> = kind
@@ -120,9 +120,9 @@ impl Coupling {
                     .map(|(i, p)| vec![if i == 0 { strength * size } else { p.default.unwrap_or(0.0) }])
                     .collect();
                 let law = (kind.build)(&values).ok()?;
-                guided.elements.push(Element { name: format!("{name}, {}", kind.name), between: [Some(link.body), Some(body)], law });
+                coupled.elements.push(Element { name: format!("{name}, {}", kind.name), between: [Some(link.body), Some(body)], law });
             }
-            guided.inputs.push(Input {
+            coupled.inputs.push(Input {
                 name,
                 kind: InputKind::Motion,
                 on: body,
@@ -140,11 +140,11 @@ impl Coupling {
                 None => Arc::new(path(samples, sensor, link.integrations, period)),
             });
         }
-        Some((guided, moved))
+        Some((coupled, moved))
     }
 }
 
-/// How a leading body moves, from what a sensor of this gain, delay and offset said.
+/// How a pulling body moves, from what a sensor of this gain, delay and offset said.
 fn path(samples: &[f64], [gain, delay, offset]: [f64; 3], integrations: usize, period: f64) -> Vec<Segment> {
     if samples.is_empty() {
         return Vec::new();

@@ -25,7 +25,7 @@ pub struct Evaluator<'a> {
     /// Substeps per sample, at most: fewer are faster, and err more where the model is very stiff.
     pub substeps: usize,
     /// What couples the simulations to the measured motion; `None` for free simulations.
-    pub guide: Option<Coupling>,
+    pub coupling: Option<Coupling>,
     /// Factor on the difference by which derivatives are taken, at first.
     pub stretch: f64,
     /// Largest such factor, where derivatives over narrow differences mislead.
@@ -49,7 +49,7 @@ impl<'a> Evaluator<'a> {
             robust: f64::INFINITY,
             budget: Budget::default(),
             substeps: tuning().fit.fine_substeps,
-            guide: None,
+            coupling: None,
             stretch: 1.0,
             own_only: false,
             widest: tuning().fit.widest,
@@ -61,7 +61,7 @@ impl<'a> Evaluator<'a> {
         Evaluator { budget, ..self.clone() }
     }
 
-    /// FreeParameter of residuals.
+    /// Number of residuals.
     pub fn len(&self) -> usize {
         self.records.iter().map(residuals_in).sum()
     }
@@ -96,12 +96,12 @@ impl<'a> Evaluator<'a> {
     /// Residuals of one record.
     pub fn record_residuals(&self, structure: &Structure, model: &Model, values: &[f64], r: usize) -> Option<Vec<f64>> {
         let record = self.records.get(r)?;
-        let along = Along { substeps: self.substeps, guide: self.guide.as_ref(), budget: &self.budget };
+        let along = Along { substeps: self.substeps, coupling: self.coupling.as_ref(), budget: &self.budget };
         let mut columns = structure.predict(self.problem, model, values, (record, r), along)?;
         for (column, output) in columns.chunks_exact_mut(record.len).zip(measured(record)) {
             let samples = record.outputs.get(output)?.as_deref()?;
             let noise_sd = self.noise_sd.get(output).copied()?;
-            let lag = if self.guide.is_some() { 0 } else { self.problem.lag.get(output).copied().unwrap_or(0) };
+            let lag = if self.coupling.is_some() { 0 } else { self.problem.lag.get(output).copied().unwrap_or(0) };
             for (prediction, sample) in column.iter_mut().zip(samples) {
                 *prediction = (sample - *prediction) / noise_sd;
             }
@@ -136,7 +136,7 @@ pub fn measured(record: &Record) -> impl Iterator<Item = usize> + '_ {
     record.outputs.iter().enumerate().filter(|(_, samples)| samples.is_some()).map(|(output, _)| output)
 }
 
-/// FreeParameter of residuals of a record.
+/// Number of residuals of a record.
 pub(crate) fn residuals_in(record: &Record) -> usize {
     measured(record).count() * record.len
 }

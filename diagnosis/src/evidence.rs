@@ -98,7 +98,7 @@ pub fn evidence(problem: &Problem, best: &Candidate, noise_sd: &[f64], which: us
     })
 }
 
-/// The model with the numbers that are known to differ in a record.
+/// The model with the parameters that are known to differ in a record.
 fn under(model: &Model, record: &Record) -> Model {
     let mut model = model.clone();
     for (path, condition) in &record.conditions {

@@ -1,11 +1,11 @@
-//! Excerpts of recordings that show enough: where many structures are tried, each is simulated only where what is left over is largest.
+//! Excerpts of recordings that show enough: where many structures are tried, each is simulated only where the residual is largest.
 //!
 //! A part is the recording's beginning where that shows enough. Others begin with the motion that the base of the search has there when it
-//! is led firmly; their first samples do not count, for laws with a memory begin without one.
+//! is coupled firmly; their first samples do not count, for laws with a memory begin without one.
 
+use crate::coupling::Coupling;
 use crate::evaluator::Evaluator;
 use crate::fit::{Fit, dot};
-use crate::coupling::Coupling;
 use crate::problem::Record;
 use crate::simulate::{Conditions, motion_at};
 use crate::structure::Structure;
@@ -14,18 +14,18 @@ use backdrive_plant::set::Initial;
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// Excerpts of recordings, ready to be simulated, and what leads along them.
+/// Excerpts of recordings, ready to be simulated, and the coupling to them.
 #[derive(Debug, Clone)]
 pub struct Excerpts {
     /// The parts.
     pub records: Vec<Record>,
-    /// The guide of the evaluator they were taken for, along them.
-    pub guide: Option<Coupling>,
+    /// The coupling of the evaluator that they were taken for.
+    pub coupling: Option<Coupling>,
 }
 
 impl Excerpts {
     /// The part of each recording where a fit leaves most over, all together about so many samples. `None` where the recordings are no
-    /// longer than that, or cannot be cut: they start freely, or have numbers of their own.
+    /// longer than that, or cannot be cut: they start freely, or have parameters of their own.
     pub fn of(evaluator: &Evaluator, structure: &Structure, fit: &Fit, samples: usize) -> Option<Excerpts> {
         let (problem, records) = (evaluator.problem, evaluator.records);
         let total: usize = records.iter().map(|r| r.len).sum();
@@ -35,7 +35,7 @@ impl Excerpts {
         }
         let model = structure.model(problem, &fit.values)?;
         // Led firmly, so that a part begins as it was measured and not as a model has it that lacks something.
-        let firm = evaluator.guide.as_ref().map(|g| g.with(tuning().coupling.firm * g.strength));
+        let firm = evaluator.coupling.as_ref().map(|g| g.with(tuning().coupling.firm * g.strength));
         let layout = evaluator.layout();
         // No part can begin with a memory of what came before.
         let remembers = model.elements.iter().any(|e| e.law.memory_len() > 0);
@@ -64,7 +64,7 @@ impl Excerpts {
                         starts: &[],
                         curves: &[],
                         substeps: evaluator.substeps,
-                        guide: firm.as_ref().map(|g| (g, r)),
+                        coupling: firm.as_ref().map(|g| (g, r)),
                         budget: &evaluator.budget,
                     },
                     at,
@@ -75,11 +75,11 @@ impl Excerpts {
         };
         let parts = ranges.par_iter().enumerate().map(cut).collect::<Vec<_>>().into_iter().collect::<Option<Vec<Record>>>()?;
         let of: Vec<(usize, Range<usize>, f64)> = ranges.into_iter().enumerate().map(|(r, range)| (r, range, records[r].period)).collect();
-        Some(Excerpts { records: parts, guide: evaluator.guide.as_ref().map(|g| g.of_parts(&of)) })
+        Some(Excerpts { records: parts, coupling: evaluator.coupling.as_ref().map(|g| g.of_parts(&of)) })
     }
 
     /// An evaluator on these parts.
     pub fn evaluator<'a>(&'a self, of: &Evaluator<'a>) -> Evaluator<'a> {
-        Evaluator { records: &self.records, guide: self.guide.clone(), ..of.clone() }
+        Evaluator { records: &self.records, coupling: self.coupling.clone(), ..of.clone() }
     }
 }

@@ -1,6 +1,6 @@
 //! Fits by simulation error: bounded, damped Gauss-Newton steps (Levenberg-Marquardt) with secant updates of the derivatives.
 
-use crate::derivatives::{to_external, secant};
+use crate::derivatives::{secant, to_external};
 use crate::effort::Effort;
 use crate::evaluator::Evaluator;
 use crate::normal_equations::normal_equations;
@@ -36,7 +36,13 @@ impl Evaluator<'_> {
     ///
     /// Derivatives are carried along by secant updates, and computed anew when a step disappoints, every few steps, and before the fit says that it
     /// has converged.
-    pub fn fit_from_derivatives(&self, structure: &Structure, start: &[f64], effort: Effort, known: Option<(&Structure, &Fit)>) -> Option<Fit> {
+    pub fn fit_from_derivatives(
+        &self,
+        structure: &Structure,
+        start: &[f64],
+        effort: Effort,
+        known: Option<(&Structure, &Fit)>,
+    ) -> Option<Fit> {
         let mut descent = Descent::from(self, structure, start, known)?;
         loop {
             let next = descent.next_step();
@@ -134,8 +140,9 @@ impl<'e, 'a> Descent<'e, 'a> {
         let numbers = &structure.free;
         let own: Vec<f64> = numbers.iter().zip(start).map(|(n, v)| n.to_internal(*v)).collect();
         // A weight that a part of a recording says nothing of stays where it is.
-        let centred =
-            |(n, x): (&FreeParameter, &f64)| n.prior.map(|(centre, spread)| (if matches!(n.role, Role::Knot(..)) { *x } else { centre }, spread));
+        let centred = |(n, x): (&FreeParameter, &f64)| {
+            n.prior.map(|(centre, spread)| (if matches!(n.role, Role::Knot(..)) { *x } else { centre }, spread))
+        };
         let priors: Vec<Option<(f64, f64)>> = numbers.iter().zip(&own).map(centred).collect();
         let residuals = evaluator.residuals(structure, &to_external(structure, &own))?;
         let cost = evaluator.cost(&residuals) + cost_of_priors(&priors, &own);

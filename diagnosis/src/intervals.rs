@@ -1,4 +1,4 @@
-//! How sure the numbers of a fit are.
+//! How sure the parameters of a fit are.
 
 use crate::candidate::Candidate;
 use crate::evaluator::Evaluator;
@@ -9,8 +9,8 @@ use crate::work::{Budget, Limit, Steps};
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-/// Standard deviations of a fit's numbers, in the fit's own unit (logarithms where it steps in them), and their correlations. Residuals
-/// that hang together count as fewer, and what is left over counts as error.
+/// Standard deviations of a fit's parameters, in the fit's own unit (logarithms where it steps in them), and their correlations. Residuals
+/// that are correlated count as fewer, and whatever is unexplained counts as error.
 #[derive(Debug, Clone)]
 pub struct Uncertainty {
     /// One for each number; infinite where the recordings do not determine it.
@@ -47,7 +47,7 @@ impl Uncertainty {
     }
 
     /// The same, measured where the fit ended: derivatives from both sides, the scatter of the scores over blocks of the recordings
-    /// (what is left over hangs together, and differs from place to place: Huber's sandwich by blocks), and what finer steps of the simulation would change.
+    /// (residuals are correlated, and their variance differs from place to place: Huber's sandwich estimate by blocks), and what finer steps of the simulation would change.
     pub fn measured(evaluator: &Evaluator, candidate: &Candidate) -> Uncertainty {
         let mut spread = Uncertainty::of(candidate);
         let structure = &candidate.structure;
@@ -104,8 +104,8 @@ impl Uncertainty {
         spread
     }
 
-    /// Whether some of these numbers lie elsewhere than the fit has them by more than chance: `others` are places among the fit's numbers, and values as
-    /// they stand in the model. All together, for numbers that go together may each lie in its own interval.
+    /// Whether some of these parameters lie elsewhere than the fit has them by more than chance: `others` are places among the fit's parameters, and values as
+    /// they stand in the model. All together, for parameters that go together may each lie in its own interval.
     pub fn is_far(&self, candidate: &Candidate, others: &[(usize, f64)]) -> bool {
         let away = |(number, other): &(usize, f64)| {
             let (n, value) = (candidate.structure.free.get(*number)?, candidate.fit.values.get(*number)?);
@@ -138,10 +138,10 @@ impl Uncertainty {
     }
 }
 
-/// Square of the distance of normal numbers from their means: `off` in standard deviations.
+/// Square of the distance of normal variables from their means: `off` in standard deviations.
 fn distance_square(off: &[f64], correlation: DMatrix<f64>) -> f64 {
     let off = DVector::from_column_slice(off);
-    // What does not tell two numbers apart at all must not make them far.
+    // What does not tell two parameters apart at all must not make them far.
     let inner = (correlation + DMatrix::identity(off.len(), off.len()) * 1e-6).cholesky();
     inner.map_or_else(|| off.norm_squared(), |inner| off.dot(&inner.solve(&off)))
 }

@@ -1,4 +1,4 @@
-//! The normal equations of a fit, where many numbers move one recording only.
+//! The normal equations of a fit, where many parameters move one recording only.
 
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;

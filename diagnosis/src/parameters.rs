@@ -1,4 +1,4 @@
-//! The numbers of a fit beside those that the file gives: how far each had to move, how sure it is, and which hang together.
+//! The parameters of a fit beside those that the file gives: how far each had to move, how sure it is, and which are correlated.
 
 use crate::candidate::Candidate;
 use crate::intervals::Uncertainty;
@@ -33,7 +33,7 @@ pub struct Row {
     pub at_bound: bool,
 }
 
-/// Two numbers that hang together.
+/// Two parameters that are correlated.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Pair {
     /// One.
@@ -46,7 +46,7 @@ pub struct Pair {
 
 /// Every number of a fit.
 pub fn rows(problem: &Problem, candidate: &Candidate, spread: &Uncertainty) -> Vec<Row> {
-    // The weights of a curve that nobody measured are no numbers of the device.
+    // The weights of a curve that nobody measured are no parameters of the device.
     let numbers = candidate.structure.free.iter().zip(&candidate.fit.values).enumerate();
     let numbers = numbers.filter(|(_, (number, _))| !matches!(number.role, Role::Knot(..)));
     let row = |(index, (number, value)): (usize, (&crate::structure::FreeParameter, &f64))| {
@@ -78,7 +78,7 @@ pub fn rows(problem: &Problem, candidate: &Candidate, spread: &Uncertainty) -> V
     numbers.map(row).collect()
 }
 
-/// Pairs of numbers whose correlation is at least `least` in size, the strongest first.
+/// Pairs of parameters whose correlation is at least `least` in size, the strongest first.
 pub fn correlated(problem: &Problem, candidate: &Candidate, spread: &Uncertainty, least: f64) -> Vec<Pair> {
     let n = spread.correlation.nrows().min(candidate.structure.free.len());
     let mut all = Vec::new();
@@ -152,7 +152,7 @@ pub fn unit_of_output(problem: &Problem, kind: &OutputKind) -> String {
     unit_for(problem.model.motion, kind.unit())
 }
 
-/// Edits that put the stated numbers as fitted into the nominal model's text; comments say what was given and the 95 % interval, or that
+/// Edits that put the stated parameters as fitted into the nominal model's text; comments say what was given and the 95 % interval, or that
 /// the recordings do not determine it.
 pub fn stated_edits(problem: &Problem, candidate: &Candidate, spread: &Uncertainty) -> Vec<Edit> {
     let rows = rows(problem, candidate, spread);
@@ -190,7 +190,7 @@ pub fn stated_edits(problem: &Problem, candidate: &Candidate, spread: &Uncertain
     edits
 }
 
-/// The nominal model's text with the stated numbers as fitted.
+/// The nominal model's text with the stated parameters as fitted.
 ///
 /// # Errors
 /// When the text cannot be edited.

@@ -1,5 +1,5 @@
-//! The same structure fitted to each record by itself: numbers that differ from record to record by more than their errors are the sign
-//! of a wrong structure, for a device has one set of numbers.
+//! The same structure fitted to each record by itself: parameters that differ from record to record by more than their errors are the sign
+//! of a wrong structure, for a device has one set of parameters.
 
 use crate::candidate::{Candidate, candidate};
 use crate::evaluator::Evaluator;
@@ -41,7 +41,7 @@ pub struct Across {
 pub struct PerRecord {
     /// The records, in order; those whose fit failed are left out.
     pub records: Vec<String>,
-    /// Root mean square of what each record's own fit leaves over at each output, noise standard deviations.
+    /// Root mean square of the residual of each record's own fit at each output, noise standard deviations.
     pub levels: Vec<Vec<f64>>,
     /// Every number that all records share.
     pub numbers: Vec<Across>,

@@ -12,31 +12,31 @@ use crate::tuning::tuning;
 use backdrive_plant::set::Initial;
 use std::collections::HashSet;
 
-/// A structure to be fitted: its hypotheses, where each starts, and the stated numbers to start from.
+/// A structure to be fitted: its hypotheses, where each starts, and the stated parameters to start from.
 #[derive(Debug, Clone)]
 pub struct Seed {
     /// Places in the list of hypotheses, with values to start from.
     pub effects: Vec<(usize, Vec<f64>)>,
-    /// Stated numbers to start from.
+    /// Stated parameters to start from.
     pub stated: Vec<f64>,
-    /// Numbers of single records to start from.
+    /// Parameters of single records to start from.
     pub of_records: Vec<(Role, f64)>,
-    /// Whether it was found along the measured path, and is to be fitted there first.
-    pub guided: bool,
+    /// Whether it was found coupled to the measured motion, and is to be fitted there first.
+    pub coupled_first: bool,
 }
 
 impl Seed {
-    /// Effects beside the other numbers of a fit.
-    pub fn beside(problem: &Problem, (base, values): (&Structure, &[f64]), effects: Vec<(usize, Vec<f64>)>, guided: bool) -> Seed {
+    /// Effects beside the other parameters of a fit.
+    pub fn beside(problem: &Problem, (base, values): (&Structure, &[f64]), effects: Vec<(usize, Vec<f64>)>, coupled_first: bool) -> Seed {
         let (stated, of_records) = (base.stated_of(problem, values), base.of_records(values));
-        Seed { effects, stated, of_records, guided }
+        Seed { effects, stated, of_records, coupled_first }
     }
 
     /// What sets a structure apart, whatever its values.
     fn key(&self) -> (Vec<usize>, bool) {
         let mut key: Vec<usize> = self.effects.iter().map(|e| e.0).collect();
         key.sort_unstable();
-        (key, self.guided)
+        (key, self.coupled_first)
     }
 }
 
@@ -51,13 +51,13 @@ pub fn distinct(seeds: &mut Vec<Seed>) {
 pub struct Course<'a> {
     /// The recordings.
     pub evaluator: &'a Evaluator<'a>,
-    /// What fits that start far off are held against first, led along the recordings, and the nominal model fitted so.
+    /// What fits that start far off are held against first: simulations coupled to the measured motion, and the nominal model fitted so.
     pub along: Option<(&'a Evaluator<'a>, &'a Candidate)>,
     /// All hypotheses.
     pub hypotheses: &'a [Hypothesis],
     /// The nominal model refitted.
     pub nominal: &'a Candidate,
-    /// The stated numbers as given.
+    /// The stated parameters as given.
     pub given: &'a [f64],
     /// Substeps per sample of the first steps, at most.
     pub coarse: usize,
@@ -192,8 +192,9 @@ fn drop_those_behind(running: &mut Vec<Running>) {
     let lead = Lead::of(running);
     let is_open = lead.cost > tuning().search.behind_far * lead.noise;
     let mut place = 0..;
-    running
-        .retain(|(_, f)| place.next() < Some(tuning().search.always) || predicted_cost(f) < lead.margin() * lead.cost.max(lead.noise) || is_open);
+    running.retain(|(_, f)| {
+        place.next() < Some(tuning().search.always) || predicted_cost(f) < lead.margin() * lead.cost.max(lead.noise) || is_open
+    });
 }
 
 /// Keeps the first fit of each structure.

@@ -1,4 +1,4 @@
-//! Which hypotheses could explain what a fit leaves over: their effects, as residuals see them, held against it.
+//! Which hypotheses could explain the residual of a fit: their effects, as residuals see them, held against it.
 
 use crate::evaluator::Evaluator;
 use crate::fit::{Fit, dot};
@@ -20,11 +20,11 @@ pub struct Promise {
     pub values: Vec<f64>,
     /// Share of the cost that it would take, to first order and with every free number adjusted.
     pub share: f64,
-    /// Its effects, with what the free numbers can do taken out.
+    /// Its effects, with what the free parameters can do taken out.
     columns: Vec<Vec<f64>>,
 }
 
-/// What is left of columns when everything that the fit's numbers can do is taken out.
+/// What is left of columns when everything that the fit's parameters can do is taken out.
 struct Projector {
     columns: Vec<Vec<f64>>,
     factor: Option<nalgebra::Cholesky<f64, nalgebra::Dyn>>,
@@ -78,8 +78,8 @@ pub fn worst_records(evaluator: &Evaluator, residuals: &[f64], count: usize) -> 
     order
 }
 
-/// What each hypothesis does to the residuals of a base, so that it can be held against what any later fit leaves over: along the
-/// measured path its effect hardly depends on what else is in the model.
+/// What each hypothesis does to the residuals of a base, so that it can be held against the residual of any later fit: coupled
+/// to the measured motion its effect hardly depends on what else is in the model.
 pub struct Screen {
     stride: usize,
     effects: Vec<Effect>,
@@ -228,7 +228,7 @@ impl Screen {
         Screen { stride: beside.stride, effects: effects.into_iter().flatten().collect() }
     }
 
-    /// For each start (hypothesis, values of the weakened effect) the length of what its effect adds beyond all that the fit's numbers can do, noise standard deviations.
+    /// For each start (hypothesis, values of the weakened effect) the length of what its effect adds beyond all that the fit's parameters can do, noise standard deviations.
     pub fn lengths(&self, fit: &Fit) -> Vec<((usize, Vec<f64>), f64)> {
         let projector = Projector::new(&fit.jacobian, self.stride);
         let one = |effect: &Effect| {
@@ -240,7 +240,7 @@ impl Screen {
         self.effects.par_iter().filter_map(one).collect()
     }
 
-    /// What each hypothesis promises of what a fit leaves over, most promising first. The fit is of the base, or of more than it.
+    /// What each hypothesis promises of the residual of a fit, most promising first. The fit is of the base, or of more than it.
     pub fn look(&self, fit: &Fit, wanted: &(dyn Fn(usize) -> bool + Sync)) -> Vec<Promise> {
         let projector = Projector::new(&fit.jacobian, self.stride);
         let mut left: Vec<f64> = fit.residuals.iter().step_by(self.stride).copied().collect();
@@ -260,7 +260,7 @@ impl Screen {
                 };
                 let (full, weak) = (projected(full), projected(weak));
                 let share_of = |column: &Option<Vec<f64>>| column.as_ref().map_or(0.0, |c| share(&[c], &left, total));
-                // A fit starts where the effect looks most like what is left over.
+                // A fit starts where the effect looks most like the residual.
                 let values = effect.values[usize::from(share_of(&weak) > share_of(&full))].clone();
                 let columns: Vec<Vec<f64>> = [full, weak].into_iter().flatten().collect();
                 let share = share(&columns.iter().collect::<Vec<_>>(), &left, total);
@@ -295,7 +295,7 @@ fn share(columns: &[&Vec<f64>], left: &[f64], total: f64) -> f64 {
         return 0.0;
     }
     let size: Vec<f64> = columns.iter().map(|c| dot(c, c).sqrt().max(1e-300)).collect();
-    // An effect that the free numbers imitate to a thousandth is not there to be seen.
+    // An effect that the free parameters imitate to a thousandth is not there to be seen.
     if size.iter().all(|s| *s < tuning().screening.imitated) {
         return 0.0;
     }

@@ -29,7 +29,7 @@ pub struct Conditions<'r> {
     /// Substeps per sample, at most; [`TWICE`] for twice as many as the model asks for.
     pub substeps: usize,
     /// Tracking (observer) coupling of the model to the measured data, and the index of the record in it.
-    pub guide: Option<(&'r Coupling, usize)>,
+    pub coupling: Option<(&'r Coupling, usize)>,
     /// Counts the work.
     pub budget: &'r Budget<'r>,
 }
@@ -37,7 +37,7 @@ pub struct Conditions<'r> {
 /// Predictions of a record's measured outputs, one column after the other in the order of the model, `record.len` samples each.
 /// At most `substeps` per sample. `None` where the model cannot be simulated or its motion leaves all bounds.
 pub fn predict(model: &Model, record: &Record, substeps: usize) -> Option<Vec<f64>> {
-    predict_under(model, record, &Conditions { starts: &[], curves: &[], substeps, guide: None, budget: &Budget::default() })
+    predict_under(model, record, &Conditions { starts: &[], curves: &[], substeps, coupling: None, budget: &Budget::default() })
 }
 
 /// The same under other conditions.
@@ -67,7 +67,7 @@ pub fn motion_at(model: &Model, record: &Record, conditions: &Conditions, at: us
 
 /// Simulates a model on the first samples of a record, and calls `show` with the plant at each.
 fn run(model: &Model, record: &Record, conditions: &Conditions, samples: usize, show: &mut dyn FnMut(&mut Plant, usize)) -> Option<()> {
-    let Conditions { starts, curves, substeps, guide, budget } = *conditions;
+    let Conditions { starts, curves, substeps, coupling, budget } = *conditions;
     let conditioned;
     let model = if record.conditions.iter().any(|(_, c)| matches!(c, Condition::Value(_))) {
         let mut changed = model.clone();
@@ -81,12 +81,12 @@ fn run(model: &Model, record: &Record, conditions: &Conditions, samples: usize, 
     } else {
         model
     };
-    let guided;
+    let coupled;
     let mut moved = Vec::new();
-    let model = match guide.filter(|(g, _)| !g.is_empty()) {
-        Some((guide, index)) => {
-            (guided, moved) = guide.attach(model, index, record.period)?;
-            &guided
+    let model = match coupling.filter(|(g, _)| !g.is_empty()) {
+        Some((coupling, index)) => {
+            (coupled, moved) = coupling.attach(model, index, record.period)?;
+            &coupled
         }
         None => model,
     };

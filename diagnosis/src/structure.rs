@@ -89,8 +89,8 @@ impl FreeParameter {
 pub struct Along<'r> {
     /// Substeps per sample, at most.
     pub substeps: usize,
-    /// A guide along the records, if it is to be coupled to what was measured.
-    pub guide: Option<&'r Coupling>,
+    /// A coupling along the records, if it is to be coupled to what was measured.
+    pub coupling: Option<&'r Coupling>,
     /// Counts the work.
     pub budget: &'r Budget<'r>,
 }
@@ -105,7 +105,7 @@ pub struct Structure {
 }
 
 impl Structure {
-    /// The nominal model with `added`. Numbers of elements that it replaces, and numbers that it stands for, are no longer free.
+    /// The nominal model with `added`. Parameters of elements that it replaces, and parameters that it stands for, are no longer free.
     pub fn new(problem: &Problem, records: &[Record], added: Vec<Hypothesis>) -> Structure {
         let mut free = Vec::new();
         for (index, stated) in problem.stated.iter().enumerate() {
@@ -173,7 +173,7 @@ impl Structure {
         Structure { added, free }
     }
 
-    /// Values to start from, as they stand in the model: the stated numbers as given, for each hypothesis the values given, and what belongs to
+    /// Values to start from, as they stand in the model: the stated parameters as given, for each hypothesis the values given, and what belongs to
     /// single records, such as the curve of a hand that nobody measured, as another fit found it.
     pub fn values(&self, problem: &Problem, stated: &[f64], added: &[Vec<f64>], of_records: &[(Role, f64)]) -> Vec<f64> {
         let own = |role: &Role| of_records.iter().find(|(other, _)| other == role).map(|(_, value)| *value);
@@ -186,13 +186,13 @@ impl Structure {
         self.free.iter().map(|n| value(n).unwrap_or(0.0).clamp(n.range.0, n.range.1)).collect()
     }
 
-    /// The numbers among `values` that belong to single records.
+    /// The parameters among `values` that belong to single records.
     pub fn of_records(&self, values: &[f64]) -> Vec<(Role, f64)> {
         let numbers = self.free.iter().zip(values).filter(|(n, _)| n.records.is_some());
         numbers.map(|(n, value)| (n.role.clone(), *value)).collect()
     }
 
-    /// The stated numbers among `values`, in the order of [`Problem::stated`]; those that are not free as given.
+    /// The stated parameters among `values`, in the order of [`Problem::stated`]; those that are not free as given.
     pub fn stated_of(&self, problem: &Problem, values: &[f64]) -> Vec<f64> {
         let mut all: Vec<f64> = problem.stated.iter().map(|s| s.given).collect();
         for (number, value) in self.free.iter().zip(values) {
@@ -255,8 +255,8 @@ impl Structure {
         let curve =
             |(u, unknown): (usize, &Unknown)| (unknown.input, unknown.curve(&self.weights(values, u, index).collect::<Vec<_>>(), record));
         let curves: Vec<Curve> = problem.unknown.iter().enumerate().map(curve).collect();
-        let Along { substeps, guide, budget } = along;
-        let conditions = Conditions { starts: &starts, curves: &curves, substeps, guide: guide.map(|g| (g, index)), budget };
+        let Along { substeps, coupling, budget } = along;
+        let conditions = Conditions { starts: &starts, curves: &curves, substeps, coupling: coupling.map(|g| (g, index)), budget };
         predict_under(changed.as_ref().unwrap_or(model), record, &conditions)
     }
 

@@ -1,4 +1,4 @@
-//! The experiment that determines numbers which the recordings leave open.
+//! The experiment that determines parameters which the recordings leave open.
 
 use super::planner::Planner;
 use super::rivals::Rival;
@@ -12,8 +12,8 @@ use crate::tuning::tuning;
 use crate::work::Budget;
 use backdrive_plant::model::Model;
 
-/// The excitation that determines numbers of a structure which the recordings do not: `numbers` are places among
-/// [`Structure::numbers`], `model` the structure's model with `values`. What exceeds the budget is not tried.
+/// The excitation that determines parameters of a structure which the recordings do not: `numbers` are places among
+/// [`Structure::free`], `model` the structure's model with `values`. What exceeds the budget is not tried.
 ///
 /// # Errors
 /// Says why when no excitation would determine them.

@@ -15,7 +15,7 @@ use rayon::prelude::*;
 /// A fitted structure.
 pub(super) struct Rival<'a> {
     pub structure: &'a Structure,
-    /// Its numbers, in the fit's own unit.
+    /// Its parameters, in the fit's own unit.
     pub own: Vec<f64>,
     /// Fisher information of the recordings about them: the curvature of half the cost, with residuals in noise standard deviations.
     information: DMatrix<f64>,
@@ -122,7 +122,7 @@ impl<'a> Rival<'a> {
         Some((fit.cost - before - priors).max(0.0))
     }
 
-    /// Standard deviations of its numbers in their own unit, with the derivatives of an experiment or without.
+    /// Standard deviations of its parameters in their own unit, with the derivatives of an experiment or without.
     pub(super) fn deviations(&self, jacobian: Option<&[Vec<f64>]>) -> Vec<f64> {
         let mut matrix = self.information.clone();
         if let Some(jacobian) = jacobian.filter(|j| j.len() == self.own.len() && !j.is_empty()) {

@@ -91,7 +91,10 @@ impl Setup<'_> {
 fn like(setup: &Setup, kind: &OutputKind) -> Option<f64> {
     let same = |other: &OutputKind| std::mem::discriminant(other) == std::mem::discriminant(kind);
     let outputs = setup.problem.model.outputs.iter().zip(&setup.sensors.noise_sd).zip(&setup.sensors.there);
-    outputs.filter(|((o, noise_sd), there)| **there && same(&o.kind) && noise_sd.is_finite()).map(|((_, noise_sd), _)| *noise_sd).reduce(f64::min)
+    outputs
+        .filter(|((o, noise_sd), there)| **there && same(&o.kind) && noise_sd.is_finite())
+        .map(|((_, noise_sd), _)| *noise_sd)
+        .reduce(f64::min)
 }
 
 fn words(setup: &Setup, kind: &OutputKind, noise_sd: f64) -> String {

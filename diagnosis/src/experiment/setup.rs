@@ -127,7 +127,7 @@ impl<'a> Setup<'a> {
     }
 
     fn conditions(&self) -> Conditions<'_> {
-        Conditions { starts: &[], curves: &[], substeps: self.substeps, guide: None, budget: &self.budget }
+        Conditions { starts: &[], curves: &[], substeps: self.substeps, coupling: None, budget: &self.budget }
     }
 
     /// What a model predicts, in the outputs' units.

@@ -13,7 +13,7 @@ pub struct Experiment {
     pub text: String,
     /// The excitation on one line, as command lines and graphs have it.
     pub excitation: String,
-    /// What it tells apart, or the numbers that it determines.
+    /// What it tells apart, or the parameters that it determines.
     pub between: Vec<String>,
     /// Standard deviations between the two of them that it separates least, each refitted to it.
     pub separation: f64,

@@ -103,7 +103,7 @@ impl<'a> ElementBuilder<'a> {
         self
     }
 
-    /// A list of numbers that are fitted.
+    /// A list of parameters that are fitted.
     pub fn list(mut self, key: &'static str, count: usize, freedom: Freedom) -> Self {
         (0..count).for_each(|index| self.push(key, Some(index), freedom));
         self
@@ -211,7 +211,7 @@ pub(crate) fn inertia(sites: &Sites, physics: &'static Physics, body: &str, free
     finish(id, physics, place, Vec::new(), vec![parameter], starts.iter().map(|s| vec![*s]).collect(), form)
 }
 
-/// A body added into a joint; `ranges` are those of stiffness, damping and inertia, as are the numbers of each start.
+/// A body added into a joint; `ranges` are those of stiffness, damping and inertia, as are the parameters of each start.
 pub(crate) fn series(
     sites: &Sites,
     physics: &'static Physics,

@@ -49,7 +49,7 @@ impl Family {
     }
 }
 
-/// The variable that a physics' force is drawn against.
+/// The variable that a physics' force is plotted against.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Against {
@@ -78,7 +78,7 @@ pub enum State {
     Large,
     /// Again and again over the displacement.
     Periodic,
-    /// With the variable that it is drawn against.
+    /// With the variable that it is plotted against.
     WithItsVariable,
 }
 
@@ -119,7 +119,7 @@ pub struct Physics {
     pub size: &'static str,
     /// Whether its force grows in proportion to its first parameter, so that the smallest size that would show can be told.
     pub proportional: bool,
-    /// What its force is drawn against.
+    /// What its force is plotted against.
     pub against: Against,
     /// In which state of the device it shows.
     pub state: State,

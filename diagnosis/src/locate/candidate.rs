@@ -119,7 +119,7 @@ impl Context<'_> {
             .collect::<Option<Vec<_>>>()?;
         let mut of_forms = [0usize; 3];
         for law in &mut laws {
-            // The best of few numbers and the best of many.
+            // The best of few parameters and the best of many.
             let form = &mut of_forms[law.form as usize];
             if law.held_out_share <= 0.02 || *form >= self.options.laws_of_a_form || law.variable == Variable::Time {
                 continue;

@@ -63,7 +63,7 @@ impl System {
         let (n, p) = (equations.a.nrows(), equations.h.nrows());
         let bodies = equations.unknown / 2;
         let order = equations.order;
-        // Derivatives of the unknown are measured per sample time, or the covariance would mix numbers of very different size.
+        // Derivatives of the unknown are measured per sample time, or the covariance would mix quantities of very different size.
         let scale = DVector::from_fn(n, |i, _| match i {
             i if i < bodies => scales[0],
             i if i < 2 * bodies => scales[1],

@@ -17,7 +17,7 @@ pub(super) struct Samples {
     pub signal: Vec<f64>,
     pub signal_rate: Vec<f64>,
     pub time: Vec<f64>,
-    /// FreeParameter of the run of each sample.
+    /// Number of the run of each sample.
     pub run: Vec<usize>,
     pub reversals: Reversals,
 }

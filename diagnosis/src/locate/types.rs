@@ -19,7 +19,7 @@ pub struct Run<'a> {
     pub inputs: &'a [Vec<f64>],
     /// Samples of each output of the model; `None` where it was not recorded.
     pub outputs: Vec<Option<&'a [f64]>>,
-    /// The model with the numbers that differ in this run; `None` where none do.
+    /// The model with the parameters that differ in this run; `None` where none do.
     pub model: Option<&'a Model>,
 }
 

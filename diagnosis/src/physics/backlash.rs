@@ -51,7 +51,7 @@ pub(super) const PHYSICS: Physics = Physics {
 /// Rounding that a fit starts from, in a gap.
 const BLUNT: f64 = 0.2;
 
-/// A sharp play as fitted, its edges a little blunt: how sharp they are is how finely it is drawn, and no other physics.
+/// A sharp play as fitted, its edges a little blunt: how sharp they are is how finely it is resolved, and no other physics.
 fn blunted(values: &[f64], finer: &Hypothesis) -> Option<Vec<f64>> {
     let [gap, ..] = values else { return None };
     let start: Vec<f64> = values.iter().copied().chain(std::iter::once(BLUNT * gap)).collect();

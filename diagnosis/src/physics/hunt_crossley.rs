@@ -25,7 +25,7 @@ pub(super) const PHYSICS: Physics = Physics {
             let new = ElementBuilder::new(sites, &PHYSICS, site)?;
             let new = if reversed { new.reversed() } else { new };
             let (peak, f) = (site.displacement_peak, site.force);
-            // Numbers of an exponent of 1.5; the range covers the others.
+            // Parameters of an exponent of 1.5; the range covers the others.
             let k = f / site.displacement.powf(1.5);
             let lambda = k / site.speed_peak;
             let most = 1e4 * f / site.displacement.min(1.0).powf(3.0);

@@ -2,7 +2,7 @@
 
 use crate::hypothesis::{Against, Family, Mark, Physics, State};
 
-/// A name that verdicts and `--without` know, without hypotheses of its own: `maxwell_slip` has the same memory with its numbers free, and
+/// A name that verdicts and `--without` know, without hypotheses of its own: `maxwell_slip` has the same memory with its parameters free, and
 /// what a search makes of both as rivals has not been measured.
 pub(super) const PHYSICS: Physics = Physics {
     name: "preisach_lugre",

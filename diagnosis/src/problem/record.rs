@@ -14,7 +14,7 @@ pub struct Record {
     pub name: String,
     /// Sample time, s.
     pub period: f64,
-    /// FreeParameter of samples.
+    /// Number of samples.
     pub len: usize,
     /// How regular its clock was before it was put on a grid.
     pub jitter: Jitter,

@@ -1,4 +1,4 @@
-//! The numbers that the nominal file states, each of which may be off.
+//! The parameters that the nominal file states, each of which may be off.
 
 use crate::tuning::tuning;
 use backdrive_plant::model::{InputKind, Model, OutputKind};

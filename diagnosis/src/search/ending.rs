@@ -1,4 +1,4 @@
-//! The end of a search: the best made simpler and brought to their ends, and held against recordings that no fit has seen.
+//! The end of a search: the best made simpler and brought to their ends, and held against held-out recordings.
 
 use super::nominal::{Nominal, to_its_end};
 use super::revive::revived;
@@ -15,8 +15,8 @@ use crate::tuning::tuning;
 use crate::work::Budget;
 use rayon::prelude::*;
 
-/// An effect may only have led the rest out of a wrong valley: each of the best's is left out again, the others from where they are now; and a law of many
-/// numbers has to win over those that it contains. One such step may open the next.
+/// An effect may only have helped the rest out of a wrong valley: each of the best's is left out again, the others from where they are now; and a law of many
+/// parameters has to win over those that it contains. One such step may open the next.
 pub(super) fn make_simpler(course: &Course, found: &mut Vec<Candidate>, work: &Work) {
     let samples = course.nominal.fit.residuals.len();
     let last = course.evaluator.within(work.up_to(tuning().search.best_end));
@@ -66,7 +66,7 @@ pub(super) fn bring_to_their_ends(evaluator: &Evaluator, found: &mut [Candidate]
     sort(found, samples);
 }
 
-/// The nominal model at its end. The numbers of what was found may lead it out of a wrong basin: then there was less to find.
+/// The nominal model at its end. The parameters of what was found may take it out of a wrong valley: then there was less to find.
 pub(super) fn nominal_at_its_end(nominal: &Nominal, found: &[Candidate], work: &Work) -> Candidate {
     let (evaluator, refitted) = (&nominal.evaluator, &nominal.refitted);
     let problem = evaluator.problem;
@@ -92,7 +92,7 @@ pub(super) fn nominal_at_its_end(nominal: &Nominal, found: &[Candidate], work: &
     }
 }
 
-/// Holds the nominal model and the best with so many effects each against the recordings that no fit has seen: those may speak for fewer effects than
+/// Holds the nominal model and the best with so many effects each against the held-out recordings: those may speak for fewer effects than
 /// fits do. How many samples there are.
 pub(super) fn hold_against_unseen(evaluator: &Evaluator, found: &mut [Candidate], nominal: &mut Candidate) -> usize {
     let problem = evaluator.problem;

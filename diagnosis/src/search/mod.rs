@@ -15,8 +15,8 @@ mod view;
 use crate::candidate::key_of;
 use crate::effort::Effort;
 use crate::evaluator::Evaluator;
-use crate::hypothesis::Hypothesis;
 use crate::excerpts::Excerpts;
+use crate::hypothesis::Hypothesis;
 use crate::physics;
 use crate::problem::Problem;
 use crate::race::Course;
@@ -45,14 +45,14 @@ pub fn search(problem: &Problem, settings: &Settings, limit: Limit, report: &(dy
     report("looking for ripples");
     let ripples = view::ripples(&nominal.seen, &nominal.model, &evaluator.noise_sd, &mut hypotheses);
     report("screening");
-    let led = &nominal.led;
+    let coupled = &nominal.coupled;
     let seeing = work.share(if nominal.far { tuning().screening.share_far } else { tuning().screening.share_near });
-    let base = (&refitted.structure, led.fit.clone());
-    let mut views = vec![View::of(&led.coarse, led.parts.as_ref(), base, &hypotheses, seeing, nominal.guided)];
-    // Some effects show better on a free simulation; and the refit of a wrong structure may have carried the numbers off, so that
-    // without a measured path the given ones are another base.
-    let free = Evaluator { guide: None, ..led.coarse.clone() };
-    let (from, steps) = if nominal.held { (&refitted.fit.values, tuning().fit.nominal_view.steps) } else { (&nominal.start, 0) };
+    let base = (&refitted.structure, coupled.fit.clone());
+    let mut views = vec![View::of(&coupled.coarse, coupled.parts.as_ref(), base, &hypotheses, seeing, nominal.coupled_first)];
+    // Some effects show better on a free simulation; and the refit of a wrong structure may have carried the parameters off, so that
+    // without a coupling the given ones are another base.
+    let free = Evaluator { coupling: None, ..coupled.coarse.clone() };
+    let (from, steps) = if nominal.pulled { (&refitted.fit.values, tuning().fit.nominal_view.steps) } else { (&nominal.start, 0) };
     let other = if nominal.far { free.fit(&refitted.structure, from, Effort { steps, ..tuning().fit.nominal_view }) } else { None };
     let free_parts = other.as_ref().and_then(|fit| Excerpts::of(&free, &refitted.structure, fit, tuning().screening.samples));
     if let Some(fit) = other {
@@ -61,7 +61,7 @@ pub fn search(problem: &Problem, settings: &Settings, limit: Limit, report: &(dy
     let view = &views[0];
     let course = Course {
         evaluator,
-        along: nominal.guided.then_some((&view.evaluator, &view.base)),
+        along: nominal.coupled_first.then_some((&view.evaluator, &view.base)),
         hypotheses: &hypotheses,
         nominal: refitted,
         given: &nominal.given,

@@ -1,15 +1,15 @@
-//! The nominal model: refitted, and led along the recordings where it stays far from the noise.
+//! The nominal model: refitted, and coupled to the measured motion where it stays far from the noise.
 
 use super::result::SearchError;
 use super::share::Work;
 use crate::candidate::{Candidate, candidate, white};
+use crate::coupling::Coupling;
 use crate::effort::Effort;
 use crate::evaluator::Evaluator;
-use crate::fit::Fit;
-use crate::noise;
-use crate::coupling::Coupling;
-use crate::hypothesis::Scales;
 use crate::excerpts::Excerpts;
+use crate::fit::Fit;
+use crate::hypothesis::Scales;
+use crate::noise;
 use crate::problem::{Problem, Record};
 use crate::screen::worst_records;
 use crate::statistics::{correlation_time, deviation_by_median, levels, whiteness_statistic};
@@ -19,17 +19,17 @@ use backdrive_plant::model::{InputKind, Model};
 
 /// The nominal model refitted, and what was learnt of the recordings by it.
 pub(super) struct Nominal<'a> {
-    /// Holds fits against the recordings, with the measuring error that the refit left over.
+    /// Holds fits against the recordings, with the measuring error estimated from the residual of the refit.
     pub evaluator: Evaluator<'a>,
-    /// The stated numbers as given.
+    /// The stated parameters as given.
     pub given: Vec<f64>,
     /// The same as a structure takes them.
     pub start: Vec<f64>,
     /// The refit.
     pub refitted: Candidate,
-    /// Level of each output with the numbers as given, noise standard deviations.
+    /// Level of each output with the parameters as given, noise standard deviations.
     pub levels_given: Vec<f64>,
-    /// The refitted model, before it was led.
+    /// The refitted model, before it was coupled.
     pub model: Model,
     /// How far it moves.
     pub scales: Scales,
@@ -37,54 +37,54 @@ pub(super) struct Nominal<'a> {
     pub seen: Vec<Record>,
     /// Whether it stays so far from the noise that its end waits until the rest is known.
     pub is_far: bool,
-    /// Whether it stays far enough for fits to start along the measured path.
+    /// Whether it stays far enough for fits to start coupled to the measured motion.
     pub far: bool,
-    /// Whether a path leads, by force.
-    pub held: bool,
-    /// Whether a path leads: by force, or as a motion that is prescribed.
-    pub guided: bool,
-    /// How it is led.
-    pub led: Led<'a>,
+    /// Whether forces couple it to the measured motion.
+    pub pulled: bool,
+    /// Whether anything does: forces, or a motion that is prescribed.
+    pub coupled_first: bool,
+    /// The coupled model.
+    pub coupled: CoupledNominal<'a>,
 }
 
-/// The nominal model along the measured path, or without one where none leads.
-pub(super) struct Led<'a> {
+/// The nominal model coupled to the measured motion, or free where nothing couples it.
+pub(super) struct CoupledNominal<'a> {
     /// What it is held against, whole.
     pub coarse: Evaluator<'a>,
     /// Excerpts of the recordings that are enough.
     pub parts: Option<Excerpts>,
-    /// Its numbers there.
+    /// Its parameters there.
     pub fit: Fit,
 }
 
 /// How the nominal model is coupled to the measured motion.
-struct Path<'p, 'a> {
+struct Coupler<'p, 'a> {
     evaluator: &'p Evaluator<'a>,
     middle: &'p Evaluator<'a>,
     structure: &'p Structure,
     /// The coupling at its full strength.
     firm: &'p Coupling,
     far: bool,
-    held: bool,
-    guided: bool,
+    pulled: bool,
+    coupled_first: bool,
 }
 
-impl<'a> Path<'_, 'a> {
+impl<'a> Coupler<'_, 'a> {
     /// The nominal model coupled, from some values, with so many times the full strength, in parts of the recordings where those are enough.
-    fn lead(&self, from: &[f64], strength: f64, in_parts: bool) -> Option<Led<'a>> {
+    fn couple(&self, from: &[f64], strength: f64, in_parts: bool) -> Option<CoupledNominal<'a>> {
         let (evaluator, structure, fit) = (self.evaluator, self.structure, &tuning().fit);
-        let guide = self.held.then(|| self.firm.with(strength * self.firm.strength));
-        let coarse = Evaluator { substeps: fit.coarse_substeps, widest: fit.widest_midway, guide, ..evaluator.clone() };
-        let view = if self.held { Effort { steps: 0, ..fit.nominal_view } } else { fit.nominal_view };
+        let coupling = self.pulled.then(|| self.firm.with(strength * self.firm.strength));
+        let coarse = Evaluator { substeps: fit.coarse_substeps, widest: fit.widest_midway, coupling: coupling, ..evaluator.clone() };
+        let view = if self.pulled { Effort { steps: 0, ..fit.nominal_view } } else { fit.nominal_view };
         let at = coarse.fit(structure, from, view)?;
         // The parts with the largest residuals are enough for screening; coupled, they begin as they were measured.
         let parts = if self.far && in_parts { Excerpts::of(&coarse, structure, &at, tuning().screening.samples) } else { None };
         let base = match &parts {
-            _ if !self.guided => None,
+            _ if !self.coupled_first => None,
             Some(parts) => parts.evaluator(&coarse).fit(structure, &at.values, fit.nominal_coupled),
             None => coarse.fit(structure, &at.values, fit.nominal_coupled),
         };
-        Some(Led { coarse, parts, fit: base.unwrap_or(at) })
+        Some(CoupledNominal { coarse, parts, fit: base.unwrap_or(at) })
     }
 
     /// A refit from the parameters of the coupled fit; `None` where it is no better than the other.
@@ -99,19 +99,19 @@ impl<'a> Path<'_, 'a> {
 
     /// Where the nominal model explains the recordings as it is coupled, every physics looks as good as any other: so with other strengths, until it
     /// leaves enough.
-    fn until_it_shows(&self, mut led: Led<'a>, refitted: &Fit) -> Led<'a> {
+    fn until_it_shows(&self, mut coupled: CoupledNominal<'a>, refitted: &Fit) -> CoupledNominal<'a> {
         let left = |fit: &Fit| fit.cost / fit.residuals.len().max(1) as f64;
         let enough = tuning().search.coupled_leaves_noise.min(tuning().search.coupled_leaves * left(refitted));
         // On parts the parameters may take on what differs from one part to the next: the first time only.
         for (nth, strength) in tuning().search.couplings.iter().enumerate() {
-            if left(&led.fit) > enough {
+            if left(&coupled.fit) > enough {
                 break;
             }
-            if let Some(other) = self.lead(&led.fit.values, *strength, nth == 0) {
-                led = other;
+            if let Some(other) = self.couple(&coupled.fit.values, *strength, nth == 0) {
+                coupled = other;
             }
         }
-        led
+        coupled
     }
 }
 
@@ -135,21 +135,21 @@ impl<'a> Nominal<'a> {
         let strength = if level > tuning().coupling.full_above * tuning().noise.far { 1.0 } else { tuning().coupling.weak };
         let firm = Coupling::new(problem, &problem.fit, &scales, &evaluator.noise_sd, strength);
         let far = level > tuning().noise.far;
-        let held = far && !firm.is_empty();
+        let pulled = far && !firm.is_empty();
         // A prescribed motion couples the device by itself.
-        let guided = held || far && problem.model.inputs.iter().any(|i| i.kind == InputKind::Motion);
-        let path = Path { evaluator: &evaluator, middle: &middle, structure: &structure, firm: &firm, far, held, guided };
-        let from = if held { &start } else { &refitted.values };
-        let mut led = path.lead(from, 1.0, true).ok_or(SearchError::RunsAway)?;
-        if held && let Some(other) = path.refit_from(&led.fit.values, &refitted, effort) {
+        let coupled_first = pulled || far && problem.model.inputs.iter().any(|i| i.kind == InputKind::Motion);
+        let coupler = Coupler { evaluator: &evaluator, middle: &middle, structure: &structure, firm: &firm, far, pulled, coupled_first };
+        let from = if pulled { &start } else { &refitted.values };
+        let mut coupled = coupler.couple(from, 1.0, true).ok_or(SearchError::RunsAway)?;
+        if pulled && let Some(other) = coupler.refit_from(&coupled.fit.values, &refitted, effort) {
             refitted = other;
         }
         refitted = to_its_end(&evaluator, &structure, refitted);
-        if held {
-            led = path.until_it_shows(led, &refitted);
+        if pulled {
+            coupled = coupler.until_it_shows(coupled, &refitted);
         }
         let refitted = candidate(&evaluator, structure.clone(), refitted);
-        Ok(Nominal { evaluator, given, start, refitted, levels_given, model, scales, seen, is_far, far, held, guided, led })
+        Ok(Nominal { evaluator, given, start, refitted, levels_given, model, scales, seen, is_far, far, pulled, coupled_first, coupled })
     }
 }
 
@@ -220,7 +220,7 @@ fn worst_first(evaluator: &Evaluator, structure: &Structure, start: &[f64], ther
     evaluator.fit(structure, &first.values, effort(steps[1]))
 }
 
-/// Size of most of the residuals, floors, that a fit with the floors `before` left over; a few that are far off do not count.
+/// Standard deviation by the median of the residuals of a fit whose noise standard deviations were `before`, normalised by the present ones.
 fn bulk(residuals: &[f64], before: &[f64], evaluator: &Evaluator) -> f64 {
     let mut sizes: Vec<f64> = Vec::with_capacity(residuals.len());
     for (_, output, range) in evaluator.layout() {
@@ -240,7 +240,7 @@ fn friction_on_prescribed(problem: &Problem) -> bool {
         .any(|i| i.kind == InputKind::Motion && problem.model.outputs.iter().any(|o| o.kind == OutputKind::Reaction(i.on)))
 }
 
-/// Measuring errors by what a fit leaves over, never above what the signals showed.
+/// Noise standard deviations by the residual of a fit, never above what the signals showed.
 fn floors(evaluator: &Evaluator, residuals: &[f64]) -> Vec<f64> {
     let problem = evaluator.problem;
     let layout = evaluator.layout();
@@ -260,7 +260,7 @@ fn floors(evaluator: &Evaluator, residuals: &[f64]) -> Vec<f64> {
         .collect()
 }
 
-/// Near the noise the end of a fit counts: what is left over short of it looks like missing physics.
+/// Near the noise the end of a fit counts: the residual short of it looks like missing physics.
 pub(super) fn to_its_end(evaluator: &Evaluator, structure: &Structure, fit: Fit) -> Fit {
     let near = levels(evaluator, &fit.residuals).iter().all(|l| *l < tuning().noise.far);
     if !near || white(correlation_time(evaluator, &fit.residuals), whiteness_statistic(evaluator, &fit.residuals)) {

@@ -36,7 +36,7 @@ pub struct Detectable {
 pub struct Search {
     /// Standard deviation of each output's measuring error, in its unit.
     pub noise_sd: Vec<f64>,
-    /// Level of each output with the numbers as given, noise standard deviations.
+    /// Level of each output with the parameters as given, noise standard deviations.
     pub levels_given: Vec<f64>,
     /// The nominal model refitted.
     pub nominal: Candidate,
@@ -46,9 +46,9 @@ pub struct Search {
     pub tried: Vec<Tried>,
     /// How many hypotheses there were.
     pub hypotheses: usize,
-    /// FreeParameter of residuals.
+    /// Number of residuals.
     pub samples: usize,
-    /// FreeParameter of residuals of the recordings that no fit has seen.
+    /// Number of residuals of the held-out recordings.
     pub unseen_samples: usize,
     /// What would have been seen beside the refitted nominal model, each physics at the place where it shows best.
     pub detectable: Vec<Detectable>,

@@ -5,8 +5,8 @@ use crate::race::Course;
 use crate::structure::Structure;
 use crate::tuning::tuning;
 
-/// The best, and what does nearly as well with as many effects, where some of their numbers have all but vanished, and where to start: with a mass
-/// shared with the neighbour that took it on, where no mass is gone with the other numbers as given. Searched in logarithms, a number near 0 moves
+/// The best, and what does nearly as well with as many effects, where some of their parameters have all but vanished, and where to start: with a mass
+/// shared with the neighbour that took it on, where no mass is gone with the other parameters as given. Searched in logarithms, a number near 0 moves
 /// nothing any more, so that a fit that took a body's mass away does not give it back.
 pub(super) fn revived(course: &Course, found: &[Candidate]) -> Vec<(Structure, Vec<f64>)> {
     let problem = course.evaluator.problem;

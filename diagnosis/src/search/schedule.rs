@@ -12,7 +12,7 @@ use crate::race::{Course, distinct};
 use crate::tuning::tuning;
 use std::collections::HashSet;
 
-/// The steps of a search for so many effects, in their order. Where nothing is left over, only what may be wrong with single effects is asked.
+/// The steps of a search for so many effects, in their order. Where the residual is noise, only what may be wrong with single effects is asked.
 fn steps(is_quiet: bool, effects: usize) -> Vec<&'static dyn Step> {
     let mut steps: Vec<&'static dyn Step> =
         vec![&Ripples, &Singles::FIRST, &GivenBack, &Laws, &Singles::NEXT, &Plain, &Relatives, &Elsewhere, &Relatives];

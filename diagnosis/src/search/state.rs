@@ -14,7 +14,7 @@ use std::collections::HashSet;
 pub(super) struct State<'s, 'a> {
     /// What structures are fitted against, and from where.
     pub course: Course<'s>,
-    /// What screening sees: from the base along the measured path, then from others.
+    /// What screening sees: from the base coupled to the measured motion, then from others.
     pub views: &'s [View<'a>],
     /// What screening promised.
     pub tried: &'s [Tried],
@@ -32,7 +32,7 @@ pub(super) struct State<'s, 'a> {
     pub plain: std::vec::IntoIter<Seed>,
     /// Effects at once.
     pub effects: usize,
-    /// Substeps that blur less than what is left over.
+    /// Substeps that blur less than the residual.
     pub fine: usize,
     /// The best whose relatives were tried.
     pub related: String,
@@ -89,13 +89,13 @@ impl<'s, 'a> State<'s, 'a> {
         tuning().screening.chance * self.course.nominal.correlation_time / self.samples() as f64
     }
 
-    /// FreeParameter of residuals.
+    /// Number of residuals.
     pub fn samples(&self) -> usize {
         self.course.nominal.fit.residuals.len()
     }
 
     /// Whether fits begin coupled to the measured motion.
-    pub fn is_guided(&self) -> bool {
+    pub fn is_coupled(&self) -> bool {
         self.course.along.is_some()
     }
 
@@ -123,7 +123,7 @@ impl<'s, 'a> State<'s, 'a> {
                     rank < tuning().search.ranks_uncoupled && promise.share > chance
                 } else {
                     rank < tuning().search.ranks_always
-                        || rank < if self.is_guided() { tuning().search.ranks_coupled } else { tuning().search.ranks_uncoupled }
+                        || rank < if self.is_coupled() { tuning().search.ranks_coupled } else { tuning().search.ranks_uncoupled }
                             && promise.share > tuning().search.promise * top
                 };
                 if wanted {
@@ -135,8 +135,8 @@ impl<'s, 'a> State<'s, 'a> {
         singles
     }
 
-    /// To first order a law may do no more than the nominal model's numbers do together, so that screening sees nothing of it, and still be what is
-    /// missing: where little is left over those of one number are fitted whatever they promise.
+    /// To first order a law may do no more than the nominal model's parameters do together, so that screening sees nothing of it, and still be what is
+    /// missing: where the residual is small those of one number are fitted whatever they promise.
     fn of_one_number(&self) -> Vec<Seed> {
         let Some(view) = self.views.first().filter(|_| !self.far) else { return Vec::new() };
         let one = |(index, h): (usize, &Hypothesis)| {

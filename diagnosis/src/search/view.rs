@@ -4,10 +4,10 @@ use super::result::Detectable;
 use crate::candidate::{Candidate, candidate};
 use crate::effort::Effort;
 use crate::evaluator::Evaluator;
+use crate::excerpts::Excerpts;
 use crate::fit::Fit;
 use crate::hypothesis::{Family, Hypothesis};
 use crate::locate::{self, Ripple};
-use crate::excerpts::Excerpts;
 use crate::problem::Record;
 use crate::race::Seed;
 use crate::screen::{Promise, Screen, pairs};
@@ -24,12 +24,12 @@ pub(super) struct View<'a> {
     pub evaluator: Evaluator<'a>,
     /// The nominal model there.
     pub base: Candidate,
-    /// Whether it is along the measured path.
-    pub guided: bool,
-    /// Whether its residuals are those of the recordings, whole and without a guide.
+    /// Whether it is coupled to the measured motion.
+    pub coupled_first: bool,
+    /// Whether its residuals are those of the recordings, whole and without a coupling.
     pub whole: bool,
     pub simple: Vec<Promise>,
-    /// Physics of many numbers come in where simpler relatives do not suffice.
+    /// Physics of many parameters come in where simpler relatives do not suffice.
     pub rich: Vec<Promise>,
 }
 
@@ -40,24 +40,24 @@ impl<'a> View<'a> {
         (structure, fit): (&Structure, Fit),
         hypotheses: &[Hypothesis],
         work: Steps,
-        guided: bool,
+        coupled_first: bool,
     ) -> View<'a> {
         let on = parts.map_or_else(|| evaluator.clone(), |p| p.evaluator(evaluator));
         let there = parts.and_then(|_| on.fit(structure, &fit.values, Effort { steps: 0, tolerance: 1.0 }));
         // A part that cannot be simulated is none.
         let (on, whole, fit) = match (parts, there) {
             (Some(_), Some(there)) => (on, false, there),
-            _ => (evaluator.clone(), evaluator.guide.is_none(), fit),
+            _ => (evaluator.clone(), evaluator.coupling.is_none(), fit),
         };
         let screen = Screen::new(&on, structure, &fit, hypotheses, work);
         let promises = screen.look(&fit, &|_| true);
         let (simple, rich) = promises.into_iter().partition(|p| hypotheses[p.hypothesis].parameters.len() <= tuning().screening.parameters);
-        View { screen, base: candidate(&on, structure.clone(), fit), evaluator: on, guided, whole, simple, rich }
+        View { screen, base: candidate(&on, structure.clone(), fit), evaluator: on, coupled_first, whole, simple, rich }
     }
 
-    /// Effects beside the numbers of its base.
+    /// Effects beside the parameters of its base.
     pub fn seed(&self, effects: Vec<(usize, Vec<f64>)>) -> Seed {
-        Seed::beside(self.evaluator.problem, (&self.base.structure, &self.base.fit.values), effects, self.guided)
+        Seed::beside(self.evaluator.problem, (&self.base.structure, &self.base.fit.values), effects, self.coupled_first)
     }
 
     /// The most promising pairs.

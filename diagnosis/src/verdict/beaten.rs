@@ -13,7 +13,7 @@ pub struct Beaten {
     pub parameters: usize,
     /// Residual, root mean square, noise standard deviations.
     pub residual: f64,
-    /// The same on the recordings that no fit has seen; `None` where it was not held against them.
+    /// The same on the held-out recordings; `None` where it was not held against them.
     pub unseen: Option<f64>,
     /// By how much the fits prefer the claimed structure: difference of the information criterion with effective samples.
     pub by_fits: f64,

@@ -18,7 +18,7 @@ pub fn chosen(search: &Search) -> &Candidate {
             .iter()
             .filter(|c| c.structure.added.len() == effects)
             .fold(next, |best, c| if evidence(search, best, c) > 0.0 { c } else { best });
-        // Ties go to the fewest numbers, then to the physics that is named first.
+        // Ties go to the fewest parameters, then to the physics that is named first.
         let simplest = search
             .found
             .iter()
@@ -36,11 +36,11 @@ fn order(h: &Hypothesis) -> usize {
     PHYSICS.iter().position(|p| *p == h.physics).unwrap_or(usize::MAX)
 }
 
-/// What the fits and the recordings that no fit has seen say for a candidate against another one, as a difference of information
+/// What the fits and the held-out recordings say for a candidate against another one, as a difference of information
 /// criteria with effective samples.
 ///
-/// A structure with more numbers may follow what it is fitted to, without being what is there. So where the fits say the one and the
-/// recordings that no fit has seen surely say the other, for a structure with fewer numbers that leaves less than twice as much over, the
+/// A structure with more parameters may follow what it is fitted to, without being what is there. So where the fits say the one and the
+/// held-out recordings surely say the other, for a structure with fewer parameters whose residual is less than twice as large, the
 /// unseen ones decide alone.
 pub(super) fn evidence(search: &Search, base: &Candidate, better: &Candidate) -> f64 {
     let (fits, unseen) = (advantage_over(base, better, search.samples), unseen_evidence(search, base, better));
@@ -52,7 +52,7 @@ pub(super) fn evidence(search: &Search, base: &Candidate, better: &Candidate) ->
     if is_overfit { unseen } else { fits + unseen }
 }
 
-/// What the recordings that no fit has seen say alone; 0 where there are none.
+/// What the held-out recordings say alone; 0 where there are none.
 pub(super) fn unseen_evidence(search: &Search, base: &Candidate, better: &Candidate) -> f64 {
     match (base.unseen, better.unseen) {
         (Some(a), Some(b)) if a.mean_square > 0.0 && b.mean_square > 0.0 => {
@@ -63,7 +63,7 @@ pub(super) fn unseen_evidence(search: &Search, base: &Candidate, better: &Candid
 }
 
 fn worth(search: &Search, base: &Candidate, better: &Candidate) -> bool {
-    // What no fit has seen must not speak against it: a law that is there is there in every recording, if not always to be seen.
+    // Held-out recordings must not speak against it: a law that is there is there in every recording, if not always to be seen.
     let seen_again = match (base.unseen, better.unseen) {
         (Some(a), Some(b)) => b.mean_square < a.mean_square * tuning().claim.unseen,
         _ => true,

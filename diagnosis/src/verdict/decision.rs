@@ -19,7 +19,7 @@ pub(super) struct Decision<'s> {
     pub(super) word: Word,
     /// The structure that explains best what it may.
     pub(super) best: &'s Candidate,
-    /// How sure its numbers are.
+    /// How sure its parameters are.
     pub(super) spread: Uncertainty,
     /// What it adds, most important first.
     pub(super) findings: Vec<Finding>,
@@ -27,7 +27,7 @@ pub(super) struct Decision<'s> {
     pub(super) alike: Vec<&'s Candidate>,
     /// Times at which a sensor is far off, s.
     pub(super) bursts: Vec<[f64; 2]>,
-    /// Whether the model's text is to hold the fitted numbers.
+    /// Whether the model's text is to hold the fitted parameters.
     pub(super) changes: bool,
 }
 
@@ -61,7 +61,7 @@ pub(super) fn decide<'s>(problem: &Problem, search: &'s Search) -> Decision<'s> 
     Decision { word, best, spread, findings, alike, bursts, changes: off || added }
 }
 
-/// Whether the refitted numbers explain more than the given ones do.
+/// Whether the refitted parameters explain more than the given ones do.
 fn given_is_off(problem: &Problem, search: &Search) -> bool {
     let each: Vec<f64> = search.levels_given.clone();
     let total: usize = problem.fit.iter().map(|r| crate::evaluator::measured(r).map(|_| r.len).sum::<usize>()).sum();
@@ -76,7 +76,7 @@ fn given_is_off(problem: &Problem, search: &Search) -> bool {
     advantage(cost, 0, refit.fit.cost, numbers, total, refit.correlation_time) > 0.0 && refit.fit.cost < tuning().claim.refit_gains * cost
 }
 
-/// Where the stated numbers are among a structure's, and what the nominal file says.
+/// Where the stated parameters are among a structure's, and what the nominal file says.
 fn stated_in(problem: &Problem, structure: &Structure) -> Vec<(usize, f64)> {
     let one = |(place, number): (usize, &FreeParameter)| match number.role {
         Role::Stated(i) => Some((place, problem.stated.get(i)?.given)),
@@ -88,7 +88,10 @@ fn stated_in(problem: &Problem, structure: &Structure) -> Vec<(usize, f64)> {
 /// Whether the recordings move the device by more than the measuring error.
 fn is_excited(problem: &Problem, search: &Search) -> bool {
     let moves = |(output, noise_sd): (usize, &f64)| {
-        problem.fit.iter().any(|r| r.outputs.get(output).is_some_and(Option::is_some) && r.spread[output] > tuning().claim.excited * noise_sd)
+        problem
+            .fit
+            .iter()
+            .any(|r| r.outputs.get(output).is_some_and(Option::is_some) && r.spread[output] > tuning().claim.excited * noise_sd)
     };
     search.noise_sd.iter().enumerate().any(moves)
 }

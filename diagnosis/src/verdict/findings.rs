@@ -1,4 +1,4 @@
-//! What was found: each physics with its place, its numbers, and what else could stand there.
+//! What was found: each physics with its place, its parameters, and what else could stand there.
 
 use super::choice::{contains, evidence};
 use super::rounded::rounded;
@@ -13,7 +13,7 @@ use crate::tuning::tuning;
 use backdrive_plant::write::round_significant;
 use std::collections::BTreeMap;
 
-/// How far what is left over is measuring error: 1 where it has its size and hangs together no more than it, less the more of either. A law
+/// How far the residual is measuring error: 1 where it has its size and is as little correlated, less the more of either. A law
 /// that only imitates what is there leaves a little over, and that little is not white.
 pub(super) fn adequacy(best: &Candidate) -> f64 {
     let level = best.levels.iter().fold(0.0f64, |a, b| a.max(*b));
@@ -83,7 +83,7 @@ fn rivals(search: &Search, best: &Candidate, which: usize) -> Vec<(Hypothesis, f
         }
     }
     found.sort_by(|a, b| a.1.total_cmp(&b.1));
-    // However finely a law is drawn, it is one physics.
+    // However finely a law is resolved, it is one physics.
     let same = |a: &Hypothesis, b: &Hypothesis| a.physics == b.physics && a.place.same(&b.place);
     let mut each: Vec<(Hypothesis, f64)> = Vec::new();
     for (rival, behind) in found {
@@ -116,7 +116,7 @@ fn parameters_of(best: &Candidate, spread: &Uncertainty, which: usize) -> BTreeM
     all
 }
 
-/// Numbers of the nominal model as the fit has them, by their path.
+/// Parameters of the nominal model as the fit has them, by their path.
 pub(super) fn moved(problem: &Problem, best: &Candidate, spread: &Uncertainty) -> BTreeMap<String, Moved> {
     let mut all = BTreeMap::new();
     for (index, number) in best.structure.free.iter().enumerate() {

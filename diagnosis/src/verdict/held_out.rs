@@ -1,4 +1,4 @@
-//! Errors on recordings that no fit has seen: of the model as given, with its numbers refitted, and diagnosed.
+//! Errors on held-out recordings: of the model as given, with its parameters refitted, and diagnosed.
 
 use super::rounded::rounded;
 use super::types::{HeldOut, RecordErrors};

@@ -53,7 +53,7 @@ pub fn rival_file(number: usize) -> String {
 pub struct Files {
     /// The model file with what was found, [`MODEL_FILE`].
     pub model: String,
-    /// Models of other explanations that leave over little more, the nearest first, as [`rival_file`]: what is built on the verdict has to stand
+    /// Models of other explanations whose residual is little larger, the nearest first, as [`rival_file`]: what is built on the verdict has to stand
     /// with these too.
     pub rivals: Vec<String>,
     /// The excitation file of the next experiment, [`EXPERIMENT_FILE`]; `None` where none is needed or can be had.

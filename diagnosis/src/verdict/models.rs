@@ -15,7 +15,7 @@ pub enum VerdictError {
     /// The model's text cannot be edited.
     #[error(transparent)]
     Patch(#[from] backdrive_plant::write::PatchError),
-    /// Refitted numbers cannot be put into the model.
+    /// Refitted parameters cannot be put into the model.
     #[error("the refitted numbers do not fit into the model: {0}")]
     Refitted(String),
     /// A physics that was found cannot be put into the model.
@@ -23,7 +23,7 @@ pub enum VerdictError {
     Hypothesis(#[from] crate::hypothesis::HypothesisError),
 }
 
-/// The nominal model's text with the fitted numbers and what was found.
+/// The nominal model's text with the fitted parameters and what was found.
 pub(super) fn model_text(problem: &Problem, best: &Candidate, spread: &Uncertainty, use_best: bool) -> Result<String, VerdictError> {
     if !use_best {
         return Ok(problem.text.clone());
@@ -39,7 +39,7 @@ pub(super) fn model_text(problem: &Problem, best: &Candidate, spread: &Uncertain
     Ok(patch(&problem.text, &edits)?)
 }
 
-/// Models of other structures that explain nearly as much of what was fitted and of what no fit has seen.
+/// Models of other structures that explain nearly as much of what was fitted and of the held-out recordings.
 pub(super) fn rival_models(problem: &Problem, search: &Search, best: &Candidate) -> Vec<String> {
     let names = |c: &Candidate| c.structure.added.iter().map(|h| h.id.clone()).collect::<Vec<_>>();
     let near = |c: &&Candidate| {

@@ -9,7 +9,7 @@ use crate::search::Search;
 use crate::tuning::tuning;
 use crate::words;
 
-/// What the explanation that is claimed leaves over; `None` where nothing was held against anything.
+/// The residual of the claimed explanation; `None` where nothing was held against anything.
 pub(super) fn remaining(problem: &Problem, search: &Search, best: &Candidate, held_out: &HeldOut) -> Option<Remaining> {
     let (refit, after, noise_sd) = (held_out.nrmse_refit?, held_out.nrmse_after?, held_out.noise_floor?);
     let share = |x: f64| if refit > 0.0 { rounded(x / refit, 3) } else { None };

@@ -1,4 +1,4 @@
-//! When and at which frequencies something is left over, glitches, and inputs that nobody measured.
+//! When and at which frequencies the residual is large, glitches, and inputs that nobody measured.
 
 use super::types::Where;
 use crate::candidate::Candidate;

@@ -36,7 +36,7 @@ impl Step for Anew {
         let without = |first: &Hypothesis| fewer().find(|c| c.structure.added.iter().all(|h| h.physics != first.physics));
         let late = state.work.is_past(tuning().search.last_other_base);
         let other = best.and_then(|b| b.structure.added.first()).filter(|_| !late).and_then(without);
-        // And far from the noise from what does nearly as well with fewer numbers: it leaves more open.
+        // And far from the noise from what does nearly as well with fewer parameters: it leaves more open.
         let has_fewer = |c: &&Candidate| best.is_some_and(|b| c.structure.free.len() < b.structure.free.len());
         let is_other = |c: &Candidate| other.is_some_and(|o| std::ptr::eq(o, c));
         let plain = simplest_of(fewer(), samples).filter(has_fewer).filter(|c| !is_other(c));
@@ -64,8 +64,8 @@ fn screened(course: &Course, evaluator: &Evaluator, base: &Candidate, work: Step
     let Some(fit) = evaluator.fit(&base.structure, &base.fit.values, tuning().fit.base) else { return Vec::new() };
     let screen = Screen::new(evaluator, &base.structure, &fit, course.hypotheses, work);
     let own = course.effects_of(&base.structure, &fit.values);
-    let seed = |p: Promise, guided| {
-        Seed::beside(problem, (&base.structure, &fit.values), [own.clone(), vec![(p.hypothesis, p.values)]].concat(), guided)
+    let seed = |p: Promise, coupled_first| {
+        Seed::beside(problem, (&base.structure, &fit.values), [own.clone(), vec![(p.hypothesis, p.values)]].concat(), coupled_first)
     };
     let fits = |h: usize| course.hypotheses[h].parameters.len() <= tuning().screening.parameters;
     let mut used = HashSet::new();
@@ -73,7 +73,7 @@ fn screened(course: &Course, evaluator: &Evaluator, base: &Candidate, work: Step
     next.take(6).map(|p| seed(p, false)).collect()
 }
 
-/// Fewest substeps per sample with which a simulation errs by less than a structure leaves over.
+/// Fewest substeps per sample with which a simulation errs by less than the residual of a structure.
 fn substeps_for(evaluator: &Evaluator, candidate: &Candidate) -> usize {
     let of = |substeps: usize| Evaluator { substeps, ..evaluator.clone() }.residuals(&candidate.structure, &candidate.fit.values);
     let Some(exact) = of(tuning().fit.fine_substeps) else { return tuning().fit.middle_substeps };

@@ -55,7 +55,7 @@ fn law(state: &State) -> String {
 }
 
 /// Each effect with its values at every other place where that physics may be: to first order neighbours that are firmly joined do the same, and
-/// screening, or a path along which they are led, may have taken one for the other.
+/// screening, or a coupled fit, may have taken one for the other.
 fn elsewhere(course: &Course, best: &Candidate) -> Vec<Seed> {
     let own = course.effects_of(&best.structure, &best.fit.values);
     let mut seeds = Vec::new();

@@ -17,10 +17,10 @@ pub(super) fn extensions(course: &Course, view: &View, base: &Candidate, count: 
         new.parameters.len() <= tuning().screening.parameters && base.structure.added.iter().all(|b| b.compatible(new))
     };
     let own = course.effects_of(&base.structure, &fit.values);
-    let seed = |p: Promise, guided| {
-        Seed::beside(problem, (&base.structure, &fit.values), [own.clone(), vec![(p.hypothesis, p.values)]].concat(), guided)
+    let seed = |p: Promise, coupled_first| {
+        Seed::beside(problem, (&base.structure, &fit.values), [own.clone(), vec![(p.hypothesis, p.values)]].concat(), coupled_first)
     };
     let mut used = HashSet::new();
     let next = view.screen.look(&fit, &fits).into_iter().filter(|p| used.insert(p.hypothesis));
-    next.take(count).map(|p| seed(p, view.guided)).collect()
+    next.take(count).map(|p| seed(p, view.coupled_first)).collect()
 }

@@ -36,7 +36,7 @@ impl Step for Finer {
     fn settle(&self, state: &mut State) {
         let comes_near = state.found.first().is_some_and(|c| c.levels.iter().all(|l| *l < tuning().noise.very_far));
         if comes_near && !state.work.is_past(tuning().search.last_revival) {
-            // Before others are tried from the numbers of the best; where it leaves much over, more is missing than a mass.
+            // Before others are tried from the parameters of the best; where its residual is large, more is missing than a mass.
             let evaluator = state
                 .course
                 .evaluator
@@ -51,7 +51,7 @@ impl Step for Finer {
     }
 }
 
-/// The best, and what does nearly as well with as many effects, with a law of theirs drawn more finely.
+/// The best, and what does nearly as well with as many effects, with a law of theirs resolved more finely.
 fn finer(course: &Course, found: &[Candidate]) -> Vec<Seed> {
     let Some(best) = found.first() else { return Vec::new() };
     let near = |c: &&Candidate| c.fit.cost < tuning().search.as_good * best.fit.cost;

@@ -62,7 +62,12 @@ fn given_back(course: &Course, promises: &[Promise], chance: f64) -> Vec<Seed> {
                 let mut stated = stated.clone();
                 stated[index] = (value - taken).clamp(number.range.0, number.range.1);
                 let values = vec![taken.clamp(parameter.range.0, parameter.range.1)];
-                seeds.push(Seed { effects: vec![(promise.hypothesis, values)], stated, of_records: of_records.clone(), guided: false });
+                seeds.push(Seed {
+                    effects: vec![(promise.hypothesis, values)],
+                    stated,
+                    of_records: of_records.clone(),
+                    coupled_first: false,
+                });
             }
         }
     }

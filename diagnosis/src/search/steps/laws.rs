@@ -18,11 +18,11 @@ impl Step for Laws {
     }
 
     fn propose(&self, state: &mut State) -> Vec<Seed> {
-        let (course, guided, samples) = (state.course, state.is_guided(), state.samples());
+        let (course, coupled_first, samples) = (state.course, state.is_coupled(), state.samples());
         // Coupled to the measured motion, what is far from the noise was tried already.
-        let best = state.found.first().filter(|c| !guided || c.fit.cost < tuning().noise.near * samples as f64);
+        let best = state.found.first().filter(|c| !coupled_first || c.fit.cost < tuning().noise.near * samples as f64);
         let mut seeds = best.map_or_else(Vec::new, |best| course.laws(&best.structure, &best.fit.values));
-        if !guided {
+        if !coupled_first {
             let own = |s: &Seed| -> f64 {
                 let promised = |h: &usize| state.tried.iter().find(|t| t.id == course.hypotheses[*h].id).map_or(0.0, |t| t.promised);
                 s.effects.iter().map(|(h, _)| promised(h)).sum()

@@ -23,7 +23,7 @@ impl Step for Ripples {
 
     fn propose(&self, state: &mut State) -> Vec<Seed> {
         // Without a coupling they are among the single effects.
-        if !state.is_guided() {
+        if !state.is_coupled() {
             return Vec::new();
         }
         let course = state.course;

@@ -8,7 +8,7 @@ use crate::search::state::State;
 pub(crate) struct Singles {
     name: &'static str,
     /// How many where fits begin coupled to the measured motion, which is cheap.
-    guided: usize,
+    coupled_first: usize,
     /// How many otherwise.
     free: usize,
     keep: Keep,
@@ -16,12 +16,18 @@ pub(crate) struct Singles {
 
 impl Singles {
     /// The first few.
-    pub const FIRST: Singles = Singles { name: "fitting single effects", guided: 30, free: 4, keep: Keep { further: 3, to_the_end: 3 } };
+    pub const FIRST: Singles =
+        Singles { name: "fitting single effects", coupled_first: 30, free: 4, keep: Keep { further: 3, to_the_end: 3 } };
     /// The next few.
-    pub const NEXT: Singles = Singles { name: "fitting single effects", guided: 30, free: 5, keep: Keep { further: 4, to_the_end: 2 } };
+    pub const NEXT: Singles =
+        Singles { name: "fitting single effects", coupled_first: 30, free: 5, keep: Keep { further: 4, to_the_end: 2 } };
     /// All others.
-    pub const REST: Singles =
-        Singles { name: "fitting more single effects", guided: usize::MAX, free: usize::MAX, keep: Keep { further: 4, to_the_end: 2 } };
+    pub const REST: Singles = Singles {
+        name: "fitting more single effects",
+        coupled_first: usize::MAX,
+        free: usize::MAX,
+        keep: Keep { further: 4, to_the_end: 2 },
+    };
 }
 
 impl Step for Singles {
@@ -34,7 +40,7 @@ impl Step for Singles {
     }
 
     fn propose(&self, state: &mut State) -> Vec<Seed> {
-        let count = if state.is_guided() { self.guided } else { self.free };
+        let count = if state.is_coupled() { self.coupled_first } else { self.free };
         state.singles.by_ref().take(count).collect()
     }
 }

@@ -17,7 +17,7 @@ pub(crate) enum Race {
     Coupled,
     /// Not coupled.
     Free,
-    /// Not coupled, with as many substeps as what the best leaves over asks for.
+    /// Not coupled, with as many substeps as the residual of the best asks for.
     Finer,
 }
 
@@ -49,7 +49,7 @@ pub(crate) trait Step {
         false
     }
 
-    /// Whether it is for rivals of the best: they are wanted however little that leaves over.
+    /// Whether it is for rivals of the best: they are wanted however small its residual is.
     fn is_for_rivals(&self, _state: &State) -> bool {
         false
     }

@@ -1,4 +1,4 @@
-//! Physics at places: what was found, what could be instead, what would have been seen, and their numbers.
+//! Physics at places: what was found, what could be instead, what would have been seen, and their parameters.
 
 use super::place::PlaceInFile;
 use crate::hypothesis::Place;
@@ -74,14 +74,14 @@ pub struct Estimate {
     pub unit: String,
 }
 
-/// A list of numbers, each with its 95 % interval.
+/// A list of parameters, each with its 95 % interval.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Estimates {
     /// As fitted, in `unit`.
     pub value: Vec<f64>,
     /// 95 % interval of each, in `unit`.
     pub ci95: Vec<Interval>,
-    /// Unit of all; empty for numbers without one.
+    /// Unit of all; empty for parameters without one.
     #[serde(default)]
     pub unit: String,
 }

@@ -34,13 +34,13 @@ pub struct Verdict {
     /// When, at which frequencies and in which state the refitted nominal model and the recordings part; null where nothing was compared.
     #[serde(rename = "where")]
     pub shows: Option<Where>,
-    /// The nominal model's numbers that the fit moved, by their path in the model (`bodies.drum`, `elements.cable.stiffness`,
+    /// The nominal model's parameters that the fit moved, by their path in the model (`bodies.drum`, `elements.cable.stiffness`,
     /// `inputs.feedback_force.gain`; of a list with the index, `elements.slip.force[0]`). Empty where the nominal file is kept.
     #[serde(default)]
     pub parameters: BTreeMap<String, Moved>,
-    /// What the claimed explanation leaves over; null where nothing was held against anything.
+    /// The residual of the claimed explanation; null where nothing was held against anything.
     pub remaining: Option<Remaining>,
-    /// Errors on the recordings that no fit has seen; of a set that holds none out, on the fitted ones.
+    /// Errors on the held-out recordings; of a set that holds none out, on the fitted ones.
     #[serde(default)]
     pub held_out: HeldOut,
     /// What the recordings say of themselves before any physics: clock, sensors, units, loops. What matters most comes first.
@@ -52,7 +52,7 @@ pub struct Verdict {
     /// File of the diagnosed model, beside the verdict; of a kept model a copy of the nominal one.
     #[serde(default)]
     pub model_after: String,
-    /// Files of models of other explanations that leave over little more, beside the verdict, the nearest first.
+    /// Files of models of other explanations whose residual is little larger, beside the verdict, the nearest first.
     #[serde(default)]
     pub rival_models: Vec<String>,
     /// With `ambiguous` and `cannot_tell` what to record next, or why no recording would tell; otherwise null.
@@ -82,7 +82,7 @@ pub struct Searched {
 pub enum Word {
     /// Physics was left out, and `findings` names it.
     Missing,
-    /// Nothing is missing, but the model's numbers are off; `model_after` has the better ones.
+    /// Nothing is missing, but the model's parameters are off; `model_after` has the better ones.
     Parameters,
     /// The model explains the recordings down to the sensors' noise.
     NothingMissing,
@@ -120,7 +120,7 @@ impl Word {
         }
     }
 
-    /// Whether the model's structure is right: nothing is missing, its numbers may be off.
+    /// Whether the model's structure is right: nothing is missing, its parameters may be off.
     pub fn is_structure_right(self) -> bool {
         match self {
             Word::Parameters | Word::NothingMissing => true,
@@ -150,10 +150,10 @@ fn stated<'de, D: serde::Deserializer<'de>>(deserializer: D) -> Result<Option<Op
     Option::deserialize(deserializer).map(Some)
 }
 
-/// What the claimed explanation leaves over: a statement of its own, which does not take the claim back.
+/// The residual of the claimed explanation: a statement of its own, which does not take the claim back.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Remaining {
-    /// Share of the residual of the refitted nominal model on recordings that no fit has seen, at least 0; null where that is nothing.
+    /// Share of the residual of the refitted nominal model on held-out recordings, at least 0; null where that is nothing.
     pub share: Option<f64>,
     /// What the sensors' noise alone would be of that residual, at least 0.
     pub floor_share: Option<f64>,
@@ -166,13 +166,13 @@ pub struct Remaining {
     pub looks_like: Option<String>,
 }
 
-/// Errors on recordings that no fit has seen. `nrmse` is the root mean square of the error over the standard deviation of the measured signal,
+/// Errors on held-out recordings. `nrmse` is the root mean square of the error over the standard deviation of the measured signal,
 /// averaged over all pairs of recording and output. Null where a model cannot be simulated.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct HeldOut {
     /// Of the nominal model as it was given.
     pub nrmse_before: Option<f64>,
-    /// Of the nominal structure with its numbers refitted.
+    /// Of the nominal structure with its parameters refitted.
     pub nrmse_refit: Option<f64>,
     /// Of the diagnosed model.
     pub nrmse_after: Option<f64>,
@@ -181,7 +181,7 @@ pub struct HeldOut {
     /// The same of the nominal model as it was given, by output: the root of the summed squared errors over that of the summed squared deviations
     /// from each recording's mean, all recordings together.
     pub pooled_before: Option<BTreeMap<String, f64>>,
-    /// As `pooled_before`, of the nominal structure with its numbers refitted.
+    /// As `pooled_before`, of the nominal structure with its parameters refitted.
     pub pooled_refit: Option<BTreeMap<String, f64>>,
     /// As `pooled_before`, of the diagnosed model.
     pub pooled_after: Option<BTreeMap<String, f64>>,
@@ -201,7 +201,7 @@ pub struct RecordErrors {
     pub output: String,
     /// Of the nominal model as it was given.
     pub nrmse_before: Option<f64>,
-    /// Of the nominal structure with its numbers refitted.
+    /// Of the nominal structure with its parameters refitted.
     pub nrmse_refit: Option<f64>,
     /// Of the diagnosed model.
     pub nrmse_after: Option<f64>,

@@ -31,7 +31,7 @@ impl NextExperiment {
     }
 }
 
-/// An excitation that would tell explanations apart, or determine numbers.
+/// An excitation that would tell explanations apart, or determine parameters.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Planned {
     /// The excitation file, beside the verdict.
@@ -42,7 +42,7 @@ pub struct Planned {
     pub excitation: String,
     /// What to play, and what would be seen.
     pub sentence: String,
-    /// What it tells apart, or the numbers that it determines.
+    /// What it tells apart, or the parameters that it determines.
     pub between: Vec<String>,
     /// How far apart it brings the two explanations that it separates least, each refitted to it, in standard deviations.
     pub separation_sd: Option<f64>,
