@@ -203,7 +203,7 @@ fn law(evidence: &Evidence, main: &Trace) -> Series {
             let thin = |x: &[f64]| x.iter().step_by(step).copied().collect::<Vec<f64>>();
             Series::points("the law found", &thin(&x), &thin(&y)).width(1.3)
         }
-        _ => Series::line("the law found", &x, &y).dash(Dash::Solid).width(2.2),
+        Against::Velocity | Against::Displacement | Against::Time => Series::line("the law found", &x, &y).dash(Dash::Solid).width(2.2),
     };
     series.colour(Colour::Nth(1))
 }
