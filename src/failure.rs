@@ -50,7 +50,20 @@ impl Failure {
     pub fn bag(error: BagError) -> Failure {
         let code = match &error {
             BagError::Create { .. } | BagError::Write { .. } => code::MACHINE,
-            _ => code::BAD_INPUT,
+            BagError::Io { .. }
+            | BagError::Exists { .. }
+            | BagError::InUse { .. }
+            | BagError::NotMcap { .. }
+            | BagError::Damaged { .. }
+            | BagError::Message { .. }
+            | BagError::Encode { .. }
+            | BagError::Metadata { .. }
+            | BagError::NoSuchIndex { .. }
+            | BagError::NoTopic { .. }
+            | BagError::Field { .. }
+            | BagError::Table { .. }
+            | BagError::Recording(_)
+            | BagError::Usage(_) => code::BAD_INPUT,
         };
         Failure { code, message: error.to_string() }
     }

@@ -6,8 +6,8 @@ use backdrive_bags::Reader;
 use backdrive_diagnosis::audit;
 use backdrive_diagnosis::problem::{Problem, ProblemError};
 use backdrive_plant::model::{Fragment, Model};
-use backdrive_plant::recording::{Columns, RecordingError};
-use backdrive_plant::set::{Initial, RecordingSet};
+use backdrive_plant::recording::RecordingError;
+use backdrive_plant::set::RecordingSet;
 use std::path::{Path, PathBuf};
 
 /// What was opened.
@@ -150,19 +150,7 @@ fn of_files(paths: &[PathBuf]) -> Result<RecordingSet, Failure> {
         }
     }
     let fit = paths.iter().map(|p| p.to_string_lossy().into_owned()).collect();
-    Ok(RecordingSet {
-        folder: PathBuf::new(),
-        model: None,
-        fit,
-        held_out: Vec::new(),
-        initial: Initial::Rest,
-        unknown: Vec::new(),
-        columns: Columns::new(),
-        files: Vec::new(),
-        sessions: Vec::new(),
-        ignore: Vec::new(),
-        mixed_rates: false,
-    })
+    Ok(RecordingSet::of_recordings(PathBuf::new(), fit))
 }
 
 /// The error, with what to do about it where that is not plain.

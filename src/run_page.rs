@@ -93,7 +93,7 @@ impl Heard {
                     None => self.statuses.push((name, vec![*status])),
                 }
             }
-            _ => {}
+            Message::Sample(_) | Message::Gains(_) | Message::Margin(_) => {}
         }
     }
 }

@@ -6,7 +6,6 @@ use crate::failure::Failure;
 use crate::output;
 use backdrive_control::engine::Ripple;
 use backdrive_nodes::graph::bench::{EngineFile, dynamometer_to_toml};
-use backdrive_plant::elements::Law;
 use backdrive_plant::model::Model;
 use backdrive_report::number;
 use backdrive_testbench::lag::Observation;
@@ -64,15 +63,13 @@ fn write(out: &Path, found: &Identified) -> Result<(), Failure> {
     let numbers = &found.bench.shaft;
     (shaft.name, shaft.title) = ("engine-test-bench-identified".to_string(), "Combustion engine test bench, identified".to_string());
     shaft.source = "identified by backdrive test-bench".to_string();
-    for body in &mut shaft.bodies {
-        body.inertia = if body.name == "engine" { numbers.engine } else { numbers.dynamometer };
-    }
-    for element in &mut shaft.elements {
-        match &mut element.law {
-            Law::Spring(spring) => spring.stiffness = numbers.stiffness,
-            Law::Damper(damper) => damper.damping = numbers.damping,
-            _ => {}
-        }
+    for (path, number) in [
+        ("bodies.engine", numbers.engine),
+        ("bodies.dyno", numbers.dynamometer),
+        ("elements.shaft.stiffness", numbers.stiffness),
+        ("elements.shaft_damping.damping", numbers.damping),
+    ] {
+        shaft.set_values_at(path, &[number]).map_err(Failure::machine)?;
     }
     put("shaft.toml", shaft.to_toml())
 }

@@ -225,7 +225,9 @@ fn differs(a: &Item, b: &Item, tolerance: Option<f64>, stamps_ignored: bool, lar
             let byte = |bytes: &[u8]| bytes.get(at).map_or("end".to_owned(), |byte| format!("{byte:#04x}"));
             return (a != b).then(|| divergence(format!("byte {at}"), byte(a), byte(b)));
         }
-        _ => return Some(divergence("type".to_owned(), "one of backdrive's and".to_owned(), "one of somebody else's".to_owned())),
+        (Content::Ours(_), Content::Foreign(_)) | (Content::Foreign(_), Content::Ours(_)) => {
+            return Some(divergence("type".to_owned(), "one of backdrive's and".to_owned(), "one of somebody else's".to_owned()));
+        }
     };
     let mut first = None;
     let mut whole = |field: &str, a: String, b: String| {
@@ -273,7 +275,9 @@ fn differs(a: &Item, b: &Item, tolerance: Option<f64>, stamps_ignored: bool, lar
             numbers.extend([("gain", a.gain, b.gain), ("factor", a.factor, b.factor), ("deviation", a.deviation, b.deviation)].map(named));
             numbers.extend([("frequency_hz", a.frequency_hz, b.frequency_hz), ("decay_per_s", a.decay_per_s, b.decay_per_s)].map(named));
         }
-        _ => whole("type", format!("{:?}", a.kind()), format!("{:?}", b.kind())),
+        (Message::Sample(_) | Message::Gains(_) | Message::Event(_) | Message::Status(_) | Message::Margin(_), _) => {
+            whole("type", format!("{:?}", a.kind()), format!("{:?}", b.kind()))
+        }
     }
     for (field, a, b) in numbers {
         let distance = (a - b).abs();

@@ -14,18 +14,7 @@ fn element(between: [Place; 2], law: Law) -> Element {
 }
 
 fn input(kind: InputKind, on: usize) -> Input {
-    Input {
-        name: String::new(),
-        kind,
-        on,
-        hold: Hold::Zero,
-        gain: 1.0,
-        saturation: f64::INFINITY,
-        delay: 0.0,
-        bandwidth: f64::INFINITY,
-        back_emf: 0.0,
-        offset: 0.0,
-    }
+    Input::ideal("", kind, on, Hold::Zero)
 }
 
 /// Motor, drum, handle and a prescribed hand; `nonlinear` adds friction and makes the linkage hysteretic.

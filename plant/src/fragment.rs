@@ -7,22 +7,11 @@ impl Fragment {
     /// takes to move the port. Both come before the fragment's own.
     pub fn driven(&self) -> Model {
         let mut model = self.network.clone();
-        let (name, gain, delay) = ("displacement".to_string(), 1.0, 0.0);
-        let input = Input {
-            name,
-            kind: InputKind::Motion,
-            on: 0,
-            hold: Hold::Cubic,
-            gain,
-            saturation: f64::INFINITY,
-            delay,
-            bandwidth: f64::INFINITY,
-            back_emf: 0.0,
-            offset: 0.0,
-        };
         let kind = OutputKind::Reaction(0);
-        model.inputs.insert(0, input);
-        model.outputs.insert(0, Output { name: "force".to_string(), kind, gain, delay, offset: 0.0, resolution: 0.0, noise: 0.0 });
+        model.inputs.insert(0, Input::ideal("displacement", InputKind::Motion, 0, Hold::Cubic));
+        model
+            .outputs
+            .insert(0, Output { name: "force".to_string(), kind, gain: 1.0, delay: 0.0, offset: 0.0, resolution: 0.0, noise: 0.0 });
         model
     }
 }
@@ -127,18 +116,7 @@ impl Model {
         }
         if let (Some(hand), None) = (fragment.hand, attached.hand_input) {
             attached.hand_input = Some(self.inputs.len());
-            self.inputs.push(Input {
-                name: named("hand"),
-                kind: InputKind::Motion,
-                on: body(hand),
-                hold: Hold::Linear,
-                gain: 1.0,
-                saturation: f64::INFINITY,
-                delay: 0.0,
-                bandwidth: f64::INFINITY,
-                back_emf: 0.0,
-                offset: 0.0,
-            });
+            self.inputs.push(Input::ideal(&named("hand"), InputKind::Motion, body(hand), Hold::Linear));
         }
         attached
     }

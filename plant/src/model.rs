@@ -115,6 +115,24 @@ pub struct Input {
     pub offset: f64,
 }
 
+impl Input {
+    /// A signal that reaches its body as it is: nothing of an actuator's gain, limit, delay or lag.
+    pub fn ideal(name: &str, kind: InputKind, on: usize, hold: Hold) -> Input {
+        Input {
+            name: name.to_owned(),
+            kind,
+            on,
+            hold,
+            gain: 1.0,
+            saturation: f64::INFINITY,
+            delay: 0.0,
+            bandwidth: f64::INFINITY,
+            back_emf: 0.0,
+            offset: 0.0,
+        }
+    }
+}
+
 /// What an output measures.
 #[derive(Debug, Clone, PartialEq)]
 pub enum OutputKind {

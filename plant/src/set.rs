@@ -79,20 +79,26 @@ impl RecordingSet {
                 if fit.is_empty() {
                     return Err(FileError::whole(path.display().to_string(), "has no set.toml and no recordings (.csv or .mcap)"));
                 }
-                Ok(RecordingSet {
-                    folder: path.to_path_buf(),
-                    model: None,
-                    fit,
-                    held_out: Vec::new(),
-                    initial: Initial::Rest,
-                    unknown: Vec::new(),
-                    columns: Columns::new(),
-                    files: Vec::new(),
-                    sessions: Vec::new(),
-                    ignore: Vec::new(),
-                    mixed_rates: false,
-                })
+                Ok(RecordingSet::of_recordings(path.to_path_buf(), fit))
             }
+        }
+    }
+
+    /// A set of recordings that nothing else is said of: all are for fitting, from rest, their columns as they are named. `fit` is relative to the
+    /// folder.
+    pub fn of_recordings(folder: PathBuf, fit: Vec<String>) -> RecordingSet {
+        RecordingSet {
+            folder,
+            model: None,
+            fit,
+            held_out: Vec::new(),
+            initial: Initial::Rest,
+            unknown: Vec::new(),
+            columns: Columns::new(),
+            files: Vec::new(),
+            sessions: Vec::new(),
+            ignore: Vec::new(),
+            mixed_rates: false,
         }
     }
 
@@ -197,14 +203,7 @@ fn read(mut top: Table, folder: PathBuf) -> Result<RecordingSet, FileError> {
         return Err(top.error("names no recordings; expected fit = [\"a.csv\", ...]"));
     }
     let initial = top.one_of("initial", &[("rest", Initial::Rest), ("free", Initial::Free)])?.unwrap_or_default();
-    let mut unknown_inputs = Vec::new();
-    if let Some(mut table) = top.table("unknown")? {
-        for name in table.keys() {
-            let mut below = table.table(&name)?.ok_or_else(|| table.missing(&name))?;
-            unknown_inputs.push((name, below.need_number("bandwidth_hz", Range::Positive)?));
-            below.finish()?;
-        }
-    }
+    let unknown_inputs = top.table("unknown")?.map(read_unknown).transpose()?.unwrap_or_default();
     let columns = top.table("columns")?.map(read_columns).transpose()?.unwrap_or_default();
     if let Some(table) = &files_table {
         for (name, _) in &files {
@@ -214,41 +213,63 @@ fn read(mut top: Table, folder: PathBuf) -> Result<RecordingSet, FileError> {
             }
         }
     }
-    let mut sessions = Vec::new();
-    if let Some(mut table) = top.table("sessions")? {
-        for (session, name) in table.keys().into_iter().enumerate() {
-            let mut below = table.table(&name)?.ok_or_else(|| table.missing(&name))?;
-            let mut condition = Vec::new();
-            read_condition(below.table("condition")?.ok_or_else(|| below.missing("condition"))?, "", &mut condition)?;
-            for c in condition.iter_mut().filter(|c| c.1 == Condition::Free) {
-                c.1 = Condition::Shared(session);
-            }
-            for file in below.strings("files")?.ok_or_else(|| below.missing("files"))? {
-                if !fit.contains(&file) && !held_out.contains(&file) {
-                    return Err(below.error_at("files", unknown("file", &file, fit.iter().chain(&held_out).map(String::as_str))));
-                }
-                let at = files.iter().position(|(name, _)| *name == file).unwrap_or_else(|| {
-                    files.push((file.clone(), FileRules::default()));
-                    files.len() - 1
-                });
-                let Some((_, rules)) = files.get_mut(at) else { continue };
-                for (path, value) in &condition {
-                    if rules.condition.iter().any(|(other, _)| other == path) {
-                        let message = format!("\"{path}\" has a condition in this file, or in another session of it, already");
-                        return Err(below.error_at("files", format!("\"{file}\": {message}")));
-                    }
-                    rules.condition.push((path.clone(), value.clone()));
-                }
-            }
-            below.finish()?;
-            sessions.push((name, condition.into_iter().map(|(path, _)| path).collect()));
-        }
-    }
+    let sessions = match top.table("sessions")? {
+        Some(table) => read_sessions(table, [&fit, &held_out], &mut files)?,
+        None => Vec::new(),
+    };
     let ignore = top.strings("ignore")?.unwrap_or_default();
     let mixed_rates = top.boolean("mixed_rates")?.unwrap_or_default();
     top.finish()?;
     let model = model.map(|name| folder.join(name));
     Ok(RecordingSet { model, folder, fit, held_out, initial, unknown: unknown_inputs, columns, files, sessions, ignore, mixed_rates })
+}
+
+/// The inputs that nobody measured.
+fn read_unknown(mut table: Table) -> Result<Vec<(String, f64)>, FileError> {
+    let mut inputs = Vec::new();
+    for name in table.keys() {
+        let mut below = table.table(&name)?.ok_or_else(|| table.missing(&name))?;
+        inputs.push((name, below.need_number("bandwidth_hz", Range::Positive)?));
+        below.finish()?;
+    }
+    Ok(inputs)
+}
+
+/// The sessions, whose conditions go to the rules of each of their files; `lists` are the files of the set.
+fn read_sessions(
+    mut table: Table,
+    lists: [&Vec<String>; 2],
+    files: &mut Vec<(String, FileRules)>,
+) -> Result<Vec<(String, Vec<String>)>, FileError> {
+    let mut sessions = Vec::new();
+    for (session, name) in table.keys().into_iter().enumerate() {
+        let mut below = table.table(&name)?.ok_or_else(|| table.missing(&name))?;
+        let mut condition = Vec::new();
+        read_condition(below.table("condition")?.ok_or_else(|| below.missing("condition"))?, "", &mut condition)?;
+        for c in condition.iter_mut().filter(|c| c.1 == Condition::Free) {
+            c.1 = Condition::Shared(session);
+        }
+        for file in below.strings("files")?.ok_or_else(|| below.missing("files"))? {
+            if !lists.iter().any(|list| list.contains(&file)) {
+                return Err(below.error_at("files", unknown("file", &file, lists.into_iter().flatten().map(String::as_str))));
+            }
+            let at = files.iter().position(|(name, _)| *name == file).unwrap_or_else(|| {
+                files.push((file.clone(), FileRules::default()));
+                files.len() - 1
+            });
+            let Some((_, rules)) = files.get_mut(at) else { continue };
+            for (path, value) in &condition {
+                if rules.condition.iter().any(|(other, _)| other == path) {
+                    let message = format!("\"{path}\" has a condition in this file, or in another session of it, already");
+                    return Err(below.error_at("files", format!("\"{file}\": {message}")));
+                }
+                rules.condition.push((path.clone(), value.clone()));
+            }
+        }
+        below.finish()?;
+        sessions.push((name, condition.into_iter().map(|(path, _)| path).collect()));
+    }
+    Ok(sessions)
 }
 
 fn shown(folder: &Path) -> String {

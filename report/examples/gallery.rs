@@ -39,21 +39,18 @@ fn noise(k: usize) -> f64 {
     sum * 3f64.sqrt()
 }
 
-fn main() -> std::io::Result<()> {
-    let path = std::env::args().nth(1).unwrap_or_else(|| "gallery.html".into());
+/// How the oscillation grows from 1 s on, m.
+fn grown(t: f64) -> f64 {
+    if t < 1.0 { 0.0 } else { 1.4e-3 * (1.0 - (-(t - 1.0) * 1.8).exp()) }
+}
+
+/// Bode and Nyquist of the loop.
+fn loop_figures(page: &mut Page) {
     let response = loop_response();
     let column = |pick: fn(&(f64, f64, f64, f64, f64)) -> f64| response.iter().map(pick).collect::<Vec<f64>>();
     let (f, magnitude, re, im) = (column(|r| r.0), column(|r| 20.0 * r.1.log10()), column(|r| r.3), column(|r| r.4));
     let phase: Vec<f64> = column(|r| r.2.to_degrees());
     let sigma: Vec<f64> = response.iter().map(|r| 0.03 * r.1 + 0.02 + 0.1 * (r.0 / 120.0).min(1.0) * r.1).collect();
-
-    let mut page = Page::new("Stability of session-07.mcap at μλ = 6.2");
-    page.lead(
-        Tone::Bad,
-        "Unstable at μλ = 6.2: the loop goes into a limit cycle of 1.4 mm at 23 Hz. It is stable up to μλ = 4.1 (95 %: 3.8 to 4.4).",
-    );
-    page.warning("The two methods disagree by 18 %: a physical effect may be missing from the model <impulse-engine>.");
-    page.note("Estimated from 31 segments of 2.0 s, Hann window, 50 % overlap; coherence above 0.8 from 1 Hz to 140 Hz.");
 
     page.section("Loop frequency response");
     let every = |v: &[f64]| v.iter().step_by(6).copied().collect::<Vec<f64>>();
@@ -92,7 +89,10 @@ fn main() -> std::io::Result<()> {
         ),
     ]);
     page.figure(bode, "Magnitude and phase with the 95 % interval; the model's answer beside it.");
+}
 
+/// Verdicts over the gain.
+fn gain_sweep(page: &mut Page) {
     page.section("Gain sweep");
     let gains: Vec<f64> = (0..200).map(|k| 0.1 * 500f64.powf(f64::from(k) / 199.0)).collect();
     let amplitude: Vec<f64> = gains
@@ -119,11 +119,11 @@ fn main() -> std::io::Result<()> {
         .vertical(6.2, "asked 6.2", Tone::Bad)
         .horizontal(1e-5, "encoder step", Tone::Unsure);
     page.figure(sweep, "200 gains of 5 s each; the colour is the verdict.");
+}
 
+/// A run in time, with a gap and a spike.
+fn time_response(page: &mut Page, t: &[f64]) {
     page.section("Time response at the asked gain");
-    let n = 20_000;
-    let t: Vec<f64> = (0..n).map(|k| k as f64 / 4000.0).collect();
-    let grown = |t: f64| if t < 1.0 { 0.0 } else { 1.4e-3 * (1.0 - (-(t - 1.0) * 1.8).exp()) };
     let x: Vec<f64> =
         t.iter().enumerate().map(|(k, t)| 4e-3 * (1.0 - (-t * 3.0).exp()) + grown(*t) * (TAU * 23.0 * t).sin() + 2e-6 * noise(k)).collect();
     let force: Vec<f64> =
@@ -135,15 +135,18 @@ fn main() -> std::io::Result<()> {
             Plot::new("Contact at μλ = 6.2")
                 .x_axis("time", "s")
                 .y_axis("position", "m")
-                .line("x_m", &t, &x)
-                .series(Series::line("operator's intent", &t, &intent).colour(Colour::Ink).dash(Dash::Dashed))
+                .line("x_m", t, &x)
+                .series(Series::line("operator's intent", t, &intent).colour(Colour::Ink).dash(Dash::Dashed))
                 .horizontal(3e-3, "wall", Tone::Neutral)
                 .region(1.0, 5.0, Tone::Warning, "limit cycle, 1.4 mm at 23 Hz"),
-            Plot::new("").y_axis("force F_s", "N").series(Series::line("", &t, &spiked).colour(Colour::Nth(1))),
+            Plot::new("").y_axis("force F_s", "N").series(Series::line("", t, &spiked).colour(Colour::Nth(1))),
         ]),
         "The force is missing from 2.20 s to 2.35 s: not measured is not zero. One sample at 2.25 s is a spike.",
     );
+}
 
+/// Who gives and takes energy.
+fn energy(page: &mut Page, t: &[f64]) {
     page.section("Energy");
     let into: Vec<f64> = t.iter().map(|t| 3e-3 * (1.0 - (-t).exp()) + 4e-4 * grown(*t) / 1.4e-3 * t).collect();
     let master: Vec<f64> = t.iter().map(|t| 2e-3 * (1.0 - (-t).exp()) - 9e-4 * (t - 1.0).max(0.0)).collect();
@@ -153,9 +156,9 @@ fn main() -> std::io::Result<()> {
             Plot::new("Passivity observers")
                 .x_axis("time", "s")
                 .y_axis("energy taken in", "J")
-                .line("master's port", &t, &master)
-                .line("slave's port", &t, &into)
-                .line("Coulomb friction and hysteresis", &t, &friction)
+                .line("master's port", t, &master)
+                .line("slave's port", t, &into)
+                .line("Coulomb friction and hysteresis", t, &friction)
                 .horizontal(0.0, "passive above", Tone::Unsure),
             Plot::new("Hysteresis of the linkage").x_axis("deflection", "m").y_axis("force", "N").line(
                 "cable side",
@@ -165,6 +168,10 @@ fn main() -> std::io::Result<()> {
         ]),
         "A port whose curve falls below zero has given out more than it took.",
     );
+}
+
+/// Bars, and points beside a line.
+fn shares(page: &mut Page) {
     page.figure(
         Figure::beside([
             Plot::new("Share of the motion by effect")
@@ -183,7 +190,10 @@ fn main() -> std::io::Result<()> {
         ]),
         "",
     );
+}
 
+/// A wide table, and what is folded away.
+fn numbers(page: &mut Page) {
     page.section("Numbers");
     let mut table = Table::new([
         "method",
@@ -235,7 +245,10 @@ fn main() -> std::io::Result<()> {
             .text("Cross-spectra against the recorded dither.\n\nA second paragraph.")
             .table(Table::new(["setting", "value"]).row(["segments", "31"]).row(["window", "Hann"]).align(1, Align::Right));
     });
+}
 
+/// What a figure makes of nothing, of one value and of what its axis cannot show.
+fn odd_data(page: &mut Page) {
     page.section("Odd data");
     page.figure(
         Figure::beside([
@@ -252,6 +265,27 @@ fn main() -> std::io::Result<()> {
         ]),
         "",
     );
+}
+
+fn main() -> std::io::Result<()> {
+    let path = std::env::args().nth(1).unwrap_or_else(|| "gallery.html".into());
+    let mut page = Page::new("Stability of session-07.mcap at μλ = 6.2");
+    page.lead(
+        Tone::Bad,
+        "Unstable at μλ = 6.2: the loop goes into a limit cycle of 1.4 mm at 23 Hz. It is stable up to μλ = 4.1 (95 %: 3.8 to 4.4).",
+    );
+    page.warning("The two methods disagree by 18 %: a physical effect may be missing from the model <impulse-engine>.");
+    page.note("Estimated from 31 segments of 2.0 s, Hann window, 50 % overlap; coherence above 0.8 from 1 Hz to 140 Hz.");
+
+    let n = 20_000;
+    let t: Vec<f64> = (0..n).map(|k| k as f64 / 4000.0).collect();
+    loop_figures(&mut page);
+    gain_sweep(&mut page);
+    time_response(&mut page, &t);
+    energy(&mut page, &t);
+    shares(&mut page);
+    numbers(&mut page);
+    odd_data(&mut page);
     page.write(&path)?;
     println!("{path}: {} kB", page.html().len() / 1000);
     Ok(())

@@ -1,7 +1,6 @@
 //! The truth about a hidden plant.
 
 use crate::effects::{Effect, EffectError};
-use crate::laws::Law;
 use crate::network::{Named, Network};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -138,10 +137,10 @@ impl Truth {
             }
         }
         for element in device.elements.iter_mut().filter(|element| element.of_grip) {
-            match &mut element.law {
-                Law::Spring(spring) => spring.stiffness *= self.hand.stiffness,
-                Law::Damper(damper) => damper.damping *= self.hand.damping,
-                _ => {}
+            for (key, factor) in [("stiffness", self.hand.stiffness), ("damping", self.hand.damping)] {
+                if let Some(number) = element.law.number_mut(key) {
+                    *number *= factor;
+                }
             }
         }
         for sensor in &self.sensors {

@@ -1,6 +1,6 @@
 //! The force that gave the physics away, the law over it, and the places that compete.
 
-use super::adds;
+use super::phrases::{adds, capital};
 use crate::recordings::file_name;
 use backdrive_diagnosis::candidate::Candidate;
 use backdrive_diagnosis::diagnose::Diagnosis;
@@ -46,7 +46,7 @@ pub(super) fn section(page: &mut Page, found: &Diagnosis, best: &Candidate) {
 /// A finding's physics and place in words, as a title.
 pub(super) fn in_words(best: &Candidate, which: usize) -> String {
     let Some(own) = best.structure.added.get(which) else { return String::new() };
-    super::capital(&words::named(own.physics.name, &own.place)).trim_end_matches('.').to_string()
+    capital(&words::named(own.physics.name, &own.place)).trim_end_matches('.').to_string()
 }
 
 /// How a place reads.
@@ -203,7 +203,7 @@ fn law(evidence: &Evidence, main: &Trace) -> Series {
             let thin = |x: &[f64]| x.iter().step_by(step).copied().collect::<Vec<f64>>();
             Series::points("the law found", &thin(&x), &thin(&y)).width(1.3)
         }
-        _ => Series::line("the law found", &x, &y).dash(Dash::Solid).width(2.2),
+        Against::Velocity | Against::Displacement | Against::Time => Series::line("the law found", &x, &y).dash(Dash::Solid).width(2.2),
     };
     series.colour(Colour::Nth(1))
 }

@@ -1,6 +1,6 @@
 //! Measured beside predicted, and what is left over.
 
-use super::adds;
+use super::phrases::adds;
 use crate::recordings::file_name;
 use backdrive_diagnosis::candidate::Candidate;
 use backdrive_diagnosis::compare::{Predicted, density, predictions, qualities};

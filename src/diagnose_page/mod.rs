@@ -2,16 +2,17 @@
 
 mod force;
 mod held_out;
+mod phrases;
 mod tables;
 
 use crate::diagnose_text::{alternatives, confidence, next_experiment, parameters, shows};
 use crate::page_parts::{command, ending};
 use backdrive_diagnosis::audit::Weight;
-use backdrive_diagnosis::candidate::Candidate;
 use backdrive_diagnosis::diagnose::Diagnosis;
 use backdrive_diagnosis::verdict::{MODEL_FILE, Verdict, Word, chosen};
 use backdrive_diagnosis::words;
 use backdrive_report::{Cell, Page, Table, Tone, percent};
+use phrases::{adds, capital};
 
 /// What a report shows.
 pub struct Shown<'a> {
@@ -126,11 +127,6 @@ fn to_do(found: &Diagnosis) -> Vec<(String, Option<String>)> {
     items
 }
 
-/// The physics that a candidate adds, or nothing.
-fn adds(candidate: &Candidate) -> bool {
-    !candidate.structure.added.is_empty()
-}
-
 fn tone(word: Word) -> Tone {
     match word {
         Word::NothingMissing => Tone::Good,
@@ -191,12 +187,4 @@ fn findings(page: &mut Page, verdict: &Verdict) {
         table.push(row);
     }
     page.table(table);
-}
-
-/// A sentence from a clause: its first letter large, a full stop at its end.
-fn capital(clause: &str) -> String {
-    let mut chars = clause.chars();
-    let first: String = chars.next().map(|c| c.to_uppercase().collect()).unwrap_or_default();
-    let stop = if clause.is_empty() || clause.ends_with(['.', '!', '?', ':']) { "" } else { "." };
-    format!("{first}{}{stop}", chars.as_str())
 }

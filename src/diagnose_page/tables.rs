@@ -1,6 +1,6 @@
 //! Tables: hypotheses, numbers, records, the audit.
 
-use super::adds;
+use super::phrases::adds;
 use backdrive_diagnosis::audit::Weight;
 use backdrive_diagnosis::candidate::{Candidate, advantage_over};
 use backdrive_diagnosis::diagnose::Diagnosis;

@@ -124,7 +124,7 @@ fn seen<R: BufRead, W: Write>(
 ) -> Result<Seen, Failure> {
     let moving = match plan.driven {
         Driven::Motion => Some(&plan.drive),
-        _ => plan.position.as_ref(),
+        Driven::Force | Driven::Current => plan.position.as_ref(),
     };
     let begins = if records.iter().any(|r| begins_moving(r, moving.map(|s| s.name.as_str()), plan)) { "free" } else { "rest" };
     let question = Question {
@@ -211,7 +211,7 @@ fn shown<'a>(plan: &Plan, records: &'a [Recording]) -> Vec<Shown<'a>> {
         let drive = signal(record, &plan.drive.name)?;
         let (force, motion) = match plan.driven {
             Driven::Motion => (signal(record, &plan.force.as_ref()?.name)?, Measured::Position(drive)),
-            _ => match (&plan.position, &plan.velocity) {
+            Driven::Force | Driven::Current => match (&plan.position, &plan.velocity) {
                 (Some(position), _) => (drive, Measured::Position(signal(record, &position.name)?)),
                 (None, Some(velocity)) => (drive, Measured::Velocity(signal(record, &velocity.name)?)),
                 (None, None) => return None,

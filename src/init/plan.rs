@@ -92,112 +92,19 @@ pub fn plan<R: BufRead, W: Write>(asker: &mut Asker<R, W>, options: &Init, found
         options.driven,
         Some(Driven::Force),
     )?;
-    let (force, position, velocity) =
-        (motion.pick(Kind::Force, Kind::Torque), motion.pick(Kind::Length, Kind::Angle), motion.pick(Kind::Speed, Kind::AngularSpeed));
-
-    // A bag's messages have times of their own.
-    let is_table = found.columns.iter().any(|c| matches!(c.source, backdrive_plant::recording::Source::Column(_)));
-    let time = match is_table || options.time.is_some() {
-        true => talk.signal(&Asked {
-            option: "time",
-            words: "Which column is the time?",
-            kinds: &[Kind::Time],
-            likely: &TIMES,
-            column: &options.time,
-            unit: &options.time_unit,
-            si: "s",
-            may_be_absent: false,
-        })?,
-        false => None,
-    };
-    let (words, kinds, likely, si): (&str, &[Kind], &[&str], &str) = match driven {
-        Driven::Force => ("Which column is the force or torque that drives it?", &[force], &DRIVES, motion.pick("N", "N m")),
-        Driven::Current => ("Which column is the motor's current?", &[Kind::Current], &CURRENTS, "A"),
-        Driven::Motion => (
-            "Which column is the prescribed motion, a position or an angle?",
-            &[position, Kind::Count],
-            &POSITIONS,
-            motion.pick("m", "rad"),
-        ),
-    };
-    let column =
-        Asked { option: "drive", words, kinds, likely, column: &options.drive, unit: &options.drive_unit, si, may_be_absent: false };
-    let mut drive = talk.signal(&column)?.ok_or_else(|| usage("say --drive: which column drives it".to_string()))?;
-    if driven == Driven::Current {
-        let words =
-            motion.pick("The motor's constant, N/A (with the gear's ratio)?", "The motor's constant, N m/A (with the gear's ratio)?");
-        drive.scale = Some(talk.number("constant", words, options.constant, None)?);
-        drive.name = talk.unique(motion.pick("motor_force", "motor_torque"));
-    }
-    let per_count = |talk: &mut Talk<R, W>| {
-        let words = motion.pick("The size of one count, m?", "The size of one count, rad? (6.2832 over the counts of a turn)");
-        talk.number("per-count", words, options.per_count, None)
-    };
-    let is_count = |s: &Signal| s.unit.or(s.column.unit).is_some_and(|u| u.kind == Kind::Count);
-    if driven == Driven::Motion && is_count(&drive) {
-        drive.scale = Some(per_count(&mut talk)?);
-    }
-
-    let attached = talk.one_of(
-        "attached",
-        "What does the driven body hold on to: nothing (its bearing only), a spring to the frame (a specimen, a return spring), or a load behind a \
-         joint that yields?",
-        options.attached,
-        Some(if driven == Driven::Motion { Attached::Spring } else { Attached::Nothing }),
-    )?;
-    let resonance = match attached {
-        Attached::Load => {
-            talk.number("resonance", "Roughly where does the load ring against the motor, Hz?", options.resonance, Some(30.0))?
-        }
-        _ => 30.0,
-    };
+    let time = time(&mut talk, options)?;
+    let drive = drive(&mut talk, options, motion, driven)?;
+    let (attached, resonance) = attached(&mut talk, options, driven)?;
     let mut plan = Plan { motion, driven, drive, time, position: None, velocity: None, force: None, attached, resonance, hand: false };
     if driven != Driven::Motion {
-        plan.position = talk.signal(&Asked {
-            option: "position",
-            words: "Which column is the measured position (angle) of the driven body?",
-            kinds: &[position, Kind::Count],
-            likely: &POSITIONS,
-            column: &options.position,
-            unit: &options.position_unit,
-            si: motion.pick("m", "rad"),
-            may_be_absent: true,
-        })?;
-        if let Some(position) = plan.position.as_mut().filter(|p| is_count(p)) {
-            position.scale = Some(per_count(&mut talk)?);
-        }
-        plan.velocity = talk.signal(&Asked {
-            option: "velocity",
-            words: "Which column is its measured velocity? (none, where it was computed from the position: it says nothing new)",
-            kinds: &[velocity],
-            likely: &VELOCITIES,
-            column: &options.velocity,
-            unit: &options.velocity_unit,
-            si: motion.pick("m/s", "rad/s"),
-            may_be_absent: true,
-        })?;
+        position_and_velocity(&mut talk, options, &mut plan)?;
     } else {
         refuse("position", &options.position, "a prescribed motion is --drive, and its reaction --force")?;
         refuse("velocity", &options.velocity, "a prescribed motion is --drive, as a position; its reaction is --force")?;
     }
-    match (driven, attached) {
-        (Driven::Motion, _) | (_, Attached::Load) => {
-            let is_reaction = driven == Driven::Motion;
-            plan.force = talk.signal(&Asked {
-                option: "force",
-                words: match is_reaction {
-                    true => "Which column is the measured reaction, the force (torque) that moves it?",
-                    false => "Which column is the measured force (torque) in the joint to the load?",
-                },
-                kinds: &[force],
-                likely: &FORCES,
-                column: &options.force,
-                unit: &options.force_unit,
-                si: motion.pick("N", "N m"),
-                may_be_absent: !is_reaction,
-            })?;
-        }
-        _ => refuse(
+    match driven == Driven::Motion || attached == Attached::Load {
+        true => plan.force = force(&mut talk, options, motion, driven)?,
+        false => refuse(
             "force",
             &options.force,
             "without a prescribed motion or a load (--attached load) there is no joint that it could be measured in",
@@ -212,6 +119,124 @@ pub fn plan<R: BufRead, W: Write>(asker: &mut Asker<R, W>, options: &Init, found
         return Err(usage("--hand: a motion that is prescribed leaves a hand nothing to move".to_string()));
     }
     Ok(plan)
+}
+
+/// The column of the time, which a bag's messages have by themselves.
+fn time<R: BufRead, W: Write>(talk: &mut Talk<R, W>, options: &Init) -> Result<Option<Signal>, Failure> {
+    let is_table = talk.found.columns.iter().any(|c| matches!(c.source, backdrive_plant::recording::Source::Column(_)));
+    match is_table || options.time.is_some() {
+        true => talk.signal(&Asked {
+            option: "time",
+            words: "Which column is the time?",
+            kinds: &[Kind::Time],
+            likely: &TIMES,
+            column: &options.time,
+            unit: &options.time_unit,
+            si: "s",
+            may_be_absent: false,
+        }),
+        false => Ok(None),
+    }
+}
+
+/// What drives it.
+fn drive<R: BufRead, W: Write>(talk: &mut Talk<R, W>, options: &Init, motion: Motion, driven: Driven) -> Result<Signal, Failure> {
+    let (force, position) = ([motion.pick(Kind::Force, Kind::Torque)], [motion.pick(Kind::Length, Kind::Angle), Kind::Count]);
+    let (words, kinds, likely, si): (&str, &[Kind], &[&str], &str) = match driven {
+        Driven::Force => ("Which column is the force or torque that drives it?", &force, &DRIVES, motion.pick("N", "N m")),
+        Driven::Current => ("Which column is the motor's current?", &[Kind::Current], &CURRENTS, "A"),
+        Driven::Motion => {
+            ("Which column is the prescribed motion, a position or an angle?", &position, &POSITIONS, motion.pick("m", "rad"))
+        }
+    };
+    let column =
+        Asked { option: "drive", words, kinds, likely, column: &options.drive, unit: &options.drive_unit, si, may_be_absent: false };
+    let mut drive = talk.signal(&column)?.ok_or_else(|| usage("say --drive: which column drives it".to_string()))?;
+    if driven == Driven::Current {
+        let words =
+            motion.pick("The motor's constant, N/A (with the gear's ratio)?", "The motor's constant, N m/A (with the gear's ratio)?");
+        drive.scale = Some(talk.number("constant", words, options.constant, None)?);
+        drive.name = talk.unique(motion.pick("motor_force", "motor_torque"));
+    }
+    if driven == Driven::Motion && is_count(&drive) {
+        drive.scale = Some(per_count(talk, options, motion)?);
+    }
+    Ok(drive)
+}
+
+/// Whether a signal is read in counts of an encoder.
+fn is_count(s: &Signal) -> bool {
+    s.unit.or(s.column.unit).is_some_and(|u| u.kind == Kind::Count)
+}
+
+/// The size of a count, m or rad.
+fn per_count<R: BufRead, W: Write>(talk: &mut Talk<R, W>, options: &Init, motion: Motion) -> Result<f64, Failure> {
+    let words = motion.pick("The size of one count, m?", "The size of one count, rad? (6.2832 over the counts of a turn)");
+    talk.number("per-count", words, options.per_count, None)
+}
+
+/// What the driven body holds on to, and where a load rings against it, Hz.
+fn attached<R: BufRead, W: Write>(talk: &mut Talk<R, W>, options: &Init, driven: Driven) -> Result<(Attached, f64), Failure> {
+    let attached = talk.one_of(
+        "attached",
+        "What does the driven body hold on to: nothing (its bearing only), a spring to the frame (a specimen, a return spring), or a load behind a \
+         joint that yields?",
+        options.attached,
+        Some(if driven == Driven::Motion { Attached::Spring } else { Attached::Nothing }),
+    )?;
+    let resonance = match attached {
+        Attached::Load => {
+            talk.number("resonance", "Roughly where does the load ring against the motor, Hz?", options.resonance, Some(30.0))?
+        }
+        Attached::Nothing | Attached::Spring => 30.0,
+    };
+    Ok((attached, resonance))
+}
+
+/// What is measured of a body that a force or a current drives.
+fn position_and_velocity<R: BufRead, W: Write>(talk: &mut Talk<R, W>, options: &Init, plan: &mut Plan) -> Result<(), Failure> {
+    plan.position = talk.signal(&Asked {
+        option: "position",
+        words: "Which column is the measured position (angle) of the driven body?",
+        kinds: &[plan.motion.pick(Kind::Length, Kind::Angle), Kind::Count],
+        likely: &POSITIONS,
+        column: &options.position,
+        unit: &options.position_unit,
+        si: plan.motion.pick("m", "rad"),
+        may_be_absent: true,
+    })?;
+    if let Some(position) = plan.position.as_mut().filter(|p| is_count(p)) {
+        position.scale = Some(per_count(talk, options, plan.motion)?);
+    }
+    plan.velocity = talk.signal(&Asked {
+        option: "velocity",
+        words: "Which column is its measured velocity? (none, where it was computed from the position: it says nothing new)",
+        kinds: &[plan.motion.pick(Kind::Speed, Kind::AngularSpeed)],
+        likely: &VELOCITIES,
+        column: &options.velocity,
+        unit: &options.velocity_unit,
+        si: plan.motion.pick("m/s", "rad/s"),
+        may_be_absent: true,
+    })?;
+    Ok(())
+}
+
+/// The measured reaction of a prescribed motion, or the force in the joint to a load.
+fn force<R: BufRead, W: Write>(talk: &mut Talk<R, W>, options: &Init, motion: Motion, driven: Driven) -> Result<Option<Signal>, Failure> {
+    let is_reaction = driven == Driven::Motion;
+    talk.signal(&Asked {
+        option: "force",
+        words: match is_reaction {
+            true => "Which column is the measured reaction, the force (torque) that moves it?",
+            false => "Which column is the measured force (torque) in the joint to the load?",
+        },
+        kinds: &[motion.pick(Kind::Force, Kind::Torque)],
+        likely: &FORCES,
+        column: &options.force,
+        unit: &options.force_unit,
+        si: motion.pick("N", "N m"),
+        may_be_absent: !is_reaction,
+    })
 }
 
 /// An option that has no place beside the others.

@@ -127,7 +127,7 @@ pub fn model(plan: &Plan, seen: &Seen, name: &str) -> String {
     if let Some(measured) = &plan.force {
         match plan.driven {
             Driven::Motion => output(measured, "reaction", &of_body, None),
-            _ => output(measured, "force", "element = [\"joint\", \"joint_damping\"]", None),
+            Driven::Force | Driven::Current => output(measured, "force", "element = [\"joint\", \"joint_damping\"]", None),
         }
     }
     if let (Some(position), true) = (&plan.position, plan.driven != Driven::Motion) {

@@ -82,7 +82,7 @@ impl Done {
             }
             let told = match &report.cause {
                 Cause::NodeDied { node, .. } | Cause::NodeFailed { node, .. } => node.as_str(),
-                _ => "",
+                Cause::Completed | Cause::EndedEarly { .. } | Cause::Stopped { .. } => "",
             };
             for death in report.deaths.iter().filter(|d| d.node != told || d.recovered) {
                 lines.push(format!("died     {} {} at {:.3} s", death.node, death.how, death.t_s));

@@ -72,6 +72,6 @@ pub fn stability(options: &cli::Stability) -> Result<u8, Failure> {
     Ok(match found.verdict {
         Word::Stable => 0,
         Word::CannotTell => code::CANNOT_TELL,
-        _ => code::NEGATIVE,
+        Word::LimitCycle | Word::Unstable | Word::Limited => code::NEGATIVE,
     })
 }

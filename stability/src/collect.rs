@@ -164,7 +164,7 @@ impl Collector {
                 }
             }
             Message::Gains(gains) if self.gains_topic.as_deref() == Some(topic) => self.hear_gains(gains),
-            _ => {}
+            Message::Gains(_) | Message::Event(_) | Message::Status(_) | Message::Margin(_) => {}
         }
     }
 

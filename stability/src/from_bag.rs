@@ -273,7 +273,9 @@ fn lay(topic: &Heard, axis: usize, first: u64, signals: &mut AxisSignals) {
         SignalRole::Dither if filled => put(signals.dither.get_or_insert_default(), EFFORT),
         SignalRole::Intent if filled => put(signals.intent.get_or_insert_default(), POSITION),
         SignalRole::Induced if filled => put(signals.induced.get_or_insert_default(), POSITION),
-        _ => {}
+        SignalRole::Dither | SignalRole::Intent | SignalRole::Induced => {}
+        // Of the scaling's force only the flags count, and the slave's motion comes with its contact force.
+        SignalRole::Force | SignalRole::Slave => {}
     }
     for (step, flags, _) in &topic.rows {
         let row = step.checked_sub(first).map(|r| r as usize);

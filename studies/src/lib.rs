@@ -9,6 +9,9 @@ pub mod filter;
 pub mod run;
 pub mod table;
 
+mod error;
+mod study;
+
 mod ball_screw;
 mod brfd_friction_damper;
 mod emps;
@@ -20,36 +23,12 @@ mod piezo_p885;
 mod silverbox;
 pub mod steering;
 
-use backdrive::failure::{Failure, code};
+pub use error::StudyError;
+pub use study::{Context, Study};
+
 use data::Data;
 use std::path::Path;
 use table::Report;
-
-/// A study.
-pub struct Study {
-    /// Its name: of its folder in `studies/`, and on the command line.
-    pub name: &'static str,
-    /// What it shows, in one line.
-    pub about: &'static str,
-    /// Folder of its recordings in the data folder, and the files it needs from there; none where it makes its recordings itself.
-    pub needs: (&'static str, &'static [&'static str]),
-    /// Runs it: where its recordings are, where its results go.
-    run: fn(&Context) -> Result<Report, StudyError>,
-}
-
-/// What a study is given.
-pub struct Context<'a> {
-    /// The folder of its models and sets.
-    pub folder: &'a Path,
-    /// The folder of its recordings.
-    pub data: &'a Path,
-    /// The folder for its results, which is there.
-    pub out: &'a Path,
-    /// Whether only the short part is wanted, less than half a minute on a machine that is free.
-    pub quick: bool,
-    /// How many times more than usual each search may compute.
-    pub longer: f64,
-}
 
 /// Every study; a new one has its line here.
 pub const STUDIES: &[&Study] = &[
@@ -68,50 +47,6 @@ pub const STUDIES: &[&Study] = &[
     &steering::STUDY,
 ];
 
-/// Why a study has no result.
-#[derive(Debug, thiserror::Error)]
-pub enum StudyError {
-    /// The recordings are not here; the study is to be skipped.
-    #[error("{0}")]
-    NoData(String),
-    /// There is no study of this name.
-    #[error("there is no study \"{0}\"; there are {names}", names = names())]
-    Unknown(String),
-    /// A file cannot be read, or does not hold what is needed.
-    #[error("{0}")]
-    File(String),
-    /// A file or folder of results cannot be written.
-    #[error("{0}")]
-    Write(String),
-    /// A file of the format of models, sets or recordings is wrong.
-    #[error(transparent)]
-    Format(#[from] backdrive_plant::tomlfile::FileError),
-    /// The diagnosis failed.
-    #[error("{0}")]
-    Diagnosis(String),
-    /// What `backdrive diagnose` would fail with.
-    #[error("{}", .0.message)]
-    Failure(Failure),
-}
-
-impl StudyError {
-    /// The exit code of `study`, as `backdrive` has them ([`code`]).
-    pub fn code(&self) -> u8 {
-        match self {
-            StudyError::NoData(_) | StudyError::Diagnosis(_) => code::CANNOT_TELL,
-            StudyError::Unknown(_) | StudyError::File(_) | StudyError::Format(_) => code::BAD_INPUT,
-            StudyError::Write(_) => code::MACHINE,
-            StudyError::Failure(failure) => failure.code,
-        }
-    }
-}
-
-impl From<Failure> for StudyError {
-    fn from(failure: Failure) -> StudyError {
-        StudyError::Failure(failure)
-    }
-}
-
 /// Names of all studies, separated by commas.
 fn names() -> String {
     STUDIES.iter().map(|s| s.name).collect::<Vec<_>>().join(", ")
@@ -122,7 +57,7 @@ fn names() -> String {
 /// # Errors
 /// When there is none.
 pub fn study_named(name: &str) -> Result<&'static Study, StudyError> {
-    STUDIES.iter().copied().find(|s| s.name == name).ok_or_else(|| StudyError::Unknown(name.to_string()))
+    STUDIES.iter().copied().find(|s| s.name == name).ok_or_else(|| StudyError::Unknown { name: name.to_string(), known: names() })
 }
 
 impl Study {

@@ -1,5 +1,6 @@
 //! Each study where its recordings are: what it names, and its figures with margins. Where they are not, a message and nothing else.
-//! The short parts; with BACKDRIVE_STUDIES=1 whole studies, which take up to a quarter of an hour together.
+//! The short parts of those that take seconds; with BACKDRIVE_LONG=1 the short parts of all, with BACKDRIVE_STUDIES=1 whole studies, which take up to
+//! a quarter of an hour together.
 
 #[path = "../../tests/common/skipped.rs"]
 mod skipped;
@@ -16,6 +17,15 @@ static TURN: Mutex<()> = Mutex::new(());
 /// Whether the long parts are wanted, too.
 fn long() -> bool {
     std::env::var_os("BACKDRIVE_STUDIES").is_some_and(|v| v == "1")
+}
+
+/// The report of a study whose short part takes half a minute; `None` with a message where nobody asks for it, or as [`report`].
+fn report_of_a_search(name: &str) -> Option<Report> {
+    if !long() && std::env::var("BACKDRIVE_LONG").as_deref() != Ok("1") {
+        skipped("a search of half a minute; BACKDRIVE_LONG=1 runs it");
+        return None;
+    }
+    report(name)
 }
 
 /// A study's report; `None` with a message where its recordings are not here.
@@ -101,7 +111,7 @@ fn emps_from_its_published_models() {
 
 #[test]
 fn silverbox_has_a_cubic_spring_that_holds_beyond_what_was_fitted() {
-    let Some(report) = report("silverbox") else { return };
+    let Some(report) = report_of_a_search("silverbox") else { return };
     assert!(report.word_named("verdict").contains("cubic_spring at mass-ground"), "{}", report.word_named("verdict"));
     // A search with time enough finds a one-sided law too, which takes a part of the hardening.
     let near = 0.05;
@@ -113,7 +123,7 @@ fn silverbox_has_a_cubic_spring_that_holds_beyond_what_was_fitted() {
 
 #[test]
 fn the_robot_s_encoders_are_read_at_different_times() {
-    let Some(report) = report("kuka_kr300") else { return };
+    let Some(report) = report_of_a_search("kuka_kr300") else { return };
     for axis in if long() { 1..=3 } else { 1..=1 } {
         let verdict = report.word_named(&format!("axis-{axis}"));
         assert!(verdict.contains("delay at") && !verdict.contains("series_compliance"), "{axis}: {verdict}");
@@ -136,7 +146,7 @@ fn the_motor_cogs_seven_times_a_turn() {
 
 #[test]
 fn the_damper_s_joint_is_slack_about_its_middle() {
-    let Some(report) = report("brfd_friction_damper") else { return };
+    let Some(report) = report_of_a_search("brfd_friction_damper") else { return };
     // What is named stands in the joint, and holds for strokes and speeds that no fit has seen.
     let verdict = report.word_named("verdict");
     assert!(["backlash at rod-drum", "cubic_spring at rod-drum"].iter().any(|p| verdict.contains(p)), "{verdict}");
@@ -153,7 +163,7 @@ fn the_damper_s_joint_is_slack_about_its_middle() {
 
 #[test]
 fn the_piezo_stack_has_hysteresis_and_lags() {
-    let Some(report) = report("piezo_p885") else { return };
+    let Some(report) = report_of_a_search("piezo_p885") else { return };
     let verdict = report.word_named("verdict");
     assert!(["bouc_wen", "hysteretic_spring", "maxwell_slip", "dahl", "preisach_lugre"].iter().any(|p| verdict.contains(p)), "{verdict}");
     assert!(["delay at drive", "bandwidth at drive"].iter().any(|p| verdict.contains(p)), "{verdict}");

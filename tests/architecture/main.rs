@@ -91,7 +91,7 @@ fn a_circle_is_seen_through_what_is_handed_on_and_not_in_tests() {
     let folder = std::env::temp_dir().join(format!("backdrive-architecture-{}", std::process::id()));
     std::fs::create_dir_all(&folder).expect("a folder can be made");
     let put = |name: &str, text: &str| std::fs::write(folder.join(name), text).expect("a file can be written");
-    put("lib.rs", "mod a;\nmod b;\nmod c;\npub use a::A;\nuse b::{self, B,};\n");
+    put("lib.rs", "mod a;\nmod b;\nmod c;\npub use a::A;\nuse b::{self, B,};\npub const NONE: Option<&'static B> = None;\n");
     put("a.rs", "use super::B;\nuse crate::c::C;\npub struct A(B, C);\n");
     put("b.rs", "use crate::c::{self, C as Other};\npub struct B(Vec<Option<c::C>>, Other);\n#[cfg(test)]\nmod tests { use crate::A; }\n");
     put("c.rs", "// use super::A;\npub struct C(&'static str);\npub const TEXT: C = C(\"crate::A\");\n");

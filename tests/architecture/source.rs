@@ -202,8 +202,9 @@ fn words(text: &str) -> Vec<String> {
         } else if c == '"' {
             i = quoted(&chars, i, '"');
         } else if c == '\'' {
-            // A character, or a lifetime.
-            i = if at(i + 1) == '\\' || at(i + 2) == '\'' { quoted(&chars, i, '\'') } else { i + 1 };
+            // A character, or a lifetime, whose name (`'static`) is no word of the text.
+            let name = || (i + 1..chars.len()).find(|j| !(chars[*j].is_alphanumeric() || chars[*j] == '_')).unwrap_or(chars.len());
+            i = if at(i + 1) == '\\' || at(i + 2) == '\'' { quoted(&chars, i, '\'') } else { name() };
         } else if c.is_alphanumeric() || c == '_' {
             let end = (i..chars.len()).find(|j| !(chars[*j].is_alphanumeric() || chars[*j] == '_')).unwrap_or(chars.len());
             found.push(chars[i..end].iter().collect());

@@ -21,8 +21,8 @@ pub const ADDRESSES: [&str; 2] = ["10.9.0.1", "10.9.0.2"];
 pub struct Hosts {
     names: [String; 2],
     relay: Option<Relay>,
-    /// Two runs in real time at once would only measure each other.
-    _alone: MutexGuard<'static, ()>,
+    /// Two runs in real time at once would only measure each other; `None` for those that run none.
+    _alone: Option<MutexGuard<'static, ()>>,
 }
 
 static ALONE: Mutex<()> = Mutex::new(());
@@ -30,16 +30,21 @@ static ALONE: Mutex<()> = Mutex::new(());
 impl Hosts {
     /// Joined by a cable. `None`, with a message, where namespaces are not permitted; with BACKDRIVE_REQUIRE_NETNS=1 a failure.
     pub fn joined() -> Option<Hosts> {
-        Hosts::make(None)
+        Hosts::make(None, true)
+    }
+
+    /// The same for a test that runs nothing in real time, and so goes on beside one that does.
+    pub fn joined_at_leisure() -> Option<Hosts> {
+        Hosts::make(None, false)
     }
 
     /// Joined by a relay.
     pub fn relayed(link: Link) -> Option<Hosts> {
-        Hosts::make(Some(link))
+        Hosts::make(Some(link), true)
     }
 
-    fn make(link: Option<Link>) -> Option<Hosts> {
-        let alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
+    fn make(link: Option<Link>, alone: bool) -> Option<Hosts> {
+        let alone = alone.then(|| ALONE.lock().unwrap_or_else(PoisonError::into_inner));
         static COUNT: AtomicU32 = AtomicU32::new(0);
         let id = format!("bd{}_{}", std::process::id(), COUNT.fetch_add(1, Ordering::Relaxed));
         let names = [format!("{id}a"), format!("{id}b")];

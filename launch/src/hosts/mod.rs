@@ -304,7 +304,8 @@ impl Round {
                 }
             }
             Say::Start { to, life, begun } if to == self.name && life == self.life => self.start(begun),
-            _ => {}
+            // For other hosts, or for an earlier life of this one.
+            Say::Ping { .. } | Say::Pong { .. } | Say::Start { .. } => {}
         }
     }
 

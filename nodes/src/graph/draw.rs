@@ -91,7 +91,14 @@ fn describe(node: &Node) -> String {
             }
         }
         Settings::Controller { law, .. } => format!("{}: {}", kind.name(), law.law.name()),
-        _ => kind.name().to_string(),
+        Settings::Operator(_)
+        | Settings::Scaling { .. }
+        | Settings::Exciter(_)
+        | Settings::Cycle(_)
+        | Settings::SpeedControl(_)
+        | Settings::Dynamometer(..)
+        | Settings::Engine(_)
+        | Settings::Recorder => kind.name().to_string(),
     }
 }
 

@@ -10,6 +10,19 @@ use super::state::Plant;
 /// Stands for a number of free bodies that is not known when the code is compiled.
 const ANY: usize = 0;
 
+/// A substep while it is computed, by place; SI units.
+struct Motion {
+    /// Mean force, N, and what of it the inputs push with.
+    force: Slots,
+    pushed: Slots,
+    /// Position in the middle, and mean velocity.
+    middle: Slots,
+    mean_velocity: Slots,
+    /// Position at the end where it is prescribed, of a free body what is added to it; velocity at the end.
+    end: Slots,
+    end_velocity: Slots,
+}
+
 impl Plant {
     /// One period by substeps.
     pub(super) fn step_by_substeps(&mut self) {
@@ -38,52 +51,70 @@ impl Plant {
     /// `N` is the number of free bodies, or [`ANY`].
     #[inline]
     fn substep<const N: usize>(&mut self, from: f64, to: f64) {
+        let n = if N == ANY { self.fixed.free.min(SLOTS) } else { N };
+        let mut motion = self.driven(n, from, to);
+        self.paths_to_the_middle(&mut motion);
+        self.move_freely(n, &mut motion);
+        if self.fixed.constraints.len() > 0 {
+            self.constrain(n, &mut motion);
+        }
+        self.count_energy(&motion);
+        self.arrive(n, &motion);
+    }
+
+    /// The motion as far as it is known before: what inputs push and prescribe, and how free bodies would go on.
+    #[inline(always)]
+    fn driven(&mut self, n: usize, from: f64, to: f64) -> Motion {
         let h = self.substep;
         let half = 0.5 * h;
-        let fixed = &self.fixed;
-        let n = if N == ANY { fixed.free.min(SLOTS) } else { N };
-
-        // Forces on each place over the substep, and velocity and position in its middle as far as known.
-        let mut force = fixed.constant;
-        let mut pushed = [0.0; SLOTS];
-        let mut middle = [0.0; SLOTS];
-        let mut mean_velocity = [0.0; SLOTS];
-        let mut end = [0.0; SLOTS];
-        let mut end_velocity = [0.0; SLOTS];
+        let mut motion = Motion {
+            force: self.fixed.constant,
+            pushed: [0.0; SLOTS],
+            middle: [0.0; SLOTS],
+            mean_velocity: [0.0; SLOTS],
+            end: [0.0; SLOTS],
+            end_velocity: [0.0; SLOTS],
+        };
         for drive in &mut self.drives {
+            let slot = drive.slot;
             if drive.moves {
-                let slot = drive.slot;
                 let (x0, v0, _) = drive.motion(from);
                 let (x1, v1, a1) = drive.motion(to);
-                (self.x[slot], end[slot], end_velocity[slot]) = (x0, x1, v1);
+                (self.x[slot], motion.end[slot], motion.end_velocity[slot]) = (x0, x1, v1);
                 self.prescribed_acceleration[slot] = a1;
                 // Mean of the cubic through both ends.
-                middle[slot] = 0.5 * (x0 + x1) + h / 12.0 * (v0 - v1);
-                mean_velocity[slot] = (x1 - x0) / h;
+                motion.middle[slot] = 0.5 * (x0 + x1) + h / 12.0 * (v0 - v1);
+                motion.mean_velocity[slot] = (x1 - x0) / h;
             } else {
                 let push = drive.mean(from, to);
-                force[drive.slot] += push;
-                pushed[drive.slot] += push;
+                motion.force[slot] += push;
+                motion.pushed[slot] += push;
             }
         }
         for i in 0..n {
-            middle[i] = self.x[i] + half * self.v[i];
-            mean_velocity[i] = self.v[i];
+            motion.middle[i] = self.x[i] + half * self.v[i];
+            motion.mean_velocity[i] = self.v[i];
         }
+        motion
+    }
 
+    /// Explicit paths come to the middle of the substep and act from there; those with a constraint to its start.
+    #[inline(always)]
+    fn paths_to_the_middle(&mut self, motion: &mut Motion) {
+        let half = 0.5 * self.substep;
         for path in &mut self.paths {
             let (first, second) = (path.first, path.second);
             let v0 = self.v[first] - self.v[second];
             if path.constraint.is_none() {
-                let x = middle[first] - middle[second];
+                let x = motion.middle[first] - motion.middle[second];
                 // Velocity in the middle by extrapolation: second order for laws that depend on it.
                 let v = 1.5 * v0 - 0.5 * path.velocity_before;
                 path.law.advance(&mut path.memory, path.reached, x, half);
                 path.reached = x;
                 let start = self.x[first] - self.x[second];
                 path.force = path.law.mean_force(&path.memory, start, 2.0 * x - start, v);
-                force[first] -= path.force;
-                force[second] += path.force;
+                motion.force[first] -= path.force;
+                motion.force[second] += path.force;
             } else {
                 // A prescribed body may have jumped to the start of this substep.
                 let x = self.x[first] - self.x[second];
@@ -94,11 +125,16 @@ impl Plant {
             }
             path.velocity_before = v0;
         }
+    }
 
-        // Half the velocity change without constraints.
+    /// Velocities as they would be without constraints.
+    #[inline(always)]
+    fn move_freely(&self, n: usize, motion: &mut Motion) {
+        let (h, fixed) = (self.substep, &self.fixed);
+        // Half the velocity change.
         let mut change = [0.0; SLOTS];
         for j in 0..n {
-            let (f, x, v) = (force[j], self.x[j], self.v[j]);
+            let (f, x, v) = (motion.force[j], self.x[j], self.v[j]);
             let (by_force, by_position, by_velocity) = (&fixed.from_force[j], &fixed.from_position[j], &fixed.from_velocity[j]);
             for i in 0..n {
                 change[i] += by_force[i] * f + by_position[i] * x + by_velocity[i] * v;
@@ -106,99 +142,120 @@ impl Plant {
         }
         for p in 0..fixed.prescribed {
             let slot = prescribed_slot(p);
-            let acceleration = (end_velocity[slot] - self.v[slot]) / h;
+            let acceleration = (motion.end_velocity[slot] - self.v[slot]) / h;
+            let (x, v) = (motion.middle[slot], motion.mean_velocity[slot]);
             let [by_position, by_velocity, by_acceleration] = &fixed.from_prescribed;
             for i in 0..n {
-                change[i] +=
-                    by_position[p][i] * middle[slot] + by_velocity[p][i] * mean_velocity[slot] + by_acceleration[p][i] * acceleration;
+                change[i] += by_position[p][i] * x + by_velocity[p][i] * v + by_acceleration[p][i] * acceleration;
             }
         }
         for i in 0..n {
-            mean_velocity[i] += change[i];
-            end_velocity[i] = mean_velocity[i] + change[i];
+            motion.mean_velocity[i] += change[i];
+            motion.end_velocity[i] = motion.mean_velocity[i] + change[i];
         }
+    }
 
-        if fixed.constraints.len() > 0 {
-            let work = &mut *self.work;
-            for (c, contact) in self.frictions.iter_mut().enumerate() {
-                work.base[c] = 0.5 * fixed.constraints.across(c, &end_velocity);
-                let v0 = self.v[contact.first] - self.v[contact.second];
-                work.bounds[c] = contact.bounds(v0, &middle, &self.paths);
-                work.force[c] = contact.force.min(work.bounds[c].high).max(work.bounds[c].low);
-                contact.velocity_before = v0;
+    /// The forces of dry friction and of stiff paths, and what they make of the velocities.
+    #[inline(always)]
+    fn constrain(&mut self, n: usize, motion: &mut Motion) {
+        self.constraint_forces(n, motion);
+        let (h, fixed, work) = (self.substep, &self.fixed, &mut *self.work);
+        let Motion { mean_velocity, end_velocity, .. } = motion;
+        for c in 0..fixed.constraints.len() {
+            let (f, response) = (work.force[c], &fixed.constraints.response[c]);
+            for i in 0..n {
+                mean_velocity[i] -= response[i] * f;
+                end_velocity[i] -= 2.0 * response[i] * f;
             }
-            for path in &self.paths {
-                if let Some(c) = path.constraint {
-                    work.base[c] = fixed.constraints.across(c, &mean_velocity);
-                    work.force[c] = path.force;
-                }
+        }
+        for (c, contact) in self.frictions.iter_mut().enumerate() {
+            contact.force = work.force[c];
+            let Bounds { low, high } = work.bounds[c];
+            contact.mode = if contact.force > low && contact.force < high {
+                0
+            } else if low == high {
+                let v = end_velocity[contact.first] - end_velocity[contact.second];
+                i8::from(v > 0.0) - i8::from(v < 0.0)
+            } else if contact.force >= high {
+                1
+            } else {
+                -1
+            };
+        }
+        for path in &mut self.paths {
+            if let Some(c) = path.constraint {
+                path.force = work.force[c];
             }
+        }
+        settle(&self.frictions, n, end_velocity);
+        for contact in self.frictions.iter_mut().filter(|contact| !contact.memory.is_empty()) {
+            let work = contact.force * (mean_velocity[contact.first] - mean_velocity[contact.second]) * h;
+            contact.law.rubbed(&mut contact.memory, work, h);
+        }
+    }
+
+    /// Solves for the forces of the constraints; of contacts that stop on the way also how much further that lets the bodies come.
+    #[inline(always)]
+    fn constraint_forces(&mut self, n: usize, motion: &mut Motion) {
+        let (h, fixed, work) = (self.substep, &self.fixed, &mut *self.work);
+        for (c, contact) in self.frictions.iter_mut().enumerate() {
+            work.base[c] = 0.5 * fixed.constraints.across(c, &motion.end_velocity);
+            let v0 = self.v[contact.first] - self.v[contact.second];
+            work.bounds[c] = contact.bounds(v0, &motion.middle, &self.paths);
+            work.force[c] = contact.force.min(work.bounds[c].high).max(work.bounds[c].low);
+            contact.velocity_before = v0;
+        }
+        for path in &self.paths {
+            if let Some(c) = path.constraint {
+                work.base[c] = fixed.constraints.across(c, &motion.mean_velocity);
+                work.force[c] = path.force;
+            }
+        }
+        fixed.constraints.solve(work, &mut self.paths);
+
+        let stops = self.frictions.iter().enumerate().any(|(c, contact)| contact.leaves_its_level(c, work));
+        if stops && stop(fixed, &self.frictions, work) {
             fixed.constraints.solve(work, &mut self.paths);
-
-            let stops = self.frictions.iter().enumerate().any(|(c, contact)| contact.leaves_its_level(c, work));
-            if stops && stop(fixed, &self.frictions, work) {
-                fixed.constraints.solve(work, &mut self.paths);
-                for (c, (share, sliding)) in work.stop.iter_mut().enumerate().take(self.frictions.len()) {
-                    if *share > 0.0 && *share < 1.0 {
-                        // The force acted in two levels, the first one early: so much more (or less) way was made.
-                        let after = (work.force[c] - *share * *sliding) / (1.0 - *share);
-                        let moment = (*sliding - after) * h * *share * (1.0 - *share);
-                        for i in 0..n {
-                            end[i] -= fixed.constraints.response[c][i] * moment;
-                        }
+            for (c, (share, sliding)) in work.stop.iter_mut().enumerate().take(self.frictions.len()) {
+                if *share > 0.0 && *share < 1.0 {
+                    // The force acted in two levels, the first one early: so much more (or less) way was made.
+                    let after = (work.force[c] - *share * *sliding) / (1.0 - *share);
+                    let moment = (*sliding - after) * h * *share * (1.0 - *share);
+                    for i in 0..n {
+                        motion.end[i] -= fixed.constraints.response[c][i] * moment;
                     }
-                    *share = 0.0;
                 }
-            }
-            for c in 0..fixed.constraints.len() {
-                let (f, response) = (work.force[c], &fixed.constraints.response[c]);
-                for i in 0..n {
-                    mean_velocity[i] -= response[i] * f;
-                    end_velocity[i] -= 2.0 * response[i] * f;
-                }
-            }
-            for (c, contact) in self.frictions.iter_mut().enumerate() {
-                contact.force = work.force[c];
-                let Bounds { low, high } = work.bounds[c];
-                contact.mode = if contact.force > low && contact.force < high {
-                    0
-                } else if low == high {
-                    let v = end_velocity[contact.first] - end_velocity[contact.second];
-                    i8::from(v > 0.0) - i8::from(v < 0.0)
-                } else if contact.force >= high {
-                    1
-                } else {
-                    -1
-                };
-            }
-            for path in &mut self.paths {
-                if let Some(c) = path.constraint {
-                    path.force = work.force[c];
-                }
-            }
-            settle(&self.frictions, n, &mut end_velocity);
-            for contact in self.frictions.iter_mut().filter(|contact| !contact.memory.is_empty()) {
-                let work = contact.force * (mean_velocity[contact.first] - mean_velocity[contact.second]) * h;
-                contact.law.rubbed(&mut contact.memory, work, h);
+                *share = 0.0;
             }
         }
+    }
 
+    #[inline(always)]
+    fn count_energy(&mut self, motion: &Motion) {
         if let Some(account) = &mut self.energy {
             let done = Done {
                 velocity: &self.v,
-                middle: &middle,
-                mean_velocity: &mean_velocity,
-                end_velocity: &end_velocity,
-                pushed: &pushed,
-                length: h,
+                middle: &motion.middle,
+                mean_velocity: &motion.mean_velocity,
+                end_velocity: &motion.end_velocity,
+                pushed: &motion.pushed,
+                length: self.substep,
             };
-            account.count(fixed, &self.drives, &self.frictions, &mut self.paths, &done);
+            account.count(&self.fixed, &self.drives, &self.frictions, &mut self.paths, &done);
         }
+    }
+
+    /// The state and the paths come to the end of the substep.
+    #[inline(always)]
+    fn arrive(&mut self, n: usize, motion: &Motion) {
+        let h = self.substep;
+        let half = 0.5 * h;
+        let mut end = motion.end;
         for i in 0..n {
-            end[i] += self.x[i] + half * (self.v[i] + end_velocity[i]);
+            end[i] += self.x[i] + half * (self.v[i] + motion.end_velocity[i]);
         }
         self.x = end;
-        self.v = end_velocity;
+        self.v = motion.end_velocity;
         for path in &mut self.paths {
             let x = end[path.first] - end[path.second];
             // An explicit one has already come to the middle.

@@ -38,18 +38,7 @@ pub fn coulomb(between: [Place; 2], force: f64) -> Element {
 }
 
 pub fn force_input(on: usize) -> Input {
-    Input {
-        name: "force".to_owned(),
-        kind: InputKind::Force,
-        on,
-        hold: Hold::Linear,
-        gain: 1.0,
-        saturation: f64::INFINITY,
-        delay: 0.0,
-        bandwidth: f64::INFINITY,
-        back_emf: 0.0,
-        offset: 0.0,
-    }
+    Input::ideal("force", InputKind::Force, on, Hold::Linear)
 }
 
 pub fn motion_input(on: usize) -> Input {

@@ -7,7 +7,7 @@ use super::sizing::{DRAG, FRICTION, between, rounded, share};
 use crate::effects::{Physics, Site};
 use crate::laws::Law;
 use crate::laws::draw::{AtBody, AtJoint, Here, Loading};
-use crate::network::{Network, Place};
+use crate::network::{Element, Network, Place};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
@@ -18,13 +18,14 @@ pub(super) fn physics(c: &Candidate, network: &Network, probe: &Probe, options: 
             let places = [network.place(&ends[0])?, network.place(&ends[1])?];
             let here = match places {
                 [Some(body), None] => Here::Body(at_body(c, body, network, probe, random)?),
-                _ => Here::Joint(at_joint(c, places, network, probe, options, random)?),
+                [None, _] | [Some(_), Some(_)] => Here::Joint(at_joint(c, places, network, probe, options, random)?),
             };
             match (c.what, &here) {
                 (What::Law(kind, _), here) => (kind.draw)(here, random).map(Physics::Law),
                 (What::Inertia, Here::Body(_)) => inertia(network, random),
                 (What::SeriesCompliance, Here::Joint(joint)) => series_compliance(joint, places, network, random),
-                _ => None,
+                (What::Inertia, Here::Joint(_)) | (What::SeriesCompliance, Here::Body(_)) => None,
+                (What::Delay | What::Bandwidth | What::BackEmf | What::Saturation, _) => None,
             }
         }
         Site::Signal(name) => at_input(c.what, network.inputs[network.input(name)?].on, probe, options, random),
@@ -47,12 +48,14 @@ fn at_body(c: &Candidate, body: usize, network: &Network, probe: &Probe, random:
         force,
         friction: rounded(share(FRICTION, random) * force),
         inertia: network.bodies[body].inertia,
-        stated_damping: match joint.map(|element| &element.law) {
-            Some(Law::Damper(damper)) => damper.damping,
-            _ => 0.0,
-        },
+        stated_damping: joint.map_or(0.0, stated_damping),
         joint: c.joint.map(|index| Loading { name: network.elements[index].name.clone(), force: positive(probe.element_force(index)) }),
     })
+}
+
+/// N s/m, the damping that the model states in an element; 0 of a law that has no such number.
+fn stated_damping(element: &Element) -> f64 {
+    element.law.clone().number_mut("damping").map_or(0.0, |damping| *damping)
 }
 
 /// What a joint does.
@@ -70,12 +73,7 @@ fn at_joint(
     let (stretch, speed) = (positive(probe.travel(places))?, positive(probe.speed(places))?);
     let force = positive(probe.element_force(joint))?;
     let absorbed = 0.01 * options.masked_percent * random.random_range(0.3..=1.0);
-    let damping: f64 = network
-        .elements
-        .iter()
-        .filter(|element| c.replaces.contains(&element.name))
-        .map(|element| if let Law::Damper(damper) = &element.law { damper.damping } else { 0.0 })
-        .sum();
+    let damping: f64 = network.elements.iter().filter(|element| c.replaces.contains(&element.name)).map(stated_damping).sum();
     Some(AtJoint { stiffness, damping, stretch, speed, force, absorbed })
 }
 

@@ -84,7 +84,9 @@ impl Answer {
             self.critical_frequency_hz = lowest.frequency_hz;
             self.critical_gain_ci95 = match lowest.method {
                 Method::Frequency => self.frequency_answer.as_ref().and_then(|a| a.critical_gain_ci95),
-                _ => lowest.critical_gain.and_then(|critical| self.interval_about(critical)),
+                Method::Resimulation | Method::Recording | Method::Nothing => {
+                    lowest.critical_gain.and_then(|critical| self.interval_about(critical))
+                }
             };
         }
         // The verdict: the worst; of several equally bad ones that with the lowest edge.

@@ -14,13 +14,12 @@ impl Answer {
         let margins = self.margins.as_ref().filter(|_| self.margins_are_of_the_edge());
         let cycle = again.filter(|_| self.from == Method::Resimulation).map(|a| a.outcome);
         let cycle = if self.from == Method::Recording { self.recorded_outcome } else { cycle };
-        let limit_cycle = match cycle {
-            Some(Outcome::LimitCycle { amplitude_m, frequency_hz }) => json!({ "amplitude_m": amplitude_m, "frequency_hz": frequency_hz }),
-            _ => Value::Null,
-        };
-        let growth = match cycle {
-            Some(Outcome::Unstable { growth_per_s }) => json!(growth_per_s),
-            _ => Value::Null,
+        let (limit_cycle, growth) = match cycle {
+            Some(Outcome::LimitCycle { amplitude_m, frequency_hz }) => {
+                (json!({ "amplitude_m": amplitude_m, "frequency_hz": frequency_hz }), Value::Null)
+            }
+            Some(Outcome::Unstable { growth_per_s }) => (Value::Null, json!(growth_per_s)),
+            Some(Outcome::Stable | Outcome::Limited { .. } | Outcome::NotJudged { .. }) | None => (Value::Null, Value::Null),
         };
         json!({
             "bag": self.bag,

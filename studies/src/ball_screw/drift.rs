@@ -1,7 +1,8 @@
 //! Figs 3-5: friction torque against position under a slow oscillating torque. LuGre drifts, the rig's orbits close.
 
-use super::{Friction, MM, PAPER, axis, failed};
+use super::axis::{Friction, MM, PAPER, axis};
 use crate::StudyError;
+use crate::error::failed;
 use crate::table::Report;
 use backdrive_plant::elements::kind_named;
 use backdrive_plant::model::{Hold, Model, OutputKind};

@@ -1,9 +1,10 @@
 //! Figs 12, 13 and 15: transition curves from five measured loops, by the deformed Dahl model, by that bent through the loops, and by the
 //! paper's network.
 
+use super::axis::{FILE, Friction, MM, PAPER, axis};
 use super::network::Network;
-use super::{FILE, Friction, MM, PAPER, axis, failed};
 use crate::StudyError;
+use crate::error::failed;
 use crate::papers::device;
 use crate::run::read;
 use crate::table::Report;

@@ -3,80 +3,19 @@
 //! No constant and no curve of the rig survives in the text that we have: every value is ours, and the paper's statements about shape
 //! and order are what is held against.
 
+mod axis;
 mod drift;
 mod identify;
 mod nested;
 mod network;
 mod tracking;
 
-use crate::papers::device;
-use crate::run::read;
 use crate::table::Report;
 use crate::{Context, Study, StudyError};
-use backdrive_control::controller::AxisModel;
-use backdrive_plant::elements::{Law, kind_named};
-use backdrive_plant::model::Model;
 use backdrive_report::{Cell, Page, Table, Tone};
 
 pub(crate) const STUDY: Study =
     Study { name: "ball_screw", about: "paper 000 reproduced: drift, nested loops, transition curves, controllers", needs: ("", &[]), run };
-
-const PAPER: &str = "Choi, Han & Kim 2006";
-const FILE: &str = "ball-screw-preisach.toml";
-/// mm of the carriage per rad of the screw, of a lead of 5 mm (chosen).
-const MM: f64 = 5.0 / std::f64::consts::TAU;
-
-/// Which friction an axis has.
-#[derive(Clone, Copy, PartialEq)]
-enum Friction {
-    Lugre,
-    Literal,
-    Gated,
-}
-
-impl Friction {
-    const ALL: [Friction; 3] = [Friction::Lugre, Friction::Literal, Friction::Gated];
-
-    fn name(self) -> &'static str {
-        match self {
-            Friction::Lugre => "LuGre",
-            Friction::Literal => "eqs (4)-(6) as printed",
-            Friction::Gated => "gated",
-        }
-    }
-}
-
-fn failed(error: impl std::fmt::Display) -> StudyError {
-    StudyError::Diagnosis(error.to_string())
-}
-
-/// The axis of the project with one of the friction laws; all have the same numbers where they have the same ones.
-fn axis(friction: Friction) -> Result<Model, StudyError> {
-    let mut model = Model::from_toml(&read(&device(FILE))?, FILE)?;
-    let element = model.elements.iter_mut().find(|e| matches!(e.law, Law::PreisachLugre(_)));
-    let element = element.ok_or_else(|| failed(format!("{FILE} has no preisach_lugre")))?;
-    let mut values = element.law.values();
-    let kind = match friction {
-        Friction::Gated => return Ok(model),
-        Friction::Literal => {
-            if let Some(gate) = values.last_mut() {
-                *gate = vec![0.0];
-            }
-            element.law.kind()
-        }
-        Friction::Lugre => {
-            values.truncate(5);
-            kind_named("lugre").ok_or_else(|| failed("there is no kind lugre"))?
-        }
-    };
-    element.law = (kind.build)(&values).map_err(failed)?;
-    Ok(model)
-}
-
-/// The friction alone, to be moved by hand.
-fn rubbing(friction: Friction) -> Result<AxisModel, StudyError> {
-    AxisModel::new(&axis(friction)?, 0).map_err(failed)
-}
 
 fn run(context: &Context) -> Result<Report, StudyError> {
     let mut report = Report::new("Paper 000: the ball-screw axis");

@@ -1,6 +1,6 @@
 //! Figs 6-8 and 11: turns within turns. LuGre forgets where it came from, the rig and the Preisach operator do not.
 
-use super::{Friction, MM, PAPER, axis, rubbing};
+use super::axis::{Friction, MM, PAPER, axis, rubbing};
 use crate::StudyError;
 use crate::table::Report;
 use backdrive_plant::elements::Law;

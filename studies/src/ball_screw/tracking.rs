@@ -1,8 +1,9 @@
 //! Figs 17-20 and the RMS table: controllers at equal bandwidth, in presliding and in sliding, with encoder steps and noise.
 
+use super::axis::{Friction, MM, PAPER, axis};
 use super::identify::Found;
-use super::{Friction, MM, PAPER, axis, failed};
 use crate::StudyError;
+use crate::error::failed;
 use crate::papers::device as device_file;
 use crate::run::read;
 use crate::table::Report;

@@ -1,6 +1,5 @@
 //! The observer beside an extended Kalman filter, a derivative, and the engine model alone.
 
-use super::Told;
 use crate::table::Report;
 use backdrive_control::butterworth::Butterworth;
 use backdrive_control::engine::Engine;
@@ -111,11 +110,11 @@ pub fn compare(bench: &Bench, observation: &Observation, record: &Record, truth:
 }
 
 /// The table, over all benches.
-pub fn table(report: &mut Report, told: &[Told]) {
+pub fn table(report: &mut Report, told: &[&Comparison]) {
     let Some(first) = told.first() else { return };
-    for (index, estimate) in first.comparison.estimates.iter().enumerate() {
+    for (index, estimate) in first.estimates.iter().enumerate() {
         let of = |pick: &dyn Fn(&Estimate) -> String| {
-            told.iter().filter_map(|t| t.comparison.estimates.get(index)).map(pick).collect::<Vec<_>>().join(", ")
+            told.iter().filter_map(|t| t.estimates.get(index)).map(pick).collect::<Vec<_>>().join(", ")
         };
         let text = format!(
             "{} N m rms, correlation {} %, late by {} ms",
@@ -124,7 +123,7 @@ pub fn table(report: &mut Report, told: &[Told]) {
             of(&|e| format!("{:.0}", 1e3 * e.late_s))
         );
         report.line(&format!("T_C by {}", estimate.name), text, "", "against the simulated torque without ripple", None);
-        let worst = told.iter().filter_map(|t| t.comparison.estimates.get(index)).map(|e| e.error).fold(0.0, f64::max);
+        let worst = told.iter().filter_map(|t| t.estimates.get(index)).map(|e| e.error).fold(0.0, f64::max);
         report.figure(&format!("error of {}", estimate.name), worst);
     }
 }

@@ -3,14 +3,16 @@
 
 mod compare;
 mod page;
+mod told;
 mod user_force;
 mod world;
 
+use crate::error::failed;
 use crate::table::Report;
 use crate::{Context, Study, StudyError};
 use backdrive_control::observer::{System, Weights, design, kalman};
-use backdrive_testbench::{Asked, Identified, Record, Validation, identify, validate};
-use compare::Comparison;
+use backdrive_testbench::{Asked, Record, Validation, identify, validate};
+use told::Told;
 
 /// The study.
 pub const STUDY: Study = Study {
@@ -19,18 +21,6 @@ pub const STUDY: Study = Study {
     needs: ("", &[]),
     run,
 };
-
-/// A bench from its seed to its figures.
-struct Told {
-    seed: u64,
-    world: world::World,
-    identified: Identified,
-    steps: Record,
-    unseen: Record,
-    dragged: Record,
-    validation: Validation,
-    comparison: Comparison,
-}
 
 /// What is known of every bench before: data sheets, plates, and the points at which it was recorded.
 fn asked() -> Asked {
@@ -42,10 +32,6 @@ fn asked() -> Asked {
         lag_points: [vec![0.0, 0.5, 1.0], vec![80.0, 160.0, 240.0]],
         observation: world::OBSERVATION,
     }
-}
-
-fn failed(error: impl std::fmt::Display) -> StudyError {
-    StudyError::Diagnosis(error.to_string())
 }
 
 fn bench(context: &Context, seed: u64) -> Result<Told, StudyError> {
@@ -74,7 +60,7 @@ fn run(context: &Context) -> Result<Report, StudyError> {
         told.push(one);
     }
     correlations(&mut report, &told);
-    compare::table(&mut report, &told);
+    compare::table(&mut report, &told.iter().map(|t| &t.comparison).collect::<Vec<_>>());
     let users = user_force::run(context)?;
     user_force::table(&mut report, &users);
     report.notes.push(

@@ -1,6 +1,7 @@
 //! The page: the paper's figures as far as its text tells them, and ours.
 
-use super::{Told, user_force};
+use super::told::Told;
+use super::user_force;
 use crate::table::Report;
 use crate::{Context, StudyError};
 use backdrive_report::{Cell, Dash, Figure, Page, Plot, Series, Table, Tone};

@@ -1,5 +1,6 @@
 //! The same observer on masters: the force of a user's hand without a force sensor.
 
+use crate::error::failed;
 use crate::table::Report;
 use crate::{Context, StudyError};
 use backdrive_bags::{Reader, Signal, signals};
@@ -41,10 +42,10 @@ pub fn run(context: &Context) -> Result<Vec<Told>, StudyError> {
         let changes = Overrides { master: Some(file(master)), bag: Some(bag.clone()), ..Overrides::default() };
         let graph = Graph::load(&file("launch/user-force.toml"), &changes)?;
         backdrive::run_here(&graph, &mut |_, _| {})?;
-        let reader = Reader::open(&bag).map_err(super::failed)?;
+        let reader = Reader::open(&bag).map_err(failed)?;
         let wanted = [Signal::new("truth", "/master/user_js", "effort[0]"), Signal::new("estimate", "/observer/filtered_js", "effort[0]")];
-        let found = signals(&reader, &wanted).map_err(super::failed)?;
-        let [truth, estimate]: [Vec<f64>; 2] = found.columns.try_into().map_err(|_| super::failed("a bag without its two columns"))?;
+        let found = signals(&reader, &wanted).map_err(failed)?;
+        let [truth, estimate]: [Vec<f64>; 2] = found.columns.try_into().map_err(|_| failed("a bag without its two columns"))?;
         let most = truth.iter().fold(0.0_f64, |most, f| most.max(f.abs()));
         let error = rms(&truth.iter().zip(&estimate).map(|(a, b)| a - b).collect::<Vec<_>>());
         let correlation = correlation(&truth, &estimate);

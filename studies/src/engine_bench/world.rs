@@ -1,6 +1,7 @@
 //! A bench drawn from a seed, written as files, and recorded on the graph.
 
 use crate::StudyError;
+use crate::error::failed;
 use crate::run::{read, write};
 use backdrive_control::dynamometer::DynamometerModel;
 use backdrive_control::engine::{Engine, Grid};
@@ -86,7 +87,7 @@ impl World {
         put("engine.toml", &engine.to_toml("engine of the identification's day"))?;
         put("engine-other-day.toml", &other_day.to_toml("engine of the validation's day"))?;
         put("dynamometer.toml", &format!("{}noise = {noise:?}\n", dynamometer_to_toml(&dynamometer, "dynamometer")))?;
-        let mut model: DocumentMut = read(&own("shaft.toml"))?.parse().map_err(super::failed)?;
+        let mut model: DocumentMut = read(&own("shaft.toml"))?.parse().map_err(failed)?;
         model["bodies"]["engine"] = value(shaft.engine);
         model["bodies"]["dyno"] = value(shaft.dynamometer);
         for element in model["elements"].as_array_of_tables_mut().into_iter().flat_map(|e| e.iter_mut()) {
@@ -134,7 +135,7 @@ fn scaled(engine: &Engine, mut torque: impl FnMut(f64) -> f64, slower: f64) -> E
 
 /// The text of the launch file with this bench's files in it.
 fn graph(folder: &Path, seed: u64) -> Result<String, StudyError> {
-    let mut document: DocumentMut = read(&launch(LAUNCH))?.parse().map_err(super::failed)?;
+    let mut document: DocumentMut = read(&launch(LAUNCH))?.parse().map_err(failed)?;
     document["seed"] = value(seed as i64);
     let beside = |name: &str| value(folder.join(name).display().to_string());
     let cycles = |item: &mut Item| {

@@ -9,6 +9,7 @@ pub(crate) mod engine_bench;
 pub(crate) mod impulse_engine;
 pub(crate) mod steering_compensator;
 
+use crate::error::failed;
 use crate::run::{Ask, diagnose, findings, read, said, write};
 use crate::table::Report;
 use crate::{Context, StudyError, csv_columns};
@@ -63,10 +64,6 @@ pub(super) struct Story<'a> {
 /// A model of the project.
 pub(super) fn device(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../plant/models").join(name)
-}
-
-fn failed(error: impl std::fmt::Display) -> StudyError {
-    StudyError::Diagnosis(error.to_string())
 }
 
 impl Story<'_> {

@@ -4,6 +4,7 @@ pub mod bench;
 pub mod device;
 pub mod identify;
 mod page;
+mod results;
 
 use crate::table::Report;
 use crate::{Context, Study, StudyError};
@@ -11,7 +12,8 @@ use backdrive_plant::correlation::fundamental;
 use backdrive_plant::stepper::{Options, simulate};
 use bench::{Bench, Curve, Recorded, cycles, grid, stroke};
 use device::{Compensator, LEVER, OILS, Parameter, SAE_10, TABLE_1, TABLE_2, TABLE_3_RUN_1, TABLE_3_RUN_2};
-use identify::{Cost, Fit, fit, identify, of_oils, predicted, residuals, rms, two_steps, up_to};
+use identify::{Cost, fit, identify, of_oils, predicted, residuals, rms, two_steps, up_to};
+use results::{Results, strokes};
 
 pub(crate) const STUDY: Study = Study {
     name: "steering",
@@ -28,29 +30,6 @@ pub(crate) const TIMES: [(usize, f64); 4] = [(0, 0.1), (19, 3.2), (24, 8.0), (29
 /// Presliding distance of the refined friction, m: that of `plant/environments/steering-compensator-hysteretic.toml`. The paper's equation is lost.
 const PRESLIDING: f64 = 0.5e-3;
 use Parameter::{Friction, Gap, Inertance, Parasitic, Presliding, Stiffness};
-
-/// Everything that the page shows.
-pub(crate) struct Results {
-    /// Measured on the rig: the design, the device of Table II, and of Table III at each scale of stroke.
-    pub design: Vec<Curve>,
-    pub friction: Vec<Curve>,
-    pub whole: Vec<(f64, Vec<Curve>)>,
-    pub design_fit: Fit,
-    pub friction_fit: Fit,
-    /// Table II's model, fitted to the device with backlash up to 20 Hz: the paper's step before it knew of the gap.
-    pub without_gap: Fit,
-    pub run_1: Fit,
-    pub run_2: Fit,
-    /// (scale, stiffness without the gap, with it).
-    pub bias: Vec<(f64, f64, f64)>,
-    /// Time responses with SAE-10: recorded, and the force of the fitted model under the recorded displacement.
-    pub times: Vec<(f64, Recorded, Vec<f64>)>,
-    /// The device with hysteretic friction on the rig: its curve, what friction without and with presliding makes of it, its run at 0.1 Hz.
-    pub hysteretic: Curve,
-    pub sudden_fit: Fit,
-    pub refined_fit: Fit,
-    pub slow: (Recorded, Vec<f64>, Vec<f64>),
-}
 
 fn run(context: &Context) -> Result<Report, StudyError> {
     let results = measure(context.quick)?;
@@ -251,11 +230,6 @@ fn checks(report: &mut Report, results: &Results) {
     let shown =
         format!("k {:.0} kN/m, b {:.1} kg, b1 {:.1} kg, h {:.2}", 1e-3 * once.device.k, once.device.b, once.device.b1, once.device.h);
     report.line("Table II by the two steps once, from the design", shown, "563, 94.5, 23.0, 9.36", PAPER, None);
-}
-
-/// Strokes of a scale in words.
-pub(crate) fn strokes(scale: f64) -> String {
-    format!("{} to {} mm", 10.0 * scale, scale)
 }
 
 /// Root mean squared difference over the standard deviation of what was measured.

@@ -1,10 +1,9 @@
 //! The page: the paper's figures, drawn from its tables, beside ours, from the rig and what was found again.
 
-use super::Results;
 use super::bench::{Curve, stroke};
 use super::device::{Compensator, OILS, SAE_10, TABLE_1, TABLE_2, TABLE_3_RUN_2};
 use super::identify::predicted;
-use super::strokes;
+use super::results::{Results, strokes};
 use crate::table::Report;
 use backdrive_plant::linear::{LinearModel, Operating, log_frequencies};
 use backdrive_report::{Cell, Colour, Figure, Page, Plot, Series, Table, Tone};
