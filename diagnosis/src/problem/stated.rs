@@ -24,7 +24,7 @@ impl Stated {
     pub fn body(&self, model: &Model) -> Option<usize> {
         match model.number_at(&self.path) {
             Ok(NumberOf::Body(body)) => Some(body),
-            _ => None,
+            Ok(NumberOf::Element(..) | NumberOf::Input(..) | NumberOf::Output(..)) | Err(_) => None,
         }
     }
 }
@@ -36,7 +36,7 @@ pub(super) fn stated_numbers(model: &Model, text: &str) -> Vec<Stated> {
     let elements_and_bodies = model.parameter_paths().into_iter().filter(|path| match model.number_at(path) {
         // A default that the file does not write is not stated.
         Ok(NumberOf::Element(..)) => keys.contains(path) || !writes_elements,
-        _ => true,
+        Ok(NumberOf::Body(_) | NumberOf::Input(..) | NumberOf::Output(..)) | Err(_) => true,
     });
     let signals = keys.iter().filter(|k| model.number_at(k).is_ok_and(is_of_signal));
     let mut found = Vec::new();
