@@ -92,6 +92,7 @@ impl Tuning {
     ///
     /// # Errors
     /// When another one is in use: it is given back.
+    #[allow(clippy::result_large_err)]
     pub fn adopt(self) -> Result<(), Tuning> {
         IN_USE.set(self)
     }
