@@ -13,6 +13,9 @@ use std::ops::Range;
 /// `fit.knots_apart`.
 type Set = (usize, usize, usize);
 
+/// Weights that are moved together, and which of the parameters they are.
+type Together = (Set, Vec<usize>);
+
 /// A parameter moved: all values as they stand in the model, the model, and the difference taken in the fit's own unit.
 type Moved = (Vec<f64>, Model, f64);
 
@@ -53,7 +56,7 @@ impl Evaluator<'_> {
                 jacobian[*j][spans[*r].clone()].copy_from_slice(&part);
             }
         }
-        let together: Vec<(Set, Vec<usize>)> = together.into_iter().collect();
+        let together: Vec<Together> = together.into_iter().collect();
         let parts = self.knots(structure, own, residuals, which, (&together, &spans), stretch);
         for (((_, r, _), ats), columns) in together.iter().zip(parts) {
             for (at, column) in ats.iter().zip(columns.unwrap_or_default()) {
@@ -90,13 +93,13 @@ impl Evaluator<'_> {
         own: &[f64],
         residuals: &[f64],
         which: &[usize],
-        (together, spans): (&[(Set, Vec<usize>)], &[Range<usize>]),
+        (together, spans): (&[Together], &[Range<usize>]),
         stretch: f64,
     ) -> Vec<Option<Vec<Vec<f64>>>> {
         let Some(model) = structure.model(self.problem, &to_external(structure, own)).filter(|_| !together.is_empty()) else {
             return Vec::new();
         };
-        let one = |((unknown, r, _), ats): &(Set, Vec<usize>)| {
+        let one = |((unknown, r, _), ats): &Together| {
             if self.budget.is_halted() {
                 return None;
             }

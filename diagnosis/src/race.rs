@@ -118,7 +118,7 @@ impl Course<'_> {
         drop_those_behind(&mut running);
         // Far from the noise there is more to come: nothing is decided by the last steps.
         if keep[1] > 0 && Lead::of(&running).cost <= tuning().noise.near * Lead::of(&running).noise {
-            self.to_their_ends(&mut running, keep[1]);
+            self.fit_to_the_end(&mut running, keep[1]);
         }
         let size = evaluator.len();
         let ended = running.into_iter().filter(|(_, f)| f.residuals.len() == size && f.cost.is_finite());
@@ -148,7 +148,7 @@ impl Course<'_> {
     }
 
     /// The last stage: so many are fitted to their ends. Those behind stay as they are: they are rivals, if beaten ones.
-    fn to_their_ends(&self, running: &mut Vec<Running>, count: usize) {
+    fn fit_to_the_end(&self, running: &mut Vec<Running>, count: usize) {
         let (lead, late) = (Lead::of(running), tuning().fit.late);
         let rest = running.split_off(count.min(running.len()));
         let is_beaten = |fit: &Fit| lead.cost < tuning().search.best_ends * lead.noise && predicted_cost(fit) > lead.cost;
