@@ -40,7 +40,7 @@ pub struct Problem {
     pub initial: Initial,
     /// Inputs that were not measured.
     pub unknown: Vec<Unknown>,
-    /// Noise standard deviation of each output, in its unit; see [`noise_sd`].
+    /// Noise standard deviation of each output, in its unit; see [`crate::noise`].
     pub noise_sd: Vec<f64>,
     /// Samples over which each output's displacement is compared instead of its position; 0 where the position itself is.
     pub lag: Vec<usize>,
