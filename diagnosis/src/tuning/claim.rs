@@ -20,7 +20,7 @@ group! {
         /// Share of the excess misfit that has to be removed for a verdict of missing physics, where the noise is not reached.
         explained: f64 = 0.99, "-", Judgement("a tenth of the residual amplitude remains");
         /// Whiteness statistic above which something is missing however small the residual is.
-        wanders: f64 = 12.0, "standard deviations", Measured("fits of the right structure stay below 3, and 2 to 3 times that where they were cut short");
+        wanders: f64 = 12.0, "standard deviations", Judgement("fits of the right structure were seen below 3, and at 2 to 3 times that where they were cut short");
         /// Correlation time above which residuals above the noise are unexplained.
         correlated: f64 = 3.0, "samples", Judgement("twice noise.white_correlation");
         /// Cost of the refit over that of the given parameters above which these are not called wrong.
