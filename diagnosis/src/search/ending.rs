@@ -1,9 +1,8 @@
 //! The end of a search: the best made simpler and brought to their ends, and held against held-out recordings.
 
 use super::nominal::{Nominal, to_its_end};
-use super::revive::revived;
 use super::share::Work;
-use crate::candidate::{Candidate, candidate, done, key_of, sort};
+use crate::candidate::{Candidate, candidate, key_of, sort};
 use crate::compare::unseen;
 use crate::evaluator::Evaluator;
 use crate::fit::Fit;
@@ -22,11 +21,7 @@ pub(super) fn make_simpler(course: &Course, found: &mut Vec<Candidate>, work: &W
     let last = course.evaluator.within(work.up_to(tuning().search.best_end));
     for _ in 0..tuning().search.simpler {
         let before = found.first().map(|c| key_of(&c.structure.added));
-        let mut starts = fewer(course, found);
-        if !done(found, course.nominal, samples) {
-            starts.extend(revived(course, found));
-        }
-        found.extend(polished(&last, starts));
+        found.extend(polished(&last, fewer(course, found)));
         sort(found, samples);
         if found.first().map(|c| key_of(&c.structure.added)) == before {
             break;

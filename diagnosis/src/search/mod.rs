@@ -4,7 +4,6 @@ mod ending;
 mod journal;
 mod nominal;
 mod result;
-mod revive;
 mod schedule;
 mod settings;
 mod share;

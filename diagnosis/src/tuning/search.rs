@@ -67,10 +67,6 @@ group! {
         may_gain_coupled: f64 = 0.95, "-", Cost("a fit on its way is not behind yet");
         /// Mean squared residual of the best below which others need only show that they do no better.
         best_ends: f64 = 1.1, "mean square", Cost("it leaves noise");
-        /// Share in which vanished parameters are given back.
-        reviving: f64 = 0.2, "of the work", Cost("a few fits");
-        /// Share after which that is not begun.
-        last_revival: f64 = 0.6, "of the work", Cost("as last_step");
         /// Share after which screening beside a structure takes the best structure only.
         last_other_base: f64 = 0.5, "of the work", Cost("as last_step");
         /// Structures that go on after their first steps whatever the best has reached.
@@ -85,10 +81,6 @@ group! {
         best_at_noise: f64 = 1.2, "mean square", Cost("as noise.at_noise squared, and a fit that is not at its end");
         /// Cost over the best's up to which a structure is refined or has parameters given back.
         as_good: f64 = 3.0, "-", Cost("1.7 times the residual");
-        /// Structures whose vanished parameters are given back, at most.
-        revived: usize = 3, "structures", Cost("one fit each");
-        /// Value over a parameter's least one below which it has vanished.
-        vanished: f64 = 2.0, "-", Numerics("a parameter that is fitted as its logarithm has no gradient near its lower bound");
         /// Excerpts of a stated parameter that a law beside it may take over.
         taken_over: [f64; 3] = [0.25, 0.5, 0.9], "-", Judgement("two dampers in a row are told apart along a narrow valley: starts along it");
         /// Steps to something simpler at the end, at most.
@@ -105,11 +97,5 @@ group! {
         nominal_from: usize = 2, "structures", Cost("one fit each");
         /// Structures that are brought to their ends.
         last_fits: usize = 6, "structures", Cost("one fit each");
-        /// Share of the nominal model's residual (mean square) that it has to leave when coupled to the measured motion.
-        coupled_leaves: f64 = 0.3, "-", Judgement("where coupling explains more than that, it explains what is missing, too");
-        /// The same in mean squares of the noise.
-        coupled_leaves_noise: f64 = 3.0, "mean square", Judgement("three times the noise is enough to tell physics apart");
-        /// Factors on the coupling, tried in this order until the nominal model leaves enough.
-        couplings: [f64; 5] = [0.2, 1.0, 0.2, 0.04, 0.008], "-", Judgement("the first on parts of the recordings, the others on the whole");
     }
 }

@@ -4,8 +4,6 @@ use super::step::{Keep, Race, Step};
 use crate::candidate::{Candidate, distinct_structures};
 use crate::hypothesis;
 use crate::race::{Course, Seed};
-use crate::search::ending::polished;
-use crate::search::revive::revived;
 use crate::search::state::State;
 use crate::tuning::tuning;
 
@@ -31,19 +29,6 @@ impl Step for Finer {
 
     fn tries_again(&self) -> bool {
         true
-    }
-
-    fn settle(&self, state: &mut State) {
-        let comes_near = state.found.first().is_some_and(|c| c.levels.iter().all(|l| *l < tuning().noise.very_far));
-        if comes_near && !state.work.is_past(tuning().search.last_revival) {
-            // Before others are tried from the parameters of the best; where its residual is large, more is missing than a mass.
-            let evaluator = state
-                .course
-                .evaluator
-                .within(state.work.up_to(tuning().search.refit_ends).next(state.work.share(tuning().search.reviving)));
-            let back = polished(&evaluator, revived(&state.course, &state.found));
-            state.take(back);
-        }
     }
 
     fn propose(&self, state: &mut State) -> Vec<Seed> {
