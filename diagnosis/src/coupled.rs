@@ -86,7 +86,7 @@ impl Course<'_> {
         let Some((coupled, _)) = self.along else { return begun };
         let coupling = coupled.coupling.as_ref().map(|g| g.with(tuning().coupling.looser * g.strength));
         let coupled = Evaluator { coupling, ..coupled.clone() };
-        let effort = tuning().fit.looser;
+        let effort = tuning().fit.early;
         self.go_on(&mut begun, |budget, structure, fit| coupled.within(budget).fit(structure, &fit.values, effort));
         rank(&mut begun, count);
         begun

@@ -61,7 +61,7 @@ pub fn fit_each<'a>(problem: &'a Problem, joint: &Candidate, noise_sd: &[f64], b
         let here: Vec<(Role, f64)> =
             own.iter().filter(|(role, _)| role.in_record(*index) == *role).map(|(role, value)| (role.in_record(0), *value)).collect();
         let start = structure.values(problem, &stated, &added, &here);
-        let fit = evaluator.fit(&structure, &start, tuning().fit.per_record)?;
+        let fit = evaluator.fit(&structure, &start, tuning().fit.to_the_end)?;
         let candidate = candidate(&evaluator, structure, fit);
         let spread = Uncertainty::of(&candidate);
         Some((record.name.clone(), candidate, spread))

@@ -149,7 +149,7 @@ impl Course<'_> {
 
     /// The last stage: so many are fitted to their ends. Those behind stay as they are: they are rivals, if beaten ones.
     fn fit_to_the_end(&self, running: &mut Vec<Running>, count: usize) {
-        let (lead, late) = (Lead::of(running), tuning().fit.late);
+        let (lead, effort) = (Lead::of(running), tuning().fit.to_the_end);
         let rest = running.split_off(count.min(running.len()));
         let is_beaten = |fit: &Fit| lead.cost < tuning().search.best_ends * lead.noise && predicted_cost(fit) > lead.cost;
         self.go_on(running, |budget, structure, fit| {
@@ -157,8 +157,8 @@ impl Course<'_> {
             if is_beaten(fit) && predicted_cost(fit) > lead.margin() * lead.cost {
                 return None;
             }
-            let steps = if is_beaten(fit) { tuning().fit.beaten_steps } else { late.steps };
-            self.evaluator.within(budget).fit_from_derivatives(structure, &fit.values, Effort { steps, ..late }, Some((structure, fit)))
+            let steps = if is_beaten(fit) { tuning().fit.beaten_steps } else { effort.steps };
+            self.evaluator.within(budget).fit_from_derivatives(structure, &fit.values, Effort { steps, ..effort }, Some((structure, fit)))
         });
         running.extend(rest);
     }
@@ -177,7 +177,7 @@ pub(crate) fn own_first(evaluator: &Evaluator, known: Option<(&Structure, &Fit)>
         return start;
     }
     let only = Evaluator { own_only: true, ..evaluator.clone() };
-    only.fit_from_derivatives(structure, &start, tuning().fit.of_records, known).map_or(start, |fit| fit.values)
+    only.fit_from_derivatives(structure, &start, tuning().fit.early, known).map_or(start, |fit| fit.values)
 }
 
 /// Whether first steps may be taken on some of the recordings only: nothing belongs to single ones.

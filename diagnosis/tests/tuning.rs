@@ -46,8 +46,8 @@ fn an_entry_can_be_changed_for_a_study_before_the_table_is_in_use_and_not_after(
     let before = changed.claim.tie;
     changed.quantity("claim.tie").unwrap().times(2.0);
     changed.quantity("noise.blocks").unwrap().set(8.0);
-    changed.quantity("fit.last").unwrap().set(3.0);
-    assert_eq!((changed.claim.tie, changed.noise.blocks, changed.fit.last.steps), (2.0 * before, [8; 4], 3));
+    changed.quantity("fit.middle").unwrap().set(3.0);
+    assert_eq!((changed.claim.tie, changed.noise.blocks, changed.fit.middle.steps), (2.0 * before, [8; 4], 3));
     assert!(changed.quantity("claim.nothing").is_none() && changed.quantity("tie").is_none());
     assert_eq!(*tuning(), Tuning::default());
     assert!(changed.adopt().is_err());

@@ -52,7 +52,7 @@ pub(super) fn bring_to_their_ends(evaluator: &Evaluator, found: &mut [Candidate]
             (false, true) => budget.until(last.end()),
             (false, false) => return None,
         };
-        Some((i, evaluator.within(by).fit(&c.structure, &c.fit.values, tuning().fit.last)?))
+        Some((i, evaluator.within(by).fit(&c.structure, &c.fit.values, tuning().fit.to_the_end)?))
     };
     let polished: Vec<(usize, Fit)> = exact.abreast(&near, |budget, i| polish(budget, *i)).into_iter().flatten().flatten().collect();
     for (i, fit) in polished {
@@ -68,7 +68,7 @@ pub(super) fn nominal_at_its_end(nominal: &Nominal, found: &[Candidate], work: &
     let numbers = |c: &Candidate| (c.structure.stated_of(problem, &c.fit.values), c.structure.of_records(&c.fit.values));
     let others = found.iter().take(tuning().search.nominal_from).map(numbers);
     // Far from the noise its last thousandths say nothing.
-    let effort = if nominal.is_far { tuning().fit.nominal_last } else { tuning().fit.to_the_end };
+    let effort = if nominal.is_far { tuning().fit.nominal_far } else { tuning().fit.to_the_end };
     let substeps = if nominal.is_far { tuning().fit.middle_substeps } else { evaluator.substeps };
     let last = Evaluator { substeps, ..evaluator.within(work.up_to(tuning().search.nominal_end)) };
     let mut better = None;
@@ -106,7 +106,7 @@ pub(super) fn hold_against_unseen(evaluator: &Evaluator, found: &mut [Candidate]
 /// Each fitted from where it starts.
 pub(super) fn polished(evaluator: &Evaluator, structures: Vec<(Structure, Vec<f64>)>) -> Vec<Candidate> {
     let fit = |budget: &Budget, (structure, start): &(Structure, Vec<f64>)| {
-        evaluator.within(budget.clone()).fit(structure, start, tuning().fit.last)
+        evaluator.within(budget.clone()).fit(structure, start, tuning().fit.to_the_end)
     };
     let fits = evaluator.budget.abreast(&structures, fit);
     let fitted = structures.iter().zip(fits).filter_map(|((structure, _), fit)| Some((structure, fit.flatten()?)));

@@ -90,7 +90,7 @@ impl<'a> Coupler<'_, 'a> {
     /// A refit from the parameters of the coupled fit; `None` where it is no better than the other.
     fn refit_from(&self, values: &[f64], other: &Fit, effort: Effort) -> Option<Fit> {
         let there = self.middle.residuals(self.structure, values)?;
-        let again = worst_first(self.middle, self.structure, values, &there, tuning().fit.nominal_again)?;
+        let again = worst_first(self.middle, self.structure, values, &there, tuning().fit.nominal_first)?;
         if again.cost >= tuning().claim.refit_gains * other.cost {
             return None;
         }

@@ -8,42 +8,26 @@ group! {
     Fit {
         /// A fit that is brought to its end: steps, and the predicted decrease of the next one at which it has ended.
         to_the_end: Effort = Effort { steps: 40, tolerance: 0.3 }, "steps, mean squares", Statistics("a parameter at one standard deviation from its optimum costs 1; most end after 5 to 15 steps");
-        /// The last fit of those that could still win.
-        last: Effort = Effort { steps: 15, tolerance: 0.3 }, "steps, mean squares", Cost("they were at their ends before");
-        /// A fit in the last stage of a race.
-        late: Effort = Effort { steps: 30, tolerance: 0.3 }, "steps, mean squares", Cost("as to_the_end");
         /// The same for one that is already beaten.
         beaten_steps: usize = 6, "steps", Cost("it only has to show that it does no better");
         /// A fit in the middle stage of a race.
         middle: Effort = Effort { steps: 5, tolerance: 1.0 }, "steps, mean squares", Cost("first steps");
-        /// A fit in the early stage of a race, and of a structure beside which others are screened.
+        /// First steps: in the early stage of a race, beside which others are screened, with a looser coupling, of the parameters of single recordings.
         early: Effort = Effort { steps: 3, tolerance: 2.0 }, "steps, mean squares", Cost("first steps");
-        /// A structure of which an effect is to be added.
-        base: Effort = Effort { steps: 4, tolerance: 2.0 }, "steps, mean squares", Cost("first steps");
         /// First steps of every structure of a race.
         first: Effort = Effort { steps: 2, tolerance: 3.0 }, "steps, mean squares", Cost("first steps");
         /// First step of every structure of a race that is coupled to the measured motion.
         first_coupled: Effort = Effort { steps: 1, tolerance: 3.0 }, "steps, mean squares", Cost("coupled, one step goes far");
         /// Steps of the next stages of such a race.
         coupled_steps: [usize; 3] = [1, 2, 3], "steps", Cost("more for fewer structures");
-        /// A fit that goes on with a looser coupling.
-        looser: Effort = Effort { steps: 3, tolerance: 3.0 }, "steps, mean squares", Cost("first steps");
-        /// Steps of the nominal model's first fit on the worst recordings, then on all.
+        /// Steps of the nominal model's first fit, from the given parameters and from where it was coupled: on the worst recordings, then on all.
         nominal_first: [usize; 2] = [12, 3], "steps", Cost("it starts far off");
-        /// Steps of the same from where it was coupled.
-        nominal_again: [usize; 2] = [8, 2], "steps", Cost("as nominal_first");
         /// The nominal model's refit far from the noise.
-        nominal_far: Effort = Effort { steps: 4, tolerance: 3.0 }, "steps, mean squares", Cost("its end waits until the rest is known");
-        /// The same once the rest is known.
-        nominal_last: Effort = Effort { steps: 8, tolerance: 3.0 }, "steps, mean squares", Cost("its last thousandths say nothing");
+        nominal_far: Effort = Effort { steps: 8, tolerance: 3.0 }, "steps, mean squares", Cost("its last thousandths say nothing there");
         /// The nominal model's fit coupled to the measured motion.
         nominal_coupled: Effort = Effort { steps: 12, tolerance: 1.0 }, "steps, mean squares", Cost("coupled simulations are short");
         /// The nominal model where a view of its residuals is taken without coupling.
         nominal_view: Effort = Effort { steps: 2, tolerance: 1.0 }, "steps, mean squares", Cost("it was fitted before");
-        /// Parameters of single recordings beside the rest.
-        of_records: Effort = Effort { steps: 4, tolerance: 3.0 }, "steps, mean squares", Cost("an unknown input is linear");
-        /// A structure fitted to one record by itself.
-        per_record: Effort = Effort { steps: 25, tolerance: 0.3 }, "steps, mean squares", Cost("as to_the_end");
         /// Share of the cost below which a predicted decrease counts as none far from the noise.
         relative_tolerance: f64 = 1e-3, "-", Cost("far from the noise another structure gains more");
         /// Decrease of the cost below which a step far from the noise is a weak one.

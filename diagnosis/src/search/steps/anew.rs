@@ -61,7 +61,7 @@ impl Step for Anew {
 /// at low speed only where the friction at speed is right.
 fn screened(course: &Course, evaluator: &Evaluator, base: &Candidate, work: Steps) -> Vec<Seed> {
     let problem = course.evaluator.problem;
-    let Some(fit) = evaluator.fit(&base.structure, &base.fit.values, tuning().fit.base) else { return Vec::new() };
+    let Some(fit) = evaluator.fit(&base.structure, &base.fit.values, tuning().fit.early) else { return Vec::new() };
     let screen = Screen::new(evaluator, &base.structure, &fit, course.hypotheses, work);
     let own = course.effects_of(&base.structure, &fit.values);
     let seed = |p: Promise, coupled_first| {

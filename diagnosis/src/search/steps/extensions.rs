@@ -10,7 +10,7 @@ use std::collections::HashSet;
 /// A structure with each of what promises most beside it added.
 pub(super) fn extensions(course: &Course, view: &View, base: &Candidate, count: usize) -> Vec<Seed> {
     let problem = course.evaluator.problem;
-    let fit = if view.whole { Some(base.fit.clone()) } else { view.evaluator.fit(&base.structure, &base.fit.values, tuning().fit.base) };
+    let fit = if view.whole { Some(base.fit.clone()) } else { view.evaluator.fit(&base.structure, &base.fit.values, tuning().fit.early) };
     let Some(fit) = fit else { return Vec::new() };
     let fits = |h: usize| {
         let new = &course.hypotheses[h];
