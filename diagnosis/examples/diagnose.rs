@@ -1,6 +1,6 @@
 //! `diagnose SET --out DIR [--without KIND] [--tuning NAME=VALUE]...`: a verdict and a diagnosed model for a set.
 //!
-//! `--tuning claim.tie=4` or `--tuning claim.tie=x2` changes an entry of the tuning table, to see how much verdicts depend on it;
+//! `--tuning claim.alike=4` or `--tuning claim.alike=x2` changes an entry of the tuning table, to see how much verdicts depend on it;
 //! `diagnose --list-tuning` lists them.
 
 use backdrive_diagnosis::candidate::advantage_over;
@@ -24,7 +24,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         return Ok(());
     }
     for (_, change) in args.iter().zip(args.iter().skip(1)).filter(|(key, _)| *key == "--tuning") {
-        let (name, value) = change.split_once('=').ok_or("--tuning takes NAME=VALUE, such as claim.tie=4 or claim.tie=x2")?;
+        let (name, value) = change.split_once('=').ok_or("--tuning takes NAME=VALUE, such as claim.alike=4 or claim.alike=x2")?;
         let entry = tuning.quantity(name).ok_or_else(|| format!("there is no tuning entry {name}: docs/tuning.md lists them"))?;
         match value.strip_prefix('x') {
             Some(factor) => entry.times(factor.parse()?),

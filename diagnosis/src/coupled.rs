@@ -18,7 +18,7 @@ impl Course<'_> {
         }
         let mut begun = self.rank_and_go_on(self.first_steps(seeds, None), count);
         // Where one law helps another one may be the right one: the places first, then the laws.
-        if begun.first().is_some_and(|(_, f)| predicted_cost(f) > tuning().coupling.complete * f.residuals.len() as f64) {
+        if begun.first().is_some_and(|(_, f)| predicted_cost(f) > tuning().noise.complete * f.residuals.len() as f64) {
             let mut places: Vec<Vec<&Place>> = Vec::new();
             let mut laws = Vec::new();
             for (structure, fit) in &begun {

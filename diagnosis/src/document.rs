@@ -30,10 +30,10 @@ pub fn tuning_page() -> String {
         let (kind, why) = row.evidence.told();
         let _ = writeln!(page, "| `{field}` | {} | {} | {} | {kind}: {why} |", row.value, row.unit, row.decides);
     }
-    page += "\n## steps\n\nEach step proposes structures. All take their first steps, so many go on, and so many are fitted to their end. Where the best is far from the noise,\n\
-             a step may take its share of the work.\n\n| step | go on | to their end | share of the work |\n|---|---|---|---|\n";
+    page += "\n## steps\n\nEach step proposes structures, which race (search.further, search.ended). Where the best is far from the noise, a step may take its share of the work.\n\n\
+             | step | share of the work |\n|---|---|\n";
     for step in step_table() {
-        let _ = writeln!(page, "| {} | {} | {} | {} |", step.name, step.further, step.to_the_end, step.share);
+        let _ = writeln!(page, "| {} | {} |", step.name, step.share);
     }
     page + "\n"
 }

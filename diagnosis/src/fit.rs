@@ -266,7 +266,7 @@ fn algebra(residuals: usize, numbers: usize) -> Steps {
 /// Whether a parameter has an effect and is not pushed against its bound.
 fn may_move(number: &FreeParameter, own: f64, slope: f64, curvature: f64) -> bool {
     let (low, high) = number.bounds();
-    let edge = tuning().fit.pushed * (high - low);
+    let edge = tuning().fit.at_bound * (high - low);
     curvature > 0.0 && !(own <= low + edge && slope > 0.0) && !(own >= high - edge && slope < 0.0)
 }
 

@@ -81,7 +81,7 @@ fn across(problem: &Problem, joint: &Candidate, index: usize, role: &Role, fits:
         let (number, value) = (candidate.structure.free.get(place)?, *candidate.fit.values.get(place)?);
         let deviation = spread.deviation.get(place).copied().unwrap_or(f64::INFINITY);
         let scale = if number.log { 1.0 } else { value.abs() };
-        let determined = deviation > 0.0 && deviation < tuning().claim.undetermined_alone * scale;
+        let determined = deviation > 0.0 && deviation < tuning().claim.undetermined * scale;
         if determined {
             points.push((number.to_internal(value), deviation));
         }

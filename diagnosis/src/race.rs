@@ -85,15 +85,15 @@ impl Lead {
 
     /// Cost over the best's up to which others have a chance.
     fn margin(&self) -> f64 {
-        let tuning = &tuning().search;
-        if self.cost < tuning.best_at_noise * self.noise { tuning.behind_at_noise } else { tuning.behind_far }
+        let search = &tuning().search;
+        if self.cost < tuning().noise.complete * self.noise { search.behind_at_noise } else { search.behind_far }
     }
 }
 
 impl Course<'_> {
-    /// Fits all seeds a little, `keep[0]` of them more, and `keep[1]` to their end.
-    pub fn race(&self, seeds: Vec<Seed>, keep: [usize; 2]) -> Vec<Candidate> {
-        let evaluator = self.evaluator;
+    /// Fits all seeds a little, some of them more, and fewer to their end.
+    pub fn race(&self, seeds: Vec<Seed>) -> Vec<Candidate> {
+        let (evaluator, further) = (self.evaluator, tuning().search.further);
         // The first steps on the recordings with the largest residuals, with few substeps.
         let few = worst_records(evaluator, &self.nominal.fit.residuals, 2);
         let whole = few.len() == evaluator.records.len() || !can_be_cut(evaluator.problem);
@@ -101,12 +101,12 @@ impl Course<'_> {
         let some: Vec<Record> = if whole { problem.fit.clone() } else { few.iter().map(|r| problem.fit[*r].clone()).collect() };
         let coarse = Evaluator { substeps: self.coarse, records: &some, widest: 1.0, ..evaluator.clone() };
         let nominal_there = if whole { self.nominal.fit.clone() } else { restricted(evaluator, &self.nominal.fit, &few) };
-        let entries = self.entries(&seeds, keep[0] + 2);
+        let entries = self.entries(&seeds, further + 2);
         let mut running = self.begun(&entries, &coarse, &nominal_there);
         let substeps = tuning().fit.middle_substeps.max(self.coarse);
         let middle = Evaluator { substeps, widest: tuning().fit.widest_midway, ..evaluator.clone() };
-        let early = if self.along.is_some() { 0 } else { keep[0] + 4 };
-        for (count, held_against, effort) in [(early, &coarse, tuning().fit.early), (keep[0], &middle, tuning().fit.middle)] {
+        let early = if self.along.is_some() { 0 } else { further + 4 };
+        for (count, held_against, effort) in [(early, &coarse, tuning().fit.early), (further, &middle, tuning().fit.middle)] {
             if count > 0 {
                 drop_those_behind(&mut running);
                 running.truncate(count);
@@ -117,8 +117,8 @@ impl Course<'_> {
         }
         drop_those_behind(&mut running);
         // Far from the noise there is more to come: nothing is decided by the last steps.
-        if keep[1] > 0 && Lead::of(&running).cost <= tuning().noise.near * Lead::of(&running).noise {
-            self.fit_to_the_end(&mut running, keep[1]);
+        if Lead::of(&running).cost <= tuning().noise.near * Lead::of(&running).noise {
+            self.fit_to_the_end(&mut running, tuning().search.ended);
         }
         let size = evaluator.len();
         let ended = running.into_iter().filter(|(_, f)| f.residuals.len() == size && f.cost.is_finite());
@@ -151,7 +151,7 @@ impl Course<'_> {
     fn fit_to_the_end(&self, running: &mut Vec<Running>, count: usize) {
         let (lead, effort) = (Lead::of(running), tuning().fit.to_the_end);
         let rest = running.split_off(count.min(running.len()));
-        let is_beaten = |fit: &Fit| lead.cost < tuning().search.best_ends * lead.noise && predicted_cost(fit) > lead.cost;
+        let is_beaten = |fit: &Fit| lead.cost < tuning().noise.complete * lead.noise && predicted_cost(fit) > lead.cost;
         self.go_on(running, |budget, structure, fit| {
             // Beside one that leaves noise, others only have to show that they do no better; those far behind have.
             if is_beaten(fit) && predicted_cost(fit) > lead.margin() * lead.cost {

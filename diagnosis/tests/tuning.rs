@@ -43,11 +43,11 @@ fn every_entry_has_a_unit_a_reason_and_a_name_of_its_own() {
 #[test]
 fn an_entry_can_be_changed_for_a_study_before_the_table_is_in_use_and_not_after() {
     let mut changed = Tuning::default();
-    let before = changed.claim.tie;
-    changed.quantity("claim.tie").unwrap().times(2.0);
+    let before = changed.claim.alike;
+    changed.quantity("claim.alike").unwrap().times(2.0);
     changed.quantity("noise.blocks").unwrap().set(8.0);
     changed.quantity("fit.middle").unwrap().set(3.0);
-    assert_eq!((changed.claim.tie, changed.noise.blocks, changed.fit.middle.steps), (2.0 * before, [8; 4], 3));
+    assert_eq!((changed.claim.alike, changed.noise.blocks, changed.fit.middle.steps), (2.0 * before, [8; 4], 3));
     assert!(changed.quantity("claim.nothing").is_none() && changed.quantity("tie").is_none());
     assert_eq!(*tuning(), Tuning::default());
     assert!(changed.adopt().is_err());

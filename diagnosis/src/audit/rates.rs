@@ -49,7 +49,7 @@ pub(super) fn unit_of_time(problem: &Problem) -> Option<String> {
         .filter_map(|(unit, word)| Some((unexplained_variance(problem, record, record.period * unit)?, *unit, *word)))
         .min_by(|a, b| a.0.total_cmp(&b.0))?;
     let better = left < (1.0 - tuning().recordings.time_unit_removes) * as_given
-        && left < 1.0 - tuning().recordings.time_unit_correlates * tuning().recordings.time_unit_correlates;
+        && left < 1.0 - tuning().recordings.unit_correlates * tuning().recordings.unit_correlates;
     better.then(|| {
         format!(
             "{}: has a sample every {:.4} s, and the model does not move like that; read as {word} it explains {:.0} % of the motion's variance \

@@ -70,7 +70,7 @@ fn clipped(record: &Record, name: &str, samples: &[f64], why: &str, all: &mut Ve
 
 fn sensor(record: &Record, name: &str, stated: f64, samples: &[f64], all: &mut Vec<Remark>) {
     match crate::noise::step_of(samples) {
-        Some(step) if stated > 0.0 && ((step / stated) - (step / stated).round()).abs() > 0.02 => {
+        Some(step) if stated > 0.0 && ((step / stated) - (step / stated).round()).abs() > tuning().recordings.grid => {
             let text = format!("moves in steps of {step:.4e}, the model says {stated:.4e}");
             add(all, Weight::Caution, record, name, "encoder", text);
         }
@@ -83,7 +83,7 @@ fn sensor(record: &Record, name: &str, stated: f64, samples: &[f64], all: &mut V
                 add(all, Weight::Caution, record, name, "filtered", text);
             }
             if let Some(share) = quiet_top(samples)
-                && share < 1e-4
+                && share < tuning().recordings.quiet_top
             {
                 let text = "has nothing in the upper part of its band, not even noise: it was low-pass filtered before it was recorded, \
                             or simulated; fast effects (delay, bandwidth) may be the filter's"

@@ -16,7 +16,7 @@ pub(super) fn noises(problem: &Problem) -> Vec<Remark> {
         }
         let spread = spreads.iter().sum::<f64>() / spreads.len() as f64;
         let text = format!("its measuring error is {noise_sd:.2e}, {:.3} % of what it moves", 100.0 * noise_sd / spread);
-        let weight = if noise_sd / spread > 0.3 { Weight::Caution } else { Weight::Note };
+        let weight = if noise_sd / spread > tuning().recordings.noisy { Weight::Caution } else { Weight::Note };
         all.push(Remark { weight, records: Vec::new(), signal: output.name.clone(), about: "noise", text });
     }
     all
@@ -29,20 +29,21 @@ pub(super) fn repeats(problem: &Problem) -> Vec<Remark> {
     let apart = |x: &[f64], y: &[f64]| x.iter().zip(y).map(|(x, y)| (x - y) * (x - y)).sum::<f64>();
     for (i, a) in problem.fit.iter().enumerate() {
         for b in &problem.fit[..i] {
-            let same = a.len == b.len && a.inputs.iter().zip(&b.inputs).all(|(x, y)| square(x) > 0.0 && apart(x, y) < 1e-6 * square(x));
+            let same = a.len == b.len
+                && a.inputs.iter().zip(&b.inputs).all(|(x, y)| square(x) > 0.0 && apart(x, y) < tuning().recordings.repeated * square(x));
             if !same {
                 continue;
             }
             for (o, output) in problem.model.outputs.iter().enumerate() {
                 let (Some(Some(x)), Some(Some(y))) = (a.outputs.get(o), b.outputs.get(o)) else { continue };
                 let off = (apart(x, y) / (2 * x.len()) as f64).sqrt();
-                let floors = off / problem.noise_sd[o];
-                let text = if floors > 3.0 {
-                    format!("repeats {} to {off:.2e} only, {floors:.1} times its noise: no model can do better", file_name(&b.name))
+                let times = off / problem.noise_sd[o];
+                let text = if times > tuning().recordings.repeats {
+                    format!("repeats {} to {off:.2e} only, {times:.1} times its noise: no model can do better", file_name(&b.name))
                 } else {
                     format!("repeats {} to its noise", file_name(&b.name))
                 };
-                let weight = if floors > 3.0 { Weight::Caution } else { Weight::Note };
+                let weight = if times > tuning().recordings.repeats { Weight::Caution } else { Weight::Note };
                 add(&mut all, weight, a, &output.name, "repeats", text);
             }
         }

@@ -1,5 +1,7 @@
 //! Properties of one column of samples: constant, clipped, quantised, low-pass filtered, correlated with another.
 
+use crate::tuning::tuning;
+
 /// Smallest and largest sample.
 pub(super) fn extremes(samples: &[f64]) -> (f64, f64) {
     samples.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(*x), b.max(*x)))
@@ -19,7 +21,7 @@ pub(super) fn clipped_share(samples: &[f64]) -> (f64, f64, f64) {
     let moving = samples.windows(2).filter(|w| (w[1] - w[0]).abs() > near).count() as f64 / count;
     let share = |x: f64| samples.iter().filter(|s| (**s - x).abs() < near).count() as f64 / count;
     // A square wave is at its extremes all of the time and does not count.
-    if moving > 0.3 { (share(low) + share(high), low, high) } else { (0.0, low, high) }
+    if moving > tuning().recordings.moving { (share(low) + share(high), low, high) } else { (0.0, low, high) }
 }
 
 /// Whether samples lie anywhere between the steps of a grid.
@@ -29,8 +31,9 @@ pub(super) fn off_grid(samples: &[f64], step: f64) -> bool {
     if 1e-6 * low.abs().max(high.abs()) > 0.05 * step {
         return false;
     }
-    let off = samples.iter().filter(|x| ((*x / step) - (*x / step).round()).abs() > 0.1).count();
-    off as f64 > 0.2 * samples.len() as f64
+    let [distance, share] = tuning().recordings.off_grid;
+    let off = samples.iter().filter(|x| ((*x / step) - (*x / step).round()).abs() > distance).count();
+    off as f64 > share * samples.len() as f64
 }
 
 /// Power above three quarters of the Nyquist frequency over that of a level of white noise at the level of the quarter below it;

@@ -37,11 +37,11 @@ pub(super) fn bring_to_their_ends(evaluator: &Evaluator, found: &mut [Candidate]
     let best = found.first().map_or(f64::INFINITY, |c| c.fit.cost);
     let unit = best / samples as f64;
     let open = |c: &Candidate| {
-        c.fit.predicted_decrease > tuning().search.open_tolerance * unit
+        c.fit.predicted_decrease > tuning().fit.to_the_end.tolerance * unit
             && c.fit.cost - 2.0 * c.fit.predicted_decrease < best + tuning().search.open_advantage * unit * c.correlation_time
     };
     let near: Vec<usize> =
-        (0..found.len().min(tuning().search.last_fits)).filter(|i| found[*i].fit.cost < tuning().search.last_cost * best).collect();
+        (0..found.len().min(tuning().search.last_fits)).filter(|i| found[*i].fit.cost < tuning().search.behind_at_noise * best).collect();
     let polish = |budget: &Budget, i: usize| -> Option<(usize, Fit)> {
         let c = &found[i];
         let evaluator = evaluator.within(budget.clone());

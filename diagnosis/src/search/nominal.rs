@@ -145,7 +145,7 @@ struct FirstFit<'a> {
 impl<'a> FirstFit<'a> {
     fn of(problem: &'a Problem, work: &Work<'a>, structure: &Structure, start: &[f64]) -> Option<FirstFit<'a>> {
         let mut evaluator = Evaluator::new(problem);
-        evaluator.budget = work.up_to(tuning().search.refit_ends);
+        evaluator.budget = work.up_to(tuning().search.last_step);
         if friction_on_prescribed(problem) {
             evaluator.robust = tuning().fit.robust;
         }

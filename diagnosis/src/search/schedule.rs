@@ -4,8 +4,7 @@ use super::journal::Outcome;
 use super::settings::Settings;
 use super::state::State;
 use super::steps::{
-    Anew, Elsewhere, Exchanges, Finer, GivenBack, Keep, Laws, More, MorePairs, Pairs, Plain, Race, Relatives, Richer, Ripples, Singles,
-    Step,
+    Anew, Elsewhere, Exchanges, Finer, GivenBack, Laws, More, MorePairs, Pairs, Plain, Race, Relatives, Richer, Ripples, Singles, Step,
 };
 use crate::candidate::key_of;
 use crate::race::{Course, distinct};
@@ -15,7 +14,7 @@ use std::collections::HashSet;
 /// The steps of a search for so many effects, in their order. Where the residual is noise, only what may be wrong with single effects is asked.
 fn steps(is_quiet: bool, effects: usize) -> Vec<&'static dyn Step> {
     let mut steps: Vec<&'static dyn Step> =
-        vec![&Ripples, &Singles::FIRST, &GivenBack, &Laws, &Singles::NEXT, &Plain, &Relatives, &Elsewhere, &Relatives];
+        vec![&Ripples, &Singles::NEXT, &GivenBack, &Laws, &Singles::NEXT, &Plain, &Relatives, &Elsewhere, &Relatives];
     if is_quiet {
         return steps;
     }
@@ -32,10 +31,6 @@ fn steps(is_quiet: bool, effects: usize) -> Vec<&'static dyn Step> {
 pub struct StepRow {
     /// What it does.
     pub name: &'static str,
-    /// How many of the structures it proposes go on after their first steps.
-    pub further: usize,
-    /// How many are fitted to their end.
-    pub to_the_end: usize,
     /// Share of the work that it may take where the best is far from the noise.
     pub share: f64,
 }
@@ -44,8 +39,7 @@ pub struct StepRow {
 pub fn table() -> Vec<StepRow> {
     let mut rows: Vec<StepRow> = Vec::new();
     for step in steps(false, 3) {
-        let Keep { further, to_the_end } = step.keep();
-        let row = StepRow { name: step.name(), further, to_the_end, share: step.share() };
+        let row = StepRow { name: step.name(), share: step.share() };
         if !rows.contains(&row) {
             rows.push(row);
         }
@@ -101,9 +95,8 @@ fn take(step: &dyn Step, state: &mut State) -> Outcome {
         Race::Free => Course { along: None, ..course },
         Race::Finer => Course { along: None, coarse: state.fine, ..course },
     };
-    let keep = step.keep();
     let proposed = seeds.len();
-    let raced = course.race(seeds, [keep.further, keep.to_the_end]);
+    let raced = course.race(seeds);
     let fitted = raced.len();
     state.take(raced);
     step.settle(state);

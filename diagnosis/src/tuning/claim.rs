@@ -9,8 +9,6 @@ group! {
         least_advantage: f64 = 30.0, "criterion", Statistics("10 is very strong evidence for one alternative (Kass & Raftery 1995); some hundred hypotheses are tried, each at several starts, which adds 2 ln 500 = 12");
         /// Share of the cost that an effect has to remove.
         least_share: f64 = 0.02, "-", Numerics("what coarse substeps and an inexact simulator may cost");
-        /// Advantage of the better of two structures below which the simpler is claimed.
-        tie: f64 = 8.0, "criterion", Statistics("between strong (6) and very strong (10) evidence (Kass & Raftery 1995)");
         /// Advantage below which two structures cannot be told apart.
         alike: f64 = 6.0, "criterion", Statistics("strong evidence begins there (Kass & Raftery 1995)");
         /// Cost over another structure's up to which a structure of fewer parameters may be claimed for what it predicts.
@@ -33,8 +31,6 @@ group! {
         undetermined: f64 = 0.7, "logarithm", Statistics("a 95 % interval of a factor of 16 from end to end");
         /// The same of a parameter that is not fitted as its logarithm and was not stated, as a share of its range.
         undetermined_range: f64 = 0.25, "-", Statistics("a 95 % interval is then the whole range");
-        /// The same for what one record alone says.
-        undetermined_alone: f64 = 0.5, "logarithm", Statistics("a 95 % interval of a factor of 7");
         /// Excursion above which a sample belongs to a glitch, in median deviations of the residual.
         glitch: f64 = 8.0, "median deviations", Statistics("white noise does not reach it");
         /// Samples without an excursion that end a glitch.
@@ -55,15 +51,13 @@ group! {
         unfitted_most: f64 = 10.0, "hypotheses", Judgement("their weight is then that of one rival at 1.6 softened");
         /// Alternatives that are listed.
         alternatives: usize = 6, "structures", Cost("nobody reads more");
-        /// Normalised residual (rms) up to which a confidence is not lowered.
-        adequate: f64 = 1.05, "rms", Judgement("as noise.at_noise");
-        /// Excess of the residual that lowers a confidence by a factor of e.
-        adequate_scale: f64 = 0.15, "rms", Judgement("noise.unexplained is that much");
-        /// Correlation time up to which a confidence is not lowered.
-        adequate_correlation: f64 = 1.2, "samples", Judgement("chance alone, see noise.white_correlation");
-        /// Excess of the correlation time that lowers a confidence by a factor of e.
-        adequate_correlation_scale: f64 = 1.5, "samples", Judgement("noise.white_correlation is that much");
-        /// Rivals whose models are written.
+        /// Least factor on a confidence where the residual is not noise.
+        least_adequacy: f64 = 0.05, "-", Judgement("one in twenty may still be right");
+        /// Share of a finding's promise from which a hypothesis that was not fitted promised as much.
+        as_promising: f64 = 0.9, "-", Judgement("screening errs by more than that");
+        /// Share of a finding's confidence from which a rival is named in the sentence.
+        near_rival: f64 = 0.5, "-", Judgement("at least half as sure");
+        /// Rivals that are named, and whose models are written.
         rivals: usize = 3, "structures", Cost("files beside the verdict");
         /// Cost over that of the claim up to which a rival's model is written.
         rival_cost: f64 = 2.0, "-", Judgement("what is built on the verdict has to stand with these, too");

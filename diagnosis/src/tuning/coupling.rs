@@ -15,7 +15,5 @@ group! {
         transient: f64 = 0.3, "-", Judgement("laws with a memory begin without one");
         /// Residual energy of a recording's beginning, as a share of its best part's, that is enough to take the beginning.
         beginning: f64 = 0.4, "-", Cost("a beginning has no transient that does not count");
-        /// Mean squared residual, coupled, up to which a structure may be complete.
-        complete: f64 = 1.2, "mean square", Judgement("coupled, a complete structure leaves noise");
     }
 }

@@ -66,8 +66,6 @@ group! {
         unknown_range: f64 = 100.0, "-", Judgement("its standard deviation before data is a hundredth of that: about the size of what was measured");
         /// Distance from a bound, as a share of the range, within which a parameter is reported at its bound.
         at_bound: f64 = 1e-6, "-", Numerics("fits clamp exactly; the rest is rounding");
-        /// The same within which a fit leaves a parameter that is pushed against its bound out of a step.
-        pushed: f64 = 1e-9, "-", Numerics("as at_bound");
         /// Largest start position of a body, in sizes of what was measured; its largest start velocity crosses that size in a sample period over so many.
         start_range: f64 = 20.0, "-", Judgement("devices start inside the range that they move in");
         /// Standard deviation of those before data, as a share of their largest value.

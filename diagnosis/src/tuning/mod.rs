@@ -81,7 +81,7 @@ impl Tuning {
         self.clone().groups().into_iter().flat_map(|(name, group)| group.rows(name)).collect()
     }
 
-    /// One entry by its name, such as `claim.tie`; `None` where there is none of it.
+    /// One entry by its name, such as `claim.alike`; `None` where there is none of it.
     pub fn quantity(&mut self, name: &str) -> Option<&mut dyn Quantity> {
         let (group, field) = name.split_once('.')?;
         let (_, group) = self.groups().into_iter().find(|(name, _)| *name == group)?;

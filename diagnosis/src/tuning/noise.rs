@@ -15,6 +15,8 @@ group! {
         fewest_blocks: usize = 12, "blocks", Statistics("a chi-square of fewer is far from the normal distribution that the statistic is read by");
         /// Normalised residual (rms) up to which a fit has reached the noise.
         at_noise: f64 = 1.04, "rms", Judgement("the noise standard deviation is itself estimated, to about 2 % from 1000 samples, and rounding adds as much");
+        /// Mean squared normalised residual below which a fit on its way counts as at the noise: coupled, or before its last steps.
+        complete: f64 = 1.2, "mean square", Judgement("at_noise squared, and a tenth for the steps that are left");
         /// Normalised residual (rms) above which an output is not explained.
         unexplained: f64 = 1.15, "rms", Judgement("seven times that error of the noise estimate");
         /// Normalised residual (rms) above which a model is far from the noise, and fits start coupled to the measured motion.

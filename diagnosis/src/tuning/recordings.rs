@@ -23,6 +23,20 @@ group! {
         jitter: f64 = 0.05, "sample periods", Judgement("a delay of that size is what a diagnosis would find instead");
         /// Share of samples at a signal's two extremes above which it looks clipped.
         clipped: f64 = 0.02, "-", Statistics("a sine has 0.9 % of its samples within 1e-4 of its range at either end");
+        /// Share of samples that differ from the one before below which a signal is a square wave, which is not clipped.
+        moving: f64 = 0.3, "-", Judgement("a clipped sine moves for most of the time");
+        /// Distance from the grid, in steps, beyond which a sample is off it, and the share of such samples beyond which a signal is.
+        off_grid: [f64; 2] = [0.1, 0.2], "steps, -", Judgement("a recording off the grid has 80 % of its samples beyond a tenth of a step");
+        /// Difference of an encoder's step from a multiple of the stated one, in stated steps, above which it is remarked.
+        grid: f64 = 0.02, "steps", Judgement("data sheets give encoders exactly");
+        /// Power in the top quarter of the band over that in the middle below which a signal was low-pass filtered.
+        quiet_top: f64 = 1e-4, "-", Judgement("40 dB: noise of a sensor is flat, quantisation nearly");
+        /// Noise standard deviation, as a share of the signal, above which it is a caution.
+        noisy: f64 = 0.3, "-", Judgement("a tenth of the power");
+        /// Squared difference of two excitations, as a share of theirs, below which they are repeats.
+        repeated: f64 = 1e-6, "-", Numerics("three digits of a file");
+        /// Difference of two repeats, in noise standard deviations, above which the device does not repeat itself.
+        repeats: f64 = 3.0, "noise standard deviations", Judgement("two recordings with noise of their own differ by 1, as it is computed");
         /// Correlation of a command's noise with a sensor's above which a controller closes the loop.
         closed_loop: f64 = 0.5, "-", Statistics("0.1 is chance at 400 samples");
         /// Ratio of sample times in a set above which it is remarked.
@@ -33,8 +47,6 @@ group! {
         slow: f64 = 0.02, "s", Judgement("no force-reflecting device is sampled at less than 50 Hz");
         /// Share of the residual's power that another unit of time has to remove.
         time_unit_removes: f64 = 0.75, "-", Judgement("half of the amplitude");
-        /// Correlation of measured and predicted signals in that unit.
-        time_unit_correlates: f64 = 0.85, "-", Judgement("as time_unit_removes: 0.87 goes with it for a model that is scaled right");
         /// Correlation of measured and predicted signals from which a factor between them means something.
         unit_correlates: f64 = 0.9, "-", Judgement("a model of another structure is scaled by chance below that");
         /// Factor beyond which a signal is called to be in another unit.

@@ -15,8 +15,6 @@ group! {
         abreast: usize = 16, "fits", Cost("two for each of eight processors; fixed, so that a verdict does not depend on their number");
         /// Share of what is left that one of many fits side by side may take.
         of_one: f64 = 0.25, "of what is left", Cost("one fit of a slow law must not starve the others");
-        /// Share at which the nominal model's refit ends.
-        refit_ends: f64 = 0.75, "of the work", Cost("never reached in practice");
         /// Share after which no step is begun.
         last_step: f64 = 0.7, "of the work", Cost("the rest is for bringing the best to their ends");
         /// Share after which no step for rivals of the best is begun.
@@ -41,12 +39,18 @@ group! {
         experiment: u64 = 100_000_000, "simulation steps", Cost("a twelfth of the work");
         /// Share of the best promise that a single effect has to reach, beyond the first few.
         promise: f64 = 0.5, "-", Cost("those that promise less are tried beside others");
-        /// Single effects fitted first and next, where a coupled fit makes first steps cheap.
+        /// Structures of a step that go on after their first steps.
+        further: usize = 4, "structures", Cost("first steps do not rank surely");
+        /// Structures of a step that are fitted to their end.
+        ended: usize = 3, "structures", Cost("one fit each");
+        /// Structures that another effect is added to: in the first step that does, and once those of it are used up.
+        bases: [usize; 2] = [3, 5], "structures", Cost("the best may have been the wrong first effect");
+        /// Effects that are tried beside each of them, those that promise most.
+        beside: [usize; 2] = [5, 7], "structures", Cost("screening is of first order");
+        /// Single effects fitted at a time, where a coupled fit makes first steps cheap.
         singles_coupled: usize = 30, "structures", Cost("first steps");
-        /// Single effects fitted first, otherwise.
-        singles_first: usize = 4, "structures", Cost("first steps");
-        /// Single effects fitted next, otherwise.
-        singles_next: usize = 5, "structures", Cost("first steps");
+        /// Single effects fitted at a time, otherwise.
+        singles: usize = 5, "structures", Cost("first steps");
         /// Ripples fitted without coupling.
         ripples: usize = 4, "structures", Cost("first steps");
         /// Other laws at the place of the best, where fits are not coupled.
@@ -65,8 +69,6 @@ group! {
         may_gain: f64 = 0.6, "-", Judgement("a prediction from a linearisation is optimistic");
         /// The same where coupled fits are dropped.
         may_gain_coupled: f64 = 0.95, "-", Cost("a fit on its way is not behind yet");
-        /// Mean squared residual of the best below which others need only show that they do no better.
-        best_ends: f64 = 1.1, "mean square", Cost("it leaves noise");
         /// Share after which screening beside a structure takes the best structure only.
         last_other_base: f64 = 0.5, "of the work", Cost("as last_step");
         /// Structures that go on after their first steps whatever the best has reached.
@@ -77,22 +79,14 @@ group! {
         behind_at_noise: f64 = 1.3, "-", Cost("no structure far behind can win any more");
         /// The same before the best is at the noise.
         behind_far: f64 = 4.0, "-", Cost("twice the residual");
-        /// Mean squared residual of the best below which it is at the noise, for the two above.
-        best_at_noise: f64 = 1.2, "mean square", Cost("as noise.at_noise squared, and a fit that is not at its end");
-        /// Cost over the best's up to which a structure is refined or has parameters given back.
-        as_good: f64 = 3.0, "-", Cost("1.7 times the residual");
         /// Excerpts of a stated parameter that a law beside it may take over.
         taken_over: [f64; 3] = [0.25, 0.5, 0.9], "-", Judgement("two dampers in a row are told apart along a narrow valley: starts along it");
         /// Steps to something simpler at the end, at most.
         simpler: usize = 3, "steps", Cost("one fit for each effect and law");
         /// Structures of each number of effects that are held against unseen recordings.
         finalists: usize = 8, "structures", Cost("one simulation each");
-        /// Predicted decrease above which one of the best goes on, in mean squared residuals.
-        open_tolerance: f64 = 0.5, "mean squares", Statistics("as fit.to_the_end");
         /// Distance from the best, in mean squared residuals over the correlation time, up to which it does.
-        open_advantage: f64 = 20.0, "criterion", Statistics("beyond twice claim.tie nothing changes any more");
-        /// Cost over the best's up to which it is looked at.
-        last_cost: f64 = 1.5, "-", Cost("as open_advantage");
+        open_advantage: f64 = 20.0, "criterion", Statistics("beyond twice claim.alike nothing changes any more");
         /// Structures whose parameters the nominal model starts from at the end.
         nominal_from: usize = 2, "structures", Cost("one fit each");
         /// Structures that are brought to their ends.

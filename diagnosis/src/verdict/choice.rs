@@ -22,7 +22,7 @@ pub fn chosen(search: &Search) -> &Candidate {
         let simplest = search
             .found
             .iter()
-            .filter(|c| c.structure.added.len() == effects && evidence(search, c, next) < tuning().claim.tie)
+            .filter(|c| c.structure.added.len() == effects && evidence(search, c, next) < tuning().claim.alike)
             .min_by_key(|c| (c.structure.free.len(), c.structure.added.iter().map(order).sum::<usize>()))
             .unwrap_or(next);
         if worth(search, best, simplest) {
@@ -47,7 +47,7 @@ pub(super) fn evidence(search: &Search, base: &Candidate, better: &Candidate) ->
     let (simple, rich) = if unseen > 0.0 { (better, base) } else { (base, better) };
     let is_overfit = simple.structure.free.len() < rich.structure.free.len()
         && simple.fit.cost < tuning().claim.twice * rich.fit.cost
-        && unseen.abs() > tuning().claim.tie
+        && unseen.abs() > tuning().claim.alike
         && fits * unseen < 0.0;
     if is_overfit { unseen } else { fits + unseen }
 }
@@ -90,7 +90,7 @@ pub(super) fn alike<'s>(search: &'s Search, best: &Candidate) -> Vec<&'s Candida
     let close = |c: &&Candidate| {
         c.structure.added.len() == best.structure.added.len() && evidence(search, c, best) < tuning().claim.alike && differs(c)
     };
-    search.found.iter().filter(close).filter(|c| seen.insert(c.structure.name())).take(3).collect()
+    search.found.iter().filter(close).filter(|c| seen.insert(c.structure.name())).take(tuning().claim.rivals).collect()
 }
 
 /// The structures of as many effects that come nearest to the best, at most two.

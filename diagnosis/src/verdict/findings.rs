@@ -16,11 +16,11 @@ use std::collections::BTreeMap;
 /// How far the residual is measuring error: 1 where it has its size and is as little correlated, less the more of either. A law
 /// that only imitates what is there leaves a little over, and that little is not white.
 pub(super) fn adequacy(best: &Candidate) -> f64 {
+    let noise = &tuning().noise;
     let level = best.levels.iter().fold(0.0f64, |a, b| a.max(*b));
-    let size = (-(level - tuning().claim.adequate).max(0.0) / tuning().claim.adequate_scale).exp();
-    let whiteness =
-        (-(best.correlation_time - tuning().claim.adequate_correlation).max(0.0) / tuning().claim.adequate_correlation_scale).exp();
-    (size * whiteness).max(0.05)
+    let size = (-(level - noise.at_noise).max(0.0) / (noise.unexplained - 1.0)).exp();
+    let whiteness = (-(best.correlation_time - noise.white_correlation).max(0.0) / noise.white_correlation).exp();
+    (size * whiteness).max(tuning().claim.least_adequacy)
 }
 
 /// Each physics of a structure with its rivals, most important first.
@@ -43,7 +43,7 @@ fn finding(search: &Search, best: &Candidate, spread: &Uncertainty, adequacy: f6
     let weights: Vec<f64> = rivals.iter().map(weight).collect();
     // And of those that promised as much, but were not fitted: little, for they did not win their race.
     let own = search.tried.iter().find(|t| t.id == hypothesis.id).map_or(1.0, |t| t.promised);
-    let unfitted = search.tried.iter().filter(|t| t.taken.is_none() && t.promised > 0.9 * own).count() as f64;
+    let unfitted = search.tried.iter().filter(|t| t.taken.is_none() && t.promised > tuning().claim.as_promising * own).count() as f64;
     let sum = 1.0 + weights.iter().sum::<f64>() + tuning().claim.unfitted * unfitted.min(tuning().claim.unfitted_most);
     let alternative = |((rival, _), weight): (&(Hypothesis, f64), &f64)| Alternative {
         physics: rival.physics.name.to_string(),

@@ -52,7 +52,11 @@ fn asserted(finding: &Finding) -> String {
 
 /// What is known where the explanations cannot be told apart: the finding and its rivals that are at least half as likely, at most three.
 fn known(finding: &Finding) -> String {
-    let near = finding.alternatives.iter().filter(|rival| rival.confidence >= 0.5 * finding.confidence).take(3);
+    let near = finding
+        .alternatives
+        .iter()
+        .filter(|rival| rival.confidence >= tuning().claim.near_rival * finding.confidence)
+        .take(tuning().claim.rivals);
     let all: Vec<(&str, &Place)> = std::iter::once((finding.physics.as_str(), &finding.place))
         .chain(near.map(|rival| (rival.physics.as_str(), &rival.place)))
         .collect();

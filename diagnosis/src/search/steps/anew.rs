@@ -1,6 +1,6 @@
 //! Hypotheses screened anew beside a structure that was found.
 
-use super::step::{Keep, Race, Step};
+use super::step::{Race, Step};
 use crate::candidate::{Candidate, distinct_structures, simplest_of};
 use crate::evaluator::Evaluator;
 use crate::hypothesis::Hypothesis;
@@ -17,10 +17,6 @@ pub(crate) struct Anew;
 impl Step for Anew {
     fn name(&self) -> &'static str {
         "screening beside the best"
-    }
-
-    fn keep(&self) -> Keep {
-        Keep { further: 4, to_the_end: 2 }
     }
 
     fn race(&self) -> Race {
@@ -70,7 +66,7 @@ fn screened(course: &Course, evaluator: &Evaluator, base: &Candidate, work: Step
     let fits = |h: usize| course.hypotheses[h].parameters.len() <= tuning().screening.parameters;
     let mut used = HashSet::new();
     let next = screen.look(&fit, &fits).into_iter().filter(|p| used.insert(p.hypothesis));
-    next.take(6).map(|p| seed(p, false)).collect()
+    next.take(tuning().search.beside[0]).map(|p| seed(p, false)).collect()
 }
 
 /// Fewest substeps per sample with which a simulation errs by less than the residual of a structure.

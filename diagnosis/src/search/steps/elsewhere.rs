@@ -1,6 +1,6 @@
 //! The law that was found, at other places.
 
-use super::step::{Keep, Race, Step};
+use super::step::{Race, Step};
 use crate::candidate::{Candidate, key_of, simplest};
 use crate::hypothesis::Hypothesis;
 use crate::race::{Course, Seed};
@@ -13,10 +13,6 @@ pub(crate) struct Elsewhere;
 impl Step for Elsewhere {
     fn name(&self) -> &'static str {
         "fitting the same law at other places"
-    }
-
-    fn keep(&self) -> Keep {
-        Keep { further: 3, to_the_end: 3 }
     }
 
     fn share(&self) -> f64 {

@@ -1,7 +1,7 @@
 //! One effect of the best exchanged for another: a first step may have been the wrong one.
 
 use super::extensions::extensions;
-use super::step::{Keep, Step};
+use super::step::Step;
 use crate::candidate::{Candidate, candidate};
 use crate::hypothesis::Hypothesis;
 use crate::race::{Course, Seed};
@@ -16,10 +16,6 @@ pub(crate) struct Exchanges;
 impl Step for Exchanges {
     fn name(&self) -> &'static str {
         "exchanging effects"
-    }
-
-    fn keep(&self) -> Keep {
-        Keep { further: 4, to_the_end: 2 }
     }
 
     fn propose(&self, state: &mut State) -> Vec<Seed> {

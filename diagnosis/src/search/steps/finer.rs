@@ -1,6 +1,6 @@
 //! Laws of the best, resolved more finely.
 
-use super::step::{Keep, Race, Step};
+use super::step::{Race, Step};
 use crate::candidate::{Candidate, distinct_structures};
 use crate::hypothesis;
 use crate::race::{Course, Seed};
@@ -13,10 +13,6 @@ pub(crate) struct Finer;
 impl Step for Finer {
     fn name(&self) -> &'static str {
         "resolving a law more finely"
-    }
-
-    fn keep(&self) -> Keep {
-        Keep { further: 3, to_the_end: 2 }
     }
 
     fn share(&self) -> f64 {
@@ -39,7 +35,7 @@ impl Step for Finer {
 /// The best, and what does nearly as well with as many effects, with a law of theirs resolved more finely.
 fn finer(course: &Course, found: &[Candidate]) -> Vec<Seed> {
     let Some(best) = found.first() else { return Vec::new() };
-    let near = |c: &&Candidate| c.fit.cost < tuning().search.as_good * best.fit.cost;
+    let near = |c: &&Candidate| c.fit.cost < tuning().search.behind * best.fit.cost;
     let mut seeds = Vec::new();
     for c in distinct_structures(found, best.structure.added.len()).filter(near) {
         let own = course.effects_of(&c.structure, &c.fit.values);

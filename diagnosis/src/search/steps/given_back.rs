@@ -1,6 +1,6 @@
 //! Stated parameters that give back what they may have absorbed.
 
-use super::step::{Keep, Step};
+use super::step::Step;
 use crate::hypothesis::Place;
 use crate::race::{Course, Seed};
 use crate::screen::Promise;
@@ -14,10 +14,6 @@ pub(crate) struct GivenBack;
 impl Step for GivenBack {
     fn name(&self) -> &'static str {
         "splitting parameters with a neighbour"
-    }
-
-    fn keep(&self) -> Keep {
-        Keep { further: 5, to_the_end: 3 }
     }
 
     fn tries_again(&self) -> bool {

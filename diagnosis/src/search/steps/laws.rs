@@ -1,6 +1,6 @@
 //! Every law at the place of the best: where one law helps another one may be the right one.
 
-use super::step::{Keep, Step};
+use super::step::Step;
 use crate::race::{Seed, distinct};
 use crate::search::state::State;
 use crate::tuning::tuning;
@@ -11,10 +11,6 @@ pub(crate) struct Laws;
 impl Step for Laws {
     fn name(&self) -> &'static str {
         "fitting other laws at the same place"
-    }
-
-    fn keep(&self) -> Keep {
-        Keep { further: 3, to_the_end: 3 }
     }
 
     fn propose(&self, state: &mut State) -> Vec<Seed> {

@@ -29,4 +29,4 @@ pub(super) use relatives::Relatives;
 pub(super) use richer::Richer;
 pub(super) use ripples::Ripples;
 pub(super) use singles::Singles;
-pub(super) use step::{Keep, Race, Step};
+pub(super) use step::{Race, Step};

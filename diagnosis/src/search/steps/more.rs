@@ -1,10 +1,11 @@
 //! One more effect.
 
 use super::extensions::extensions;
-use super::step::{Keep, Step};
+use super::step::Step;
 use crate::candidate::distinct_structures;
 use crate::race::Seed;
 use crate::search::state::State;
+use crate::tuning::tuning;
 
 /// The best with one effect fewer, and what promises most beside them.
 pub(crate) struct More;
@@ -14,14 +15,11 @@ impl Step for More {
         "fitting more effects at once"
     }
 
-    fn keep(&self) -> Keep {
-        Keep { further: 4, to_the_end: 3 }
-    }
-
     fn propose(&self, state: &mut State) -> Vec<Seed> {
         state.effects += 1;
+        let (bases, beside) = (tuning().search.bases[0], tuning().search.beside[0]);
         let (course, found) = (state.course, &state.found);
         let Some(view) = state.views.first() else { return Vec::new() };
-        distinct_structures(found, state.effects - 1).take(3).flat_map(|base| extensions(&course, view, base, 5)).collect()
+        distinct_structures(found, state.effects - 1).take(bases).flat_map(|base| extensions(&course, view, base, beside)).collect()
     }
 }

@@ -1,10 +1,11 @@
 //! Pairs of effects.
 
 use super::extensions::extensions;
-use super::step::{Keep, Step};
+use super::step::Step;
 use crate::candidate::distinct_structures;
 use crate::race::Seed;
 use crate::search::state::State;
+use crate::tuning::tuning;
 
 /// The pairs that promise most together, and the best singles with what promises most beside them.
 pub(crate) struct Pairs;
@@ -14,17 +15,14 @@ impl Step for Pairs {
         "fitting pairs"
     }
 
-    fn keep(&self) -> Keep {
-        Keep { further: 5, to_the_end: 3 }
-    }
-
     fn propose(&self, state: &mut State) -> Vec<Seed> {
         state.effects = 2;
+        let (bases, beside) = (tuning().search.bases[0], tuning().search.beside[0]);
         let (course, found) = (state.course, &state.found);
         let Some(view) = state.views.first() else { return Vec::new() };
-        let mut seeds: Vec<Seed> = state.views.iter().flat_map(|view| view.pairs(course.hypotheses, 5)).collect();
-        for base in distinct_structures(found, 1).take(3) {
-            seeds.extend(extensions(&course, view, base, 4));
+        let mut seeds: Vec<Seed> = state.views.iter().flat_map(|view| view.pairs(course.hypotheses, beside)).collect();
+        for base in distinct_structures(found, 1).take(bases) {
+            seeds.extend(extensions(&course, view, base, beside));
         }
         seeds
     }
@@ -38,13 +36,10 @@ impl Step for MorePairs {
         "fitting more pairs"
     }
 
-    fn keep(&self) -> Keep {
-        Keep { further: 5, to_the_end: 3 }
-    }
-
     fn propose(&self, state: &mut State) -> Vec<Seed> {
+        let (bases, beside) = (tuning().search.bases[1], tuning().search.beside[1]);
         let (course, found) = (state.course, &state.found);
         let Some(view) = state.views.first() else { return Vec::new() };
-        distinct_structures(found, 1).take(5).flat_map(|base| extensions(&course, view, base, 7)).collect()
+        distinct_structures(found, 1).take(bases).flat_map(|base| extensions(&course, view, base, beside)).collect()
     }
 }

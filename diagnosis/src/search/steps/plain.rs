@@ -1,6 +1,6 @@
 //! Laws of one parameter, whatever screening promised of them.
 
-use super::step::{Keep, Step};
+use super::step::Step;
 use crate::race::Seed;
 use crate::search::state::State;
 
@@ -10,10 +10,6 @@ pub(crate) struct Plain;
 impl Step for Plain {
     fn name(&self) -> &'static str {
         "fitting laws of one parameter"
-    }
-
-    fn keep(&self) -> Keep {
-        Keep { further: 4, to_the_end: 2 }
     }
 
     fn is_for_rivals(&self, state: &State) -> bool {

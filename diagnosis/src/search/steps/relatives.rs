@@ -1,6 +1,6 @@
 //! Simpler laws of the family of the best, in its place.
 
-use super::step::{Keep, Race, Step};
+use super::step::{Race, Step};
 use crate::candidate::Candidate;
 use crate::hypothesis::{self, Hypothesis};
 use crate::race::{Course, Seed};
@@ -14,10 +14,6 @@ pub(crate) struct Relatives;
 impl Step for Relatives {
     fn name(&self) -> &'static str {
         "fitting simpler laws of the same family"
-    }
-
-    fn keep(&self) -> Keep {
-        Keep { further: 3, to_the_end: 3 }
     }
 
     fn share(&self) -> f64 {

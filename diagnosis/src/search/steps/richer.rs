@@ -1,6 +1,6 @@
 //! A law of many parameters in the place of the best.
 
-use super::step::{Keep, Step};
+use super::step::Step;
 use crate::candidate::distinct_structures;
 use crate::hypothesis::{Family, Hypothesis};
 use crate::race::Seed;
@@ -12,10 +12,6 @@ pub(crate) struct Richer;
 impl Step for Richer {
     fn name(&self) -> &'static str {
         "fitting richer laws"
-    }
-
-    fn keep(&self) -> Keep {
-        Keep { further: 2, to_the_end: 1 }
     }
 
     fn propose(&self, state: &mut State) -> Vec<Seed> {

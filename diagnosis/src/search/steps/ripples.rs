@@ -1,6 +1,6 @@
 //! Ripples that stand alone in the spectrum of their force.
 
-use super::step::{Keep, Race, Step};
+use super::step::{Race, Step};
 use crate::race::Seed;
 use crate::search::state::State;
 use crate::tuning::tuning;
@@ -11,10 +11,6 @@ pub(crate) struct Ripples;
 impl Step for Ripples {
     fn name(&self) -> &'static str {
         "fitting ripples"
-    }
-
-    fn keep(&self) -> Keep {
-        Keep { further: 3, to_the_end: 2 }
     }
 
     fn race(&self) -> Race {

@@ -3,13 +3,6 @@
 use crate::race::Seed;
 use crate::search::state::State;
 
-/// How many of the structures that a step proposes are fitted further than their first steps, and how many to their end.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Keep {
-    pub further: usize,
-    pub to_the_end: usize,
-}
-
 /// How structures are fitted at first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Race {
@@ -25,9 +18,6 @@ pub(crate) enum Race {
 pub(crate) trait Step {
     /// What it does, as progress and explanation say it.
     fn name(&self) -> &'static str;
-
-    /// How far its structures are fitted.
-    fn keep(&self) -> Keep;
 
     /// Share of the work that it may take where the best is far from the noise and another effect may be what is missing.
     fn share(&self) -> f64 {
