@@ -105,8 +105,9 @@ impl<'a> Nominal<'a> {
         let structure = Structure::new(problem, &problem.fit, Vec::new());
         let given: Vec<f64> = problem.stated.iter().map(|s| s.given).collect();
         let start = structure.values(problem, &given, &[], &[]);
-        let FirstFit { evaluator, middle, fit, levels_given, is_far } =
+        let FirstFit { evaluator, fit, levels_given, is_far } =
             FirstFit::of(problem, work, &structure, &start).ok_or(SearchError::RunsAway)?;
+        let middle = at_middle(&evaluator);
         let effort = if is_far { tuning().fit.nominal_far } else { tuning().fit.to_the_end };
         let mut refitted = evaluator.fit(&structure, &fit.values, effort).ok_or(SearchError::RunsAway)?;
         // Far from the noise the residuals coupled to the measured motion show better than those of a simulation what is missing, and coupled fits
@@ -135,7 +136,6 @@ impl<'a> Nominal<'a> {
 /// The nominal model's first fit, and the noise estimated from its residuals.
 struct FirstFit<'a> {
     evaluator: Evaluator<'a>,
-    middle: Evaluator<'a>,
     fit: Fit,
     /// Normalised residual (rms) of each output with the parameters as given.
     levels_given: Vec<f64>,
@@ -150,8 +150,7 @@ impl<'a> FirstFit<'a> {
             evaluator.robust = tuning().fit.robust;
         }
         let first = evaluator.residuals(structure, start)?;
-        let middle = at_middle(&evaluator);
-        let fit = worst_first(&middle, structure, start, &first, tuning().fit.nominal_first)?;
+        let fit = worst_first(&at_middle(&evaluator), structure, start, &first, tuning().fit.nominal_first)?;
         // The residuals of a fit show the noise better than the signal does.
         let before = evaluator.noise_sd.clone();
         evaluator.noise_sd = floors(&evaluator, &fit.residuals);
@@ -164,7 +163,7 @@ impl<'a> FirstFit<'a> {
         };
         let levels_given = rescaled(&first);
         let is_far = rescaled(&fit.residuals).iter().any(|l| *l > tuning().noise.very_far);
-        Some(FirstFit { evaluator, middle, fit, levels_given, is_far })
+        Some(FirstFit { evaluator, fit, levels_given, is_far })
     }
 }
 

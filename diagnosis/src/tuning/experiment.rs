@@ -22,7 +22,7 @@ group! {
         /// Mean of a force, as a share of its peak, below which it counts as none.
         small_mean: f64 = 0.3, "-", Judgement("what is larger is weight or preload, and is kept");
         /// Share of the sampling rate that excitations keep below.
-        band: f64 = 0.1, "-", Numerics("ten samples per period: a zero-order hold is then off by 5 %");
+        band: f64 = 0.1, "-", Numerics("ten samples per period: the first harmonic behind a zero-order hold is then smaller by 1.6 % (sinc 0.1)");
         /// Samples of an excitation, at most.
         longest: f64 = 16_000.0, "samples", Cost("as long as the recordings");
         /// Share of the work for simulating everything, and for simulating and evaluating it.

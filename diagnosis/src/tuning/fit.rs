@@ -7,7 +7,7 @@ group! {
     /// How a structure is fitted: damped Gauss-Newton steps (Levenberg-Marquardt) with secant updates of the derivatives.
     Fit {
         /// A fit that is brought to its end: steps, and the predicted decrease of the next one at which it has ended.
-        to_the_end: Effort = Effort { steps: 40, tolerance: 0.3 }, "steps, mean squares", Statistics("a parameter at one standard deviation from its optimum costs 1; most end after 5 to 15 steps");
+        to_the_end: Effort = Effort { steps: 40, tolerance: 0.3 }, "steps, mean squares", Statistics("a parameter at one standard deviation from its optimum costs 1");
         /// The same for one that is already beaten.
         beaten_steps: usize = 6, "steps", Cost("it only has to show that it does no better");
         /// A fit in the middle stage of a race.

@@ -6,9 +6,9 @@ group! {
     /// When residuals count as noise. They are normalised: divided by the noise standard deviation of their output.
     Noise {
         /// Correlation time below which residuals may be white.
-        white_correlation: f64 = 1.5, "samples", Statistics("white noise has 1; the sum over lags that chance makes positive adds up to about 0.3 at 1000 samples and more");
+        white_correlation: f64 = 1.5, "samples", Statistics("white noise has 1; correlations below twice their standard error are not summed, and of 1000 samples one in 44 exceeds it, by which it adds 0.15");
         /// Whiteness statistic below which residuals may be white.
-        white_statistic: f64 = 4.0, "standard deviations", Statistics("the largest of four block lengths exceeds 4 by chance in about 1 of 8000 fits (normal tail)");
+        white_statistic: f64 = 4.0, "standard deviations", Statistics("a chi-square, normalised: the tail beyond 4 is 1 in 4000 with 100 blocks, 1 in 630 with 12 (scipy.stats.chi2)");
         /// Block lengths over which the whiteness statistic sums residuals.
         blocks: [usize; 4] = [4, 16, 64, 256], "samples", Statistics("sums over blocks see slow residuals that neighbours do not show; factors of four leave no gap between them");
         /// Blocks of a record below which the whiteness statistic leaves it out.

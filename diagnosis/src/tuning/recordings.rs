@@ -22,7 +22,7 @@ group! {
         /// Distance of samples from the even grid above which a clock is called uneven.
         jitter: f64 = 0.05, "sample periods", Judgement("a delay of that size is what a diagnosis would find instead");
         /// Share of samples at a signal's two extremes above which it looks clipped.
-        clipped: f64 = 0.02, "-", Statistics("a sine has 0.9 % of its samples within 1e-4 of its range at either end");
+        clipped: f64 = 0.02, "-", Statistics("a sine has 1.3 % of its samples within 1e-4 of its range from its two ends: 2 arccos(1 - 2e-4) / pi");
         /// Share of samples that differ from the one before below which a signal is a square wave, which is not clipped.
         moving: f64 = 0.3, "-", Judgement("a clipped sine moves for most of the time");
         /// Distance from the grid, in steps, beyond which a sample is off it, and the share of such samples beyond which a signal is.
@@ -38,7 +38,7 @@ group! {
         /// Difference of two repeats, in noise standard deviations, above which the device does not repeat itself.
         repeats: f64 = 3.0, "noise standard deviations", Judgement("two recordings with noise of their own differ by 1, as it is computed");
         /// Correlation of a command's noise with a sensor's above which a controller closes the loop.
-        closed_loop: f64 = 0.5, "-", Statistics("0.1 is chance at 400 samples");
+        closed_loop: f64 = 0.5, "-", Statistics("0.1 is two standard errors at 400 samples");
         /// Ratio of sample times in a set above which it is remarked.
         sample_times: f64 = 2.0, "-", Judgement("the faster recording has an octave above the band of the slower one");
         /// Distance, as a factor, of a ratio or factor from that of two units within which it is taken for them.

@@ -36,7 +36,7 @@ group! {
         /// Squared simulation error of coarse substeps, as a share of the squared residual, above which finer ones are taken.
         substep_error: f64 = 0.02, "-", Numerics("an error of 14 % of the residual moves a cost by 2 %, as little as claim.least_share");
         /// Decrease of the cost that the best of many hypotheses promises on white noise.
-        chance: f64 = 25.0, "mean squares", Statistics("the largest of 500 chi-squares of 6 degrees of freedom has a median of 24");
+        chance: f64 = 25.0, "mean squares", Statistics("the largest of 500 chi-squares of 6 degrees of freedom has a median of 22, and 25 or more in one of six (scipy.stats.chi2)");
         /// Samples in which ripples are looked for, at most.
         ripple_samples: usize = 12_000, "samples", Cost("their lines stand out in fewer");
         /// Power of a ripple's line over the median of all.

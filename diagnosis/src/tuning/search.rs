@@ -10,7 +10,7 @@ group! {
         /// Wall-clock limit of a search, where nothing else is said.
         patience: u64 = 600, "s", Cost("far longer than the default effort takes on a slow machine");
         /// Simulation steps of two threads of a laptop in a second: for progress bars only.
-        steps_per_second: f64 = 60e6, "simulation steps", Measured("`cargo bench -p backdrive-plant --bench stepper`: about 25 ns a step of a linear network");
+        steps_per_second: f64 = 60e6, "simulation steps", Judgement("one over tens of nanoseconds, which a step of a small network takes, on two threads");
         /// Fits that run side by side before their work is added up.
         abreast: usize = 16, "fits", Cost("two for each of eight processors; fixed, so that a verdict does not depend on their number");
         /// Share of what is left that one of many fits side by side may take.
