@@ -92,7 +92,7 @@ pub fn evidence(problem: &Problem, best: &Candidate, noise_sd: &[f64], which: us
         variable_unit,
         displacement_unit,
         force_unit,
-        memory: finding.physics.memory,
+        memory: finding.physics.facts.memory,
         replaces: finding.replaces.clone(),
         traces,
     })

@@ -159,5 +159,5 @@ pub(super) fn separator(a: &Structure, b: &Structure) -> Option<&'static str> {
 /// What would have to be known of two structures that no recording of the same signals tells apart.
 pub(super) fn same_force(a: &Structure, b: &Structure) -> &'static str {
     let own = [only(a, b), only(b, a)].concat();
-    own.iter().find_map(|h| h.physics.twin).unwrap_or("they are the same force under two names")
+    own.iter().find_map(|h| h.physics.facts.twin).unwrap_or("they are the same force under two names")
 }

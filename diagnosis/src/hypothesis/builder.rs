@@ -1,6 +1,6 @@
 //! Puts hypotheses together: names, units and paths follow from the element registry and the site.
 
-use super::sites::{Site, Sites};
+use super::sites::{DryFriction, Site, Sites};
 use super::types::{ElementForm, Form, Hypothesis, Parameter, Physics, Place, Source};
 use backdrive_plant::describe::unit_for;
 use backdrive_plant::elements::{Kind, Law, kind_named};
@@ -74,6 +74,31 @@ impl<'a> ElementBuilder<'a> {
             (self.name, self.between, self.in_place) = (element.name, element.between, true);
         }
         self
+    }
+
+    /// It takes the place of the dry friction that the model has at its site, if any, and starts from its level. `None` where that is of the same kind.
+    pub fn in_place_of_friction(self, site: &Site) -> Option<(Self, Option<DryFriction>)> {
+        match self.sites.dry_friction(site) {
+            None => Some((self, None)),
+            Some(there) if there.kind == self.physics.name => None,
+            Some(there) => Some((self.replacing(there.index), Some(there))),
+        }
+    }
+
+    /// The same of a law that has friction of one level as its only special case, and that level. `None` where another law stands there.
+    pub fn in_place_of_plain_friction(self, site: &Site) -> Option<(Self, Option<f64>)> {
+        match self.sites.dry_friction(site) {
+            None => Some((self, None)),
+            Some(there) => there.is_plain().then(|| (self.replacing(there.index), Some(there.level))),
+        }
+    }
+
+    /// It takes the place of the spring that holds the joint, if any, and starts from its stiffness. `None` where another law holds it.
+    pub fn in_place_of_spring(self, site: &Site) -> Option<(Self, Option<f64>)> {
+        match self.sites.holding(site) {
+            None => Some((self, None)),
+            Some((index, there)) => (there.law.kind().name == "spring").then(|| (self.replacing(index), Some(first_value(&there.law)))),
+        }
     }
 
     /// It stands for this element, too, which goes.

@@ -13,4 +13,4 @@ pub use apply::apply_edits;
 pub use scales::{Scales, Span};
 pub(crate) use sites::is_seen;
 pub(crate) use starts::{inherited, refined, starts_beside};
-pub use types::{Against, Family, Hypothesis, HypothesisError, Mark, Parameter, Physics, Place, State};
+pub use types::{Against, Facts, Family, Hypothesis, HypothesisError, Mark, Parameter, Physics, Place, State};

@@ -8,7 +8,7 @@ pub(crate) fn refined(coarse: &Hypothesis, values: &[f64], finer: &Hypothesis) -
     if !coarse.place.same(&finer.place) || coarse.replaces != finer.replaces {
         return None;
     }
-    (finer.physics.refine)(coarse, values, finer)
+    (finer.physics.facts.refine)(coarse, values, finer)
 }
 
 /// Where a fit of `other` starts in the place of a law that was fitted: of friction that holds and slides the forces are those of the one before, all
@@ -41,8 +41,8 @@ pub(crate) fn inherited(hypothesis: &Hypothesis, start: &[f64], from: &Hypothesi
     let known = || from.parameters.iter().zip(values);
     let value = |key: &str| {
         let same = known().find(|(p, _)| p.key == key);
-        let is_level = hypothesis.physics.from_level.contains(&key);
-        let level = || known().find(|(p, _)| is_level && from.physics.from_level.contains(&p.key.as_str()));
+        let is_level = hypothesis.physics.facts.from_level.contains(&key);
+        let level = || known().find(|(p, _)| is_level && from.physics.facts.from_level.contains(&p.key.as_str()));
         same.or_else(level).map(|(_, value)| *value)
     };
     let one = |(p, s): (&Parameter, &f64)| match value(&p.key).filter(|_| p.index.is_none()) {

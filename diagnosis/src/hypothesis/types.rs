@@ -117,14 +117,22 @@ pub struct Physics {
     pub words: &'static str,
     /// The parameter that says how large it is.
     pub size: &'static str,
-    /// Whether its force grows in proportion to its first parameter, so that the smallest size that would show can be told.
-    pub proportional: bool,
     /// What its force is plotted against.
     pub against: Against,
     /// In which state of the device it shows.
     pub state: State,
     /// What it is among those that are easily taken for each other.
     pub mark: Mark,
+    /// What is so of a few only.
+    pub facts: Facts,
+    /// The hypotheses that it makes of a device.
+    pub(crate) propose: fn(&Sites) -> Vec<Hypothesis>,
+}
+
+/// What is so of a few physics only: a file says what differs from [`Facts::NONE`].
+pub struct Facts {
+    /// Whether its force grows in proportion to its first parameter, so that the smallest size that would show can be told.
+    pub proportional: bool,
     /// What would have to be known to tell it from a physics whose force is the same in the same place; `None` where there is none.
     pub twin: Option<&'static str>,
     /// Of dry friction: the parameters whose mean is the level at speed (the values of a list add up).
@@ -140,8 +148,20 @@ pub struct Physics {
     pub refine: fn(&Hypothesis, &[f64], &Hypothesis) -> Option<Vec<f64>>,
     /// Physics that it contains as a special or limiting case: who withholds one of these withholds it too.
     pub contains: &'static [&'static str],
-    /// The hypotheses that it makes of a device.
-    pub(crate) propose: fn(&Sites) -> Vec<Hypothesis>,
+}
+
+impl Facts {
+    /// No twin, no level of friction, no memory, no finer form, no special case.
+    pub const NONE: Facts = Facts {
+        proportional: false,
+        twin: None,
+        sliding: &[],
+        from_level: &[],
+        memory: false,
+        holds: false,
+        refine: |_, _, _| None,
+        contains: &[],
+    };
 }
 
 impl std::fmt::Debug for Physics {

@@ -1,33 +1,27 @@
 //! Dry friction of another level in each direction.
 
 use crate::hypothesis::builder::{ElementBuilder, even};
-use crate::hypothesis::{Against, Family, Mark, Physics, State};
+use crate::hypothesis::{Against, Facts, Family, Mark, Physics, State};
 
 pub(super) const PHYSICS: Physics = Physics {
     name: "asymmetric_coulomb",
     family: Family::Friction,
     words: "dry friction that differs by direction",
     size: "positive",
-    proportional: false,
     against: Against::Velocity,
     state: State::Reversals,
     mark: Mark::Lopsided,
-    twin: Some("lopsided dry friction and dry friction with a bias are the same force: a force sensor at rest would tell"),
-    sliding: &["positive", "negative"],
-    from_level: &[],
-    memory: false,
-    holds: false,
-    refine: |_, _, _| None,
-    contains: &["coulomb"],
+    facts: Facts {
+        twin: Some("lopsided dry friction and dry friction with a bias are the same force: a force sensor at rest would tell"),
+        sliding: &["positive", "negative"],
+        contains: &["coulomb"],
+        ..Facts::NONE
+    },
     propose: |sites| {
         let one = |site| {
             let new = ElementBuilder::new(sites, &PHYSICS, site)?;
             let f = site.force;
-            let (new, c) = match sites.dry_friction(site) {
-                None => (new, None),
-                Some(there) if there.is_plain() => (new.replacing(there.index), Some(there.level)),
-                Some(_) => return None,
-            };
+            let (new, c) = new.in_place_of_plain_friction(site)?;
             let room = even(0.0, 20.0 * f.max(c.unwrap_or(0.0)), c.unwrap_or(0.0));
             let c = c.unwrap_or(0.1 * f);
             let starts = vec![vec![1.3 * c, 0.7 * c], vec![0.7 * c, 1.3 * c], vec![0.2 * c, 0.1 * c]];

@@ -1,24 +1,17 @@
 //! Viscous friction of another slope in each direction: a valve that opens one way.
 
 use crate::hypothesis::builder::{ElementBuilder, even, first_value};
-use crate::hypothesis::{Against, Family, Mark, Physics, State};
+use crate::hypothesis::{Against, Facts, Family, Mark, Physics, State};
 
 pub(super) const PHYSICS: Physics = Physics {
     name: "asymmetric_damper",
     family: Family::Damping,
     words: "viscous friction that differs by direction",
     size: "positive",
-    proportional: false,
     against: Against::Velocity,
     state: State::WithItsVariable,
     mark: Mark::Lopsided,
-    twin: None,
-    sliding: &[],
-    from_level: &[],
-    memory: false,
-    holds: false,
-    refine: |_, _, _| None,
-    contains: &["damper"],
+    facts: Facts { contains: &["damper"], ..Facts::NONE },
     propose: |sites| {
         let places = sites.near().filter(|site| !sites.has(site, &["asymmetric_damper", "backlash"]));
         let one = |site| {

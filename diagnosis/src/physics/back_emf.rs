@@ -2,7 +2,7 @@
 
 use crate::hypothesis::builder::{even, key, stated};
 use crate::hypothesis::sites::Reach;
-use crate::hypothesis::{Against, Family, Mark, Physics, State};
+use crate::hypothesis::{Against, Facts, Family, Mark, Physics, State};
 use backdrive_plant::model::InputKind;
 
 pub(super) const PHYSICS: Physics = Physics {
@@ -10,19 +10,17 @@ pub(super) const PHYSICS: Physics = Physics {
     family: Family::Damping,
     words: "back-EMF",
     size: "back_emf",
-    proportional: true,
     against: Against::Velocity,
     state: State::WithItsVariable,
     mark: Mark::Viscous,
-    twin: Some(
-        "back-EMF and a damper to ground on the driven body are the same force: the motor's current would tell, or letting the device coast with the winding open",
-    ),
-    sliding: &[],
-    from_level: &[],
-    memory: false,
-    holds: false,
-    refine: |_, _, _| None,
-    contains: &["damper"],
+    facts: Facts {
+        proportional: true,
+        twin: Some(
+            "back-EMF and a damper to ground on the driven body are the same force: the motor's current would tell, or letting the device coast with the winding open",
+        ),
+        contains: &["damper"],
+        ..Facts::NONE
+    },
     propose: |sites| {
         let inputs = sites.model.inputs.iter().filter(|i| i.kind == InputKind::Force && i.back_emf == 0.0);
         let one = |input: &backdrive_plant::model::Input| {

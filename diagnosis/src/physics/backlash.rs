@@ -1,7 +1,7 @@
 //! A joint with play: it stands in the place of the joint's spring and damper.
 
 use crate::hypothesis::builder::{ElementBuilder, even, first_value};
-use crate::hypothesis::{Against, Family, Hypothesis, Mark, Parameter, Physics, State};
+use crate::hypothesis::{Against, Facts, Family, Hypothesis, Mark, Parameter, Physics, State};
 
 /// The word that sets a play with round edges apart.
 const ROUND: &str = "round";
@@ -11,18 +11,17 @@ pub(super) const PHYSICS: Physics = Physics {
     family: Family::Contact,
     words: "backlash",
     size: "gap",
-    proportional: false,
     against: Against::Displacement,
     state: State::Contact,
     mark: Mark::Gap,
-    twin: None,
-    sliding: &[],
-    from_level: &[],
-    memory: true,
-    holds: true,
-    refine: |coarse, values, finer| (coarse.physics == finer.physics).then(|| blunted(values, finer)).flatten(),
-    // With no gap it is a spring and a damper.
-    contains: &["spring"],
+    facts: Facts {
+        memory: true,
+        holds: true,
+        refine: |coarse, values, finer| (coarse.physics == finer.physics).then(|| blunted(values, finer)).flatten(),
+        // With no gap it is a spring and a damper.
+        contains: &["spring"],
+        ..Facts::NONE
+    },
     propose: |sites| {
         let one = |site, round: bool| {
             // Play without a shaft is nothing.

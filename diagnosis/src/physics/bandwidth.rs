@@ -1,7 +1,7 @@
 //! An actuator that follows its command with a first-order lag.
 
 use crate::hypothesis::builder::{Freedom, key};
-use crate::hypothesis::{Against, Family, Mark, Physics, State};
+use crate::hypothesis::{Against, Facts, Family, Mark, Physics, State};
 use backdrive_plant::model::InputKind;
 
 pub(super) const PHYSICS: Physics = Physics {
@@ -9,17 +9,13 @@ pub(super) const PHYSICS: Physics = Physics {
     family: Family::Lag,
     words: "a limited bandwidth",
     size: "bandwidth",
-    proportional: false,
     against: Against::SignalRate,
     state: State::WithItsVariable,
     mark: Mark::Lag,
-    twin: Some("a delay at the only input and at the only output move the same signal: a second sensor would tell"),
-    sliding: &[],
-    from_level: &[],
-    memory: false,
-    holds: false,
-    refine: |_, _, _| None,
-    contains: &[],
+    facts: Facts {
+        twin: Some("a delay at the only input and at the only output move the same signal: a second sensor would tell"),
+        ..Facts::NONE
+    },
     propose: |sites| {
         let inputs = sites.model.inputs.iter().filter(|i| i.kind == InputKind::Force && i.bandwidth == f64::INFINITY);
         let rate = 1.0 / sites.scales.period;

@@ -2,7 +2,7 @@
 
 use crate::hypothesis::builder::{ElementBuilder, even};
 use crate::hypothesis::sites::{Reach, Site};
-use crate::hypothesis::{Against, Family, Mark, Physics, State};
+use crate::hypothesis::{Against, Facts, Family, Mark, Physics, State};
 use backdrive_plant::model::{InputKind, Place};
 
 pub(super) const PHYSICS: Physics = Physics {
@@ -10,17 +10,10 @@ pub(super) const PHYSICS: Physics = Physics {
     family: Family::Bias,
     words: "a constant force",
     size: "force",
-    proportional: true,
     against: Against::Time,
     state: State::WithItsVariable,
     mark: Mark::Bias,
-    twin: None,
-    sliding: &[],
-    from_level: &["force"],
-    memory: false,
-    holds: false,
-    refine: |_, _, _| None,
-    contains: &[],
+    facts: Facts { proportional: true, from_level: &["force"], ..Facts::NONE },
     propose: |sites| {
         // On a body that is moved whatever the force, a constant one is what an offset of the force sensor is.
         let is_moved = |end: &Place| sites.model.inputs.iter().any(|i| i.kind == InputKind::Motion && Some(i.on) == *end);

@@ -1,34 +1,28 @@
 //! Smooth hysteresis: part of the stiffness yields.
 
-use crate::hypothesis::builder::{ElementBuilder, any, even, first_value, log};
-use crate::hypothesis::{Against, Family, Mark, Physics, State};
+use crate::hypothesis::builder::{ElementBuilder, any, even, log};
+use crate::hypothesis::{Against, Facts, Family, Mark, Physics, State};
 
 pub(super) const PHYSICS: Physics = Physics {
     name: "bouc_wen",
     family: Family::Hysteresis,
     words: "hysteresis (Bouc-Wen)",
     size: "stiffness",
-    proportional: false,
     against: Against::Displacement,
     state: State::WithItsVariable,
     mark: Mark::Memory,
-    twin: None,
-    sliding: &[],
-    from_level: &[],
-    memory: true,
-    holds: true,
-    refine: |_, _, _| None,
-    // Without a yielding share it is a spring; with nothing else, γ = 0 and n = 1 it is the Dahl friction.
-    contains: &["spring", "dahl"],
+    facts: Facts {
+        memory: true,
+        holds: true,
+        // Without a yielding share it is a spring; with nothing else, γ = 0 and n = 1 it is the Dahl friction.
+        contains: &["spring", "dahl"],
+        ..Facts::NONE
+    },
     propose: |sites| {
         let one = |site| {
             let new = ElementBuilder::new(sites, &PHYSICS, site)?;
             let (typical, x) = (site.force / site.displacement, site.displacement);
-            let (new, stated) = match sites.holding(site) {
-                None => (new, None),
-                Some((index, e)) if e.law.kind().name == "spring" => (new.replacing(index), Some(first_value(&e.law))),
-                Some(_) => return None,
-            };
+            let (new, stated) = new.in_place_of_spring(site)?;
             let neutral = stated.unwrap_or(0.0).max(0.0);
             let most = typical.max(neutral);
             let ratio = if stated.is_some() { even(0.0, 1.0, 1.0) } else { any(0.0, 1.0) };

@@ -1,7 +1,7 @@
 //! A force that repeats with position: the poles of a motor, a screw's turn, gear teeth.
 
 use crate::hypothesis::builder::{ElementBuilder, any, even, log};
-use crate::hypothesis::{Against, Family, Mark, Physics, State};
+use crate::hypothesis::{Against, Facts, Family, Mark, Physics, State};
 
 /// Periods that fits start from, in a peak-to-peak travel, longest first; a ripple has to be seen to come again.
 const PERIODS: [f64; 13] = [0.71, 0.5, 0.35, 0.25, 0.18, 0.125, 0.088, 0.0625, 0.044, 0.031, 0.022, 0.016, 0.011];
@@ -11,17 +11,10 @@ pub(super) const PHYSICS: Physics = Physics {
     family: Family::Ripple,
     words: "a ripple over position (cogging)",
     size: "amplitude",
-    proportional: true,
     against: Against::Displacement,
     state: State::Periodic,
     mark: Mark::Ripple,
-    twin: None,
-    sliding: &[],
-    from_level: &[],
-    memory: false,
-    holds: false,
-    refine: |_, _, _| None,
-    contains: &[],
+    facts: Facts { proportional: true, ..Facts::NONE },
     propose: |sites| {
         let one = |site| {
             let new = ElementBuilder::new(sites, &PHYSICS, site)?;

@@ -2,24 +2,17 @@
 
 use crate::hypothesis::builder::{ElementBuilder, any, even, first_value};
 use crate::hypothesis::sites::{Site, Sites};
-use crate::hypothesis::{Against, Family, Hypothesis, Mark, Physics, State};
+use crate::hypothesis::{Against, Facts, Family, Hypothesis, Mark, Physics, State};
 
 pub(super) const PHYSICS: Physics = Physics {
     name: "contact",
     family: Family::Contact,
     words: "a contact",
     size: "stiffness",
-    proportional: false,
     against: Against::Displacement,
     state: State::Contact,
     mark: Mark::Gap,
-    twin: None,
-    sliding: &[],
-    from_level: &[],
-    memory: false,
-    holds: true,
-    refine: |_, _, _| None,
-    contains: &[],
+    facts: Facts { holds: true, ..Facts::NONE },
     propose: |sites| sites.near().flat_map(|site| stops(sites, site).into_iter().chain(lifting(sites, site))).collect(),
 };
 

@@ -1,24 +1,17 @@
 //! Dry friction of one level.
 
 use crate::hypothesis::builder::{ElementBuilder, even};
-use crate::hypothesis::{Against, Family, Mark, Physics, State};
+use crate::hypothesis::{Against, Facts, Family, Mark, Physics, State};
 
 pub(super) const PHYSICS: Physics = Physics {
     name: "coulomb",
     family: Family::Friction,
     words: "dry friction",
     size: "force",
-    proportional: true,
     against: Against::Velocity,
     state: State::Reversals,
     mark: Mark::Dry,
-    twin: None,
-    sliding: &["force"],
-    from_level: &["force"],
-    memory: false,
-    holds: false,
-    refine: |_, _, _| None,
-    contains: &[],
+    facts: Facts { proportional: true, sliding: &["force"], from_level: &["force"], ..Facts::NONE },
     propose: |sites| {
         // Also beside presliding friction: where two rub, one may slip at once.
         let places = sites.pairs.iter().filter(|site| !sites.has_set_valued(site));

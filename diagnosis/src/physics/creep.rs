@@ -1,25 +1,23 @@
 //! A spring that goes on yielding under a constant force.
 
 use crate::hypothesis::builder::{ElementBuilder, Freedom, first_value, log};
-use crate::hypothesis::{Against, Family, Mark, Physics, State};
+use crate::hypothesis::{Against, Facts, Family, Mark, Physics, State};
 
 pub(super) const PHYSICS: Physics = Physics {
     name: "creep",
     family: Family::Stiffness,
     words: "a spring that creeps",
     size: "creep_stiffness",
-    proportional: false,
     against: Against::Displacement,
     state: State::WithItsVariable,
     mark: Mark::Other,
-    twin: None,
-    sliding: &[],
-    from_level: &[],
-    memory: true,
-    holds: true,
-    refine: |_, _, _| None,
-    // Where nothing yields later it is a spring.
-    contains: &["spring"],
+    facts: Facts {
+        memory: true,
+        holds: true,
+        // Where nothing yields later it is a spring.
+        contains: &["spring"],
+        ..Facts::NONE
+    },
     propose: |sites| {
         let one = |site| {
             let (index, spring) = sites.holding(site).filter(|(_, e)| e.law.kind().name == "spring")?;

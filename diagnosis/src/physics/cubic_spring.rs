@@ -1,33 +1,22 @@
 //! Stiffness that rises or falls with deflection.
 
-use crate::hypothesis::builder::{ElementBuilder, even, first_value};
-use crate::hypothesis::{Against, Family, Mark, Physics, State};
+use crate::hypothesis::builder::{ElementBuilder, even};
+use crate::hypothesis::{Against, Facts, Family, Mark, Physics, State};
 
 pub(super) const PHYSICS: Physics = Physics {
     name: "cubic_spring",
     family: Family::Stiffness,
     words: "a stiffening spring",
     size: "cubic",
-    proportional: false,
     against: Against::Displacement,
     state: State::WithItsVariable,
     mark: Mark::Shape,
-    twin: None,
-    sliding: &[],
-    from_level: &[],
-    memory: false,
-    holds: true,
-    refine: |_, _, _| None,
-    contains: &["spring"],
+    facts: Facts { holds: true, contains: &["spring"], ..Facts::NONE },
     propose: |sites| {
         let one = |site| {
             let new = ElementBuilder::new(sites, &PHYSICS, site)?;
             let (typical, x) = (site.force / site.displacement, site.displacement);
-            let (new, stated) = match sites.holding(site) {
-                None => (new, None),
-                Some((index, e)) if e.law.kind().name == "spring" => (new.replacing(index), Some(first_value(&e.law))),
-                Some(_) => return None,
-            };
+            let (new, stated) = new.in_place_of_spring(site)?;
             let neutral = stated.unwrap_or(0.0);
             let most = typical.max(neutral.abs());
             let cubic = 1000.0 * most / (x * x);

@@ -1,7 +1,7 @@
 //! Friction that builds up over a distance.
 
 use crate::hypothesis::builder::{ElementBuilder, log};
-use crate::hypothesis::{Against, Family, Mark, Physics, State};
+use crate::hypothesis::{Against, Facts, Family, Mark, Physics, State};
 
 /// Forces over displacements of the recordings up to which friction builds up over a distance that could show: stiffer, it is dry friction, and a fit only
 /// imitates the steps of whoever simulated or sampled it.
@@ -12,28 +12,23 @@ pub(super) const PHYSICS: Physics = Physics {
     family: Family::Friction,
     words: "dry friction with presliding (Dahl)",
     size: "coulomb",
-    proportional: false,
     against: Against::Displacement,
     state: State::Reversals,
     mark: Mark::Presliding,
-    twin: None,
-    sliding: &["coulomb"],
-    from_level: &["coulomb"],
-    memory: true,
-    holds: false,
-    refine: |_, _, _| None,
-    // Infinitely stiff, it is dry friction.
-    contains: &["coulomb"],
+    facts: Facts {
+        sliding: &["coulomb"],
+        from_level: &["coulomb"],
+        memory: true,
+        // Infinitely stiff, it is dry friction.
+        contains: &["coulomb"],
+        ..Facts::NONE
+    },
     propose: |sites| {
         let one = |site| {
             let new = ElementBuilder::new(sites, &PHYSICS, site)?;
             let (f, x) = (site.force, site.displacement);
-            let (new, stated) = match sites.dry_friction(site) {
-                None => (new, None),
-                Some(there) if there.kind == PHYSICS.name => return None,
-                Some(there) => (new.replacing(there.index), Some(there.level)),
-            };
-            let c = stated.unwrap_or(0.1 * f);
+            let (new, stated) = new.in_place_of_friction(site)?;
+            let c = stated.map_or(0.1 * f, |there| there.level);
             let most = 20.0 * f.max(c);
             let mut coulomb = log(1e-6 * f, most);
             coulomb.neutral = stated.is_none().then_some(1e-6 * f);

@@ -1,24 +1,17 @@
 //! Viscous friction.
 
 use crate::hypothesis::builder::{ElementBuilder, even};
-use crate::hypothesis::{Against, Family, Mark, Physics, State};
+use crate::hypothesis::{Against, Facts, Family, Mark, Physics, State};
 
 pub(super) const PHYSICS: Physics = Physics {
     name: "damper",
     family: Family::Damping,
     words: "viscous friction",
     size: "damping",
-    proportional: true,
     against: Against::Velocity,
     state: State::WithItsVariable,
     mark: Mark::Viscous,
-    twin: None,
-    sliding: &[],
-    from_level: &[],
-    memory: false,
-    holds: false,
-    refine: |_, _, _| None,
-    contains: &["back_emf"],
+    facts: Facts { proportional: true, contains: &["back_emf"], ..Facts::NONE },
     propose: |sites| {
         let places = sites.pairs.iter().filter(|site| !sites.has(site, &["damper", "asymmetric_damper", "backlash"]));
         let one = |site| {

@@ -4,7 +4,7 @@
 //! motion then has a negative delay. That of the only output beside a motion is the motion's own: both shift one signal against the other.
 
 use crate::hypothesis::builder::{even, key, only_input_and_output};
-use crate::hypothesis::{Against, Family, Mark, Physics, State};
+use crate::hypothesis::{Against, Facts, Family, Mark, Physics, State};
 use backdrive_plant::model::InputKind;
 
 pub(super) const PHYSICS: Physics = Physics {
@@ -12,17 +12,14 @@ pub(super) const PHYSICS: Physics = Physics {
     family: Family::Lag,
     words: "a delay",
     size: "delay",
-    proportional: true,
     against: Against::SignalRate,
     state: State::WithItsVariable,
     mark: Mark::Delay,
-    twin: Some("a delay at the only input and at the only output move the same signal: a second sensor would tell"),
-    sliding: &[],
-    from_level: &[],
-    memory: false,
-    holds: false,
-    refine: |_, _, _| None,
-    contains: &[],
+    facts: Facts {
+        proportional: true,
+        twin: Some("a delay at the only input and at the only output move the same signal: a second sensor would tell"),
+        ..Facts::NONE
+    },
     propose: |sites| {
         let moved = |kind: InputKind| kind == InputKind::Motion;
         let inputs = sites.model.inputs.iter().filter(|i| i.delay == 0.0).map(|i| ("inputs", &i.name, moved(i.kind)));

@@ -1,24 +1,17 @@
 //! An actuator or a sensor of another scale than 1.
 
 use crate::hypothesis::builder::{even, key};
-use crate::hypothesis::{Against, Family, Mark, Physics, State};
+use crate::hypothesis::{Against, Facts, Family, Mark, Physics, State};
 
 pub(super) const PHYSICS: Physics = Physics {
     name: "gain",
     family: Family::Scale,
     words: "a gain that is off",
     size: "gain",
-    proportional: false,
     against: Against::Signal,
     state: State::WithItsVariable,
     mark: Mark::Other,
-    twin: None,
-    sliding: &[],
-    from_level: &[],
-    memory: false,
-    holds: false,
-    refine: |_, _, _| None,
-    contains: &[],
+    facts: Facts::NONE,
     propose: |sites| {
         // A gain other than 1 is stated, so it is a number that may be off.
         let inputs = sites.model.inputs.iter().filter(|i| i.gain == 1.0).map(|i| ("inputs", &i.name));

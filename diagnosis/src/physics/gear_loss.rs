@@ -1,25 +1,18 @@
 //! Friction of a gear or screw in proportion to the force that it passes on.
 
 use crate::hypothesis::builder::{ElementBuilder, even};
-use crate::hypothesis::{Against, Family, Mark, Physics, State};
+use crate::hypothesis::{Against, Facts, Family, Mark, Physics, State};
 
 pub(super) const PHYSICS: Physics = Physics {
     name: "gear_loss",
     family: Family::Friction,
     words: "a loss in proportion to the force passed on",
     size: "efficiency",
-    proportional: false,
     against: Against::Velocity,
     state: State::Reversals,
     mark: Mark::Other,
-    twin: None,
     // It has no level of its own: without load there is no loss.
-    sliding: &[],
-    from_level: &[],
-    memory: false,
-    holds: false,
-    refine: |_, _, _| None,
-    contains: &[],
+    facts: Facts::NONE,
     propose: |sites| {
         let places = sites.near().filter(|site| sites.is_loaded(site) && !sites.has(site, &["gear_loss", "load_friction"]));
         let one = |site| {

@@ -2,24 +2,17 @@
 
 use crate::hypothesis::builder::{ElementBuilder, any, even};
 use crate::hypothesis::sites::Site;
-use crate::hypothesis::{Against, Family, Mark, Physics, State};
+use crate::hypothesis::{Against, Facts, Family, Mark, Physics, State};
 
 pub(super) const PHYSICS: Physics = Physics {
     name: "hunt_crossley",
     family: Family::Contact,
     words: "a contact (Hunt-Crossley)",
     size: "stiffness",
-    proportional: false,
     against: Against::Displacement,
     state: State::Contact,
     mark: Mark::Gap,
-    twin: None,
-    sliding: &[],
-    from_level: &[],
-    memory: false,
-    holds: true,
-    refine: |_, _, _| None,
-    contains: &["contact"],
+    facts: Facts { holds: true, contains: &["contact"], ..Facts::NONE },
     propose: |sites| {
         let one = |(site, reversed): (&Site, bool)| {
             let new = ElementBuilder::new(sites, &PHYSICS, site)?;

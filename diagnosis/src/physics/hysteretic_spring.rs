@@ -1,34 +1,28 @@
 //! A spring whose force runs on one line when it is stretched and on another when it is let go.
 
-use crate::hypothesis::builder::{ElementBuilder, even, first_value, log};
-use crate::hypothesis::{Against, Family, Mark, Physics, State};
+use crate::hypothesis::builder::{ElementBuilder, even, log};
+use crate::hypothesis::{Against, Facts, Family, Mark, Physics, State};
 
 pub(super) const PHYSICS: Physics = Physics {
     name: "hysteretic_spring",
     family: Family::Hysteresis,
     words: "a hysteretic spring",
     size: "stiffness_positive",
-    proportional: false,
     against: Against::Displacement,
     state: State::WithItsVariable,
     mark: Mark::Memory,
-    twin: None,
-    sliding: &[],
-    from_level: &[],
-    memory: true,
-    holds: true,
-    refine: |_, _, _| None,
-    // Without slopes, and the same both ways, it is the Dahl friction.
-    contains: &["spring", "dahl"],
+    facts: Facts {
+        memory: true,
+        holds: true,
+        // Without slopes, and the same both ways, it is the Dahl friction.
+        contains: &["spring", "dahl"],
+        ..Facts::NONE
+    },
     propose: |sites| {
         let one = |site| {
             let new = ElementBuilder::new(sites, &PHYSICS, site)?;
             let (f, x) = (site.force, site.displacement);
-            let (new, stated) = match sites.holding(site) {
-                None => (new, None),
-                Some((index, e)) if e.law.kind().name == "spring" => (new.replacing(index), Some(first_value(&e.law))),
-                Some(_) => return None,
-            };
+            let (new, stated) = new.in_place_of_spring(site)?;
             let neutral = stated.unwrap_or(0.0).max(0.0);
             let most = (f / x).max(neutral);
             let slope = even(0.0, 1000.0 * most, neutral);

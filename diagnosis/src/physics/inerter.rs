@@ -2,25 +2,22 @@
 
 use crate::hypothesis::builder::{ElementBuilder, even};
 use crate::hypothesis::sites::{Reach, Site};
-use crate::hypothesis::{Against, Family, Mark, Physics, State};
+use crate::hypothesis::{Against, Facts, Family, Mark, Physics, State};
 
 pub(super) const PHYSICS: Physics = Physics {
     name: "inerter",
     family: Family::Inertia,
     words: "an inertance",
     size: "inertance",
-    proportional: false,
     against: Against::Acceleration,
     state: State::WithItsVariable,
     mark: Mark::Mass,
-    twin: Some("inertia and an inerter to ground are the same force: weighing the body would tell"),
-    sliding: &[],
-    from_level: &[],
-    memory: false,
-    holds: false,
-    refine: |_, _, _| None,
-    // To ground it is added inertia, which `inertia` proposes.
-    contains: &["inertia"],
+    facts: Facts {
+        twin: Some("inertia and an inerter to ground are the same force: weighing the body would tell"),
+        // To ground it is added inertia, which `inertia` proposes.
+        contains: &["inertia"],
+        ..Facts::NONE
+    },
     propose: |sites| {
         let places = sites.pairs.iter().filter(|site| site.reach != Reach::Ground && !sites.has(site, &["inerter"]));
         let one = |site: &Site| {

@@ -2,24 +2,22 @@
 
 use crate::hypothesis::builder::{even, inertia, stated};
 use crate::hypothesis::sites::{Reach, Site};
-use crate::hypothesis::{Against, Family, Mark, Physics, State};
+use crate::hypothesis::{Against, Facts, Family, Mark, Physics, State};
 
 pub(super) const PHYSICS: Physics = Physics {
     name: "inertia",
     family: Family::Inertia,
     words: "additional inertia",
     size: "inertia",
-    proportional: true,
     against: Against::Acceleration,
     state: State::WithItsVariable,
     mark: Mark::Mass,
-    twin: Some("inertia and an inerter to ground are the same force: weighing the body would tell"),
-    sliding: &[],
-    from_level: &[],
-    memory: false,
-    holds: false,
-    refine: |_, _, _| None,
-    contains: &["inerter"],
+    facts: Facts {
+        proportional: true,
+        twin: Some("inertia and an inerter to ground are the same force: weighing the body would tell"),
+        contains: &["inerter"],
+        ..Facts::NONE
+    },
     propose: |sites| {
         let bodies = sites.pairs.iter().filter(|s| s.reach == Reach::Ground);
         let one = |site: &Site| {

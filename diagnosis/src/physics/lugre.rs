@@ -1,34 +1,30 @@
 //! Bristle friction: presliding, a level that falls with speed, and lag between them.
 
 use crate::hypothesis::builder::{ElementBuilder, Freedom, any, log};
-use crate::hypothesis::{Against, Family, Hypothesis, Mark, Parameter, Physics, State};
+use crate::hypothesis::{Against, Facts, Family, Hypothesis, Mark, Parameter, Physics, State};
 
 pub(super) const PHYSICS: Physics = Physics {
     name: "lugre",
     family: Family::Friction,
     words: "dry friction with presliding (LuGre)",
     size: "coulomb",
-    proportional: false,
     against: Against::Displacement,
     state: State::Reversals,
     mark: Mark::Presliding,
-    twin: None,
-    sliding: &["coulomb"],
-    from_level: &["coulomb", "static"],
-    memory: true,
-    holds: false,
-    refine: |coarse, values, finer| (coarse.physics.name == super::dahl::PHYSICS.name).then(|| around(values, finer)).flatten(),
-    contains: &["dahl", "stribeck", "coulomb"],
+    facts: Facts {
+        sliding: &["coulomb"],
+        from_level: &["coulomb", "static"],
+        memory: true,
+        refine: |coarse, values, finer| (coarse.physics.name == super::dahl::PHYSICS.name).then(|| around(values, finer)).flatten(),
+        contains: &["dahl", "stribeck", "coulomb"],
+        ..Facts::NONE
+    },
     propose: |sites| {
         let one = |site| {
             let new = ElementBuilder::new(sites, &PHYSICS, site)?;
             let (f, x, v) = (site.force, site.displacement, site.speed);
-            let (new, stated) = match sites.dry_friction(site) {
-                None => (new, (0.1 * f, Some(1e-6 * f))),
-                Some(there) if there.kind == PHYSICS.name => return None,
-                Some(there) => (new.replacing(there.index), (there.level, there.neutral())),
-            };
-            let (c, neutral) = stated;
+            let (new, stated) = new.in_place_of_friction(site)?;
+            let (c, neutral) = stated.map_or((0.1 * f, Some(1e-6 * f)), |there| (there.level, there.neutral()));
             let level = Freedom { range: (1e-6 * f, 20.0 * f.max(c)), neutral: neutral.map(|n| n.max(1e-6 * f)), log: false };
             let new = new
                 .number("stiffness", log(0.01 * f / x, super::dahl::STIFFEST * f / x))

@@ -1,7 +1,7 @@
 //! Friction of many contacts that slip one after the other: presliding hysteresis with non-local memory.
 
 use crate::hypothesis::builder::{ElementBuilder, log};
-use crate::hypothesis::{Against, Family, Hypothesis, Mark, Parameter, Physics, State};
+use crate::hypothesis::{Against, Facts, Family, Hypothesis, Mark, Parameter, Physics, State};
 
 /// Sliders that are fitted, and the word that sets the hypothesis apart: few enough to be tried at every place, then many enough for the shape of a loop.
 const SLIDERS: [(usize, &str); 2] = [(3, ""), (5, "fine")];
@@ -14,30 +14,26 @@ pub(super) const PHYSICS: Physics = Physics {
     family: Family::Friction,
     words: "presliding hysteresis (Maxwell slip)",
     size: "force",
-    proportional: false,
     against: Against::Displacement,
     state: State::Reversals,
     mark: Mark::Memory,
-    twin: None,
-    sliding: &["force"],
-    from_level: &["force"],
-    memory: true,
-    holds: false,
-    refine: |coarse, values, finer| match coarse.physics == finer.physics {
-        true => split(coarse, values, finer),
-        false => spread(coarse, values, finer),
+    facts: Facts {
+        sliding: &["force"],
+        from_level: &["force"],
+        memory: true,
+        refine: |coarse, values, finer| match coarse.physics == finer.physics {
+            true => split(coarse, values, finer),
+            false => spread(coarse, values, finer),
+        },
+        contains: &["coulomb"],
+        ..Facts::NONE
     },
-    contains: &["coulomb"],
     propose: |sites| {
         let one = |site, (count, tag): (usize, &'static str)| {
             let new = ElementBuilder::new(sites, &PHYSICS, site)?;
             let (f, x) = (site.force, site.displacement);
-            let (new, stated) = match sites.dry_friction(site) {
-                None => (new, None),
-                Some(there) if there.kind == PHYSICS.name => return None,
-                Some(there) => (new.replacing(there.index), Some(there.level)),
-            };
-            let c = stated.unwrap_or(0.1 * f);
+            let (new, stated) = new.in_place_of_friction(site)?;
+            let c = stated.map_or(0.1 * f, |there| there.level);
             let most = 20.0 * f.max(c);
             let mut force = log(1e-7 * f, most);
             force.neutral = stated.is_none().then_some(1e-7 * f);

@@ -57,7 +57,7 @@ register!(
 fn level(physics: &Physics, law: &Law) -> f64 {
     let values = law.values();
     let of = |key: &&str| law.kind().parameters.iter().zip(&values).find(|(p, _)| p.key == *key).map_or(0.0, |(_, list)| list.iter().sum());
-    let levels: Vec<f64> = physics.sliding.iter().map(of).collect();
+    let levels: Vec<f64> = physics.facts.sliding.iter().map(of).collect();
     levels.iter().sum::<f64>() / levels.len().max(1) as f64
 }
 
@@ -65,7 +65,7 @@ fn level(physics: &Physics, law: &Law) -> f64 {
 pub fn all(model: &Model, scales: &Scales) -> Vec<Hypothesis> {
     let kin = |law: &Law| {
         let physics = physics_named(law.kind().name);
-        Kin { level: physics.filter(|p| !p.sliding.is_empty()).map(|p| level(p, law)), holds: physics.is_some_and(|p| p.holds) }
+        Kin { level: physics.filter(|p| !p.facts.sliding.is_empty()).map(|p| level(p, law)), holds: physics.is_some_and(|p| p.facts.holds) }
     };
     let sites = Sites::of(model, scales, kin);
     PHYSICS.iter().flat_map(|physics| (physics.propose)(&sites)).collect()
@@ -78,15 +78,18 @@ pub fn physics_named(name: &str) -> Option<&'static Physics> {
 
 /// Whether one physics has another as a special or limiting case.
 pub(crate) fn contains(physics: &Physics, simpler: &Physics) -> bool {
-    physics.contains.contains(&simpler.name)
+    physics.facts.contains.contains(&simpler.name)
 }
 
 /// Names of everything that goes when these are withheld: themselves and whatever contains one of them.
 pub fn withheld(names: &[&str]) -> Vec<&'static str> {
     let mut gone: Vec<&'static str> = PHYSICS.iter().map(|p| p.name).filter(|name| names.contains(name)).collect();
     loop {
-        let next: Vec<_> =
-            PHYSICS.iter().filter(|p| !gone.contains(&p.name) && p.contains.iter().any(|c| gone.contains(c))).map(|p| p.name).collect();
+        let next: Vec<_> = PHYSICS
+            .iter()
+            .filter(|p| !gone.contains(&p.name) && p.facts.contains.iter().any(|c| gone.contains(c)))
+            .map(|p| p.name)
+            .collect();
         if next.is_empty() {
             return gone;
         }

@@ -1,7 +1,7 @@
 //! A sensor that does not read 0 at 0.
 
 use crate::hypothesis::builder::{even, key};
-use crate::hypothesis::{Against, Family, Mark, Physics, State};
+use crate::hypothesis::{Against, Facts, Family, Mark, Physics, State};
 use backdrive_plant::model::OutputKind;
 
 pub(super) const PHYSICS: Physics = Physics {
@@ -9,17 +9,10 @@ pub(super) const PHYSICS: Physics = Physics {
     family: Family::Bias,
     words: "a sensor offset",
     size: "offset",
-    proportional: false,
     against: Against::Time,
     state: State::WithItsVariable,
     mark: Mark::Bias,
-    twin: None,
-    sliding: &[],
-    from_level: &[],
-    memory: false,
-    holds: false,
-    refine: |_, _, _| None,
-    contains: &[],
+    facts: Facts::NONE,
     propose: |sites| {
         let outputs = sites.model.outputs.iter().enumerate().filter(|(_, o)| o.offset == 0.0);
         let one = |(index, output): (usize, &backdrive_plant::model::Output)| {

@@ -1,6 +1,6 @@
 //! Bristle friction with non-local memory.
 
-use crate::hypothesis::{Against, Family, Mark, Physics, State};
+use crate::hypothesis::{Against, Facts, Family, Mark, Physics, State};
 
 /// A name that verdicts and `--without` know, without hypotheses of its own: `maxwell_slip` has the same memory with its parameters free, and
 /// what a search makes of both as rivals has not been measured.
@@ -9,16 +9,15 @@ pub(super) const PHYSICS: Physics = Physics {
     family: Family::Friction,
     words: "presliding hysteresis (Preisach)",
     size: "coulomb",
-    proportional: false,
     against: Against::Displacement,
     state: State::Reversals,
     mark: Mark::Memory,
-    twin: None,
-    sliding: &["coulomb"],
-    from_level: &["coulomb", "static"],
-    memory: true,
-    holds: false,
-    refine: |_, _, _| None,
-    contains: &["lugre", "dahl", "stribeck", "coulomb"],
+    facts: Facts {
+        sliding: &["coulomb"],
+        from_level: &["coulomb", "static"],
+        memory: true,
+        contains: &["lugre", "dahl", "stribeck", "coulomb"],
+        ..Facts::NONE
+    },
     propose: |_| Vec::new(),
 };

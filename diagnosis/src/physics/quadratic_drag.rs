@@ -1,24 +1,17 @@
 //! Drag that rises with the square of speed: a fluid through an orifice.
 
 use crate::hypothesis::builder::{ElementBuilder, even};
-use crate::hypothesis::{Against, Family, Mark, Physics, State};
+use crate::hypothesis::{Against, Facts, Family, Mark, Physics, State};
 
 pub(super) const PHYSICS: Physics = Physics {
     name: "quadratic_drag",
     family: Family::Damping,
     words: "quadratic drag",
     size: "coefficient",
-    proportional: true,
     against: Against::Velocity,
     state: State::WithItsVariable,
     mark: Mark::Drag,
-    twin: None,
-    sliding: &[],
-    from_level: &[],
-    memory: false,
-    holds: false,
-    refine: |_, _, _| None,
-    contains: &[],
+    facts: Facts { proportional: true, ..Facts::NONE },
     propose: |sites| {
         let places = sites.near().filter(|site| !sites.has(site, &["quadratic_drag"]));
         let one = |site| {

@@ -1,7 +1,7 @@
 //! The largest force that an actuator gives.
 
 use crate::hypothesis::builder::{even, key};
-use crate::hypothesis::{Against, Family, Mark, Physics, State};
+use crate::hypothesis::{Against, Facts, Family, Mark, Physics, State};
 use backdrive_plant::model::InputKind;
 
 pub(super) const PHYSICS: Physics = Physics {
@@ -9,17 +9,10 @@ pub(super) const PHYSICS: Physics = Physics {
     family: Family::Limit,
     words: "saturation",
     size: "saturation",
-    proportional: false,
     against: Against::Signal,
     state: State::Large,
     mark: Mark::Limit,
-    twin: None,
-    sliding: &[],
-    from_level: &[],
-    memory: false,
-    holds: false,
-    refine: |_, _, _| None,
-    contains: &[],
+    facts: Facts::NONE,
     propose: |sites| {
         let inputs = sites.model.inputs.iter().enumerate();
         let limitless = inputs.filter(|(_, i)| i.kind == InputKind::Force && i.saturation == f64::INFINITY);

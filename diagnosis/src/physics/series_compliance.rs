@@ -2,7 +2,7 @@
 
 use crate::hypothesis::builder::{Freedom, log, series};
 use crate::hypothesis::sites::Site;
-use crate::hypothesis::{Against, Family, Mark, Physics, State};
+use crate::hypothesis::{Against, Facts, Family, Mark, Physics, State};
 use backdrive_plant::model::{Element, InputKind, Model};
 
 pub(super) const PHYSICS: Physics = Physics {
@@ -10,17 +10,10 @@ pub(super) const PHYSICS: Physics = Physics {
     family: Family::Compliance,
     words: "a compliance in series",
     size: "stiffness",
-    proportional: false,
     against: Against::Displacement,
     state: State::WithItsVariable,
     mark: Mark::Soft,
-    twin: None,
-    sliding: &[],
-    from_level: &[],
-    memory: false,
-    holds: false,
-    refine: |_, _, _| None,
-    contains: &[],
+    facts: Facts::NONE,
     propose: |sites| {
         let joints = sites.pairs.iter().filter(|site| !site.elements.is_empty());
         let one = |site: &Site| {

@@ -1,24 +1,17 @@
 //! Stiffness where the model has none.
 
 use crate::hypothesis::builder::{ElementBuilder, even};
-use crate::hypothesis::{Against, Family, Mark, Physics, State};
+use crate::hypothesis::{Against, Facts, Family, Mark, Physics, State};
 
 pub(super) const PHYSICS: Physics = Physics {
     name: "spring",
     family: Family::Stiffness,
     words: "a spring",
     size: "stiffness",
-    proportional: true,
     against: Against::Displacement,
     state: State::WithItsVariable,
     mark: Mark::Spring,
-    twin: None,
-    sliding: &[],
-    from_level: &[],
-    memory: false,
-    holds: true,
-    refine: |_, _, _| None,
-    contains: &[],
+    facts: Facts { proportional: true, holds: true, ..Facts::NONE },
     propose: |sites| {
         let places = sites.pairs.iter().filter(|site| sites.holding(site).is_none());
         let one = |site| {

@@ -265,7 +265,7 @@ fn withholding_takes_what_contains_it_along() {
     assert_eq!(withheld(&["damper"]).len(), 3, "{:?}", withheld(&["damper"]));
     assert!(withheld(&["back_emf"]).contains(&"damper"));
     for physics in PHYSICS {
-        assert!(physics.contains.iter().all(|c| physics_named(c).is_some()), "{}", physics.name);
+        assert!(physics.facts.contains.iter().all(|c| physics_named(c).is_some()), "{}", physics.name);
     }
 }
 
@@ -392,7 +392,7 @@ fn friction_laws_begin_at_the_level_of_the_one_before() {
             let mut values = law.starts[0].clone();
             let slot = law.parameters.iter().position(is_force).expect("has a level");
             values[slot] *= 1.7;
-            for other in hypotheses.iter().filter(|h| !h.physics.sliding.is_empty() && h.place.same(&law.place) && h.id != law.id) {
+            for other in hypotheses.iter().filter(|h| !h.physics.facts.sliding.is_empty() && h.place.same(&law.place) && h.id != law.id) {
                 for start in starts_beside(law, &values, other) {
                     let forces: Vec<f64> = other.parameters.iter().zip(&start).filter(|(p, _)| is_force(p)).map(|(_, v)| *v).collect();
                     let together: f64 = forces.iter().sum();
@@ -424,10 +424,10 @@ fn every_physics_is_an_element_kind_a_key_of_a_signal_or_a_body() {
         // What it says of its parameters is what the model file calls them.
         let keys: Vec<&str> =
             kind.map_or(vec![physics.name, "stiffness", "damping", "inertia"], |k| k.parameters.iter().map(|p| p.key).collect());
-        for key in physics.sliding.iter().chain(physics.from_level).chain([&physics.size]) {
+        for key in physics.facts.sliding.iter().chain(physics.facts.from_level).chain([&physics.size]) {
             assert!(keys.contains(key), "{}: no parameter {key}", physics.name);
         }
-        assert!(physics.family == Family::Friction || physics.sliding.is_empty(), "{}: levels of dry friction", physics.name);
+        assert!(physics.family == Family::Friction || physics.facts.sliding.is_empty(), "{}: levels of dry friction", physics.name);
         assert!(!physics.words.is_empty() && physics.words.chars().all(|c| c != '_'), "{}", physics.name);
         assert!(!physics.state_at("a-b").is_empty());
         let at_signal = matches!(physics.against, Against::Signal | Against::SignalRate);
@@ -449,6 +449,6 @@ fn what_remembers_its_path_is_what_the_stepper_gives_a_memory() {
             (kind.build)(&kind.parameters.iter().enumerate().map(value).collect::<Vec<_>>())
         };
         let law = with(1.0).or_else(|_| with(0.5)).or_else(|_| with(2.0)).unwrap_or_else(|e| panic!("{}: {e}", kind.name));
-        assert_eq!(physics_named(kind.name).map(|p| p.memory), Some(law.memory_len() > 0), "{}", kind.name);
+        assert_eq!(physics_named(kind.name).map(|p| p.facts.memory), Some(law.memory_len() > 0), "{}", kind.name);
     }
 }

@@ -1,33 +1,28 @@
 //! Dry friction that its own heat lowers.
 
 use crate::hypothesis::builder::{ElementBuilder, Freedom, log};
-use crate::hypothesis::{Against, Family, Mark, Physics, State};
+use crate::hypothesis::{Against, Facts, Family, Mark, Physics, State};
 
 pub(super) const PHYSICS: Physics = Physics {
     name: "warm_friction",
     family: Family::Friction,
     words: "dry friction that falls as it warms up",
     size: "force",
-    proportional: false,
     against: Against::Velocity,
     state: State::Reversals,
     mark: Mark::Other,
-    twin: None,
-    sliding: &["force"],
-    from_level: &["force"],
-    memory: true,
-    holds: false,
-    refine: |_, _, _| None,
-    // Where no heat lowers it, it is dry friction of one level.
-    contains: &["coulomb"],
+    facts: Facts {
+        sliding: &["force"],
+        from_level: &["force"],
+        memory: true,
+        // Where no heat lowers it, it is dry friction of one level.
+        contains: &["coulomb"],
+        ..Facts::NONE
+    },
     propose: |sites| {
         let one = |site| {
             let new = ElementBuilder::new(sites, &PHYSICS, site)?;
-            let (new, stated) = match sites.dry_friction(site) {
-                None => (new, None),
-                Some(there) if there.is_plain() => (new.replacing(there.index), Some(there.level)),
-                Some(_) => return None,
-            };
+            let (new, stated) = new.in_place_of_plain_friction(site)?;
             let (f, duration) = (site.force, sites.scales.duration);
             let c = stated.unwrap_or(0.1 * f);
             let level = Freedom { range: (0.0, 20.0 * f.max(c)), neutral: Some(stated.unwrap_or(0.0)), log: false };

@@ -39,7 +39,7 @@ pub struct StepRow {
 pub fn table() -> Vec<StepRow> {
     let mut rows: Vec<StepRow> = Vec::new();
     for step in steps(false, 3) {
-        let row = StepRow { name: step.name(), share: step.share() };
+        let row = StepRow { name: step.name(), share: step.terms().share };
         if !rows.contains(&row) {
             rows.push(row);
         }
@@ -78,19 +78,20 @@ fn hindrance(step: &dyn Step, state: &mut State) -> Option<Outcome> {
 fn take(step: &dyn Step, state: &mut State) -> Outcome {
     let before = state.work.budget.spent();
     let mut seeds = step.propose(state);
+    let terms = step.terms();
     let course = state.course;
-    if !step.tries_again() {
+    if !terms.tries_again {
         distinct(&mut seeds);
         let known: HashSet<String> = state.found.iter().map(|c| key_of(&c.structure.added)).collect();
         seeds.retain(|s| !known.contains(&key_of(s.effects.iter().map(|(h, _)| &course.hypotheses[*h]))));
     }
     // Where the best leaves much over, another effect may be what is missing: other laws in its place have their share of the work, and no more.
     let more_to_come = state.found.first().is_none_or(|c| c.fit.cost > tuning().noise.near * state.samples() as f64);
-    let share = state.work.share(if more_to_come { step.share() } else { 1.0 });
-    let budget = step.ends().map_or_else(|| course.evaluator.budget.clone(), |end| state.work.up_to(end));
+    let share = state.work.share(if more_to_come { terms.share } else { 1.0 });
+    let budget = terms.ends.map_or_else(|| course.evaluator.budget.clone(), |end| state.work.up_to(end));
     let evaluator = course.evaluator.within(budget.next(share));
     let course = Course { evaluator: &evaluator, ..course };
-    let course = match step.race() {
+    let course = match terms.race {
         Race::Coupled => course,
         Race::Free => Course { along: None, ..course },
         Race::Finer => Course { along: None, coarse: state.fine, ..course },

@@ -114,7 +114,7 @@ pub(super) fn detectable(view: &View, samples: usize, hypotheses: &[Hypothesis])
         let h = &hypotheses[index.0];
         let (Some(parameter), Some(value)) = (h.parameters.first(), index.1.first()) else { continue };
         let size = value.abs() * (needed / (more * length * length)).sqrt();
-        if !h.physics.proportional || !size.is_finite() || parameter.neutral != Some(0.0) {
+        if !h.physics.facts.proportional || !size.is_finite() || parameter.neutral != Some(0.0) {
             continue;
         }
         let new =

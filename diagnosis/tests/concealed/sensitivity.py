@@ -1,7 +1,7 @@
 """How much verdicts depend on each entry of the tuning table.
 
     python sensitivity.py CASES TRUTH OUT --program PROGRAM [--entry NAME]... [--change x0.5 --change x2] [--pattern 'case-0*'] [--workers 2]
-    python sensitivity.py CASES TRUTH OUT --program PROGRAM --run claim.tie=0 --run search.simpler=0,search.revived=0
+    python sensitivity.py CASES TRUTH OUT --program PROGRAM --run claim.alike=0 --run search.simpler=0,search.ripples=0
 
 PROGRAM is `target/release/examples/diagnose`. Every case is diagnosed with the table as it is, then with one entry changed at a time (or with the
 changes of each --run). What is counted: cases whose claim (the word, and the physics with their places) differs from the first, the points against

@@ -1,6 +1,6 @@
 //! Hypotheses screened anew beside a structure that was found.
 
-use super::step::{Race, Step};
+use super::step::{Race, Step, Terms};
 use crate::candidate::{Candidate, distinct_structures, simplest_of};
 use crate::evaluator::Evaluator;
 use crate::hypothesis::Hypothesis;
@@ -19,8 +19,8 @@ impl Step for Anew {
         "screening beside the best"
     }
 
-    fn race(&self) -> Race {
-        Race::Finer
+    fn terms(&self) -> Terms {
+        Terms { race: Race::Finer, ..Terms::effects() }
     }
 
     fn propose(&self, state: &mut State) -> Vec<Seed> {

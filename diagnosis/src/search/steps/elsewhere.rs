@@ -1,11 +1,10 @@
 //! The law that was found, at other places.
 
-use super::step::{Race, Step};
+use super::step::{Step, Terms};
 use crate::candidate::{Candidate, key_of, simplest};
 use crate::hypothesis::Hypothesis;
 use crate::race::{Course, Seed};
 use crate::search::state::State;
-use crate::tuning::tuning;
 
 /// The place where a law was found at first may be a neighbour of its own.
 pub(crate) struct Elsewhere;
@@ -15,24 +14,12 @@ impl Step for Elsewhere {
         "fitting the same law at other places"
     }
 
-    fn share(&self) -> f64 {
-        tuning().search.share_of_relatives
-    }
-
-    fn race(&self) -> Race {
-        Race::Free
-    }
-
-    fn tries_again(&self) -> bool {
-        true
+    fn terms(&self) -> Terms {
+        Terms::rivals()
     }
 
     fn is_for_rivals(&self, _: &State) -> bool {
         true
-    }
-
-    fn ends(&self) -> Option<f64> {
-        Some(tuning().search.rivals_end)
     }
 
     fn is_wanted(&self, state: &State) -> bool {

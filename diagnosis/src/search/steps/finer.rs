@@ -1,6 +1,6 @@
 //! Laws of the best, resolved more finely.
 
-use super::step::{Race, Step};
+use super::step::{Step, Terms};
 use crate::candidate::{Candidate, distinct_structures};
 use crate::hypothesis;
 use crate::race::{Course, Seed};
@@ -15,16 +15,8 @@ impl Step for Finer {
         "resolving a law more finely"
     }
 
-    fn share(&self) -> f64 {
-        tuning().search.share_of_finer
-    }
-
-    fn race(&self) -> Race {
-        Race::Free
-    }
-
-    fn tries_again(&self) -> bool {
-        true
+    fn terms(&self) -> Terms {
+        Terms::forms_of_the_best(tuning().search.share_of_finer)
     }
 
     fn propose(&self, state: &mut State) -> Vec<Seed> {

@@ -1,6 +1,6 @@
 //! Stated parameters that give back what they may have absorbed.
 
-use super::step::Step;
+use super::step::{Step, Terms};
 use crate::hypothesis::Place;
 use crate::race::{Course, Seed};
 use crate::screen::Promise;
@@ -16,8 +16,8 @@ impl Step for GivenBack {
         "splitting parameters with a neighbour"
     }
 
-    fn tries_again(&self) -> bool {
-        true
+    fn terms(&self) -> Terms {
+        Terms { tries_again: true, ..Terms::effects() }
     }
 
     fn is_for_rivals(&self, _: &State) -> bool {

@@ -1,11 +1,10 @@
 //! Simpler laws of the family of the best, in its place.
 
-use super::step::{Race, Step};
+use super::step::{Step, Terms};
 use crate::candidate::Candidate;
 use crate::hypothesis::{self, Hypothesis};
 use crate::race::{Course, Seed};
 use crate::search::state::State;
-use crate::tuning::tuning;
 
 /// A law that wins with more parameters has to win over its simpler relatives, whatever these promised; and far from the noise, where fits were cut
 /// short, the first that came near may not be the one.
@@ -16,24 +15,12 @@ impl Step for Relatives {
         "fitting simpler laws of the same family"
     }
 
-    fn share(&self) -> f64 {
-        tuning().search.share_of_relatives
-    }
-
-    fn race(&self) -> Race {
-        Race::Free
-    }
-
-    fn tries_again(&self) -> bool {
-        true
+    fn terms(&self) -> Terms {
+        Terms::rivals()
     }
 
     fn is_for_rivals(&self, _: &State) -> bool {
         true
-    }
-
-    fn ends(&self) -> Option<f64> {
-        Some(tuning().search.rivals_end)
     }
 
     fn is_wanted(&self, state: &State) -> bool {

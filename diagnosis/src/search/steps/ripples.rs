@@ -1,6 +1,6 @@
 //! Ripples that stand alone in the spectrum of their force.
 
-use super::step::{Race, Step};
+use super::step::{Race, Step, Terms};
 use crate::race::Seed;
 use crate::search::state::State;
 use crate::tuning::tuning;
@@ -13,8 +13,8 @@ impl Step for Ripples {
         "fitting ripples"
     }
 
-    fn race(&self) -> Race {
-        Race::Free
+    fn terms(&self) -> Terms {
+        Terms { race: Race::Free, ..Terms::effects() }
     }
 
     fn propose(&self, state: &mut State) -> Vec<Seed> {

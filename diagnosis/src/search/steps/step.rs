@@ -2,6 +2,7 @@
 
 use crate::race::Seed;
 use crate::search::state::State;
+use crate::tuning::tuning;
 
 /// How structures are fitted at first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -14,29 +15,45 @@ pub(crate) enum Race {
     Finer,
 }
 
+/// On which terms the structures of a step are fitted.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Terms {
+    /// Share of the work that they may take where the best is far from the noise and another effect may be what is missing.
+    pub share: f64,
+    /// Share of the whole work at which their fits end, where that is not the schedule's.
+    pub ends: Option<f64>,
+    /// How they are fitted at first.
+    pub race: Race,
+    /// Whether structures that were tried before are tried again, from other values.
+    pub tries_again: bool,
+}
+
+impl Terms {
+    /// Of effects that may be what is missing.
+    pub fn effects() -> Terms {
+        Terms { share: 1.0, ends: None, race: Race::Coupled, tries_again: false }
+    }
+
+    /// Of the best in another form, from where it is.
+    pub fn forms_of_the_best(share: f64) -> Terms {
+        Terms { share, ends: None, race: Race::Free, tries_again: true }
+    }
+
+    /// Of rivals that the best has to win over.
+    pub fn rivals() -> Terms {
+        let search = &tuning().search;
+        Terms { ends: Some(search.rivals_end), ..Terms::forms_of_the_best(search.share_of_relatives) }
+    }
+}
+
 /// A step of a search.
 pub(crate) trait Step {
     /// What it does, as progress and explanation say it.
     fn name(&self) -> &'static str;
 
-    /// Share of the work that it may take where the best is far from the noise and another effect may be what is missing.
-    fn share(&self) -> f64 {
-        1.0
-    }
-
-    /// Share of the whole work at which its fits end, where that is not the schedule's.
-    fn ends(&self) -> Option<f64> {
-        None
-    }
-
-    /// How its structures are fitted at first.
-    fn race(&self) -> Race {
-        Race::Coupled
-    }
-
-    /// Whether structures that were tried before are tried again, from other values.
-    fn tries_again(&self) -> bool {
-        false
+    /// On which terms its structures are fitted.
+    fn terms(&self) -> Terms {
+        Terms::effects()
     }
 
     /// Whether it is for rivals of the best: they are wanted however small its residual is.
