@@ -122,18 +122,7 @@ impl Coupling {
                 let law = (kind.build)(&values).ok()?;
                 coupled.elements.push(Element { name: format!("{name}, {}", kind.name), between: [Some(link.body), Some(body)], law });
             }
-            coupled.inputs.push(Input {
-                name,
-                kind: InputKind::Motion,
-                on: body,
-                hold: Hold::Cubic,
-                gain: 1.0,
-                saturation: f64::INFINITY,
-                delay: 0.0,
-                bandwidth: f64::INFINITY,
-                back_emf: 0.0,
-                offset: 0.0,
-            });
+            coupled.inputs.push(Input::ideal(&name, InputKind::Motion, body, Hold::Cubic));
             let sensor = [sensor.gain, sensor.delay, sensor.offset];
             moved.push(match link.paths.get(record).filter(|_| sensor == link.sensor) {
                 Some(known) => known.clone(),
