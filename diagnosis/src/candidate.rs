@@ -93,5 +93,5 @@ pub(crate) fn simplest_of<'c>(candidates: impl Iterator<Item = &'c Candidate>, s
     if best.fit.cost < tuning().noise.near * samples as f64 {
         return Some(best);
     }
-    candidates.filter(|c| c.fit.cost < tuning().claim.twice * best.fit.cost).min_by_key(|c| c.structure.free.len())
+    candidates.filter(|c| c.fit.cost < tuning().search.behind_far * best.fit.cost).min_by_key(|c| c.structure.free.len())
 }

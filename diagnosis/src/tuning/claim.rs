@@ -11,8 +11,6 @@ group! {
         least_share: f64 = 0.02, "-", Numerics("what coarse substeps and an inexact simulator may cost");
         /// Advantage below which two structures cannot be told apart.
         alike: f64 = 6.0, "criterion", Statistics("strong evidence begins there (Kass & Raftery 1995)");
-        /// Cost over another structure's up to which a structure of fewer parameters may be claimed for what it predicts.
-        twice: f64 = 4.0, "-", Judgement("twice the residual: beyond that it does not explain what was fitted");
         /// Mean squared residual on unseen recordings, over that without the effect, above which an effect is not claimed.
         unseen: f64 = 1.005, "-", Judgement("an effect that is there helps everywhere; half a percent for what does not move it");
         /// Share of the excess misfit that has to be removed for a verdict of missing physics, where the noise is not reached.

@@ -38,18 +38,8 @@ fn order(h: &Hypothesis) -> usize {
 
 /// What the fits and the held-out recordings say for a candidate against another one, as a difference of information
 /// criteria with effective samples.
-///
-/// A structure with more parameters may follow what it is fitted to, without being what is there. So where the fits say the one and the
-/// held-out recordings surely say the other, for a structure with fewer parameters whose residual is less than twice as large, the
-/// unseen ones decide alone.
 pub(super) fn evidence(search: &Search, base: &Candidate, better: &Candidate) -> f64 {
-    let (fits, unseen) = (advantage_over(base, better, search.samples), unseen_evidence(search, base, better));
-    let (simple, rich) = if unseen > 0.0 { (better, base) } else { (base, better) };
-    let is_overfit = simple.structure.free.len() < rich.structure.free.len()
-        && simple.fit.cost < tuning().claim.twice * rich.fit.cost
-        && unseen.abs() > tuning().claim.alike
-        && fits * unseen < 0.0;
-    if is_overfit { unseen } else { fits + unseen }
+    advantage_over(base, better, search.samples) + unseen_evidence(search, base, better)
 }
 
 /// What the held-out recordings say alone; 0 where there are none.
