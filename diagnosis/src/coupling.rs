@@ -42,7 +42,7 @@ pub struct Coupling {
 impl Coupling {
     /// Couples every measured position, velocity and acceleration of a body that no input prescribes. A strength of 1 pulls, at the rms of the motion,
     /// as hard as the forces that act there; `noise_sd` is each output's measuring error.
-    pub fn new(problem: &Problem, records: &[Record], scales: &Scales, noise_sd: &[f64]) -> Coupling {
+    pub fn new(problem: &Problem, records: &[Record], scales: &Scales, noise_sd: &[f64], strength: f64) -> Coupling {
         let model = &problem.model;
         let mut links: Vec<Link> = Vec::new();
         for (output, o) in model.outputs.iter().enumerate() {
@@ -70,7 +70,7 @@ impl Coupling {
             let paths = samples.iter().zip(records).map(|(s, r)| Arc::new(path(s, sensor, integrations, r.period))).collect();
             links.push(Link { output, body, elements, integrations, samples, sensor, paths });
         }
-        Coupling { links, strength: 1.0, gains: model.inputs.iter().map(|i| i.gain).collect() }
+        Coupling { links, strength, gains: model.inputs.iter().map(|i| i.gain).collect() }
     }
 
     /// Whether there is nothing to hold on to.

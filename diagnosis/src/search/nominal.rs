@@ -70,15 +70,15 @@ struct Coupler<'p, 'a> {
 }
 
 impl<'a> Coupler<'_, 'a> {
-    /// The nominal model coupled, from some values, in excerpts of the recordings where those are enough.
-    fn couple(&self, from: &[f64]) -> Option<CoupledNominal<'a>> {
+    /// The nominal model coupled, from some values, with so many times the full strength, in excerpts of the recordings where those are enough.
+    fn couple(&self, from: &[f64], strength: f64, in_parts: bool) -> Option<CoupledNominal<'a>> {
         let (evaluator, structure, fit) = (self.evaluator, self.structure, &tuning().fit);
-        let coupling = self.pulled.then(|| self.firm.clone());
+        let coupling = self.pulled.then(|| self.firm.with(strength * self.firm.strength));
         let coarse = Evaluator { substeps: fit.coarse_substeps, widest: fit.widest_midway, coupling, ..evaluator.clone() };
         let view = if self.pulled { Effort { steps: 0, ..fit.nominal_view } } else { fit.nominal_view };
         let at = coarse.fit(structure, from, view)?;
         // The parts with the largest residuals are enough for screening; coupled, they begin as they were measured.
-        let parts = if self.far { Excerpts::of(&coarse, structure, &at, tuning().screening.samples) } else { None };
+        let parts = if self.far && in_parts { Excerpts::of(&coarse, structure, &at, tuning().screening.samples) } else { None };
         let base = match &parts {
             _ if !self.coupled_first => None,
             Some(parts) => parts.evaluator(&coarse).fit(structure, &at.values, fit.nominal_coupled),
@@ -95,6 +95,23 @@ impl<'a> Coupler<'_, 'a> {
             return None;
         }
         self.evaluator.fit(self.structure, &again.values, effort).filter(|fit| fit.cost < other.cost)
+    }
+
+    /// Where the nominal model explains the recordings as it is coupled, every physics looks as good as any other: so with other strengths, until it
+    /// leaves enough.
+    fn until_it_shows(&self, mut coupled: CoupledNominal<'a>, refitted: &Fit) -> CoupledNominal<'a> {
+        let left = |fit: &Fit| fit.cost / fit.residuals.len().max(1) as f64;
+        let enough = tuning().search.coupled_leaves_noise.min(tuning().search.coupled_leaves * left(refitted));
+        // On parts the parameters may take on what differs from one part to the next: the first time only.
+        for (nth, strength) in tuning().search.couplings.iter().enumerate() {
+            if left(&coupled.fit) > enough {
+                break;
+            }
+            if let Some(other) = self.couple(&coupled.fit.values, *strength, nth == 0) {
+                coupled = other;
+            }
+        }
+        coupled
     }
 }
 
@@ -116,18 +133,22 @@ impl<'a> Nominal<'a> {
         let seen = structure.with_unknown(problem, &problem.fit, &refitted.values);
         let scales = scales(problem, &model, &seen)?;
         let level = levels(&evaluator, &refitted.residuals).into_iter().fold(0.0, f64::max);
-        let firm = Coupling::new(problem, &problem.fit, &scales, &evaluator.noise_sd);
+        let strength = if level > tuning().coupling.full_above * tuning().noise.far { 1.0 } else { tuning().coupling.weak };
+        let firm = Coupling::new(problem, &problem.fit, &scales, &evaluator.noise_sd, strength);
         let far = level > tuning().noise.far;
         let pulled = far && !firm.is_empty();
         // A prescribed motion couples the device by itself.
         let coupled_first = pulled || far && problem.model.inputs.iter().any(|i| i.kind == InputKind::Motion);
         let coupler = Coupler { evaluator: &evaluator, middle: &middle, structure: &structure, firm: &firm, far, pulled, coupled_first };
         let from = if pulled { &start } else { &refitted.values };
-        let coupled = coupler.couple(from).ok_or(SearchError::RunsAway)?;
+        let mut coupled = coupler.couple(from, 1.0, true).ok_or(SearchError::RunsAway)?;
         if pulled && let Some(other) = coupler.refit_from(&coupled.fit.values, &refitted, effort) {
             refitted = other;
         }
         refitted = to_its_end(&evaluator, &structure, refitted);
+        if pulled {
+            coupled = coupler.until_it_shows(coupled, &refitted);
+        }
         let refitted = candidate(&evaluator, structure.clone(), refitted);
         Ok(Nominal { evaluator, given, start, refitted, levels_given, model, scales, seen, is_far, far, pulled, coupled_first, coupled })
     }

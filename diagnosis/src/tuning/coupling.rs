@@ -5,6 +5,10 @@ use super::table::group;
 group! {
     /// How a model is coupled to the measured motion (an observer), and which parts of the recordings are simulated then.
     Coupling {
+        /// Normalised residual (rms), over noise.far, above which the coupling has its full strength.
+        full_above: f64 = 3.0, "-", Judgement("near the noise a strong coupling hides what is small");
+        /// Strength below that.
+        weak: f64 = 0.3, "-", Judgement("as full_above");
         /// Factor on the strength with which coupled fits go on.
         looser: f64 = 0.1, "-", Judgement("residuals are then more and more simulation errors");
         /// Factor on the strength with which a part's initial motion is found.

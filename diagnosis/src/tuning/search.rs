@@ -91,5 +91,11 @@ group! {
         nominal_from: usize = 2, "structures", Cost("one fit each");
         /// Structures that are brought to their ends.
         last_fits: usize = 6, "structures", Cost("one fit each");
+        /// Share of the nominal model's residual (mean square) that it has to leave when coupled to the measured motion.
+        coupled_leaves: f64 = 0.3, "-", Judgement("where coupling explains more than that, it explains what is missing, too");
+        /// The same in mean squares of the noise.
+        coupled_leaves_noise: f64 = 3.0, "mean square", Judgement("three times the noise is enough to tell physics apart");
+        /// Factors on the coupling, tried in this order until the nominal model leaves enough.
+        couplings: [f64; 5] = [0.2, 1.0, 0.2, 0.04, 0.008], "-", Judgement("the first on parts of the recordings, the others on the whole");
     }
 }
