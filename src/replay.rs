@@ -53,17 +53,14 @@ pub fn replay(options: &cli::Replay) -> Result<u8, Failure> {
         }
         busy(&format!("reading {}", path.display()), || rows_of(&reader, &topic, graph.nodes[operator].axes, read))
     };
-    let (settings, steps) = match graph.nodes[operator].kind {
-        NodeKind::Cycle => {
-            let (pedal, steps) = recorded("pedal", &|s, axis| [s.position[axis], 0.0])?;
-            let (speed, _) = recorded("speed", &|s, axis| [s.velocity[axis], 0.0])?;
-            let both = pedal.iter().flatten().zip(speed.iter().flatten());
-            (Settings::Cycle(Cycle::Recorded(both.map(|(p, s)| [p[0], s[0]]).collect())), steps)
-        }
-        _ => {
-            let (rows, steps) = recorded("intent", &|s, axis| [s.position[axis], s.velocity[axis]])?;
-            (Settings::Operator(rows.into_iter().map(Intent::Recorded).collect()), steps)
-        }
+    let (settings, steps) = if graph.nodes[operator].kind == NodeKind::Cycle {
+        let (pedal, steps) = recorded("pedal", &|s, axis| [s.position[axis], 0.0])?;
+        let (speed, _) = recorded("speed", &|s, axis| [s.velocity[axis], 0.0])?;
+        let both = pedal.iter().flatten().zip(speed.iter().flatten());
+        (Settings::Cycle(Cycle::Recorded(both.map(|(p, s)| [p[0], s[0]]).collect())), steps)
+    } else {
+        let (rows, steps) = recorded("intent", &|s, axis| [s.position[axis], s.velocity[axis]])?;
+        (Settings::Operator(rows.into_iter().map(Intent::Recorded).collect()), steps)
     };
     graph.timing.steps = Some(options.changes.duration.map_or(steps, |d| ((d * graph.timing.rate_hz).round() as u64).max(1)));
     graph.nodes[operator].settings = settings;

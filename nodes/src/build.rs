@@ -119,8 +119,9 @@ pub fn topics(graph: &Graph) -> Vec<GraphTopic> {
     topics
 }
 
+/// Whether nothing that it hears holds a node back.
 fn is_source(kind: NodeKind) -> bool {
-    matches!(kind, NodeKind::Operator | NodeKind::Exciter | NodeKind::Cycle | NodeKind::Rig)
+    !kind.stages().is_empty() && kind.stages().iter().all(|stage| stage.inputs.is_empty())
 }
 
 /// What holds the graph's sources back in lockstep: (topic, steps they may be ahead).

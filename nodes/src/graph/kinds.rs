@@ -1,40 +1,5 @@
 //! Node kinds: their stages and ports. A new kind is one entry here, its settings, and its core in `build`.
 
-/// What a node is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum NodeKind {
-    /// The user's hand: what it wants.
-    Operator,
-    /// The device in the user's hand.
-    Master,
-    /// Predicts the induced motion and subtracts it.
-    Canceller,
-    /// Position and force scaling.
-    Scaling,
-    /// The remote device with its environment.
-    Slave,
-    /// Drives a slave whose feedback is a force.
-    Controller,
-    /// Plays an excitation on a force channel.
-    Exciter,
-    /// Estimates the force that nobody measures.
-    Observer,
-    /// The operator of a test bench: pedal and speed over time.
-    Cycle,
-    /// Keeps a test bench at its speed.
-    SpeedControl,
-    /// The machine that loads an engine.
-    Dynamometer,
-    /// A combustion engine.
-    Engine,
-    /// The shaft between engine and dynamometer.
-    Shaft,
-    /// Records every topic.
-    Recorder,
-    /// A test rig: a ram under displacement control with a specimen on it.
-    Rig,
-}
-
 /// Whether a port takes or gives.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Direction {
@@ -221,52 +186,64 @@ const RIG: &[StageKind] = &[StageKind {
     ],
 }];
 
-impl NodeKind {
-    /// Names in graph files.
-    pub const ALL: &'static [(&'static str, NodeKind)] = &[
-        ("operator", NodeKind::Operator),
-        ("master", NodeKind::Master),
-        ("canceller", NodeKind::Canceller),
-        ("scaling", NodeKind::Scaling),
-        ("slave", NodeKind::Slave),
-        ("controller", NodeKind::Controller),
-        ("exciter", NodeKind::Exciter),
-        ("observer", NodeKind::Observer),
-        ("cycle", NodeKind::Cycle),
-        ("speed_control", NodeKind::SpeedControl),
-        ("dynamometer", NodeKind::Dynamometer),
-        ("engine", NodeKind::Engine),
-        ("shaft", NodeKind::Shaft),
-        ("recorder", NodeKind::Recorder),
-        ("rig", NodeKind::Rig),
-    ];
+macro_rules! kinds {
+    ($($(#[$doc:meta])* $kind:ident $name:literal $stages:ident,)*) => {
+        /// What a node is.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+        pub enum NodeKind { $($(#[$doc])* $kind,)* }
 
-    /// Name in graph files.
-    pub fn name(self) -> &'static str {
-        NodeKind::ALL.iter().find(|(_, kind)| *kind == self).map_or("", |(name, _)| name)
-    }
+        impl NodeKind {
+            /// Names in graph files.
+            pub const ALL: &'static [(&'static str, NodeKind)] = &[$(($name, NodeKind::$kind)),*];
 
-    /// The stages that step separately.
-    pub fn stages(self) -> &'static [StageKind] {
-        match self {
-            NodeKind::Operator => OPERATOR,
-            NodeKind::Master => MASTER,
-            NodeKind::Canceller => CANCELLER,
-            NodeKind::Scaling => SCALING,
-            NodeKind::Slave => SLAVE,
-            NodeKind::Controller => CONTROLLER,
-            NodeKind::Exciter => EXCITER,
-            NodeKind::Observer => OBSERVER,
-            NodeKind::Cycle => CYCLE,
-            NodeKind::SpeedControl => SPEED_CONTROL,
-            NodeKind::Dynamometer => DYNAMOMETER,
-            NodeKind::Engine => ENGINE,
-            NodeKind::Shaft => SHAFT,
-            NodeKind::Recorder => RECORDER,
-            NodeKind::Rig => RIG,
+            /// Name in graph files.
+            pub fn name(self) -> &'static str {
+                match self { $(NodeKind::$kind => $name),* }
+            }
+
+            /// The stages that step separately.
+            pub fn stages(self) -> &'static [StageKind] {
+                match self { $(NodeKind::$kind => $stages),* }
+            }
         }
-    }
+    };
+}
 
+// What it is, its name in graph files, its stages.
+kinds!(
+    /// The user's hand: what it wants.
+    Operator "operator" OPERATOR,
+    /// The device in the user's hand.
+    Master "master" MASTER,
+    /// Predicts the induced motion and subtracts it.
+    Canceller "canceller" CANCELLER,
+    /// Position and force scaling.
+    Scaling "scaling" SCALING,
+    /// The remote device with its environment.
+    Slave "slave" SLAVE,
+    /// Drives a slave whose feedback is a force.
+    Controller "controller" CONTROLLER,
+    /// Plays an excitation on a force channel.
+    Exciter "exciter" EXCITER,
+    /// Estimates the force that nobody measures.
+    Observer "observer" OBSERVER,
+    /// The operator of a test bench: pedal and speed over time.
+    Cycle "cycle" CYCLE,
+    /// Keeps a test bench at its speed.
+    SpeedControl "speed_control" SPEED_CONTROL,
+    /// The machine that loads an engine.
+    Dynamometer "dynamometer" DYNAMOMETER,
+    /// A combustion engine.
+    Engine "engine" ENGINE,
+    /// The shaft between engine and dynamometer.
+    Shaft "shaft" SHAFT,
+    /// Records every topic.
+    Recorder "recorder" RECORDER,
+    /// A test rig: a ram under displacement control with a specimen on it.
+    Rig "rig" RIG,
+);
+
+impl NodeKind {
     /// A port by its name and direction, with the index of its stage.
     pub fn port(self, name: &str, direction: Direction) -> Option<(usize, &'static PortKind)> {
         self.stages().iter().enumerate().find_map(|(index, stage)| {
