@@ -5,42 +5,35 @@ mod system;
 use std::process::{Command, Stdio};
 use system::{Place, file};
 
-/// Every verb that a person can give, as the words that name it.
-const VERBS: &[&[&str]] = &[
-    &["run"],
-    &["replay"],
-    &["stability"],
-    &["init"],
-    &["diagnose"],
-    &["fit"],
-    &["test-bench"],
-    &["check"],
-    &["graph"],
-    &["simulate"],
-    &["model", "show"],
-    &["model", "check"],
-    &["bag", "info"],
-    &["bag", "import"],
-    &["bag", "export"],
-    &["bag", "recover"],
-    &["bag", "merge"],
-    &["bag", "play"],
-    &["bag", "diff"],
-    &["clean"],
-    &["bridge"],
-    &["doctor"],
-    &["prove"],
-    &["completions"],
-    &["man"],
-];
+/// Every verb that a person may use, with its parent where it has one, as the help lists them.
+fn verbs(place: &Place, parents: &[&str]) -> Vec<Vec<String>> {
+    let done = place.backdrive(&[parents, &["--help"]].concat());
+    assert_eq!(done.code, Some(0), "{parents:?}: {done:?}");
+    let Some(list) = done.stdout.split("\nCommands:\n").nth(1) else { return Vec::new() };
+    let listed = list.lines().take_while(|line| !line.is_empty());
+    // Names stand two columns in; what they do, where it takes more lines, further.
+    let names = listed.filter_map(|line| line.strip_prefix("  ").filter(|rest| !rest.starts_with(' '))).filter_map(|l| l.split(' ').next());
+    let mut all = Vec::new();
+    for name in names.filter(|name| *name != "help") {
+        let verb = [parents, &[name]].concat();
+        match verbs(place, &verb) {
+            below if below.is_empty() => all.push(verb.iter().map(|word| word.to_string()).collect()),
+            below => all.extend(below),
+        }
+    }
+    all
+}
 
 #[test]
-fn every_help_says_what_the_exit_codes_mean() {
+fn every_help_has_an_example_and_says_what_the_exit_codes_mean() {
     let place = Place::new();
-    for verb in VERBS {
-        let done = place.backdrive(&[verb, &["--help"][..]].concat());
+    let verbs = verbs(&place, &[]);
+    assert!(verbs.len() >= 20 && verbs.contains(&vec!["bag".to_string(), "info".to_string()]), "{verbs:?}");
+    for verb in verbs {
+        let words: Vec<&str> = verb.iter().map(String::as_str).collect();
+        let done = place.backdrive(&[&words, &["--help"][..]].concat());
         assert_eq!(done.code, Some(0), "{verb:?}: {done:?}");
-        assert!(done.stdout.contains("Exit code"), "{verb:?}: {}", done.stdout);
+        assert!(done.stdout.contains("Exit code") && done.stdout.contains("Example"), "{verb:?}: {}", done.stdout);
     }
 }
 
@@ -68,7 +61,7 @@ fn man_writes_a_page_for_every_verb() {
     let place = Place::new();
     let done = place.backdrive(&["man", "--out", "man1"]);
     assert_eq!(done.code, Some(0), "{done:?}");
-    for verb in VERBS {
+    for verb in verbs(&place, &[]) {
         let page = place.path("man1").join(format!("backdrive-{}.1", verb.join("-")));
         let text = std::fs::read_to_string(&page).unwrap_or_else(|e| panic!("{}: {e}", page.display()));
         assert!(text.contains(".TH") && text.contains("Exit code"), "{}", page.display());

@@ -8,6 +8,7 @@ use backdrive_nodes::transport::iceoryx2::Iceoryx2;
 use backdrive_nodes::transport::inproc::Hub;
 use backdrive_nodes::transport::ros2::{Delivery, Network, Ros2};
 use backdrive_nodes::transport::{Location, Publisher, Subscriber, Transport, TransportError};
+use std::path::Path;
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::{Duration, Instant};
 
@@ -133,6 +134,29 @@ macro_rules! conform {
             $(#[test] fn $test() { super::$test(&super::Domain::new(), &super::Domain::new()) })*
         }
     };
+}
+
+/// Names of the types that a folder's files make a transport of.
+fn transports_in(folder: &Path, found: &mut Vec<String>) {
+    for entry in std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()) {
+        if entry.is_dir() {
+            transports_in(&entry, found);
+        } else {
+            let text = std::fs::read_to_string(&entry).unwrap();
+            found.extend(text.split("\nimpl Transport for ").skip(1).filter_map(|rest| rest.split(' ').next()).map(str::to_string));
+        }
+    }
+}
+
+#[test]
+fn every_transport_conforms() {
+    let mut found = Vec::new();
+    transports_in(&Path::new(env!("CARGO_MANIFEST_DIR")).join("src/transport"), &mut found);
+    assert!(found.len() >= 3, "{found:?}");
+    let here = include_str!("transport_conformance.rs");
+    for name in found {
+        assert!(here.contains(&format!("mod {} {{", name.to_lowercase())), "{name} is no instance of conform!");
+    }
 }
 
 conform!(
