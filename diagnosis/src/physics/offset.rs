@@ -2,7 +2,6 @@
 
 use crate::hypothesis::builder::{even, key};
 use crate::hypothesis::{Against, Facts, Family, Mark, Physics, State};
-use backdrive_plant::model::OutputKind;
 
 pub(super) const PHYSICS: Physics = Physics {
     name: "offset",
@@ -17,12 +16,7 @@ pub(super) const PHYSICS: Physics = Physics {
         let outputs = sites.model.outputs.iter().enumerate().filter(|(_, o)| o.offset == 0.0);
         let one = |(index, output): (usize, &backdrive_plant::model::Output)| {
             let span = sites.scales.output(index);
-            let unit = match output.kind {
-                OutputKind::Position(_) => "m",
-                OutputKind::Velocity(_) => "m/s",
-                OutputKind::Acceleration(_) => "m/s²",
-                OutputKind::Force(_) | OutputKind::Reaction(_) => "N",
-            };
+            let unit = output.kind.unit();
             let room = even(-10.0 * span.peak, 10.0 * span.peak, 0.0);
             (span.peak > 0.0).then(|| key(sites, &PHYSICS, "outputs", &output.name, unit, room, &[0.05 * span.rms, -0.05 * span.rms]))
         };

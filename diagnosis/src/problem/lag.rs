@@ -1,7 +1,8 @@
 //! Positions that no spring holds, which are compared by their displacement over a lag.
 
 use super::record::Record;
-use backdrive_plant::model::{InputKind, Model, OutputKind};
+use crate::physics::physics_named;
+use backdrive_plant::model::{Element, InputKind, Model, OutputKind};
 
 /// A lag for positions that nothing holds back: without a spring to ground, a small wrong force moves them without bounds.
 pub(super) fn lag_of(model: &Model, fit: &[Record], output: usize) -> usize {
@@ -16,7 +17,7 @@ pub(super) fn lag_of(model: &Model, fit: &[Record], output: usize) -> usize {
 /// Whether springs, or what acts like one, tie a body to ground or to a body whose motion is prescribed.
 fn is_held(model: &Model, body: usize) -> bool {
     let fixed = |place: Option<usize>| place.is_none_or(|b| model.inputs.iter().any(|i| i.kind == InputKind::Motion && i.on == b));
-    let elastic = ["spring", "cubic_spring", "hysteretic_spring", "bouc_wen", "backlash", "contact", "hunt_crossley"];
+    let holds = |element: &&Element| physics_named(element.law.kind().name).is_some_and(|p| p.facts.holds);
     let mut reached = vec![false; model.bodies.len()];
     let mut waiting = vec![body];
     while let Some(at) = waiting.pop() {
@@ -26,7 +27,7 @@ fn is_held(model: &Model, body: usize) -> bool {
         if std::mem::replace(&mut reached[at], true) {
             continue;
         }
-        for element in model.elements.iter().filter(|e| elastic.contains(&e.law.kind().name)) {
+        for element in model.elements.iter().filter(holds) {
             let other = match element.between {
                 [Some(a), b] if a == at => b,
                 [a, Some(b)] if b == at => a,

@@ -49,9 +49,8 @@ pub(super) fn stated_numbers(model: &Model, text: &str) -> Vec<Stated> {
             let key = path.rsplit('.').next().unwrap_or("");
             // A shape, not a size: moved a little only.
             let factor = if ["exponent", "ratio"].contains(&key) { 2.0 } else { tuning().recordings.stated_range };
-            let signed = ["phase", "offset", "rest", "gap", "force"].contains(&key) && given < 0.0 || key == "phase";
             let (range, log) = match () {
-                () if signed && key == "phase" => ((given - std::f64::consts::PI, given + std::f64::consts::PI), false),
+                () if key == "phase" => ((given - std::f64::consts::PI, given + std::f64::consts::PI), false),
                 () if given > 0.0 => ((given / factor, given * factor), true),
                 () => ((given - 10.0 * given.abs(), given + 10.0 * given.abs()), false),
             };
