@@ -115,14 +115,16 @@ fn a_joint_that_creeps() {
     agree(&device("motor", &joint), to_and_fro, None, 1e-3);
 }
 
+/// Kinds that model files may name and that the hidden plant has not: no device with one of them can be concealed.
+const NOT_HIDDEN: [&str; 4] = ["bouc_wen", "contact", "hunt_crossley", "preisach_lugre"];
+
 #[test]
 fn every_element_kind_of_the_stepper_is_known_to_the_hidden_plant() {
     for kind in KINDS {
         // Parameters may be missing or wrong here: that is said of a kind that is known.
-        let told = match Network::from_toml(&device("motor", &element(kind.name, ["motor", "ground"], "")), "device") {
-            Ok(_) => continue,
-            Err(error) => error.to_string(),
-        };
-        assert!(!told.contains("does not know"), "{told}: a law of it belongs into sealed/src/laws/");
+        let told = Network::from_toml(&device("motor", &element(kind.name, ["motor", "ground"], "")), "device").err();
+        let told = told.map_or_else(String::new, |error| error.to_string());
+        let is_unknown = told.contains("does not know");
+        assert_eq!(is_unknown, NOT_HIDDEN.contains(&kind.name), "{}: a law of it belongs into sealed/src/laws/ ({told})", kind.name);
     }
 }
