@@ -140,11 +140,18 @@ pub fn alternatives(finding: &Finding) -> Vec<String> {
 /// A parameter of a verdict: value and interval, or lists of them.
 fn parameter(parameter: &Parameter) -> String {
     let one = |value: f64, ci95: &Interval, unit: &str| {
-        let [low, high] = ci95.map(|end| end.unwrap_or(f64::NAN));
-        format!("{} (95 %: {} to {})", si(value, unit), si(low, unit), si(high, unit))
+        let interval = match ci95 {
+            [Some(low), Some(high)] => format!("95 %: {} to {}", si(*low, unit), si(*high, unit)),
+            [Some(low), None] => format!("95 %: above {}", si(*low, unit)),
+            [None, Some(high)] => format!("95 %: below {}", si(*high, unit)),
+            [None, None] => "not determined".to_string(),
+        };
+        format!("{} ({interval})", si(value, unit))
     };
     match parameter {
-        Parameter::One(Estimate { value, ci95, unit }) => one(*value, ci95, unit),
+        Parameter::One(Estimate { value, ci95, unit, at_bound }) => {
+            format!("{}{}", one(*value, ci95, unit), if *at_bound { ", at the bound of what was tried" } else { "" })
+        }
         Parameter::List(list) => {
             let each = list.value.iter().zip(&list.ci95).map(|(value, ci95)| one(*value, ci95, &list.unit));
             each.collect::<Vec<_>>().join("; ")
@@ -202,7 +209,7 @@ mod tests {
 
     #[test]
     fn a_finding_reads_as_a_line() {
-        let force = Parameter::One(Estimate { value: 0.101, ci95: [Some(0.098), Some(0.104)], unit: "N".to_string() });
+        let force = Parameter::One(Estimate { value: 0.101, ci95: [Some(0.098), Some(0.104)], at_bound: false, unit: "N".to_string() });
         let finding = Finding {
             physics: "coulomb".to_string(),
             place: Place::Between("drum".to_string(), "ground".to_string()),
@@ -212,6 +219,8 @@ mod tests {
             alternatives: Vec::new(),
         };
         assert_eq!(described(&finding), "dry friction at the drum: force 101 mN (95 %: 98.0 mN to 104 mN); well supported (97 %)");
+        let stiff = Parameter::One(Estimate { value: 2.0, ci95: [Some(1.5), None], at_bound: true, unit: "N".to_string() });
+        assert_eq!(parameter(&stiff), "2.00 N (95 %: above 1.50 N), at the bound of what was tried");
         let ci95 = vec![[Some(0.5), Some(1.5)], [Some(1.0), Some(3.0)]];
         let slip = Parameter::List(Estimates { value: vec![1.0, 2.0], ci95, unit: "N".to_string() });
         assert_eq!(parameter(&slip), "1.00 N (95 %: 500 mN to 1.50 N); 2.00 N (95 %: 1.00 N to 3.00 N)");
@@ -219,12 +228,20 @@ mod tests {
 
     #[test]
     fn what_remains_is_told_only_where_it_is_more_than_noise() {
-        let noise = Remaining { share: Some(0.03), floor_share: Some(0.03), noise_sd: Some(1.01), shows: None, looks_like: None };
+        let noise = Remaining {
+            share: Some(0.03),
+            floor_share: Some(0.03),
+            noise_sd: Some(1.01),
+            not_repeated: None,
+            shows: None,
+            looks_like: None,
+        };
         assert_eq!(remains(&noise), None);
         let left = Remaining {
             share: Some(0.31),
             floor_share: Some(0.06),
             noise_sd: Some(5.2),
+            not_repeated: None,
             shows: Some(Where { time: vec![[1.0, 1.2]], band_hz: [20.0, 90.0], state: None, class: None }),
             looks_like: Some("backlash between motor and drum".to_string()),
         };

@@ -68,6 +68,20 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         for t in found.tried.iter().take(10) {
             eprintln!("   promised {:.3} taken {:.3?} {}", t.promised, t.taken, t.id);
         }
+        for (physics, place, figures) in backdrive_diagnosis::verdict::figures_of(found) {
+            let list: Vec<String> = figures.list().iter().map(|x| format!("{x:.4}")).collect();
+            eprintln!("figures\t{physics}\t{place}\t{}", list.join("\t"));
+        }
+        let held = |c: &backdrive_diagnosis::candidate::Candidate| {
+            let (n, b) = (nominal.unseen.as_ref(), backdrive_diagnosis::verdict::chosen(found).unseen.as_ref());
+            c.unseen.as_ref().map(|u| (u.mean_square.sqrt(), n.and_then(|n| n.gain_over(u)), b.and_then(|b| u.gain_over(b))))
+        };
+        eprintln!("unseen nominal {:.3?}", held(nominal));
+        for c in &found.found {
+            if let Some(h) = held(c) {
+                eprintln!("unseen {:.3?} {}", h, c.structure.name());
+            }
+        }
         for c in &found.found {
             let (cost, ahead) = (c.fit.cost / n, advantage_over(nominal, c, found.samples));
             let values = c.structure.added_of(&c.fit.values);

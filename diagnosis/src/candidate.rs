@@ -1,6 +1,6 @@
 //! A structure, fitted, and what tells a good one: the data that fitting, proposals, schedule and verdict speak of.
 
-use crate::compare::HeldOut;
+use crate::compare::{HeldOut, blocks};
 use crate::evaluator::Evaluator;
 use crate::fit::Fit;
 use crate::hypothesis::Hypothesis;
@@ -22,6 +22,10 @@ pub struct Candidate {
     pub whiteness_statistic: f64,
     /// Root mean square of its residual at each output, noise standard deviations.
     pub levels: Vec<f64>,
+    /// Mean squares of its residual block by block, see [`blocks`].
+    pub blocks: Vec<Vec<f64>>,
+    /// Whether one of its effects may as well be nothing, as far as the recordings tell; only the best is looked at.
+    pub may_be_nothing: bool,
     /// Its residual on the held-out recordings; `None` where it was not held against them.
     pub unseen: Option<HeldOut>,
 }
@@ -59,7 +63,8 @@ pub(crate) fn distinct_structures(found: &[Candidate], effects: usize) -> impl I
 pub(crate) fn candidate(evaluator: &Evaluator, structure: Structure, fit: Fit) -> Candidate {
     let correlation_time = correlation_time(evaluator, &fit.residuals);
     let (levels, whiteness_statistic) = (levels(evaluator, &fit.residuals), whiteness_statistic(evaluator, &fit.residuals));
-    Candidate { structure, fit, correlation_time, whiteness_statistic, levels, unseen: None }
+    let blocks = blocks(evaluator, &fit.residuals);
+    Candidate { structure, fit, correlation_time, whiteness_statistic, levels, blocks, may_be_nothing: false, unseen: None }
 }
 
 /// Sorts by price, with the correlation time of the one that costs least.

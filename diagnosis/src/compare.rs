@@ -2,6 +2,7 @@
 
 use crate::effort::Effort;
 use crate::evaluator::{Evaluator, measured};
+use crate::predictive::{Gain, gain};
 use crate::problem::{Problem, Record};
 pub use crate::signal::{density, rms};
 use crate::statistics::correlation_time;
@@ -54,12 +55,21 @@ pub fn predictions(problem: &Problem, records: &[Record], structure: &Structure,
 }
 
 /// Residuals of a structure in recordings that were not fitted.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct HeldOut {
     /// Mean square of the normalised residuals, noise variances.
     pub mean_square: f64,
     /// Their correlation time, samples: an error of amplitude or a drift correlates thousands of samples, which then count as one.
     pub correlation_time: f64,
+    /// The same mean square, block by block: of each record and output a list, in the order of their samples.
+    pub blocks: Vec<Vec<f64>>,
+}
+
+impl HeldOut {
+    /// How much better another explanation predicts these recordings; `None` where there are too few blocks to say.
+    pub fn gain_over(&self, better: &HeldOut) -> Option<Gain> {
+        gain(&self.blocks, &better.blocks)
+    }
 }
 
 /// Residuals of a structure with these values in `records`, normalised by the noise standard deviations `noise_sd`.
@@ -68,7 +78,17 @@ pub fn unseen(problem: &Problem, records: &[Record], structure: &Structure, valu
     let evaluator = Evaluator { noise_sd: noise_sd.to_vec(), ..Evaluator::on(&ready.fixed, records) };
     let residuals = evaluator.residuals(&ready.own, &ready.values).filter(|r| !r.is_empty())?;
     let mean_square = residuals.iter().map(|r| r * r).sum::<f64>() / residuals.len() as f64;
-    Some(HeldOut { mean_square, correlation_time: correlation_time(&evaluator, &residuals) })
+    Some(HeldOut { mean_square, correlation_time: correlation_time(&evaluator, &residuals), blocks: blocks(&evaluator, &residuals) })
+}
+
+/// Mean squares of residuals over blocks: for each record and output a list, with a block for every [`crate::tuning::Claim::blocks`]th part of the record.
+pub fn blocks(evaluator: &Evaluator, residuals: &[f64]) -> Vec<Vec<f64>> {
+    let mean_square = |block: &[f64]| block.iter().map(|r| r * r).sum::<f64>() / block.len().max(1) as f64;
+    let of = |part: &[f64]| {
+        let length = (part.len() / tuning().claim.blocks).max(tuning().claim.block_samples);
+        part.chunks(length).filter(|block| 2 * block.len() > length).map(mean_square).collect()
+    };
+    evaluator.layout().into_iter().filter_map(|(_, _, range)| residuals.get(range)).map(of).collect()
 }
 
 /// Mean squared error of a structure with these values at every output measured in every record, in the unit squared: record by record, outputs
@@ -79,7 +99,7 @@ pub fn mean_squares(problem: &Problem, records: &[Record], structure: &Structure
     let mut all = Vec::new();
     for (record, predicted) in records.iter().zip(&predicted) {
         for output in measured(record) {
-            let (samples, column) = (record.outputs.get(output)?.as_deref()?, predicted.get(output)?.as_deref()?);
+            let (samples, column) = (record.compared(output)?, predicted.get(output)?.as_deref()?);
             all.push(column.iter().zip(samples).map(|(a, b)| (a - b) * (a - b)).sum::<f64>() / record.len as f64);
         }
     }
@@ -107,7 +127,7 @@ pub fn qualities(problem: &Problem, records: &[Record], predicted: &[Predicted],
     let mut all = Vec::new();
     for (record, predicted) in records.iter().zip(predicted) {
         for (index, output) in problem.model.outputs.iter().enumerate() {
-            let (Some(Some(samples)), Some(Some(column))) = (record.outputs.get(index), predicted.get(index)) else { continue };
+            let (Some(samples), Some(Some(column))) = (record.compared(index), predicted.get(index)) else { continue };
             let error: Vec<f64> = samples.iter().zip(column).map(|(y, p)| y - p).collect();
             let lag = problem.lag.get(index).copied().unwrap_or(0);
             let lagged: Vec<f64> = match lag {

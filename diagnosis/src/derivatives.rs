@@ -129,7 +129,7 @@ impl Evaluator<'_> {
 
     /// Whether a parameter moves in this fit.
     pub(crate) fn moves(&self, number: &FreeParameter) -> bool {
-        !self.own_only || number.records.is_some()
+        number.records.is_some() || !self.own_only && self.only.as_ref().is_none_or(|only| only.contains(&number.role))
     }
 
     /// Derivatives by all parameters, 0 by those that do not move.

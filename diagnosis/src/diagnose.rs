@@ -6,7 +6,7 @@ use crate::per_record::{PerRecord, fit_each};
 use crate::problem::Problem;
 use crate::search::{Search, SearchError, Settings, search};
 use crate::tuning::tuning;
-use crate::verdict::{Files, Verdict, VerdictError, verdict};
+use crate::verdict::{Files, Verdict, VerdictError, timing, verdict};
 use crate::work::Budget;
 use std::sync::atomic::AtomicBool;
 
@@ -51,8 +51,9 @@ pub fn diagnose(
 ) -> Result<Diagnosis, DiagnosisError> {
     let limit = settings.limit(stop);
     report("looking at the recordings");
-    let remarks = audit(&problem);
+    let mut remarks = audit(&problem);
     let search = search(&problem, settings, limit, report)?;
+    remarks.extend(timing(&problem, &search));
     report("locating the missing force");
     let location = located(&problem, &search);
     report("deciding");

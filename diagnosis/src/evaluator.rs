@@ -2,7 +2,7 @@
 
 use crate::coupling::Coupling;
 use crate::problem::{Problem, Record};
-use crate::structure::{Along, Structure};
+use crate::structure::{Along, Role, Structure};
 use crate::tuning::tuning;
 use crate::work::Budget;
 use backdrive_plant::model::Model;
@@ -32,6 +32,8 @@ pub struct Evaluator<'a> {
     pub widest: f64,
     /// Whether only parameters of single records move, such as the curve of an unmeasured hand force.
     pub own_only: bool,
+    /// The parameters of the model that alone move, beside those of single records; `None` where all do.
+    pub only: Option<Vec<Role>>,
 }
 
 impl<'a> Evaluator<'a> {
@@ -52,6 +54,7 @@ impl<'a> Evaluator<'a> {
             coupling: None,
             stretch: 1.0,
             own_only: false,
+            only: None,
             widest: tuning().fit.widest,
         }
     }
@@ -99,7 +102,7 @@ impl<'a> Evaluator<'a> {
         let along = Along { substeps: self.substeps, coupling: self.coupling.as_ref(), budget: &self.budget };
         let mut columns = structure.predict(self.problem, model, values, (record, r), along)?;
         for (column, output) in columns.chunks_exact_mut(record.len).zip(measured(record)) {
-            let samples = record.outputs.get(output)?.as_deref()?;
+            let samples = if self.coupling.is_some() { record.outputs.get(output)?.as_deref()? } else { record.compared(output)? };
             let noise_sd = self.noise_sd.get(output).copied()?;
             let lag = if self.coupling.is_some() { 0 } else { self.problem.lag.get(output).copied().unwrap_or(0) };
             for (prediction, sample) in column.iter_mut().zip(samples) {

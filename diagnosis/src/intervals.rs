@@ -4,6 +4,7 @@ use crate::candidate::Candidate;
 use crate::evaluator::Evaluator;
 use crate::normal_equations::normal_equations;
 use crate::simulate::TWICE;
+use crate::structure::{Bound, FreeParameter, Role, Structure};
 use crate::tuning::tuning;
 use crate::work::{Budget, Limit, Steps};
 use nalgebra::{DMatrix, DVector};
@@ -135,6 +136,45 @@ impl Uncertainty {
         let own = n.to_internal(*value);
         let half = self.half(number);
         [n.to_external((own - half).max(low)), n.to_external((own + half).min(high))]
+    }
+
+    /// The same, one-sided where the number is at a bound: the recordings say only that it is no less far than that. `None` for an open end.
+    pub fn one_sided(&self, candidate: &Candidate, number: usize) -> [Option<f64>; 2] {
+        let [low, high] = self.interval(candidate, number).map(|end| Some(end).filter(|x| x.is_finite()));
+        let bound = candidate.structure.free.get(number).zip(candidate.fit.values.get(number)).and_then(|(n, value)| n.at_bound(*value));
+        match bound {
+            Some(Bound::Low) => [None, high],
+            Some(Bound::High) => [low, None],
+            None => [low, high],
+        }
+    }
+
+    /// Adds what other explanations of nearly the same fit make of the same numbers, each with a weight of 0 to 1: numbers are as unsure as the structure
+    /// around them.
+    pub fn beside(&mut self, candidate: &Candidate, others: &[(&Candidate, f64)]) {
+        let structure = &candidate.structure;
+        let sum = 1.0 + others.iter().map(|(_, weight)| weight).sum::<f64>();
+        for (j, number) in structure.free.iter().enumerate() {
+            let own = number.to_internal(candidate.fit.values[j]);
+            let square = |(other, weight): &(&Candidate, f64)| {
+                let place = other.structure.free.iter().position(|n| is_same(structure, number, &other.structure, n))?;
+                Some(weight * (number.to_internal(*other.fit.values.get(place)?) - own).powi(2))
+            };
+            let variance = others.iter().filter_map(square).sum::<f64>() / sum;
+            if self.deviation[j].is_finite() {
+                self.deviation[j] = self.deviation[j].hypot(variance.sqrt());
+            }
+        }
+    }
+}
+
+/// Whether numbers of two structures are the same one.
+fn is_same(a: &Structure, number: &FreeParameter, b: &Structure, other: &FreeParameter) -> bool {
+    match (&number.role, &other.role) {
+        (Role::Added(h, p), Role::Added(k, q)) => {
+            p == q && a.added.get(*h).zip(b.added.get(*k)).is_some_and(|(own, other)| own.id == other.id)
+        }
+        (own, other) => own == other,
     }
 }
 

@@ -49,7 +49,7 @@ fn median(values: &mut [f64]) -> f64 {
 
 /// Noise standard deviation of an output over all recordings of it, in its unit: its white part, and at least the error of rounding.
 pub fn of_signal(model: &Model, records: &[Record], output: usize) -> f64 {
-    let signals: Vec<&[f64]> = records.iter().filter_map(|r| r.outputs.get(output)?.as_deref()).collect();
+    let signals: Vec<&[f64]> = records.iter().filter_map(|r| r.compared(output)).collect();
     let spread = records.iter().filter_map(|r| r.spread.get(output)).fold(0.0f64, |a, b| a.max(*b));
     of(&signals, stated(model, output, &signals), spread)
 }

@@ -41,6 +41,18 @@ impl Role {
     }
 }
 
+/// An end of a range.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Bound {
+    /// The lower one.
+    Low,
+    /// The upper one.
+    High,
+}
+
+/// Share of a range that counts as its end.
+const AT_BOUND: f64 = 1e-3;
+
 /// A number that a fit may move.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FreeParameter {
@@ -71,6 +83,17 @@ impl FreeParameter {
     pub fn to_external(&self, own: f64) -> f64 {
         let value = if self.log { own.exp() } else { own };
         value.clamp(self.range.0, self.range.1)
+    }
+
+    /// The end of its range at which a value is, where it is at one.
+    pub fn at_bound(&self, value: f64) -> Option<Bound> {
+        let (low, high) = self.bounds();
+        let (own, near) = (self.to_internal(value), AT_BOUND * (high - low));
+        match () {
+            () if own - low < near => Some(Bound::Low),
+            () if high - own < near => Some(Bound::High),
+            () => None,
+        }
     }
 
     /// Whether a record depends on it.

@@ -145,6 +145,8 @@ mod tests {
             begins: Vec::new(),
             skip: 0,
             before,
+            outliers: Vec::new(),
+            logged: None,
         }
     }
 

@@ -83,7 +83,7 @@ mod tests {
     #[test]
     fn a_finding_reads_in_words() {
         let between = |a: &str, b: &str| Place::Between(a.to_string(), b.to_string());
-        let gap = Estimate { value: 0.00031, ci95: [Some(0.0003), Some(0.00032)], unit: "m".to_string() };
+        let gap = Estimate { value: 0.00031, ci95: [Some(0.0003), Some(0.00032)], at_bound: false, unit: "m".to_string() };
         let found = Finding {
             physics: "backlash".to_string(),
             place: between("motor", "drum"),

@@ -26,11 +26,19 @@ pub fn audit(problem: &Problem) -> Vec<Remark> {
     }
     set::closed_loop(problem, &mut all);
     let mut all = merged(all, problem.fit.len() + problem.held_out.len());
+    all.extend(problem.left_out.iter().map(short));
     all.extend(set::repeats(problem));
     all.extend(units::remarks(problem));
     all.extend(set::noises(problem));
     all.sort_by_key(|r| std::cmp::Reverse(r.weight));
     all
+}
+
+/// A recording that was left out.
+fn short((name, count): &(String, usize)) -> Remark {
+    let fewest = crate::tuning::tuning().recordings.fewest_samples;
+    let text = format!("has {count} samples and was left out: a recording needs at least {fewest}");
+    Remark { weight: Weight::Caution, records: vec![file_name(name).to_string()], signal: String::new(), about: "short", text }
 }
 
 /// Whether there is anything to fit: a sentence says what is wrong and what to do where there is not.

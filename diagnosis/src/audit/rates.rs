@@ -66,7 +66,7 @@ pub(super) fn unit_of_time(problem: &Problem) -> Option<String> {
 /// differences over a lag where no spring holds the position.
 fn unexplained_variance(problem: &Problem, record: &Record, period: f64) -> Option<f64> {
     let mut record = record.clone();
-    record.period = period;
+    (record.period, record.logged) = (period, None);
     record.segments =
         problem.model.inputs.iter().zip(&record.inputs).map(|(input, samples)| segments(input.hold, samples, period)).collect();
     let predicted = predict(&problem.model, &record, 16)?;

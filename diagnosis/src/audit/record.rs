@@ -9,11 +9,28 @@ use backdrive_plant::model::{InputKind, OutputKind};
 /// Every check of one recording.
 pub(super) fn record(problem: &Problem, record: &Record, all: &mut Vec<Remark>) {
     clock(record, all);
+    for found in &record.outliers {
+        let what = if found.count == 1 { "one sample is".to_string() } else { format!("{} samples are", found.count) };
+        let done = if found.replaced { "put between the neighbours" } else { "left as they are; check the file" };
+        let text = format!(
+            "{what} far from the neighbours, the first after {:.4} s by {:.0} times the signal's range: {done}",
+            found.first, found.size
+        );
+        add(all, Weight::Caution, record, &found.signal, "outliers", text);
+    }
     for (index, (input, samples)) in problem.model.inputs.iter().zip(&record.inputs).enumerate() {
         if problem.unknown.iter().any(|u| u.input == index) {
             continue;
         }
         constant(record, &input.name, samples, all);
+        if let (InputKind::Motion, Some(step)) = (input.kind, crate::noise::step_of(samples)) {
+            let text = format!(
+                "drives the model and moves in steps of {step:.4e}: differentiated twice, each is an acceleration of {:.1e} for a sample; what that does to \
+                 the forces counts as noise of theirs",
+                step / (record.period * record.period)
+            );
+            add(all, Weight::Caution, record, &input.name, "encoder", text);
+        }
         if input.kind == InputKind::Force {
             clipped(record, &input.name, samples, "its source may be limited", all);
         }

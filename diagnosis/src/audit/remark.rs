@@ -25,7 +25,8 @@ pub struct Remark {
     pub records: Vec<String>,
     /// The signal; empty where it is about the clock.
     pub signal: String,
-    /// What was looked at: `clock`, `gaps`, `missing`, `constant`, `encoder`, `filtered`, `saturated`, `sign`, `unit`, `loop`, `repeats`, `noise`.
+    /// What was looked at: `clock`, `gaps`, `short`, `missing`, `constant`, `outliers`, `encoder`, `filtered`, `saturated`, `sign`, `unit`, `loop`,
+    /// `repeats`, `noise`, `timing`.
     pub about: &'static str,
     /// One clause; of several recordings that of the first.
     pub text: String,

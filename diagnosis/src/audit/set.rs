@@ -3,6 +3,7 @@
 use super::remark::{Remark, Weight, add, file_name};
 use super::signals::answers;
 use crate::problem::Problem;
+use crate::repeatability::{self, Repeat};
 use crate::tuning::tuning;
 use backdrive_plant::model::{InputKind, OutputKind};
 
@@ -22,31 +23,24 @@ pub(super) fn noises(problem: &Problem) -> Vec<Remark> {
     all
 }
 
-/// Recordings of the same excitation: how well the device repeats itself.
+/// Recordings of the same excitation, and periods of a periodic one: how well the device repeats itself.
 pub(super) fn repeats(problem: &Problem) -> Vec<Remark> {
     let mut all = Vec::new();
-    let square = |x: &[f64]| x.iter().map(|x| x * x).sum::<f64>();
-    let apart = |x: &[f64], y: &[f64]| x.iter().zip(y).map(|(x, y)| (x - y) * (x - y)).sum::<f64>();
-    for (i, a) in problem.fit.iter().enumerate() {
-        for b in &problem.fit[..i] {
-            let same = a.len == b.len
-                && a.inputs.iter().zip(&b.inputs).all(|(x, y)| square(x) > 0.0 && apart(x, y) < tuning().recordings.repeated * square(x));
-            if !same {
-                continue;
-            }
-            for (o, output) in problem.model.outputs.iter().enumerate() {
-                let (Some(Some(x)), Some(Some(y))) = (a.outputs.get(o), b.outputs.get(o)) else { continue };
-                let off = (apart(x, y) / (2 * x.len()) as f64).sqrt();
-                let times = off / problem.noise_sd[o];
-                let text = if times > tuning().recordings.repeats {
-                    format!("repeats {} to {off:.2e} only, {times:.1} times its noise: no model can do better", file_name(&b.name))
-                } else {
-                    format!("repeats {} to its noise", file_name(&b.name))
-                };
-                let weight = if times > tuning().recordings.repeats { Weight::Caution } else { Weight::Note };
-                add(&mut all, weight, a, &output.name, "repeats", text);
-            }
-        }
+    for Repeat { record, of, output, apart, period } in repeatability::repeats(problem) {
+        let (Some(own), Some(other), Some(name)) = (problem.fit.get(record), problem.fit.get(of), problem.model.outputs.get(output)) else {
+            continue;
+        };
+        let times = apart / problem.noise_sd[output];
+        let what = match period {
+            Some(length) => format!("its periods of {length:.3} s"),
+            None => file_name(&other.name).to_string(),
+        };
+        let (text, weight) = if times > tuning().recordings.repeats {
+            (format!("repeats {what} to {apart:.2e} only, {times:.1} times its noise: no model can do better"), Weight::Caution)
+        } else {
+            (format!("repeats {what} to its noise"), Weight::Note)
+        };
+        add(&mut all, weight, own, &name.name, "repeats", text);
     }
     all
 }

@@ -146,6 +146,8 @@ pub struct Facts {
     /// Values with which a hypothesis of this physics does nearly what a coarser one at the same place does with its own, where it is the same
     /// law resolved more finely: friction that builds up over a distance is that of many contacts, described by one state.
     pub refine: fn(&Hypothesis, &[f64], &Hypothesis) -> Option<Vec<f64>>,
+    /// Ranges of parameters that a device may have, by key, in SI units: what a fit finds outside them is never claimed. Narrower than what it may try.
+    pub plausible: &'static [(&'static str, f64, f64)],
     /// Physics that it contains as a special or limiting case: who withholds one of these withholds it too.
     pub contains: &'static [&'static str],
 }
@@ -160,6 +162,7 @@ impl Facts {
         memory: false,
         holds: false,
         refine: |_, _, _| None,
+        plausible: &[],
         contains: &[],
     };
 }

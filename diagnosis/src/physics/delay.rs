@@ -17,6 +17,8 @@ pub(super) const PHYSICS: Physics = Physics {
     mark: Mark::Delay,
     facts: Facts {
         proportional: true,
+        // A motor answers its command within some milliseconds, a bus or a camera within a fifth of a second. Below 0 only beside a prescribed motion.
+        plausible: &[("delay", -3e-3, 0.2)],
         twin: Some("a delay at the only input and at the only output move the same signal: a second sensor would tell"),
         ..Facts::NONE
     },

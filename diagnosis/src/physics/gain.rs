@@ -11,7 +11,8 @@ pub(super) const PHYSICS: Physics = Physics {
     against: Against::Signal,
     state: State::WithItsVariable,
     mark: Mark::Other,
-    facts: Facts::NONE,
+    // An amplifier or a gauge that is off by more is another one, or its unit is.
+    facts: Facts { plausible: &[("gain", 0.25, 4.0)], ..Facts::NONE },
     propose: |sites| {
         // A gain other than 1 is stated, so it is a number that may be off.
         let inputs = sites.model.inputs.iter().filter(|i| i.gain == 1.0).map(|i| ("inputs", &i.name));

@@ -20,6 +20,16 @@ pub enum ProblemError {
     /// The nominal model cannot be simulated.
     #[error("the nominal model cannot be simulated: {0}")]
     Model(#[from] CompileError),
+    /// A recording that is too short to be fitted.
+    #[error("{name}: has {count} samples; a diagnosis needs at least {fewest} per recording")]
+    Short {
+        /// Its file.
+        name: String,
+        /// Samples that it has.
+        count: usize,
+        /// Samples that it needs.
+        fewest: usize,
+    },
     /// The set does not say which model, or names nothing to fit.
     #[error("{0}")]
     Set(String),

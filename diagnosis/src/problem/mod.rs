@@ -3,14 +3,20 @@
 mod error;
 mod files;
 mod lag;
+mod logged;
+mod outliers;
 mod record;
 mod stated;
 
 pub use error::ProblemError;
+pub use logged::Logged;
+pub use outliers::Outliers;
 pub use record::Record;
 pub use stated::Stated;
 
+use crate::error_budget::of_driving_motion;
 use crate::noise;
+use crate::tuning::tuning;
 use crate::unknown::Unknown;
 use backdrive_plant::model::Model;
 use backdrive_plant::set::{Initial, RecordingSet};
@@ -40,6 +46,8 @@ pub struct Problem {
     pub initial: Initial,
     /// Inputs that were not measured.
     pub unknown: Vec<Unknown>,
+    /// Recordings that are too short and were left out: file and samples.
+    pub left_out: Vec<(String, usize)>,
     /// Noise standard deviation of each output, in its unit; see [`crate::noise`].
     pub noise_sd: Vec<f64>,
     /// Samples over which each output's displacement is compared instead of its position; 0 where the position itself is.
@@ -75,9 +83,24 @@ impl Problem {
         let model = Model::from_toml(&text, &model_path.display().to_string())?;
         set.check_conditions(&model)?;
         let unknown = unknown_of(set, &model)?;
-        let read = |files: &[String]| files.iter().map(|file| record(set, file, &model, &unknown)).collect::<Result<Vec<_>, _>>();
+        let mut left_out = Vec::new();
+        let mut read = |files: &[String]| {
+            let mut records = Vec::new();
+            for file in files {
+                match record(set, file, &model, &unknown) {
+                    Ok(record) => records.push(record),
+                    // One short file says nothing, and does not keep the others from being diagnosed.
+                    Err(ProblemError::Short { name, count, .. }) => left_out.push((name, count)),
+                    Err(error) => return Err(error),
+                }
+            }
+            Ok(records)
+        };
         let (fit, held_out) = (read(&set.fit)?, read(&set.held_out)?);
-        Ok(Problem { unknown, ..Problem::new(text, model_path, model, fit, held_out, set.initial)? })
+        if let (true, Some((name, count))) = (fit.is_empty(), left_out.first()) {
+            return Err(ProblemError::Short { name: name.clone(), count: *count, fewest: tuning().recordings.fewest_samples });
+        }
+        Ok(Problem { unknown, left_out, ..Problem::new(text, model_path, model, fit, held_out, set.initial)? })
     }
 
     /// The same from recordings at hand.
@@ -103,8 +126,10 @@ impl Problem {
             )));
         }
         let stated = stated_numbers(&model, &text);
-        let noise_sd = (0..model.outputs.len()).map(|output| noise::of_signal(&model, &fit, output)).collect();
+        // Noise and rounding of a motion that drives the model are errors like noise of what is predicted from it.
+        let driven = of_driving_motion(&model, &fit);
+        let noise_sd = driven.iter().enumerate().map(|(output, error)| noise::of_signal(&model, &fit, output).hypot(*error)).collect();
         let lag = (0..model.outputs.len()).map(|output| lag_of(&model, &fit, output)).collect();
-        Ok(Problem { text, model_path, model, fit, held_out, stated, initial, unknown: Vec::new(), noise_sd, lag })
+        Ok(Problem { text, model_path, model, fit, held_out, stated, initial, unknown: Vec::new(), left_out: Vec::new(), noise_sd, lag })
     }
 }

@@ -7,9 +7,10 @@ use crate::compare::unseen;
 use crate::evaluator::Evaluator;
 use crate::fit::Fit;
 use crate::hypothesis::{self, Hypothesis};
+use crate::intervals::Uncertainty;
 use crate::physics;
 use crate::race::Course;
-use crate::structure::Structure;
+use crate::structure::{FreeParameter, Role, Structure};
 use crate::tuning::tuning;
 use crate::work::Budget;
 use rayon::prelude::*;
@@ -61,8 +62,60 @@ pub(super) fn bring_to_their_ends(evaluator: &Evaluator, found: &mut [Candidate]
     sort(found, samples);
 }
 
+/// An effect that may be nothing may only have led the parameters around a bend: from the best, each such effect is taken back in steps while all else is
+/// fitted along (continuation), and where the rest may start from then. A fit from elsewhere does not get there through a curved valley.
+pub(super) fn taken_back(evaluator: &Evaluator, found: &mut [Candidate], work: &Work) -> Vec<(Structure, Vec<f64>)> {
+    let problem = evaluator.problem;
+    let Some(best) = found.first_mut() else { return Vec::new() };
+    let spread = Uncertainty::measured(evaluator, best);
+    let unsure: Vec<Option<(usize, f64)>> = (0..best.structure.added.len()).map(|which| may_be_nothing(best, &spread, which)).collect();
+    best.may_be_nothing = unsure.iter().any(Option::is_some);
+    let best = &*best;
+    let along = evaluator.within(work.up_to(tuning().search.best_end));
+    let one = |which: usize| {
+        let (number, neutral) = unsure.get(which).copied().flatten()?;
+        let mut structure = best.structure.clone();
+        let mut values = best.fit.values.clone();
+        let own = |values: &[f64]| structure_value(&best.structure, values, number);
+        let size = own(&values) - neutral;
+        for share in tuning().search.taken_back {
+            let target = neutral + share * size;
+            structure.free[number].prior = Some((target, HELD * size.abs()));
+            values[number] = best.structure.free[number].to_external(target);
+            values = along.fit(&structure, &values, tuning().fit.to_the_end)?.values;
+        }
+        let rest: Vec<Hypothesis> = best.structure.added.iter().enumerate().filter(|(i, _)| *i != which).map(|(_, h)| h.clone()).collect();
+        let added: Vec<Vec<f64>> =
+            structure.added_of(&values).into_iter().enumerate().filter(|(i, _)| *i != which).map(|(_, values)| values).collect();
+        let without = Structure::new(problem, &problem.fit, rest);
+        let start = without.values(problem, &structure.stated_of(problem, &values), &added, &structure.of_records(&values));
+        Some((without, start))
+    };
+    (0..best.structure.added.len()).filter_map(one).collect()
+}
+
+/// Standard deviation of the prior that holds a parameter at a step of the way back, as a share of what it was.
+const HELD: f64 = 0.01;
+
+fn structure_value(structure: &Structure, values: &[f64], number: usize) -> f64 {
+    structure.free[number].to_internal(values[number])
+}
+
+/// The size of an effect among a fit's parameters, and in the fit's own unit where it has none, if the recordings do not surely tell the two apart.
+fn may_be_nothing(candidate: &Candidate, spread: &Uncertainty, which: usize) -> Option<(usize, f64)> {
+    let structure = &candidate.structure;
+    let hypothesis = structure.added.get(which)?;
+    let is_size = |n: &FreeParameter| matches!(n.role, Role::Added(h, p) if h == which && hypothesis.parameters[p].key == hypothesis.physics.size && hypothesis.parameters[p].index.is_none());
+    let number = structure.free.iter().position(is_size)?;
+    let Role::Added(_, place) = structure.free[number].role else { return None };
+    let neutral = hypothesis.parameters[place].neutral.filter(|n| n.is_finite() && !structure.free[number].log)?;
+    let deviation = *spread.deviation.get(number)?;
+    let away = structure_value(structure, &candidate.fit.values, number) - neutral;
+    (away != 0.0 && away.abs() < tuning().claim.may_be_nothing * deviation).then_some((number, neutral))
+}
+
 /// The nominal model at its end. The parameters of what was found may take it out of a wrong valley: then there was less to find.
-pub(super) fn nominal_at_its_end(nominal: &Nominal, found: &[Candidate], work: &Work) -> Candidate {
+pub(super) fn nominal_at_its_end(nominal: &Nominal, found: &[Candidate], taken_back: &[Vec<f64>], work: &Work) -> Candidate {
     let (evaluator, refitted) = (&nominal.evaluator, &nominal.refitted);
     let problem = evaluator.problem;
     let numbers = |c: &Candidate| (c.structure.stated_of(problem, &c.fit.values), c.structure.of_records(&c.fit.values));
@@ -72,8 +125,9 @@ pub(super) fn nominal_at_its_end(nominal: &Nominal, found: &[Candidate], work: &
     let substeps = if nominal.is_far { tuning().fit.middle_substeps } else { evaluator.substeps };
     let last = Evaluator { substeps, ..evaluator.within(work.up_to(tuning().search.nominal_end)) };
     let mut better = None;
-    for (stated, of_records) in others.chain(nominal.is_far.then(|| numbers(refitted))) {
-        let start = refitted.structure.values(problem, &stated, &[], &of_records);
+    let starts = others.chain(nominal.is_far.then(|| numbers(refitted)));
+    let starts = starts.map(|(stated, of_records)| refitted.structure.values(problem, &stated, &[], &of_records));
+    for start in taken_back.iter().cloned().chain(starts) {
         let least = better.as_ref().map_or(refitted.fit.cost, |f: &Fit| f.cost);
         if let Some(fit) = last.fit(&refitted.structure, &start, effort)
             && fit.cost < (1.0 - tuning().fit.relative_tolerance) * least

@@ -11,8 +11,9 @@ mod state;
 mod steps;
 mod view;
 
-use crate::candidate::key_of;
+use crate::candidate::{key_of, sort};
 use crate::effort::Effort;
+use crate::error_budget::error_budget;
 use crate::evaluator::Evaluator;
 use crate::excerpts::Excerpts;
 use crate::hypothesis::Hypothesis;
@@ -74,7 +75,12 @@ pub fn search(problem: &Problem, settings: &Settings, limit: Limit, report: &(dy
     report("fitting the best to the end");
     ending::make_simpler(&course, &mut found, &work);
     ending::bring_to_their_ends(evaluator, &mut found, samples, &work);
-    let mut refitted = ending::nominal_at_its_end(&nominal, &found, &work);
+    let (alone, fewer): (Vec<_>, Vec<_>) =
+        ending::taken_back(evaluator, &mut found, &work).into_iter().partition(|(structure, _)| structure.added.is_empty());
+    found.extend(ending::polished(evaluator, fewer));
+    sort(&mut found, samples);
+    let alone: Vec<Vec<f64>> = alone.into_iter().map(|(_, start)| start).collect();
+    let mut refitted = ending::nominal_at_its_end(&nominal, &found, &alone, &work);
     let mut seen = HashSet::new();
     found.retain(|c| seen.insert(key_of(&c.structure.added)));
     let unseen_samples = ending::hold_against_unseen(evaluator, &mut found, &mut refitted);
@@ -83,6 +89,7 @@ pub fn search(problem: &Problem, settings: &Settings, limit: Limit, report: &(dy
         t.taken = single.map(|c| 1.0 - c.fit.cost / refitted.fit.cost);
     }
     Ok(Search {
+        errors: error_budget(evaluator, &refitted.structure, &refitted.fit.values),
         noise_sd: evaluator.noise_sd.clone(),
         levels_given: nominal.levels_given.clone(),
         found,

@@ -13,8 +13,9 @@ use crate::noise;
 use crate::problem::{Problem, Record};
 use crate::screen::worst_records;
 use crate::statistics::{correlation_time, deviation_by_median, levels, whiteness_statistic};
-use crate::structure::Structure;
+use crate::structure::{Role, Structure};
 use crate::tuning::tuning;
+use crate::work::Budget;
 use backdrive_plant::model::{InputKind, Model};
 
 /// The nominal model refitted, and what was learnt of the recordings by it.
@@ -146,6 +147,9 @@ impl<'a> Nominal<'a> {
             refitted = other;
         }
         refitted = to_its_end(&evaluator, &structure, refitted);
+        if let Some(other) = few_first(&evaluator, &structure, &start, &refitted) {
+            refitted = other;
+        }
         if pulled {
             coupled = coupler.until_it_shows(coupled, &refitted);
         }
@@ -257,6 +261,36 @@ fn floors(evaluator: &Evaluator, residuals: &[f64]) -> Vec<f64> {
             }
         })
         .collect()
+}
+
+/// Mostly few numbers are wrong: the one, and the two, that explain most where all others are as given, and from there all. Numbers that go together draw
+/// a fit of all of them into valleys from which it does not come back. `None` where the refit leaves white noise, or is no worse.
+fn few_first(evaluator: &Evaluator, structure: &Structure, start: &[f64], refitted: &Fit) -> Option<Fit> {
+    let white = |fit: &Fit| white(correlation_time(evaluator, &fit.residuals), whiteness_statistic(evaluator, &fit.residuals));
+    let stated: Vec<&Role> = structure.free.iter().map(|n| &n.role).filter(|role| matches!(role, Role::Stated(_))).collect();
+    if stated.len() < 2 || white(refitted) {
+        return None;
+    }
+    let middle = at_middle(evaluator);
+    let with = |budget: &Budget, (only, from): &(Vec<Role>, Vec<f64>)| {
+        let some = Evaluator { only: Some(only.clone()), ..middle.within(budget.clone()) };
+        Some((only.clone(), some.fit(structure, from, tuning().fit.middle)?))
+    };
+    let mut best: Option<(Vec<Role>, Fit)> = None;
+    for _ in 0..2 {
+        let (before, from) = best.as_ref().map_or((Vec::new(), start.to_vec()), |(only, fit)| (only.clone(), fit.values.clone()));
+        let next = stated.iter().filter(|role| !before.contains(role));
+        let tries: Vec<(Vec<Role>, Vec<f64>)> = next.map(|role| ([before.as_slice(), &[(*role).clone()]].concat(), from.clone())).collect();
+        let fits = middle.budget.abreast(&tries, with);
+        let found = fits.into_iter().flatten().flatten().min_by(|a, b| a.1.cost.total_cmp(&b.1.cost))?;
+        best = Some(found);
+        // All from there: that is what counts.
+        let all = best.as_ref().and_then(|(_, fit)| evaluator.fit(structure, &fit.values, tuning().fit.to_the_end));
+        if let Some(fit) = all.filter(|fit| fit.cost < (1.0 - tuning().fit.relative_tolerance) * refitted.cost) {
+            return Some(to_its_end(evaluator, structure, fit));
+        }
+    }
+    None
 }
 
 /// Near the noise the end of a fit counts: the residual short of it looks like missing physics.

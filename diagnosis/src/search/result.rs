@@ -2,6 +2,7 @@
 
 use super::journal::Entry;
 use crate::candidate::Candidate;
+use crate::error_budget::BudgetedError;
 use crate::hypothesis::Place;
 use crate::work::Steps;
 
@@ -34,6 +35,8 @@ pub struct Detectable {
 /// What a search found.
 #[derive(Debug)]
 pub struct Search {
+    /// What is off in the predictions of the refitted nominal model although no physics is missing.
+    pub errors: Vec<BudgetedError>,
     /// Standard deviation of each output's measuring error, in its unit.
     pub noise_sd: Vec<f64>,
     /// Level of each output with the parameters as given, noise standard deviations.

@@ -11,10 +11,22 @@ group! {
         least_share: f64 = 0.02, "-", Numerics("what coarse substeps and an inexact simulator may cost");
         /// Advantage below which two structures cannot be told apart.
         alike: f64 = 6.0, "criterion", Statistics("strong evidence begins there (Kass & Raftery 1995)");
-        /// Mean squared residual on unseen recordings, over that without the effect, above which an effect is not claimed.
-        unseen: f64 = 1.005, "-", Judgement("an effect that is there helps everywhere; half a percent for what does not move it");
-        /// Share of the excess misfit that has to be removed for a verdict of missing physics, where the noise is not reached.
-        explained: f64 = 0.99, "-", Judgement("a tenth of the residual amplitude remains");
+        /// Standard deviations of its size within which an effect may be nothing.
+        may_be_nothing: f64 = 3.0, "standard deviations", Statistics("one in 400 by chance, of effects that screening picked from some hundred");
+        /// Delay or lag, as a share of a sample period, below which it is a matter of timing and no missing physics.
+        timing: f64 = 0.05, "sample periods", Statistics("rounding of times, and when a sensor is read within its period, come to that");
+        /// Blocks into which a held-out recording is cut to see whether an explanation predicts all of it better, at most.
+        blocks: usize = 48, "blocks", Statistics("enough for a standard error, and each longer than most residuals correlate");
+        /// Samples of such a block, at least.
+        block_samples: usize = 20, "samples", Statistics("its mean square is then known to a third");
+        /// Standard errors by which an effect has to predict unseen recordings better, block by block.
+        sure: f64 = 2.0, "standard errors", Statistics("one in forty by chance, of what the fits have preferred already");
+        /// Share of gains and losses of the blocks that has to speak for an effect where it shows in few of them.
+        one_sided: f64 = 0.9, "-", Judgement("noise takes from the other blocks a tenth of what a short event gives");
+        /// Least improvement on unseen recordings that is of use: of the root mean square, over the noise standard deviation or over itself, whichever is larger.
+        useful: f64 = 0.01, "-", Judgement("below one percent of the noise no controller and no user can tell the models apart");
+        /// Share of what a simpler law leaves beyond the noise that a law which contains it has to remove.
+        richer_removes: f64 = 0.2, "-", Judgement("a tenth of the amplitude; on a real device a law with more numbers always gains a little");
         /// Whiteness statistic above which something is missing however small the residual is.
         wanders: f64 = 12.0, "standard deviations", Judgement("fits of the right structure were seen below 3, and at 2 to 3 times that where they were cut short");
         /// Correlation time above which residuals above the noise are unexplained.
@@ -39,20 +51,12 @@ group! {
         glitch_samples: usize = 3, "samples", Statistics("two may be a transmission error that moves no fit");
         /// Share of the samples that glitches have, at most.
         glitch_share: f64 = 0.02, "-", Judgement("what is off more often is no glitch");
-        /// Factor of the softened weight of a rival in a confidence: advantage per unit of log-odds.
+        /// Log-odds of a finding: a constant, then one for each of its figures, see [`crate::verdict::Figures`].
+        confidence: [f64; 10] = [-2.0, 0.5, 1.0, 0.5, 0.3, 1.0, -0.2, -0.1, -0.5, -1.0], "log-odds", Measured("a logistic regression on drawn cases: diagnosis/tests/concealed/calibrate.py");
+        /// Advantage over a rival, in units of the criterion, that makes it e times less likely than another one.
         softened: f64 = 20.0, "criterion", Judgement("an information criterion says 2; a simulator is never the device");
-        /// Weight in a confidence of a richer law of the same family at the same place.
-        richer: f64 = 0.1, "-", Judgement("it contains the claimed law");
-        /// Weight in a confidence of a hypothesis that promised as much and was not fitted.
-        unfitted: f64 = 0.02, "-", Judgement("it lost its race before its fit");
-        /// Such hypotheses that count, at most.
-        unfitted_most: f64 = 10.0, "hypotheses", Judgement("their weight is then that of one rival at 1.6 softened");
         /// Alternatives that are listed.
         alternatives: usize = 6, "structures", Cost("nobody reads more");
-        /// Least factor on a confidence where the residual is not noise.
-        least_adequacy: f64 = 0.05, "-", Judgement("one in twenty may still be right");
-        /// Share of a finding's promise from which a hypothesis that was not fitted promised as much.
-        as_promising: f64 = 0.9, "-", Judgement("screening errs by more than that");
         /// Share of a finding's confidence from which a rival is named in the sentence.
         near_rival: f64 = 0.5, "-", Judgement("at least half as sure");
         /// Rivals that are named, and whose models are written.

@@ -19,6 +19,14 @@ group! {
         travel: f64 = 4.0, "-", Judgement("more looks like a sensor's offset");
         /// Magnitude beyond which a simulation has run away.
         runaway: f64 = 1e9, "SI units", Numerics("no device is there, and squares are still finite");
+        /// Distance of samples from the even grid up to which their times are even but for the digits they are written with.
+        rounded_times: f64 = 1e-3, "sample periods", Numerics("seven digits of a time in a recording of some thousand samples");
+        /// Steps of the grid on which a recording of an irregular clock is simulated, for each of its samples.
+        grid_steps: usize = 4, "steps", Numerics("a cubic through four points of it reads a tenth of the sampling rate to 1e-4");
+        /// Recordings in which the error of motions that drive the model is measured.
+        driving_records: usize = 2, "recordings", Cost("each takes two simulations, and they say the same");
+        /// Distance of single samples from their neighbours above which they are outliers, in ranges of the signal.
+        outlier: f64 = 3.0, "ranges", Judgement("no motion leaves its range by three times that and is back two samples later");
         /// Distance of samples from the even grid above which a clock is called uneven.
         jitter: f64 = 0.05, "sample periods", Judgement("a delay of that size is what a diagnosis would find instead");
         /// Share of samples at a signal's two extremes above which it looks clipped.

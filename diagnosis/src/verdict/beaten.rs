@@ -64,7 +64,7 @@ pub fn beaten(search: &Search) -> Vec<Beaten> {
             name: c.structure.name(),
             parameters: c.structure.free.len(),
             residual: (c.fit.cost / search.samples.max(1) as f64).sqrt(),
-            unseen: c.unseen.map(|u| u.mean_square.sqrt()),
+            unseen: c.unseen.as_ref().map(|u| u.mean_square.sqrt()),
             by_fits,
             by_unseen,
             why,

@@ -1,8 +1,11 @@
 //! Which of the structures is claimed, and which cannot be told from it.
 
+use super::plausible::{is_at_bound, is_plausible};
 use crate::candidate::{Candidate, advantage_over};
+use crate::error_budget::beside_noise;
 use crate::hypothesis::{Hypothesis, Physics};
 use crate::physics::{PHYSICS, withheld};
+use crate::predictive::{Gain, gain};
 use crate::search::Search;
 use crate::tuning::tuning;
 use std::collections::HashSet;
@@ -11,18 +14,12 @@ use std::collections::HashSet;
 pub fn chosen(search: &Search) -> &Candidate {
     let mut best = &search.nominal;
     for effects in 1..=search.found.iter().map(|c| c.structure.added.len()).max().unwrap_or(0) {
-        let next = search.found.iter().filter(|c| c.structure.added.len() == effects).min_by(|a, b| a.fit.cost.total_cmp(&b.fit.cost));
-        let Some(next) = next else { continue };
-        let next = search
-            .found
-            .iter()
-            .filter(|c| c.structure.added.len() == effects)
-            .fold(next, |best, c| if evidence(search, best, c) > 0.0 { c } else { best });
+        let so_many = || search.found.iter().filter(|c| c.structure.added.len() == effects && is_plausible(c));
+        let Some(next) = so_many().min_by(|a, b| a.fit.cost.total_cmp(&b.fit.cost)) else { continue };
+        let next = so_many().fold(next, |best, c| if evidence(search, best, c) > 0.0 { c } else { best });
         // Ties go to the fewest parameters, then to the physics that is named first.
-        let simplest = search
-            .found
-            .iter()
-            .filter(|c| c.structure.added.len() == effects && evidence(search, c, next) < tuning().claim.alike)
+        let simplest = so_many()
+            .filter(|c| evidence(search, c, next) < tuning().claim.alike || is_enough(search, c, next))
             .min_by_key(|c| (c.structure.free.len(), c.structure.added.iter().map(order).sum::<usize>()))
             .unwrap_or(next);
         if worth(search, best, simplest) {
@@ -30,6 +27,64 @@ pub fn chosen(search: &Search) -> &Candidate {
         }
     }
     best
+}
+
+/// Whether a law of fewer parameters is enough where one that contains it, at the same place, fits better: that one has to predict better by more than its
+/// own variation, and to remove a good part of what the simpler one leaves beyond the noise. On a real device one more number always helps a little.
+fn is_enough(search: &Search, simple: &Candidate, rich: &Candidate) -> bool {
+    if simple.structure.free.len() >= rich.structure.free.len() || !is_contained(simple, rich) {
+        return false;
+    }
+    let (a, b) = (mean_square(search, simple), mean_square(search, rich));
+    let removes = (a - b) / (a - b.min(1.0)).max(f64::MIN_POSITIVE);
+    let surely = everywhere(simple, rich).is_none_or(|gain| gain.is_sure());
+    !surely || removes < tuning().claim.richer_removes || (is_at_bound(rich) && !is_at_bound(simple) && removes < 0.5)
+}
+
+/// Whether two structures differ in one effect, and the one of the first is a special or limiting case of the other's at the same place.
+fn is_contained(simple: &Candidate, rich: &Candidate) -> bool {
+    let only = |c: &Candidate, other: &Candidate| -> Vec<Hypothesis> {
+        c.structure.added.iter().filter(|h| other.structure.added.iter().all(|o| o.id != h.id)).cloned().collect()
+    };
+    match (only(simple, rich).as_slice(), only(rich, simple).as_slice()) {
+        ([own], [more]) => more.place.same(&own.place) && contains(more.physics, own),
+        _ => false,
+    }
+}
+
+/// Mean square of the residual over the fitted and the held-out recordings, noise variances.
+fn mean_square(search: &Search, c: &Candidate) -> f64 {
+    let unseen = c.unseen.as_ref().map_or(0.0, |u| u.mean_square * search.unseen_samples as f64);
+    let unseen_samples = if c.unseen.is_some() { search.unseen_samples } else { 0 };
+    (c.fit.cost + unseen) / (search.samples + unseen_samples).max(1) as f64
+}
+
+/// How much better one candidate predicts than another, over all blocks of all recordings.
+pub(super) fn everywhere(base: &Candidate, better: &Candidate) -> Option<Gain> {
+    match (&base.unseen, &better.unseen) {
+        (Some(a), Some(b)) => {
+            let all = |own: &[Vec<f64>], unseen: &[Vec<f64>]| [own, unseen].concat();
+            gain(&all(&base.blocks, &a.blocks), &all(&better.blocks, &b.blocks))
+        }
+        _ => gain(&base.blocks, &better.blocks),
+    }
+}
+
+/// Whether an effect predicts recordings that no fit has seen better: by more than that varies from block to block, and by enough to be of use. Where the
+/// nominal model predicts them down to the noise already they cannot say, and the fitted ones do; and where there are none. What errors of the
+/// integration and of the clock come to is no improvement.
+fn predicts(search: &Search, base: &Candidate, better: &Candidate) -> bool {
+    let no_physics = beside_noise(&search.errors);
+    let of_use = |a: f64, b: f64| a.sqrt() - b.sqrt() > tuning().claim.useful * b.sqrt().max(1.0) && a - b > no_physics;
+    let fitted = || gain(&base.blocks, &better.blocks).is_none_or(|gain| gain.is_sure());
+    match (&base.unseen, &better.unseen) {
+        (Some(a), Some(b)) if of_use(a.mean_square, b.mean_square) => a.gain_over(b).is_none_or(|gain| gain.is_sure()),
+        (Some(a), Some(b)) => {
+            let silent = a.mean_square.sqrt() < tuning().noise.at_noise && !of_use(b.mean_square, a.mean_square);
+            base.structure.added.is_empty() && silent && fitted()
+        }
+        _ => fitted(),
+    }
 }
 
 fn order(h: &Hypothesis) -> usize {
@@ -44,7 +99,7 @@ pub(super) fn evidence(search: &Search, base: &Candidate, better: &Candidate) ->
 
 /// What the held-out recordings say alone; 0 where there are none.
 pub(super) fn unseen_evidence(search: &Search, base: &Candidate, better: &Candidate) -> f64 {
-    match (base.unseen, better.unseen) {
+    match (&base.unseen, &better.unseen) {
         (Some(a), Some(b)) if a.mean_square > 0.0 && b.mean_square > 0.0 => {
             (search.unseen_samples as f64 / a.correlation_time.max(b.correlation_time)) * (a.mean_square / b.mean_square).ln()
         }
@@ -52,15 +107,11 @@ pub(super) fn unseen_evidence(search: &Search, base: &Candidate, better: &Candid
     }
 }
 
+/// Whether a structure with one effect more is worth it.
 fn worth(search: &Search, base: &Candidate, better: &Candidate) -> bool {
-    // Held-out recordings must not speak against it: a law that is there is there in every recording, if not always to be seen.
-    let seen_again = match (base.unseen, better.unseen) {
-        (Some(a), Some(b)) => b.mean_square < a.mean_square * tuning().claim.unseen,
-        _ => true,
-    };
     evidence(search, base, better) > tuning().claim.least_advantage
         && better.fit.cost < (1.0 - tuning().claim.least_share) * base.fit.cost
-        && seen_again
+        && predicts(search, base, better)
 }
 
 /// Structures of as many effects that cannot be told from the best: another place, or a law that is no richer form of its own.
@@ -77,8 +128,14 @@ pub(super) fn alike<'s>(search: &'s Search, best: &Candidate) -> Vec<&'s Candida
         }
     };
     let mut seen = HashSet::new();
+    // A fit that is not at its end may still come as near.
+    let effective = search.samples as f64 / best.correlation_time.max(1.0);
+    let still = |c: &Candidate| effective * (2.0 * c.fit.predicted_decrease / c.fit.cost).min(0.5);
     let close = |c: &&Candidate| {
-        c.structure.added.len() == best.structure.added.len() && evidence(search, c, best) < tuning().claim.alike && differs(c)
+        c.structure.added.len() == best.structure.added.len()
+            && evidence(search, c, best) - still(c) < tuning().claim.alike
+            && is_plausible(c)
+            && differs(c)
     };
     search.found.iter().filter(close).filter(|c| seen.insert(c.structure.name())).take(tuning().claim.rivals).collect()
 }

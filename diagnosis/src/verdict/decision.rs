@@ -1,13 +1,15 @@
 //! What is claimed of a search, in one word, and what that rests on.
 
-use super::choice::{alike, chosen};
-use super::findings::{adequacy, findings};
+use super::choice::{alike, chosen, evidence};
+use super::findings::{findings, is_timing_of};
 use super::signals::bursts;
 use super::types::{Finding, Word};
 use crate::candidate::Candidate;
+use crate::error_budget::beside_noise;
 use crate::evaluator::Evaluator;
 use crate::intervals::Uncertainty;
 use crate::problem::Problem;
+use crate::repeatability::floors;
 use crate::search::Search;
 use crate::statistics::advantage;
 use crate::structure::{FreeParameter, Role, Structure};
@@ -27,6 +29,10 @@ pub(super) struct Decision<'s> {
     pub(super) alike: Vec<&'s Candidate>,
     /// Times at which a sensor is far off, s.
     pub(super) bursts: Vec<[f64; 2]>,
+    /// Whether what is left is as small as the sensors' noise, or as what the device does not repeat.
+    pub(super) at_floor: bool,
+    /// What the device does not repeat at each output, noise standard deviations; 1 where nothing was repeated.
+    pub(super) floors: Vec<f64>,
     /// Whether the model's text is to hold the fitted parameters.
     pub(super) changes: bool,
 }
@@ -35,30 +41,42 @@ pub(super) struct Decision<'s> {
 pub(super) fn decide<'s>(problem: &Problem, search: &'s Search) -> Decision<'s> {
     let best = chosen(search);
     let evaluator = Evaluator { noise_sd: search.noise_sd.clone(), ..Evaluator::new(problem) };
-    let spread = Uncertainty::measured(&evaluator, best);
-    let at_floor = best.levels.iter().all(|l| *l < tuning().noise.unexplained);
-    let nominal_cost = search.nominal.fit.cost;
-    let excess = |c: f64| (c / search.samples as f64 - 1.0).max(0.0);
-    let explained = 1.0 - excess(best.fit.cost) / excess(nominal_cost).max(1e-12);
+    let mut spread = Uncertainty::measured(&evaluator, best);
+    spread.beside(best, &near(search, best));
+    let floors = floors(problem, &search.noise_sd);
+    let no_physics = beside_noise(&search.errors);
+    let beyond = |level: f64, limit: f64| level * level > limit * limit + no_physics;
+    let at_floor = best.levels.iter().zip(&floors).all(|(level, floor)| !beyond(*level, tuning().noise.unexplained * floor));
     let added = !best.structure.added.is_empty();
+    let claims = (0..best.structure.added.len()).any(|which| !is_timing_of(problem, best, which));
     let bursts = bursts(problem, best);
     let alike = alike(search, best);
     let nominal = &search.nominal;
     let off = given_is_off(problem, search) && (added || spread.is_far(nominal, &stated_in(problem, &nominal.structure)));
-    let wanders = nominal.whiteness_statistic > tuning().claim.wanders && nominal.levels.iter().any(|l| *l > tuning().noise.at_noise);
-    let findings = findings(search, best, &spread, adequacy(best));
+    let wanders =
+        best.whiteness_statistic > tuning().claim.wanders && best.levels.iter().any(|level| beyond(*level, tuning().noise.at_noise));
+    let findings = findings(problem, search, best, &spread);
     let is_outdone = findings.first().is_some_and(Finding::has_likelier_rival);
     let word = match () {
-        () if added && (at_floor || explained > tuning().claim.explained) && (!alike.is_empty() || is_outdone) => Word::Ambiguous,
-        () if added && (at_floor || explained > tuning().claim.explained) => Word::Missing,
-        () if added => Word::Unexplained,
+        () if claims && (!alike.is_empty() || is_outdone) => Word::Ambiguous,
+        () if claims => Word::Missing,
         () if !bursts.is_empty() => Word::Unexplained,
-        () if !at_floor && nominal.correlation_time > tuning().claim.correlated || wanders => Word::Unexplained,
+        () if !at_floor && best.correlation_time > tuning().claim.correlated || wanders => Word::Unexplained,
         () if off => Word::Parameters,
         () if !is_excited(problem, search) => Word::CannotTell,
         () => Word::NothingMissing,
     };
-    Decision { word, best, spread, findings, alike, bursts, changes: off || added }
+    Decision { word, best, spread, findings, alike, bursts, at_floor, floors, changes: off || added }
+}
+
+/// Structures of as many effects, and what each weighs beside the best, 0 to 1.
+fn near<'s>(search: &'s Search, best: &Candidate) -> Vec<(&'s Candidate, f64)> {
+    let weight = |c: &Candidate| (-evidence(search, c, best).max(0.0) / tuning().claim.softened).exp();
+    let others = search
+        .found
+        .iter()
+        .filter(|c| c.structure.added.len() == best.structure.added.len() && c.structure.name() != best.structure.name());
+    others.map(|c| (c, weight(c))).filter(|(_, weight)| *weight > 1e-3).collect()
 }
 
 /// Whether the refitted parameters explain more than the given ones do.

@@ -1,6 +1,8 @@
 //! What was found: each physics with its place, its parameters, and what else could stand there.
 
-use super::choice::{contains, evidence};
+use super::choice::{chosen, evidence};
+use super::confidence::{Figures, figures, probability, without};
+use super::plausible::is_timing;
 use super::rounded::rounded;
 use super::types::{Alternative, Detectable, Estimate, Estimates, Finding, Moved, Parameter};
 use crate::candidate::Candidate;
@@ -13,82 +15,77 @@ use crate::tuning::tuning;
 use backdrive_plant::write::round_significant;
 use std::collections::BTreeMap;
 
-/// How far the residual is measuring error: 1 where it has its size and is as little correlated, less the more of either. A law
-/// that only imitates what is there leaves a little over, and that little is not white.
-pub(super) fn adequacy(best: &Candidate) -> f64 {
-    let noise = &tuning().noise;
-    let level = best.levels.iter().fold(0.0f64, |a, b| a.max(*b));
-    let size = (-(level - noise.at_noise).max(0.0) / (noise.unexplained - 1.0)).exp();
-    let whiteness = (-(best.correlation_time - noise.white_correlation).max(0.0) / noise.white_correlation).exp();
-    (size * whiteness).max(tuning().claim.least_adequacy)
-}
-
-/// Each physics of a structure with its rivals, most important first.
-pub(super) fn findings(search: &Search, best: &Candidate, spread: &Uncertainty, adequacy: f64) -> Vec<Finding> {
-    let one = |which| (cost_without(search, best, which), finding(search, best, spread, adequacy, which));
-    let mut all: Vec<(f64, Finding)> = (0..best.structure.added.len()).map(one).collect();
+/// Each physics of a structure that is claimed, with its rivals, most important first. What comes late by a small share of a sample is a matter of timing,
+/// and not among them.
+pub(super) fn findings(problem: &Problem, search: &Search, best: &Candidate, spread: &Uncertainty) -> Vec<Finding> {
+    let claimed = (0..best.structure.added.len()).filter(|which| !is_timing_of(problem, best, *which));
+    let one = |which| (without(search, best, which).fit.cost, finding(search, best, spread, which));
+    let mut all: Vec<(f64, Finding)> = claimed.map(one).collect();
     all.sort_by(|a, b| b.0.total_cmp(&a.0));
     all.into_iter().map(|(_, finding)| finding).collect()
 }
 
-fn finding(search: &Search, best: &Candidate, spread: &Uncertainty, adequacy: f64, which: usize) -> Finding {
+/// Whether one of the effects of a structure is a matter of timing.
+pub(super) fn is_timing_of(problem: &Problem, best: &Candidate, which: usize) -> bool {
+    let period = problem.fit.iter().map(|r| r.period).fold(f64::INFINITY, f64::min);
+    let values = best.structure.added_of(&best.fit.values);
+    best.structure.added.get(which).zip(values.get(which)).is_some_and(|(hypothesis, values)| is_timing(hypothesis, values, period))
+}
+
+/// The figures of every finding of a search, for those who calibrate its confidence: physics, place, figures.
+pub fn figures_of(search: &Search) -> Vec<(String, String, Figures)> {
+    let best = chosen(search);
+    let one = |(which, h): (usize, &Hypothesis)| {
+        let rivals = rivals(search, best, which);
+        let near: Vec<(&Hypothesis, &Candidate)> = rivals.iter().map(|(h, c, _)| (h, *c)).collect();
+        (h.physics.name.to_string(), h.place.to_string(), figures(search, best, which, &near))
+    };
+    best.structure.added.iter().enumerate().map(one).collect()
+}
+
+fn finding(search: &Search, best: &Candidate, spread: &Uncertainty, which: usize) -> Finding {
     let hypothesis = &best.structure.added[which];
     let rivals = rivals(search, best, which);
-    // The weight of each, softened: a simulator is never the device.
-    // A richer law at the same place that fits no better is the same law.
-    let nested = |rival: &Hypothesis| rival.place.same(&hypothesis.place) && contains(rival.physics, hypothesis);
-    let weight = |(rival, behind): &(Hypothesis, f64)| {
-        (-behind.max(0.0) / tuning().claim.softened).exp() * if nested(rival) { tuning().claim.richer } else { 1.0 }
-    };
-    let weights: Vec<f64> = rivals.iter().map(weight).collect();
-    // And of those that promised as much, but were not fitted: little, for they did not win their race.
-    let own = search.tried.iter().find(|t| t.id == hypothesis.id).map_or(1.0, |t| t.promised);
-    let unfitted = search.tried.iter().filter(|t| t.taken.is_none() && t.promised > tuning().claim.as_promising * own).count() as f64;
-    let sum = 1.0 + weights.iter().sum::<f64>() + tuning().claim.unfitted * unfitted.min(tuning().claim.unfitted_most);
-    let alternative = |((rival, _), weight): (&(Hypothesis, f64), &f64)| Alternative {
+    let near: Vec<(&Hypothesis, &Candidate)> = rivals.iter().map(|(h, c, _)| (h, *c)).collect();
+    let confidence = probability(&figures(search, best, which, &near));
+    // What is left of the probability goes to the rivals that were fitted, the more the nearer they come, and to what was not.
+    let weights: Vec<f64> = rivals.iter().map(|(_, _, behind)| (-behind.max(0.0) / tuning().claim.softened).exp()).collect();
+    let sum = 1.0 + weights.iter().sum::<f64>();
+    let alternative = |((rival, _, _), weight): (&(Hypothesis, &Candidate, f64), &f64)| Alternative {
         physics: rival.physics.name.to_string(),
         place: rival.place.clone(),
-        confidence: round_significant(weight / sum, 3),
+        confidence: round_significant((1.0 - confidence) * weight / sum, 3),
     };
     Finding {
         physics: hypothesis.physics.name.to_string(),
         place: hypothesis.place.clone(),
         parameters: parameters_of(best, spread, which),
         replaces: hypothesis.replaces.clone(),
-        confidence: round_significant(adequacy / sum, 3),
+        confidence: round_significant(confidence, 3),
         alternatives: rivals.iter().zip(&weights).take(tuning().claim.alternatives).map(alternative).collect(),
     }
 }
 
-/// What the cost would be without one of the physics: that tells how important it is.
-fn cost_without(search: &Search, best: &Candidate, which: usize) -> f64 {
-    let (added, id) = (&best.structure.added, &best.structure.added[which].id);
-    let is_rest = |c: &&Candidate| {
-        c.structure.added.len() + 1 == added.len() && c.structure.added.iter().all(|o| o.id != *id && added.iter().any(|b| b.id == o.id))
-    };
-    search.found.iter().filter(is_rest).map(|c| c.fit.cost).fold(search.nominal.fit.cost, f64::min)
-}
-
-/// What stands in the place of one hypothesis in structures that are else the same, and how far it is behind.
-fn rivals(search: &Search, best: &Candidate, which: usize) -> Vec<(Hypothesis, f64)> {
+/// What stands in the place of one hypothesis in structures that are else the same, its structure, and how far it is behind.
+fn rivals<'s>(search: &'s Search, best: &Candidate, which: usize) -> Vec<(Hypothesis, &'s Candidate, f64)> {
     let own = &best.structure.added[which];
     let others: Vec<&str> = best.structure.added.iter().filter(|h| h.id != own.id).map(|h| h.id.as_str()).collect();
-    let mut found: Vec<(Hypothesis, f64)> = Vec::new();
+    let mut found: Vec<(Hypothesis, &Candidate, f64)> = Vec::new();
     for candidate in search.found.iter().filter(|c| c.structure.added.len() == best.structure.added.len()) {
         let added = &candidate.structure.added;
         let rest: Vec<&Hypothesis> = added.iter().filter(|h| !others.contains(&h.id.as_str())).collect();
         let [rival] = rest.as_slice() else { continue };
         if rival.id != own.id && added.len() - 1 == others.len() {
-            found.push(((*rival).clone(), evidence(search, candidate, best)));
+            found.push(((*rival).clone(), candidate, evidence(search, candidate, best)));
         }
     }
-    found.sort_by(|a, b| a.1.total_cmp(&b.1));
+    found.sort_by(|a, b| a.2.total_cmp(&b.2));
     // However finely a law is resolved, it is one physics.
     let same = |a: &Hypothesis, b: &Hypothesis| a.physics == b.physics && a.place.same(&b.place);
-    let mut each: Vec<(Hypothesis, f64)> = Vec::new();
-    for (rival, behind) in found {
-        if !same(&rival, own) && !each.iter().any(|(other, _)| same(&rival, other)) {
-            each.push((rival, behind));
+    let mut each: Vec<(Hypothesis, &Candidate, f64)> = Vec::new();
+    for (rival, candidate, behind) in found {
+        if !same(&rival, own) && !each.iter().any(|(other, _, _)| same(&rival, other)) {
+            each.push((rival, candidate, behind));
         }
     }
     each
@@ -101,7 +98,7 @@ fn parameters_of(best: &Candidate, spread: &Uncertainty, which: usize) -> BTreeM
         let Role::Added(h, p) = number.role else { continue };
         let Some(parameter) = hypothesis.parameters.get(p).filter(|_| h == which) else { continue };
         let value = round_significant(best.fit.values[index], 5);
-        let ci95 = spread.interval(best, index).map(|end| rounded(end, 5));
+        let ci95 = spread.one_sided(best, index).map(|end| end.and_then(|end| rounded(end, 5)));
         let unit = parameter.unit.clone();
         if parameter.index.is_some() {
             let none = || Parameter::List(Estimates { value: Vec::new(), ci95: Vec::new(), unit });
@@ -110,7 +107,10 @@ fn parameters_of(best: &Candidate, spread: &Uncertainty, which: usize) -> BTreeM
                 list.ci95.push(ci95);
             }
         } else {
-            all.insert(parameter.key.clone(), Parameter::One(Estimate { value, ci95, unit }));
+            all.insert(
+                parameter.key.clone(),
+                Parameter::One(Estimate { value, ci95, at_bound: number.at_bound(best.fit.values[index]).is_some(), unit }),
+            );
         }
     }
     all
@@ -127,7 +127,7 @@ pub(super) fn moved(problem: &Problem, best: &Candidate, spread: &Uncertainty) -
         let away = (number.to_internal(value) - number.to_internal(stated.given)) / spread.deviation[index];
         let moved = Moved {
             value: round_significant(value, 5),
-            ci95: spread.interval(best, index).map(|end| rounded(end, 5)),
+            ci95: spread.one_sided(best, index).map(|end| end.and_then(|end| rounded(end, 5))),
             nominal: stated.given,
             moved_sd: rounded(away, 3),
         };

@@ -2,25 +2,31 @@
 
 mod beaten;
 mod choice;
+mod confidence;
 mod decision;
 mod experiments;
 mod findings;
 mod held_out;
 mod models;
+mod plausible;
 mod remaining;
 mod rounded;
 mod schema;
 mod sentence;
 mod shows;
 mod signals;
+mod timing;
 pub(crate) mod types;
 
 use crate::tuning::tuning;
 pub use beaten::{Beaten, Why, beaten};
 pub use choice::chosen;
+pub use confidence::{Figures, NAMES as FIGURES};
 pub use experiments::EXPERIMENT_FILE;
+pub use findings::figures_of;
 pub use models::VerdictError;
 pub use schema::schema;
+pub use timing::timing;
 pub use types::*;
 
 use crate::audit;
@@ -85,7 +91,8 @@ pub fn verdict(
         sentence: sentence(&decision, experiment.is_some()),
         shows: shows(problem, search, &decision, location),
         parameters: if changes { moved(problem, best, &decision.spread) } else { BTreeMap::new() },
-        remaining: remaining(problem, search, best, &held_out),
+        remaining: remaining(problem, search, &decision, &held_out),
+        error_budget: search.errors.clone(),
         held_out,
         audit: remarks.iter().map(Remark::from).collect(),
         unknown_inputs: unknown_inputs(problem, best),

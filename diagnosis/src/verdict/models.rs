@@ -43,7 +43,7 @@ pub(super) fn model_text(problem: &Problem, best: &Candidate, spread: &Uncertain
 pub(super) fn rival_models(problem: &Problem, search: &Search, best: &Candidate) -> Vec<String> {
     let names = |c: &Candidate| c.structure.added.iter().map(|h| h.id.clone()).collect::<Vec<_>>();
     let near = |c: &&Candidate| {
-        let unseen = match (best.unseen, c.unseen) {
+        let unseen = match (&best.unseen, &c.unseen) {
             (Some(a), Some(b)) => b.mean_square <= tuning().claim.rival_cost * a.mean_square,
             _ => true,
         };

@@ -34,12 +34,12 @@ pub(super) fn sentence(decision: &Decision, planned: bool) -> String {
             format!("the model leaves out {what}{others}: the recordings cannot tell which{next}{still}")
         }
         Word::CannotTell => "the recordings hardly move the device: they cannot tell what is missing".to_string(),
-        Word::Missing if still.is_empty() => format!("the model leaves out {all}; with it the recordings are explained {end}"),
-        Word::Missing => format!("the model leaves out {all}{still}"),
-        Word::Unexplained if best.structure.added.is_empty() => {
-            format!("something is missing that none of the laws tried explains; refitted, the model comes {end}")
+        Word::Missing if decision.at_floor && !still.is_empty() => {
+            format!("the model leaves out {all}; with it the recordings are explained down to what the device repeats")
         }
-        Word::Unexplained => format!("something is missing that no known physics explains; the nearest is {all}{still}"),
+        Word::Missing if still.is_empty() => format!("the model leaves out {all}; with it the recordings are explained {end}"),
+        Word::Missing => format!("the model leaves out {all}; beside that a residual of {times} times the sensor noise remains"),
+        Word::Unexplained => format!("something is missing that none of the laws tried explains; refitted, the model comes {end}"),
         Word::Parameters => format!("nothing is missing, but the model's parameters are off; refitted they explain the recordings {end}"),
         Word::NothingMissing => format!("the model explains the recordings {end}"),
     }

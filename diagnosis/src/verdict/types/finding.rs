@@ -67,8 +67,11 @@ pub enum Parameter {
 pub struct Estimate {
     /// As fitted, in `unit`.
     pub value: f64,
-    /// 95 % interval, in `unit`.
+    /// 95 % interval, in `unit`; one-sided where the value is at a bound of what the fit may try.
     pub ci95: Interval,
+    /// Whether the value is at a bound of what the fit may try; not in other files.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub at_bound: bool,
     /// Unit; empty for a number without one.
     #[serde(default)]
     pub unit: String,

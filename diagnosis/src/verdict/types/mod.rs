@@ -8,6 +8,7 @@ pub use finding::{Alternative, Detectable, Estimate, Estimates, Finding, Interva
 pub use next_experiment::{NextExperiment, Planned, Refused};
 
 use crate::audit::{self, Weight};
+use crate::error_budget::BudgetedError;
 use crate::locate::Character;
 use crate::unknown::Estimated;
 use schemars::JsonSchema;
@@ -40,6 +41,9 @@ pub struct Verdict {
     pub parameters: BTreeMap<String, Moved>,
     /// The residual of the claimed explanation; null where nothing was held against anything.
     pub remaining: Option<Remaining>,
+    /// What is off in a prediction although no physics is missing, by source and output; an effect whose whole benefit is no larger is not claimed.
+    #[serde(default)]
+    pub error_budget: Vec<BudgetedError>,
     /// Errors on the held-out recordings; of a set that holds none out, on the fitted ones.
     #[serde(default)]
     pub held_out: HeldOut,
@@ -55,7 +59,8 @@ pub struct Verdict {
     /// Files of models of other explanations whose residual is little larger, beside the verdict, the nearest first.
     #[serde(default)]
     pub rival_models: Vec<String>,
-    /// With `ambiguous` and `cannot_tell` what to record next, or why no recording would tell; otherwise null.
+    /// What to record next: what tells rivals apart, confirms what remains, or determines what is not well known yet; or why no recording would help.
+    /// Null in files of versions that planned one for `ambiguous` and `cannot_tell` only.
     pub next_experiment: Option<NextExperiment>,
     /// Where nothing was added to the model: for each physics the smallest size that the recordings would have shown, at the place where it
     /// shows best. Otherwise null.
@@ -159,6 +164,10 @@ pub struct Remaining {
     pub floor_share: Option<f64>,
     /// What is left over on the fitted recordings, in standard deviations of the sensor noise: 1 cannot be improved on.
     pub noise_sd: Option<f64>,
+    /// What the device does not repeat where it was repeated (recordings of one excitation, periods), in standard deviations of the sensor noise, the
+    /// largest of the outputs: no model can do better. Null where nothing was repeated.
+    #[serde(default)]
+    pub not_repeated: Option<f64>,
     /// Where it shows; null where it is the sensors' noise.
     #[serde(rename = "where")]
     pub shows: Option<Where>,
@@ -212,7 +221,8 @@ pub struct RecordErrors {
 /// What was seen in the recordings before any physics.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Remark {
-    /// What was looked at: `clock`, `gaps`, `missing`, `constant`, `encoder`, `filtered`, `saturated`, `sign`, `unit`, `loop`, `repeats`, `noise`.
+    /// What was looked at: `clock`, `gaps`, `short`, `missing`, `constant`, `outliers`, `encoder`, `filtered`, `saturated`, `sign`, `unit`, `loop`,
+    /// `repeats`, `noise`, `timing`.
     pub what: String,
     /// Recordings, signal, or both.
     #[serde(rename = "where")]

@@ -1,0 +1,28 @@
+//! What is a matter of timing: an effect that comes late by a small share of a sample period.
+
+use super::choice::chosen;
+use super::findings::is_timing_of;
+use super::plausible::lag;
+use crate::audit::{Remark, Weight};
+use crate::problem::Problem;
+use crate::search::Search;
+use crate::tuning::tuning;
+
+/// What the best explanation shifts in time by so little that it says when samples were taken, and nothing of the device.
+pub fn timing(problem: &Problem, search: &Search) -> Vec<Remark> {
+    let best = chosen(search);
+    let values = best.structure.added_of(&best.fit.values);
+    let period = problem.fit.iter().map(|r| r.period).fold(f64::INFINITY, f64::min);
+    let one = |(which, hypothesis): (usize, &crate::hypothesis::Hypothesis)| {
+        let late = lag(hypothesis, values.get(which)?).filter(|_| is_timing_of(problem, best, which))?;
+        let text = format!(
+            "seems to be {:.3} ms late, {:.1} % of a sample period: when it was sampled or how the input runs between samples, not physics (less than {:.0} % is not \
+             claimed)",
+            1e3 * late,
+            100.0 * late / period,
+            100.0 * tuning().claim.timing
+        );
+        Some(Remark { weight: Weight::Note, records: Vec::new(), signal: hypothesis.place.to_string(), about: "timing", text })
+    };
+    best.structure.added.iter().enumerate().filter_map(one).collect()
+}
