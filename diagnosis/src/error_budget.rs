@@ -63,7 +63,9 @@ pub fn error_budget(evaluator: &Evaluator, structure: &Structure, values: &[f64]
         step / 12.0f64.sqrt()
     };
     add(Source::Rounding, relative((0..problem.model.outputs.len()).map(steps).collect()));
-    add(Source::DrivingMotion, relative(of_driving_motion(&problem.model, &problem.fit)));
+    // What it does is in the residual, and what of that is white is in the noise: it is no larger than all of it.
+    let driven = structure.model(problem, values).map_or_else(Vec::new, |model| of_driving_motion(&model, &problem.fit));
+    add(Source::DrivingMotion, relative(driven).into_iter().map(|error: f64| error.min(1.0)).collect());
     all
 }
 

@@ -105,6 +105,8 @@ fn refitted_numbers_lie_in_their_intervals() {
         correlation_time: 1.0,
         whiteness_statistic: 0.0,
         levels: vec![level],
+        blocks: Vec::new(),
+        may_be_nothing: false,
         unseen: None,
     };
     let spread = Uncertainty::measured(&evaluator, &candidate);

@@ -51,7 +51,27 @@ pub(super) fn record(problem: &Problem, record: &Record, all: &mut Vec<Remark>) 
 
 fn clock(record: &Record, all: &mut Vec<Remark>) {
     let jitter = &record.jitter;
-    if !jitter.gaps.is_empty() {
+    if record.logged.is_some() {
+        let missing: usize = jitter.gaps.iter().map(|g| g.missing).sum();
+        let longest = jitter.gaps.iter().map(|g| g.length).fold(0.0, f64::max);
+        let gaps = match jitter.gaps.first() {
+            Some(first) => format!(
+                "{missing} samples seem to be missing in {} gaps of up to {:.1} ms, the first after {:.4} s",
+                jitter.gaps.len(),
+                1e3 * longest,
+                first.after
+            ),
+            None => format!("samples are up to {:.1} ms off an even clock of {:.3} ms", 1e3 * jitter.largest, 1e3 * record.period),
+        };
+        add(
+            all,
+            Weight::Caution,
+            record,
+            "",
+            "clock",
+            format!("the clock is irregular: {gaps}; it is simulated on the times that were logged"),
+        );
+    } else if !jitter.gaps.is_empty() {
         let missing: usize = jitter.gaps.iter().map(|g| g.missing).sum();
         let text = format!(
             "{missing} samples are missing in {} gaps, the first after {:.4} s; they are filled in as the input's hold says",

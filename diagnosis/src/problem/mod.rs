@@ -14,7 +14,6 @@ pub use outliers::Outliers;
 pub use record::Record;
 pub use stated::Stated;
 
-use crate::error_budget::of_driving_motion;
 use crate::noise;
 use crate::tuning::tuning;
 use crate::unknown::Unknown;
@@ -126,9 +125,7 @@ impl Problem {
             )));
         }
         let stated = stated_numbers(&model, &text);
-        // Noise and rounding of a motion that drives the model are errors like noise of what is predicted from it.
-        let driven = of_driving_motion(&model, &fit);
-        let noise_sd = driven.iter().enumerate().map(|(output, error)| noise::of_signal(&model, &fit, output).hypot(*error)).collect();
+        let noise_sd = (0..model.outputs.len()).map(|output| noise::of_signal(&model, &fit, output)).collect();
         let lag = (0..model.outputs.len()).map(|output| lag_of(&model, &fit, output)).collect();
         Ok(Problem { text, model_path, model, fit, held_out, stated, initial, unknown: Vec::new(), left_out: Vec::new(), noise_sd, lag })
     }

@@ -5,6 +5,7 @@ use super::share::Work;
 use crate::candidate::{Candidate, candidate, white};
 use crate::coupling::Coupling;
 use crate::effort::Effort;
+use crate::error_budget::of_driving_motion;
 use crate::evaluator::Evaluator;
 use crate::excerpts::Excerpts;
 use crate::fit::Fit;
@@ -147,7 +148,8 @@ impl<'a> Nominal<'a> {
             refitted = other;
         }
         refitted = to_its_end(&evaluator, &structure, refitted);
-        if let Some(other) = few_first(&evaluator, &structure, &start, &refitted) {
+        let within = evaluator.within(work.budget.extended(work.budget.spent() + work.share(tuning().search.few_first)));
+        if let Some(other) = few_first(&within, &structure, &start, &refitted) {
             refitted = other;
         }
         if pulled {
@@ -171,6 +173,10 @@ impl<'a> FirstFit<'a> {
     fn of(problem: &'a Problem, work: &Work<'a>, structure: &Structure, start: &[f64]) -> Option<FirstFit<'a>> {
         let mut evaluator = Evaluator::new(problem);
         evaluator.budget = work.up_to(tuning().search.last_step);
+        // Noise and rounding of a motion that drives the model are errors like noise of what is predicted from it; the residuals say how large they are.
+        for (noise_sd, driven) in evaluator.noise_sd.iter_mut().zip(of_driving_motion(&problem.model, &problem.fit)) {
+            *noise_sd = noise_sd.hypot(driven);
+        }
         if friction_on_prescribed(problem) {
             evaluator.robust = tuning().fit.robust;
         }

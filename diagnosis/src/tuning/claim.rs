@@ -52,7 +52,7 @@ group! {
         /// Share of the samples that glitches have, at most.
         glitch_share: f64 = 0.02, "-", Judgement("what is off more often is no glitch");
         /// Log-odds of a finding: a constant, then one for each of its figures, see [`crate::verdict::Figures`].
-        confidence: [f64; 10] = [-2.0, 0.5, 1.0, 0.5, 0.3, 1.0, -0.2, -0.1, -0.5, -1.0], "log-odds", Measured("a logistic regression on drawn cases: diagnosis/tests/concealed/calibrate.py");
+        confidence: [f64; 11] = [-1.26, 0.465, 0.0936, 0.0, 0.295, 1.15, 0.0, -0.239, -1.37, -0.996, -0.755], "log-odds", Measured("a logistic regression on drawn cases: `diagnosis/tests/concealed/calibrate.py fit`; docs/diagnosis.md says on which");
         /// Advantage over a rival, in units of the criterion, that makes it e times less likely than another one.
         softened: f64 = 20.0, "criterion", Judgement("an information criterion says 2; a simulator is never the device");
         /// Alternatives that are listed.

@@ -78,7 +78,13 @@ fn predicts(search: &Search, base: &Candidate, better: &Candidate) -> bool {
     let of_use = |a: f64, b: f64| a.sqrt() - b.sqrt() > tuning().claim.useful * b.sqrt().max(1.0) && a - b > no_physics;
     let fitted = || gain(&base.blocks, &better.blocks).is_none_or(|gain| gain.is_sure());
     match (&base.unseen, &better.unseen) {
-        (Some(a), Some(b)) if of_use(a.mean_square, b.mean_square) => a.gain_over(b).is_none_or(|gain| gain.is_sure()),
+        (Some(a), Some(b)) if of_use(a.mean_square, b.mean_square) => {
+            // A device that drifts freely may end elsewhere after the least difference. Where the fits explain all there is, it is enough that the unseen
+            // recordings do not speak against it.
+            let at_floor = |c: &Candidate| c.levels.iter().all(|level| *level < tuning().noise.unexplained);
+            let explained = at_floor(better) && !at_floor(base);
+            a.gain_over(b).is_none_or(|gain| gain.is_sure() || explained && gain.mean > 0.0)
+        }
         (Some(a), Some(b)) => {
             let silent = a.mean_square.sqrt() < tuning().noise.at_noise && !of_use(b.mean_square, a.mean_square);
             base.structure.added.is_empty() && silent && fitted()

@@ -26,6 +26,8 @@ pub struct Figures {
     pub left: f64,
     /// Logarithm of the correlation time of what is left, samples.
     pub correlated: f64,
+    /// 1 where its force depends on the path: laws with a memory are easily taken for one another.
+    pub memory: f64,
     /// Effects that are claimed beside it.
     pub beside: f64,
     /// Whether one of its parameters is at the end of its range.
@@ -34,14 +36,15 @@ pub struct Figures {
 
 impl Figures {
     /// In the order of [`NAMES`].
-    pub fn list(&self) -> [f64; 9] {
-        let Figures { with, over_rival, over_kin, preferred, removes, left, correlated, beside, at_bound } = *self;
-        [with, over_rival, over_kin, preferred, removes, left, correlated, beside, at_bound]
+    pub fn list(&self) -> [f64; 10] {
+        let Figures { with, over_rival, over_kin, preferred, removes, left, correlated, memory, beside, at_bound } = *self;
+        [with, over_rival, over_kin, preferred, removes, left, correlated, memory, beside, at_bound]
     }
 }
 
 /// Names of the figures.
-pub const NAMES: [&str; 9] = ["with", "over_rival", "over_kin", "preferred", "removes", "left", "correlated", "beside", "at_bound"];
+pub const NAMES: [&str; 10] =
+    ["with", "over_rival", "over_kin", "preferred", "removes", "left", "correlated", "memory", "beside", "at_bound"];
 
 /// Standard errors beyond which more do not make it surer.
 const MOST: f64 = 20.0;
@@ -64,6 +67,7 @@ pub(super) fn figures(search: &Search, best: &Candidate, which: usize, rivals: &
         removes: 1.0 - (excess(best) / excess(without).max(1e-3)).min(1.0),
         left: level.ln(),
         correlated: best.correlation_time.max(1.0).ln(),
+        memory: f64::from(u8::from(own.physics.facts.memory)),
         beside: (best.structure.added.len() - 1) as f64,
         at_bound: f64::from(u8::from(super::plausible::is_at_bound_of(best, which))),
     }

@@ -1,0 +1,195 @@
+//! What is claimed and what is not: errors that are no physics, numbers that a refit has to find, and a law that is there although more remains.
+
+use backdrive_diagnosis::error_budget::Source;
+use backdrive_diagnosis::problem::{Problem, Record};
+use backdrive_diagnosis::search::{Settings, search};
+use backdrive_diagnosis::verdict::{Parameter, Verdict, Word, timing, verdict};
+use backdrive_diagnosis::work::Limit;
+use backdrive_plant::model::Model;
+use backdrive_plant::recording::Recording;
+use backdrive_plant::set::Initial;
+use backdrive_plant::stepper::{Options, simulate};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+use std::f64::consts::TAU;
+
+/// A measured signal: the samples and white noise.
+fn noisy(clean: &[f64], noise_sd: f64, random: &mut ChaCha8Rng) -> Vec<f64> {
+    clean.iter().map(|y| y + noise_sd * <StandardNormal as Distribution<f64>>::sample(&StandardNormal, random)).collect()
+}
+
+/// Recordings of `truth` under these excitations, held against `nominal`; the last one is held out. `input_noise` is on what is recorded of the first
+/// input, not on what drives the device; inputs of the truth beyond those of the nominal model are not recorded.
+struct Bench<'b> {
+    truth: &'b str,
+    nominal: &'b str,
+    noise_sd: f64,
+    input_noise: f64,
+    excitations: Vec<Vec<Box<dyn Fn(f64) -> f64>>>,
+}
+
+impl Bench<'_> {
+    fn problem(&self, seed: u64) -> Problem {
+        let (truth, nominal) = (Model::from_toml(self.truth, "truth").unwrap(), Model::from_toml(self.nominal, "nominal").unwrap());
+        let period = 1e-3;
+        let one = |(i, inputs): (usize, &Vec<Box<dyn Fn(f64) -> f64>>)| {
+            let t: Vec<f64> = (0..4000).map(|k| f64::from(k) * period).collect();
+            let driven: Vec<Vec<f64>> = inputs.iter().map(|f| t.iter().map(|t| f(*t)).collect()).collect();
+            let mut random = ChaCha8Rng::seed_from_u64(100 * seed + i as u64);
+            let columns = simulate(&truth, &driven, period, &Options::default()).unwrap();
+            let mut signals = vec![(nominal.inputs[0].name.clone(), noisy(&driven[0], self.input_noise, &mut random))];
+            for (output, clean) in nominal.outputs.iter().zip(&columns) {
+                signals.push((output.name.clone(), noisy(clean, self.noise_sd, &mut random)));
+            }
+            Record::new(&Recording::new(format!("{i}"), t, signals).unwrap(), &nominal, Vec::new()).unwrap()
+        };
+        let mut fit: Vec<Record> = self.excitations.iter().enumerate().map(one).collect();
+        let held_out = fit.split_off(fit.len() - 1);
+        Problem::new(self.nominal.to_string(), "nominal.toml".into(), nominal, fit, held_out, Initial::Rest).unwrap()
+    }
+
+    fn said(&self, seed: u64) -> Verdict {
+        let problem = self.problem(seed);
+        let found = search(&problem, &Settings::default(), Limit::default(), &|_| {}).unwrap();
+        verdict(&problem, &found, &timing(&problem, &found), None, Limit::default()).unwrap().0
+    }
+}
+
+/// Sweeps of a size, and a sum of sines; in Hz.
+fn sweeps(size: f64, from: f64, to: f64) -> Vec<Vec<Box<dyn Fn(f64) -> f64>>> {
+    let sweep = move |scale: f64, top: f64| -> Box<dyn Fn(f64) -> f64> {
+        Box::new(move |t| scale * size * (TAU * (from + 0.5 * (top - from) * t / 4.0) * t).sin())
+    };
+    let sines =
+        move |t: f64| size * (0.5 * (TAU * 1.3 * from * t).sin() + 0.4 * (TAU * 0.31 * to * t).sin() - 0.3 * (TAU * 0.11 * to * t).sin());
+    vec![vec![sweep(1.0, to)], vec![sweep(0.5, 0.6 * to)], vec![Box::new(sines)]]
+}
+
+/// A mass that a spring ties to a measured motion, whose force is measured there.
+const RIG: &str = r#"
+name = "rig"
+motion = "translation"
+[bodies]
+ram = 0.001
+disc = 20.0
+[[elements]]
+name = "rod"
+kind = "spring"
+between = ["ram", "disc"]
+stiffness = 8e5
+[[elements]]
+name = "oil"
+kind = "damper"
+between = ["disc", "ground"]
+damping = 900.0
+[[inputs]]
+name = "place"
+kind = "motion"
+on = "ram"
+[[outputs]]
+name = "force"
+kind = "reaction"
+of = "ram"
+"#;
+
+#[test]
+fn noise_of_a_motion_that_drives_the_model_is_no_physics() {
+    // Through the rod it is a force of 0.12 N, half as much again as the noise of the gauge.
+    let bench = Bench { truth: RIG, nominal: RIG, noise_sd: 0.08, input_noise: 1.5e-7, excitations: sweeps(1e-4, 1.0, 60.0) };
+    for seed in 0..3 {
+        let said = bench.said(seed);
+        assert!(said.word.is_structure_right() && said.findings.is_empty(), "{said:#?}");
+        let driving = said.error_budget.iter().find(|e| e.source == Source::DrivingMotion).unwrap();
+        assert!((0.6..1.4).contains(&driving.noise_sd), "{driving:?}");
+    }
+}
+
+/// Two masses on springs, pushed at the one and read at the other.
+const CHAIN: &str = r#"
+name = "chain"
+motion = "translation"
+[bodies]
+a = 0.085
+b = 0.224
+[[elements]]
+name = "joint"
+kind = "spring"
+between = ["a", "b"]
+stiffness = 980.0
+[[elements]]
+name = "joint_loss"
+kind = "damper"
+between = ["a", "b"]
+damping = 1.7
+[[elements]]
+name = "anchor"
+kind = "spring"
+between = ["b", "ground"]
+stiffness = 2700.0
+[[elements]]
+name = "oil"
+kind = "damper"
+between = ["b", "ground"]
+damping = 6.3
+[[inputs]]
+name = "push"
+kind = "force"
+on = "a"
+[[outputs]]
+name = "place"
+kind = "position"
+of = "b"
+"#;
+
+#[test]
+fn one_wrong_number_among_many_that_go_together_is_found() {
+    let truth = CHAIN.replace("b = 0.224", "b = 0.316");
+    let bench = Bench { truth: &truth, nominal: CHAIN, noise_sd: 7e-6, input_noise: 0.0, excitations: sweeps(2.0, 0.5, 40.0) };
+    for seed in 0..2 {
+        let said = bench.said(seed);
+        assert_eq!(said.word, Word::Parameters, "{said:#?}");
+        assert!(said.remaining.unwrap().noise_sd.unwrap() < 1.05);
+        let held = &said.held_out;
+        assert!(held.nrmse_after.unwrap() < 1.1 * held.noise_floor.unwrap(), "{held:?}");
+    }
+}
+
+#[test]
+fn what_is_late_by_a_small_share_of_a_sample_is_timing_and_no_physics() {
+    // Of a sample period of 1 ms.
+    for (delay, is_timing) in [("2e-5", true), ("2e-3", false)] {
+        let truth = CHAIN.replace("on = \"a\"\n", &format!("on = \"a\"\ndelay = {delay}\n"));
+        let bench = Bench { truth: &truth, nominal: CHAIN, noise_sd: 2e-6, input_noise: 0.0, excitations: sweeps(2.0, 0.5, 40.0) };
+        let said = bench.said(1);
+        assert_eq!(said.findings.is_empty(), is_timing, "{delay}: {said:#?}");
+        assert_eq!(said.word.is_structure_right(), is_timing, "{delay}: {said:#?}");
+        // It is told, unless stated numbers have taken it up.
+        assert!(said.audit.iter().all(|remark| remark.what == "timing") && (is_timing || said.audit.is_empty()), "{:#?}", said.audit);
+    }
+}
+
+#[test]
+fn dry_friction_is_claimed_although_more_remains() {
+    // A disturbance that nobody measured, tied to nothing: no model predicts it.
+    let truth = CHAIN.replace(
+        "[[inputs]]\n",
+        "[[elements]]\nname = \"rub\"\nkind = \"coulomb\"\nbetween = [\"b\", \"ground\"]\nforce = 0.9\n[[inputs]]\n",
+    ) + "[[inputs]]\nname = \"draught\"\nkind = \"force\"\non = \"b\"\n";
+    let mut excitations = sweeps(4.0, 0.5, 12.0);
+    for (i, inputs) in excitations.iter_mut().enumerate() {
+        let (a, b) = (3.3 + 1.1 * i as f64, 0.7 + 0.13 * i as f64);
+        inputs.push(Box::new(move |t| 0.08 * (TAU * a * t).sin() * (TAU * b * t).cos()));
+    }
+    let bench = Bench { truth: &truth, nominal: CHAIN, noise_sd: 2e-6, input_noise: 0.0, excitations };
+    let said = bench.said(1);
+    assert!(matches!(said.word, Word::Missing), "{said:#?}");
+    let first = &said.findings[0];
+    assert_eq!(first.physics, "coulomb", "{said:#?}");
+    let Parameter::One(force) = &first.parameters["force"] else { panic!("{first:#?}") };
+    assert!((force.value - 0.9).abs() < 0.09, "{force:?}");
+    // What remains is told beside it, and what to do about it.
+    let left = said.remaining.as_ref().unwrap();
+    assert!(left.noise_sd.unwrap() > 3.0 && left.shows.is_some(), "{left:#?}");
+    assert!(said.next_experiment.is_some());
+}
