@@ -2,6 +2,7 @@
 
 use backdrive_diagnosis::audit::Weight;
 use backdrive_diagnosis::diagnose::Diagnosis;
+use backdrive_diagnosis::error_budget::{BudgetedError, Source};
 use backdrive_diagnosis::intervals::Uncertainty;
 use backdrive_diagnosis::parameters::rows;
 use backdrive_diagnosis::verdict::{Alternative, Estimate, Finding, HeldOut, Interval, NextExperiment, Parameter, Remaining, Where};
@@ -27,6 +28,9 @@ pub fn text(found: &Diagnosis) -> String {
     match cautions.count() {
         0 => {}
         more => line("", format!("and {more} more cautions, see the report")),
+    }
+    if let Some(errors) = errors(&verdict.error_budget) {
+        line("errors", errors);
     }
     line("refit", refit(found));
     line("verdict", format!("{}: {}", verdict.word.spoken().to_uppercase(), verdict.sentence));
@@ -181,6 +185,19 @@ pub fn shows(place: &Where) -> String {
     parts.join("; ")
 }
 
+/// What is off although no physics is missing, where it is a tenth of the noise or more: `noise of a motion that drives the model 0.93 (force)`.
+pub fn errors(budget: &[BudgetedError]) -> Option<String> {
+    let told = |source: Source| match source {
+        Source::Integration => "integration",
+        Source::Clock => "jitter of the clock",
+        Source::Rounding => "rounding of the output",
+        Source::DrivingMotion => "noise of a motion that drives the model",
+    };
+    let large = budget.iter().filter(|error| error.noise_sd >= 0.1);
+    let all: Vec<String> = large.map(|e| format!("{} {} ({})", told(e.source), number(e.noise_sd), e.output)).collect();
+    (!all.is_empty()).then(|| format!("no physics, in times the sensor noise: {}", all.join(", ")))
+}
+
 /// What the explanation leaves over, beside what was found; `None` where that is the sensors' noise.
 fn remains(left: &Remaining) -> Option<String> {
     let place = shows(left.shows.as_ref()?);
@@ -248,6 +265,15 @@ mod tests {
         let said = "31 % of the residual with the parameters refitted (the sensors' noise would be 6 %); 20.0 Hz to 90.0 Hz; most at 1.00 to 1.20 s; \
                     looks most like backlash between motor and drum";
         assert_eq!(remains(&left).as_deref(), Some(said));
+    }
+
+    #[test]
+    fn errors_that_are_no_physics_are_told_where_they_are_large() {
+        let error = |source: Source, noise_sd: f64| BudgetedError { source, output: "force".to_string(), noise_sd };
+        let budget = [error(Source::Integration, 1e-9), error(Source::DrivingMotion, 0.93)];
+        let said = "no physics, in times the sensor noise: noise of a motion that drives the model 0.93 (force)";
+        assert_eq!(errors(&budget).map(|text| text.replace("0.930", "0.93")).as_deref(), Some(said));
+        assert_eq!(errors(&budget[..1]), None);
     }
 
     #[test]

@@ -5,7 +5,7 @@ mod held_out;
 mod phrases;
 mod tables;
 
-use crate::diagnose_text::{alternatives, confidence, next_experiment, parameters, shows};
+use crate::diagnose_text::{alternatives, confidence, errors, next_experiment, parameters, shows};
 use crate::page_parts::{command, ending};
 use backdrive_diagnosis::audit::Weight;
 use backdrive_diagnosis::diagnose::Diagnosis;
@@ -163,6 +163,9 @@ fn summary(found: &Diagnosis, added: bool) -> String {
     }
     if let Some(place) = verdict.shows.as_ref().filter(|_| !verdict.word.is_structure_right()) {
         text.push_str(&format!(" It shows {}.", shows(place)));
+    }
+    if let Some(errors) = errors(&verdict.error_budget) {
+        text.push_str(&format!(" What is off in the prediction is partly {errors}."));
     }
     text
 }
