@@ -14,6 +14,9 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use std::f64::consts::TAU;
 
+/// How an input runs, at a time in s.
+type Course = Box<dyn Fn(f64) -> f64>;
+
 /// A measured signal: the samples and white noise.
 fn noisy(clean: &[f64], noise_sd: f64, random: &mut ChaCha8Rng) -> Vec<f64> {
     clean.iter().map(|y| y + noise_sd * <StandardNormal as Distribution<f64>>::sample(&StandardNormal, random)).collect()
@@ -26,14 +29,14 @@ struct Bench<'b> {
     nominal: &'b str,
     noise_sd: f64,
     input_noise: f64,
-    excitations: Vec<Vec<Box<dyn Fn(f64) -> f64>>>,
+    excitations: Vec<Vec<Course>>,
 }
 
 impl Bench<'_> {
     fn problem(&self, seed: u64) -> Problem {
         let (truth, nominal) = (Model::from_toml(self.truth, "truth").unwrap(), Model::from_toml(self.nominal, "nominal").unwrap());
         let period = 1e-3;
-        let one = |(i, inputs): (usize, &Vec<Box<dyn Fn(f64) -> f64>>)| {
+        let one = |(i, inputs): (usize, &Vec<Course>)| {
             let t: Vec<f64> = (0..4000).map(|k| f64::from(k) * period).collect();
             let driven: Vec<Vec<f64>> = inputs.iter().map(|f| t.iter().map(|t| f(*t)).collect()).collect();
             let mut random = ChaCha8Rng::seed_from_u64(100 * seed + i as u64);
@@ -57,10 +60,9 @@ impl Bench<'_> {
 }
 
 /// Sweeps of a size, and a sum of sines; in Hz.
-fn sweeps(size: f64, from: f64, to: f64) -> Vec<Vec<Box<dyn Fn(f64) -> f64>>> {
-    let sweep = move |scale: f64, top: f64| -> Box<dyn Fn(f64) -> f64> {
-        Box::new(move |t| scale * size * (TAU * (from + 0.5 * (top - from) * t / 4.0) * t).sin())
-    };
+fn sweeps(size: f64, from: f64, to: f64) -> Vec<Vec<Course>> {
+    let sweep =
+        move |scale: f64, top: f64| -> Course { Box::new(move |t| scale * size * (TAU * (from + 0.5 * (top - from) * t / 4.0) * t).sin()) };
     let sines =
         move |t: f64| size * (0.5 * (TAU * 1.3 * from * t).sin() + 0.4 * (TAU * 0.31 * to * t).sin() - 0.3 * (TAU * 0.11 * to * t).sin());
     vec![vec![sweep(1.0, to)], vec![sweep(0.5, 0.6 * to)], vec![Box::new(sines)]]
