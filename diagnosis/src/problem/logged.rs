@@ -100,7 +100,7 @@ mod tests {
         let step = |i: usize| {
             mean * if i % 97 == 50 {
                 6.0
-            } else if i % 2 == 0 {
+            } else if i.is_multiple_of(2) {
                 0.4
             } else {
                 1.6
