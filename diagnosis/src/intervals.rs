@@ -124,7 +124,7 @@ impl Uncertainty {
     /// Half of a number's 95 % interval, in the fit's own unit.
     pub fn half(&self, number: usize) -> f64 {
         let deviation = self.deviation.get(number).copied().unwrap_or(f64::INFINITY);
-        NORMAL_975 * deviation + self.bias.get(number).copied().unwrap_or(0.0)
+        tuning().intervals.wider * NORMAL_975 * deviation + self.bias.get(number).copied().unwrap_or(0.0)
     }
 
     /// 95 % interval of a number, as it stands in the model.
