@@ -50,9 +50,6 @@ pub enum Bound {
     High,
 }
 
-/// Share of a range that counts as its end.
-const AT_BOUND: f64 = 1e-3;
-
 /// A number that a fit may move.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FreeParameter {
@@ -88,7 +85,7 @@ impl FreeParameter {
     /// The end of its range at which a value is, where it is at one.
     pub fn at_bound(&self, value: f64) -> Option<Bound> {
         let (low, high) = self.bounds();
-        let (own, near) = (self.to_internal(value), AT_BOUND * (high - low));
+        let (own, near) = (self.to_internal(value), tuning().fit.at_bound * (high - low));
         match () {
             () if own - low < near => Some(Bound::Low),
             () if high - own < near => Some(Bound::High),
