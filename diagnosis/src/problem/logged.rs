@@ -2,7 +2,7 @@
 //! that grid each sample was taken.
 
 use crate::tuning::tuning;
-use backdrive_plant::model::{Hold, Model};
+use backdrive_plant::model::{Hold, Input, Model};
 use backdrive_plant::recording::resample;
 use backdrive_plant::stepper::{Segment, segments};
 
@@ -23,14 +23,14 @@ pub struct Logged {
 
 impl Logged {
     /// From samples at times `t`, s, which rise. `inputs` and `outputs` are in the order of the model.
-    pub(super) fn new(model: &Model, t: &[f64], inputs: &[Vec<f64>], outputs: Vec<Option<Vec<f64>>>) -> Logged {
+    pub(super) fn new(model: &Model, t: &[f64], inputs: &[&[f64]], outputs: Vec<Option<Vec<f64>>>) -> Logged {
         let (first, last) = (t.first().copied().unwrap_or(0.0), t.last().copied().unwrap_or(0.0));
         let mean = (last - first) / t.len().saturating_sub(1).max(1) as f64;
         let step = mean / tuning().recordings.grid_steps as f64;
         // One point beyond the last sample, so that it has neighbours on both sides.
         let count = ((last - first) / step).ceil() as usize + 2;
         let grid: Vec<f64> = (0..count).map(|i| first + i as f64 * step).collect();
-        let onto = |(input, samples): (&backdrive_plant::model::Input, &Vec<f64>)| match input.hold {
+        let onto = |(input, samples): (&Input, &&[f64])| match input.hold {
             Hold::Zero => held(t, samples, first, step, count),
             hold => resample(hold, t, samples, &grid),
         };

@@ -4,7 +4,7 @@ use super::error::ProblemError;
 use super::logged::Logged;
 use super::outliers::{Outliers, beside, places};
 use crate::tuning::tuning;
-use backdrive_plant::model::{Hold, Model, OutputKind};
+use backdrive_plant::model::{Hold, Input, Model, OutputKind};
 use backdrive_plant::recording::{Jitter, Recording};
 use backdrive_plant::set::Condition;
 use backdrive_plant::stepper::{Segment, segments};
@@ -60,51 +60,30 @@ impl Record {
         unmeasured: &[usize],
     ) -> Result<Record, ProblemError> {
         let jitter = recording.jitter.clone();
-        let logged = recording;
-        let (count, fewest) = (logged.len(), tuning().recordings.fewest_samples);
+        let (count, fewest) = (recording.len(), tuning().recordings.fewest_samples);
         if count < fewest {
-            return Err(ProblemError::Short { name: logged.name.clone(), count, fewest });
+            return Err(ProblemError::Short { name: recording.name.clone(), count, fewest });
         }
+        let (as_logged, outliers) = without_outliers(recording, model);
         // A clock that only jitters is taken for even. What fits need of an irregular one on an even grid has as many samples; what is simulated and
         // compared stays on the times at which it was logged.
-        let is_irregular = !logged.is_regular(0.5) && unmeasured.is_empty();
+        let is_irregular = !as_logged.is_regular(0.5) && unmeasured.is_empty();
         let hold = |name: &str| model.inputs.iter().find(|i| i.name == name).map_or(Hold::Linear, |i| i.hold);
-        let recording = if is_irregular { logged.onto_grid(logged.period, hold)? } else { logged.regular_for(model)? };
-        let input = |(index, input): (usize, &backdrive_plant::model::Input)| match unmeasured.contains(&index) {
+        let recording = if is_irregular { as_logged.onto_grid(as_logged.period, hold)? } else { as_logged.regular_for(model)? };
+        let input = |(index, input): (usize, &Input)| match unmeasured.contains(&index) {
             true => Ok(vec![0.0; recording.len()]),
             false => recording.need_signal(&input.name).map(<[f64]>::to_vec),
         };
-        let inputs: Vec<Vec<f64>> = model.inputs.iter().enumerate().map(input).collect::<Result<_, _>>()?;
-        let mut outputs: Vec<Option<Vec<f64>>> = model.outputs.iter().map(|o| recording.signal(&o.name).map(<[f64]>::to_vec)).collect();
-        let mut outliers = Vec::new();
-        let mut look = |name: &str, samples: &mut [f64], replace: bool| {
-            let found = places(samples);
-            let Some((first, size)) = found.first().copied() else { return };
-            found.iter().filter(|_| replace).for_each(|(i, _)| samples[*i] = beside(samples, *i));
-            let (count, first) = (found.len(), first as f64 * recording.period);
-            outliers.push(Outliers { signal: name.to_string(), count, first, size, replaced: replace });
+        let outputs_in = |from: &Recording| -> Vec<Option<Vec<f64>>> {
+            model.outputs.iter().map(|o| from.signal(&o.name).map(<[f64]>::to_vec)).collect()
         };
-        // A motion cannot do that; a force may, and what drove the device is what was recorded of it.
-        for (output, samples) in model.outputs.iter().zip(&mut outputs) {
-            let motion = !matches!(output.kind, OutputKind::Reaction(_));
-            samples.iter_mut().for_each(|samples| look(&output.name, samples, motion));
-        }
-        for (input, samples) in model.inputs.iter().zip(&inputs) {
-            look(&input.name, &mut samples.clone(), false);
-        }
+        let inputs: Vec<Vec<f64>> = model.inputs.iter().enumerate().map(input).collect::<Result<_, _>>()?;
+        let outputs = outputs_in(&recording);
         let period = recording.period;
         let segments = model.inputs.iter().zip(&inputs).map(|(input, samples)| segments(input.hold, samples, period)).collect();
-        let logged = if is_irregular {
-            let of = |name: &String| logged.need_signal(name).map(<[f64]>::to_vec);
-            let inputs: Vec<Vec<f64>> = model.inputs.iter().map(|i| of(&i.name)).collect::<Result<_, _>>()?;
-            let mut outputs: Vec<Option<Vec<f64>>> = model.outputs.iter().map(|o| logged.signal(&o.name).map(<[f64]>::to_vec)).collect();
-            for (output, samples) in model.outputs.iter().zip(&mut outputs).filter(|(o, _)| !matches!(o.kind, OutputKind::Reaction(_))) {
-                samples.iter_mut().for_each(|s| places(s).into_iter().for_each(|(i, _)| s[i] = beside(s, i)));
-                debug_assert!(samples.as_ref().is_none_or(|s| s.len() == count), "{}", output.name);
-            }
-            Some(Arc::new(Logged::new(model, &logged.t, &inputs, outputs)))
-        } else {
-            None
+        let logged = match is_irregular {
+            true => Some(Arc::new(Logged::new(model, &as_logged.t, &as_logged.inputs_of(model)?, outputs_in(&as_logged)))),
+            false => None,
         };
         let spread = outputs.iter().map(|o| o.as_deref().map_or(1.0, spread)).collect();
         let (name, len, begins) = (recording.name.clone(), recording.len(), Vec::new());
@@ -154,6 +133,23 @@ impl Record {
     }
 }
 
+/// A recording whose outliers are put between their neighbours, and all that were found. Those of forces are left as they are: a motion cannot do that, a force
+/// may, and what drove the device is what was recorded of it.
+fn without_outliers(recording: &Recording, model: &Model) -> (Recording, Vec<Outliers>) {
+    let mut clean = recording.clone();
+    let mut all = Vec::new();
+    let is_motion = |name: &str| model.outputs.iter().any(|o| o.name == name && !matches!(o.kind, OutputKind::Reaction(_)));
+    let is_of_model = |name: &str| model.inputs.iter().any(|i| i.name == name) || model.outputs.iter().any(|o| o.name == name);
+    for (name, samples) in clean.signals.iter_mut().filter(|(name, _)| is_of_model(name)) {
+        let (found, replaced) = (places(samples), is_motion(name));
+        let Some((at, size)) = found.first().copied() else { continue };
+        found.iter().filter(|_| replaced).for_each(|(i, _)| samples[*i] = beside(samples, *i));
+        let first = recording.t[at] - recording.t[0];
+        all.push(Outliers { signal: name.clone(), count: found.len(), first, size, replaced });
+    }
+    (clean, all)
+}
+
 /// Standard deviation; 1 where it is 0.
 fn spread(samples: &[f64]) -> f64 {
     let n = samples.len().max(1) as f64;
@@ -165,6 +161,26 @@ fn spread(samples: &[f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_wild_sample_of_a_motion_is_put_between_its_neighbours_on_whatever_clock() {
+        let text = "name = 'cart'\n[bodies]\ncart = 2.0\n[[inputs]]\nname = 'f'\nkind = 'force'\non = 'cart'\n\
+                    [[outputs]]\nname = 'x'\nkind = 'position'\nof = 'cart'\n";
+        let model = Model::from_toml(text, "cart.toml").unwrap();
+        for odd in [0.0, 0.6] {
+            // With a gap in the middle, or without.
+            let t: Vec<f64> = (0..200).map(|i| 0.01 * (f64::from(i) + if i > 100 { 40.0 * odd } else { 0.0 })).collect();
+            let mut x: Vec<f64> = t.iter().map(|t| t.sin()).collect();
+            x[40] = 90.0;
+            let signals = vec![("f".to_string(), t.clone()), ("x".to_string(), x)];
+            let record = Record::new(&Recording::new("r", t.clone(), signals).unwrap(), &model, Vec::new()).unwrap();
+            assert_eq!(record.logged.is_some(), odd > 0.0);
+            let [found] = record.outliers.as_slice() else { panic!("{:?}", record.outliers) };
+            assert!(found.count == 1 && found.replaced && (found.first - 0.4).abs() < 1e-9, "{found:?}");
+            assert!((record.compared(0).unwrap()[40] - t[40].sin()).abs() < 1e-4);
+            assert!(record.outputs[0].as_ref().unwrap().iter().all(|x| x.abs() < 1.1));
+        }
+    }
 
     #[test]
     fn a_part_to_the_very_end_keeps_its_inputs() {
