@@ -191,6 +191,7 @@ pub fn errors(budget: &[BudgetedError]) -> Option<String> {
         Source::Integration => "integration",
         Source::Clock => "jitter of the clock",
         Source::Rounding => "rounding of the output",
+        Source::Hold => "how the input runs between samples",
         Source::DrivingMotion => "noise of a motion that drives the model",
     };
     let large = budget.iter().filter(|error| error.noise_sd >= 0.1);

@@ -1,13 +1,15 @@
 //! A diagnosis from its problem to its verdict: the audit, the search, the force located, what is claimed, and each record by itself.
 
-use crate::audit::{Remark, audit};
+use crate::audit::{Remark, Weight, audit};
+use crate::candidate::price;
+use crate::hold;
 use crate::locate::{self, Location, locate};
 use crate::per_record::{PerRecord, fit_each};
 use crate::problem::Problem;
 use crate::search::{Search, SearchError, Settings, search};
 use crate::tuning::tuning;
 use crate::verdict::{Files, Verdict, VerdictError, timing, verdict};
-use crate::work::Budget;
+use crate::work::{Budget, Limit};
 use std::sync::atomic::AtomicBool;
 
 /// Everything that was found.
@@ -52,7 +54,7 @@ pub fn diagnose(
     let limit = settings.limit(stop);
     report("looking at the recordings");
     let mut remarks = audit(&problem);
-    let search = search(&problem, settings, limit, report)?;
+    let (problem, search) = with_inputs_as_they_run(problem, settings, limit, report, &mut remarks)?;
     remarks.extend(timing(&problem, &search));
     report("locating the missing force");
     let location = located(&problem, &search);
@@ -61,6 +63,40 @@ pub fn diagnose(
     report("fitting each record by itself");
     let per_record = fit_each(&problem, &search.nominal, &search.noise_sd, &Budget::new(tuning().search.per_record, limit));
     Ok(Diagnosis { problem, remarks, search, location, verdict, files, per_record })
+}
+
+/// Searches; where the recordings say that an input which the model file does not call held runs on between its samples, once more with it so. That is kept where it
+/// explains them better.
+fn with_inputs_as_they_run(
+    problem: Problem,
+    settings: &Settings,
+    limit: Limit,
+    report: &(dyn Fn(&str) + Sync),
+    remarks: &mut Vec<Remark>,
+) -> Result<(Problem, Search), SearchError> {
+    let first = search(&problem, settings, limit, report)?;
+    let running: Vec<usize> = first.holds.iter().filter(|told| told.runs_on()).map(|told| told.input).collect();
+    if running.is_empty() {
+        return Ok((problem, first));
+    }
+    report("once more with inputs that run on between their samples");
+    let other = hold::linear(&problem, &running);
+    let again = search(&other, settings, limit, report)?;
+    let least = |search: &Search| {
+        let all = search.found.iter().chain(std::iter::once(&search.nominal));
+        all.map(|c| price(c, search.samples, first.nominal.correlation_time)).fold(f64::INFINITY, f64::min)
+    };
+    if least(&again) >= least(&first) {
+        return Ok((problem, first));
+    }
+    for input in running {
+        let signal = problem.model.inputs.get(input).map_or_else(String::new, |i| i.name.clone());
+        let text = "runs on in straight lines between its samples, as the recordings say, and is not held as it is by default: it was simulated so; say hold = \"linear\" in \
+                    the model file"
+            .to_string();
+        remarks.push(Remark { weight: Weight::Caution, records: Vec::new(), signal, about: "hold", text });
+    }
+    Ok((other, again))
 }
 
 /// The latent force that the refitted nominal model needs.

@@ -1,12 +1,13 @@
 //! What is off in a prediction although no physics is missing: the integration, when samples were taken, steps of encoders.
 
+use crate::candidate::Candidate;
 use crate::evaluator::{Evaluator, measured};
+use crate::hold::Told;
 use crate::noise::{step_of, white};
 use crate::problem::{Problem, Record};
 use crate::signal::rms;
 use crate::simulate::{TWICE, predict};
 use crate::statistics::levels;
-use crate::structure::Structure;
 use crate::tuning::tuning;
 use backdrive_plant::model::{InputKind, Model};
 use backdrive_plant::stepper::segments;
@@ -25,6 +26,8 @@ pub enum Source {
     Clock,
     /// Rounding of the output to its step.
     Rounding,
+    /// How an input that is taken as held runs between its samples, as far as neither the model file nor the recordings tell.
+    Hold,
     /// Noise and rounding of a motion that drives the model: what another noise of the same size changes.
     DrivingMotion,
 }
@@ -40,8 +43,9 @@ pub struct BudgetedError {
     pub noise_sd: f64,
 }
 
-/// Every error of the predictions of a structure with these values.
-pub fn error_budget(evaluator: &Evaluator, structure: &Structure, values: &[f64]) -> Vec<BudgetedError> {
+/// Every error of the predictions of a fitted structure; `holds` is what it says of inputs between their samples.
+pub fn error_budget(evaluator: &Evaluator, fitted: &Candidate, holds: &[Told]) -> Vec<BudgetedError> {
+    let (structure, values) = (&fitted.structure, &fitted.fit.values);
     let (problem, noise_sd) = (evaluator.problem, &evaluator.noise_sd);
     let mut all = Vec::new();
     let mut add = |source: Source, errors: Vec<f64>| {
@@ -53,6 +57,9 @@ pub fn error_budget(evaluator: &Evaluator, structure: &Structure, values: &[f64]
     if let (Some(a), Some(b)) = (evaluator.residuals(structure, values), fine.residuals(structure, values)) {
         let apart: Vec<f64> = a.iter().zip(&b).map(|(a, b)| a - b).collect();
         add(Source::Integration, levels(evaluator, &apart));
+    }
+    for told in holds {
+        add(Source::Hold, told.unknown());
     }
     let relative = |errors: Vec<f64>| errors.iter().zip(noise_sd).map(|(error, sd)| error / sd).collect();
     add(Source::Clock, relative(clock(problem)));

@@ -22,6 +22,7 @@ pub mod evidence;
 pub mod excerpts;
 pub mod experiment;
 pub mod fit;
+pub mod hold;
 pub mod hypothesis;
 pub mod intervals;
 pub mod locate;

@@ -32,6 +32,16 @@ impl Seed {
         Seed { effects, stated, of_records, coupled_first }
     }
 
+    /// The structure on some recordings, and where it starts.
+    pub(crate) fn begin(&self, course: &Course, records: &[Record]) -> (Structure, Vec<f64>) {
+        let problem = course.evaluator.problem;
+        let added = self.effects.iter().filter_map(|(h, _)| course.hypotheses.get(*h).cloned()).collect();
+        let values: Vec<Vec<f64>> = self.effects.iter().map(|(_, v)| v.clone()).collect();
+        let structure = Structure::new(problem, records, added);
+        let start = structure.values(problem, &self.stated, &values, &self.of_records);
+        (structure, start)
+    }
+
     /// What sets a structure apart, whatever its values.
     fn key(&self) -> (Vec<usize>, bool) {
         let mut key: Vec<usize> = self.effects.iter().map(|e| e.0).collect();
@@ -91,6 +101,14 @@ impl Lead {
 }
 
 impl Course<'_> {
+    /// The recordings on which a fit leaves most, two at most where they may be cut: first steps need no more.
+    pub(crate) fn worst(&self, residuals: &[f64]) -> Vec<usize> {
+        match can_be_cut(self.evaluator.problem) {
+            true => worst_records(self.evaluator, residuals, 2),
+            false => (0..self.evaluator.records.len()).collect(),
+        }
+    }
+
     /// Fits all seeds a little, some of them more, and fewer to their end.
     pub fn race(&self, seeds: Vec<Seed>) -> Vec<Candidate> {
         let (evaluator, further) = (self.evaluator, tuning().search.further);
@@ -181,7 +199,7 @@ pub(crate) fn own_first(evaluator: &Evaluator, known: Option<(&Structure, &Fit)>
 }
 
 /// Whether first steps may be taken on some of the recordings only: nothing belongs to single ones.
-fn can_be_cut(problem: &Problem) -> bool {
+pub(crate) fn can_be_cut(problem: &Problem) -> bool {
     problem.initial != Initial::Free && problem.unknown.is_empty() && problem.fit.iter().all(|r| r.conditions.is_empty())
 }
 
@@ -204,7 +222,7 @@ pub(crate) fn distinct_fits(fits: &mut Vec<(Structure, Fit)>) {
 }
 
 /// A fit's residuals and derivatives on some of its recordings.
-fn restricted(evaluator: &Evaluator, fit: &Fit, records: &[usize]) -> Fit {
+pub(crate) fn restricted(evaluator: &Evaluator, fit: &Fit, records: &[usize]) -> Fit {
     let layout = evaluator.layout();
     let pick = |all: &Vec<f64>| -> Vec<f64> {
         layout.iter().filter(|l| records.contains(&l.0)).filter_map(|l| all.get(l.2.clone())).flatten().copied().collect()

@@ -25,13 +25,13 @@ pub struct Promise {
 }
 
 /// What is left of columns when everything that the fit's parameters can do is taken out.
-struct Projector {
+pub(crate) struct Projector {
     columns: Vec<Vec<f64>>,
     factor: Option<nalgebra::Cholesky<f64, nalgebra::Dyn>>,
 }
 
 impl Projector {
-    fn new(jacobian: &[Vec<f64>], stride: usize) -> Projector {
+    pub(crate) fn new(jacobian: &[Vec<f64>], stride: usize) -> Projector {
         Projector::of(jacobian.iter().map(|c| c.iter().step_by(stride).copied().collect()).collect())
     }
 
@@ -46,7 +46,7 @@ impl Projector {
         Projector { columns, factor: gram.cholesky() }
     }
 
-    fn apply(&self, column: &mut [f64]) {
+    pub(crate) fn apply(&self, column: &mut [f64]) {
         let Some(factor) = &self.factor else { return };
         let products = DVector::from_iterator(self.columns.len(), self.columns.iter().map(|c| dot(c, column)));
         for (weight, own) in factor.solve(&products).iter().zip(&self.columns) {

@@ -1,6 +1,8 @@
 //! What is claimed and what is not: errors that are no physics, numbers that a refit has to find, and a law that is there although more remains.
 
+use backdrive_diagnosis::diagnose::diagnose;
 use backdrive_diagnosis::error_budget::Source;
+use backdrive_diagnosis::hold;
 use backdrive_diagnosis::problem::{Problem, Record};
 use backdrive_diagnosis::search::{Settings, search};
 use backdrive_diagnosis::verdict::{Parameter, Verdict, Word, timing, verdict};
@@ -194,4 +196,37 @@ fn dry_friction_is_claimed_although_more_remains() {
     let left = said.remaining.as_ref().unwrap();
     assert!(left.noise_sd.unwrap() > 3.0 && left.shows.is_some(), "{left:#?}");
     assert!(said.next_experiment.is_some());
+}
+
+#[test]
+fn an_input_that_runs_on_between_its_samples_is_no_missing_physics() {
+    let truth = CHAIN.replace("on = \"a\"\n", "on = \"a\"\nhold = \"linear\"\n");
+    let bench = Bench { truth: &truth, nominal: CHAIN, noise_sd: 5e-7, input_noise: 0.0, excitations: sweeps(2.0, 0.5, 60.0) };
+    let done = diagnose(bench.problem(1), &Settings::default(), None, &|_| {}).unwrap();
+    assert!(done.verdict.word.is_structure_right() && done.verdict.findings.is_empty(), "{:#?}", done.verdict);
+    assert!(done.remarks.iter().any(|remark| remark.about == "hold" && remark.signal == "push"), "{:#?}", done.remarks);
+    // What the file says is not asked for again.
+    let stated = CHAIN.replace("on = \"a\"\n", "on = \"a\"\nhold = \"linear\"\n");
+    let problem = Bench { nominal: &stated, ..bench }.problem(1);
+    assert!(hold::assumed(&problem).is_empty());
+}
+
+#[test]
+fn a_body_in_a_joint_is_found_where_stiffness_and_inertia_have_absorbed_it() {
+    let truth =
+        CHAIN.replace("b = 0.224\n", "b = 0.224\nw = 0.05\n").replace("between = [\"a\", \"b\"]", "between = [\"a\", \"w\"]").replace(
+            "[[inputs]]\n",
+            "[[elements]]\nname = \"bolt\"\nkind = \"spring\"\nbetween = [\"w\", \"b\"]\nstiffness = 800.0\n\
+             [[elements]]\nname = \"bolt_loss\"\nkind = \"damper\"\nbetween = [\"w\", \"b\"]\ndamping = 0.3\n[[inputs]]\n",
+        );
+    let bench = Bench { truth: &truth, nominal: CHAIN, noise_sd: 2e-6, input_noise: 0.0, excitations: sweeps(2.0, 0.5, 60.0) };
+    let said = bench.said(1);
+    let first = said.findings.first().unwrap_or_else(|| panic!("{said:#?}"));
+    assert_eq!((first.physics.as_str(), said.findings.len()), ("series_compliance", 1), "{said:#?}");
+    let ends = first.place.to_string();
+    assert!(ends == "a-b" || ends == "b-a", "{ends}");
+    // Either spring of the joint may be called the one that was left out.
+    let Parameter::One(stiffness) = &first.parameters["stiffness"] else { panic!("{first:#?}") };
+    assert!([800.0, 980.0].iter().any(|k| (stiffness.value - k).abs() < 0.03 * k), "{stiffness:?}");
+    assert!(said.remaining.unwrap().noise_sd.unwrap() < 1.1);
 }

@@ -4,6 +4,7 @@
 
 mod apply;
 pub(crate) mod builder;
+mod condensed;
 mod scales;
 pub(crate) mod sites;
 mod starts;

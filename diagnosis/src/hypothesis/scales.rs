@@ -146,7 +146,8 @@ impl Scales {
         self.outputs.get(index).copied().unwrap_or_default()
     }
 
-    /// Force that a place knows, N or N m: the largest rms of what its elements, its inputs and its bodies' inertia take.
+    /// Force that a place knows, N or N m: the largest rms of what its elements, its inputs and its bodies' inertia take, and no less than a share of the largest
+    /// anywhere: a refit without what is missing there may have cut the place off.
     pub fn force(&self, model: &Model, between: [Option<usize>; 2]) -> f64 {
         let same = |ends: &[Option<usize>; 2]| *ends == between || *ends == [between[1], between[0]];
         let elements = model.elements.iter().enumerate().filter(|(_, e)| same(&e.between)).map(|(i, _)| self.element(i).rms);
@@ -160,7 +161,8 @@ impl Scales {
         };
         let at_bodies = between.iter().filter_map(of_body).fold(f64::INFINITY, f64::min);
         let here = elements.fold(0.0, f64::max).max(if at_bodies.is_finite() { at_bodies } else { 0.0 });
-        if here > 0.0 { here } else { self.largest_force(model) }
+        let largest = self.largest_force(model);
+        if here > 0.0 { here.max(tuning().screening.least_force * largest) } else { largest }
     }
 
     /// Largest force anywhere, N or N m.

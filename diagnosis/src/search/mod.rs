@@ -16,6 +16,7 @@ use crate::effort::Effort;
 use crate::error_budget::error_budget;
 use crate::evaluator::Evaluator;
 use crate::excerpts::Excerpts;
+use crate::hold::told;
 use crate::hypothesis::Hypothesis;
 use crate::physics;
 use crate::problem::Problem;
@@ -88,8 +89,10 @@ pub fn search(problem: &Problem, settings: &Settings, limit: Limit, report: &(dy
         let single = found.iter().find(|c| c.structure.added.len() == 1 && c.structure.added[0].id == t.id);
         t.taken = single.map(|c| 1.0 - c.fit.cost / refitted.fit.cost);
     }
+    let holds = told(evaluator, &refitted);
     Ok(Search {
-        errors: error_budget(evaluator, &refitted.structure, &refitted.fit.values),
+        errors: error_budget(evaluator, &refitted, &holds),
+        holds,
         noise_sd: evaluator.noise_sd.clone(),
         levels_given: nominal.levels_given.clone(),
         found,

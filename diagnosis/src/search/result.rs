@@ -3,6 +3,7 @@
 use super::journal::Entry;
 use crate::candidate::Candidate;
 use crate::error_budget::BudgetedError;
+use crate::hold::Told;
 use crate::hypothesis::Place;
 use crate::work::Steps;
 
@@ -37,6 +38,8 @@ pub struct Detectable {
 pub struct Search {
     /// What is off in the predictions of the refitted nominal model although no physics is missing.
     pub errors: Vec<BudgetedError>,
+    /// What the refitted nominal model says of inputs that are held by default.
+    pub holds: Vec<Told>,
     /// Standard deviation of each output's measuring error, in its unit.
     pub noise_sd: Vec<f64>,
     /// Level of each output with the parameters as given, noise standard deviations.

@@ -4,7 +4,8 @@ use super::journal::Outcome;
 use super::settings::Settings;
 use super::state::State;
 use super::steps::{
-    Anew, Elsewhere, Exchanges, Finer, GivenBack, Laws, More, MorePairs, Pairs, Plain, Race, Relatives, Richer, Ripples, Singles, Step,
+    Anew, Elsewhere, Exchanges, Finer, GivenBack, Laws, More, MorePairs, Pairs, Plain, Race, Relatives, Richer, Ripples, Singles, Split,
+    Step,
 };
 use crate::candidate::key_of;
 use crate::race::{Course, distinct};
@@ -14,13 +15,25 @@ use std::collections::HashSet;
 /// The steps of a search for so many effects, in their order. Where the residual is noise, only what may be wrong with single effects is asked.
 fn steps(is_quiet: bool, effects: usize) -> Vec<&'static dyn Step> {
     let mut steps: Vec<&'static dyn Step> =
-        vec![&Ripples, &Singles::NEXT, &GivenBack, &Laws, &Singles::NEXT, &Plain, &Relatives, &Elsewhere, &Relatives];
+        vec![&Ripples, &Singles::NEXT, &GivenBack, &Split::ALONE, &Laws, &Singles::NEXT, &Plain, &Relatives, &Elsewhere, &Relatives];
     if is_quiet {
         return steps;
     }
-    steps.extend([&Finer as &dyn Step, &Pairs, &Laws, &Exchanges, &Richer, &Singles::REST, &MorePairs, &Laws, &Exchanges, &Elsewhere]);
+    steps.extend([
+        &Finer as &dyn Step,
+        &Pairs,
+        &Split::BESIDE,
+        &Laws,
+        &Exchanges,
+        &Richer,
+        &Singles::REST,
+        &MorePairs,
+        &Laws,
+        &Exchanges,
+        &Elsewhere,
+    ]);
     for _ in 2..effects {
-        steps.extend([&More as &dyn Step, &Anew, &Exchanges]);
+        steps.extend([&More as &dyn Step, &Split::BESIDE, &Anew, &Exchanges]);
     }
     steps.extend([&Elsewhere as &dyn Step, &Relatives]);
     steps

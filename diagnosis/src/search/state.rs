@@ -4,7 +4,7 @@ use super::journal::{Entry, Outcome};
 use super::result::Tried;
 use super::share::Work;
 use super::view::View;
-use crate::candidate::{Candidate, done, key_of, sort};
+use crate::candidate::{Candidate, advantage_over, done, key_of, sort};
 use crate::hypothesis::Hypothesis;
 use crate::race::{Course, Seed, distinct};
 use crate::tuning::tuning;
@@ -102,6 +102,15 @@ impl<'s, 'a> State<'s, 'a> {
     /// Whether the best leaves nothing that another effect could explain.
     pub fn is_done(&self) -> bool {
         done(&self.found, self.course.nominal, self.samples())
+    }
+
+    /// Whether the best could be claimed at all: only then rivals have to be beaten.
+    pub fn may_be_claimed(&self) -> bool {
+        let (nominal, claim) = (self.course.nominal, &tuning().claim);
+        let beats = |c: &Candidate| {
+            c.fit.cost < (1.0 - claim.least_share) * nominal.fit.cost && advantage_over(nominal, c, self.samples()) > claim.least_advantage
+        };
+        self.found.first().is_some_and(beats)
     }
 
     /// What the best adds.

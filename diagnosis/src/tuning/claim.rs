@@ -25,6 +25,10 @@ group! {
         one_sided: f64 = 0.9, "-", Judgement("noise takes from the other blocks a tenth of what a short event gives");
         /// Least improvement on unseen recordings that is of use: of the root mean square, over the noise standard deviation or over itself, whichever is larger.
         useful: f64 = 0.01, "-", Judgement("below one percent of the noise no controller and no user can tell the models apart");
+        /// Standard deviations by which the recordings have to say that an input runs on between its samples, where the model file does not say that it is held.
+        runs_on: f64 = 5.0, "standard deviations", Statistics("one in two million by chance; physics that is left out may look like a little of it");
+        /// Residual of the held-out recordings, over that of the fitted ones and over the noise, above which what was fitted does not explain them.
+        far_on_unseen: f64 = 2.0, "rms", Judgement("four times the variance: parameters that the fitted recordings determine badly cost less");
         /// Share of what a simpler law leaves beyond the noise that a law which contains it has to remove.
         richer_removes: f64 = 0.2, "-", Judgement("a tenth of the amplitude; on a real device a law with more numbers always gains a little");
         /// Whiteness statistic above which something is missing however small the residual is.

@@ -5,6 +5,8 @@ use super::table::group;
 group! {
     /// How hypotheses are screened: each simulated once beside a base, its effect projected on the residuals.
     Screening {
+        /// Least force that hypotheses at a place are measured against, as a share of the largest in the device.
+        least_force: f64 = 0.1, "-", Judgement("ranges end at twenty times it: no dry friction is larger than twice what drives the device");
         /// Residuals kept, at most; of more every second, third and so on is.
         residuals: usize = 16_000, "samples", Cost("projections take as long as they are many");
         /// Size of a hypothesis' second effect beside its first.

@@ -29,6 +29,8 @@ group! {
         refitted: f64 = 0.1, "of the work", Numerics("a structure must not win by the error of its substeps");
         /// Share of a step that tries other laws or places for the best, far from the noise.
         share_of_relatives: f64 = 0.08, "of the work", Cost("another effect may be what is missing");
+        /// Share in which a law is brought near at other places, before it is held against the best.
+        share_of_elsewhere: f64 = 0.05, "of the work", Cost("some steps at each of some places");
         /// Share of the step that resolves laws more finely, far from the noise.
         share_of_finer: f64 = 0.15, "of the work", Cost("as share_of_relatives");
         /// Work in which every law at a place takes its first step.
@@ -85,6 +87,18 @@ group! {
         behind_far: f64 = 4.0, "-", Cost("twice the residual");
         /// Excerpts of a stated parameter that a law beside it may take over.
         taken_over: [f64; 3] = [0.25, 0.5, 0.9], "-", Judgement("two dampers in a row are told apart along a narrow valley: starts along it");
+        /// Share of the compliance of a joint that a spring has which is put into it, at its starts.
+        condensed_softness: [f64; 3] = [0.2, 0.5, 0.8], "-", Judgement("less is no compliance of use, more leaves nothing of the model's own spring");
+        /// Inertia of the body there, in that of the lighter end.
+        condensed_inertia: [f64; 6] = [0.02, 0.06, 0.15, 0.35, 0.7, 1.2], "-", Judgement("from steps of two and more in its frequency a fit finds the resonance between");
+        /// Its damping ratio.
+        condensed_damping: f64 = 0.1, "-", Judgement("more than devices have: a wide resonance is found from further off");
+        /// Starts of each joint that are fitted.
+        condensed_starts: usize = 3, "starts", Cost("first steps");
+        /// Starts beside the stated parameters as given that are fitted on.
+        condensed_far: usize = 4, "starts", Cost("as many fits as the nominal model's first");
+        /// Structures beside which joints are split.
+        condensed_bases: usize = 2, "structures", Cost("as many starts for each");
         /// Steps to something simpler at the end, at most.
         simpler: usize = 3, "steps", Cost("one fit for each effect and law");
         /// Structures of each number of effects that are held against unseen recordings.

@@ -31,6 +31,8 @@ pub(super) struct Decision<'s> {
     pub(super) bursts: Vec<[f64; 2]>,
     /// Whether what is left is as small as the sensors' noise, or as what the device does not repeat.
     pub(super) at_floor: bool,
+    /// Root mean square of what is left on the held-out recordings, noise standard deviations, where that is far more than on the fitted ones.
+    pub(super) unseen: Option<f64>,
     /// What the device does not repeat at each output, noise standard deviations; 1 where nothing was repeated.
     pub(super) floors: Vec<f64>,
     /// Whether the model's text is to hold the fitted parameters.
@@ -47,6 +49,8 @@ pub(super) fn decide<'s>(problem: &Problem, search: &'s Search) -> Decision<'s> 
     let no_physics = beside_noise(&search.errors);
     let beyond = |level: f64, limit: f64| level * level > limit * limit + no_physics;
     let at_floor = best.levels.iter().zip(&floors).all(|(level, floor)| !beyond(*level, tuning().noise.unexplained * floor));
+    let unseen = far_on_unseen(best, &floors);
+    let at_floor = at_floor && unseen.is_none();
     let added = !best.structure.added.is_empty();
     let claims = (0..best.structure.added.len()).any(|which| !is_timing_of(problem, best, which));
     let bursts = bursts(problem, best);
@@ -61,12 +65,20 @@ pub(super) fn decide<'s>(problem: &Problem, search: &'s Search) -> Decision<'s> 
         () if claims && (!alike.is_empty() || is_outdone) => Word::Ambiguous,
         () if claims => Word::Missing,
         () if !bursts.is_empty() => Word::Unexplained,
-        () if !at_floor && best.correlation_time > tuning().claim.correlated || wanders => Word::Unexplained,
+        () if unseen.is_some() || !at_floor && best.correlation_time > tuning().claim.correlated || wanders => Word::Unexplained,
         () if off => Word::Parameters,
         () if !is_excited(problem, search) => Word::CannotTell,
         () => Word::NothingMissing,
     };
-    Decision { word, best, spread, findings, alike, bursts, at_floor, floors, changes: off || added }
+    Decision { word, best, spread, findings, alike, bursts, at_floor, unseen, floors, changes: off || added }
+}
+
+/// Root mean square of what a candidate leaves on the held-out recordings, where that is far beyond the noise and beyond what it leaves on the fitted ones: numbers
+/// may bend to the recordings that they are fitted to, and what they bend to shows elsewhere.
+fn far_on_unseen(best: &Candidate, floors: &[f64]) -> Option<f64> {
+    let unseen = best.unseen.as_ref()?.mean_square.sqrt();
+    let most = best.levels.iter().chain(floors).fold(1.0f64, |a, b| a.max(*b));
+    (unseen > tuning().claim.far_on_unseen * most).then_some(unseen)
 }
 
 /// Structures of as many effects, and what each weighs beside the best, 0 to 1.

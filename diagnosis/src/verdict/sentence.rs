@@ -20,6 +20,9 @@ pub(super) fn sentence(decision: &Decision, planned: bool) -> String {
     };
     let still =
         if level < tuning().noise.unexplained { String::new() } else { format!("; the residual is still {times} times the sensor noise") };
+    let unseen = decision.unseen.map_or_else(String::new, |level| {
+        format!("; recordings that no fit has seen are predicted only to {} times the sensor noise", round_significant(level, 2))
+    });
     let all = findings.iter().map(asserted).collect::<Vec<_>>().join(", and ");
     match decision.word {
         Word::Ambiguous => {
@@ -31,15 +34,15 @@ pub(super) fn sentence(decision: &Decision, planned: bool) -> String {
             };
             let next = if planned { ", the next experiment would" } else { "" };
             let what = findings.first().map_or_else(|| "something".to_string(), known);
-            format!("the model leaves out {what}{others}: the recordings cannot tell which{next}{still}")
+            format!("the model leaves out {what}{others}: the recordings cannot tell which{next}{still}{unseen}")
         }
         Word::CannotTell => "the recordings hardly move the device: they cannot tell what is missing".to_string(),
         Word::Missing if decision.at_floor && !still.is_empty() => {
             format!("the model leaves out {all}; with it the recordings are explained down to what the device repeats")
         }
-        Word::Missing if still.is_empty() => format!("the model leaves out {all}; with it the recordings are explained {end}"),
-        Word::Missing => format!("the model leaves out {all}; beside that a residual of {times} times the sensor noise remains"),
-        Word::Unexplained => format!("something is missing that none of the laws tried explains; refitted, the model comes {end}"),
+        Word::Missing if still.is_empty() => format!("the model leaves out {all}; with it the recordings are explained {end}{unseen}"),
+        Word::Missing => format!("the model leaves out {all}; beside that a residual of {times} times the sensor noise remains{unseen}"),
+        Word::Unexplained => format!("something is missing that none of the laws tried explains; refitted, the model comes {end}{unseen}"),
         Word::Parameters => format!("nothing is missing, but the model's parameters are off; refitted they explain the recordings {end}"),
         Word::NothingMissing => format!("the model explains the recordings {end}"),
     }

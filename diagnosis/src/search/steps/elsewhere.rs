@@ -1,10 +1,14 @@
 //! The law that was found, at other places.
 
+use super::near::brought_near;
 use super::step::{Step, Terms};
 use crate::candidate::{Candidate, key_of, simplest};
+use crate::evaluator::Evaluator;
 use crate::hypothesis::Hypothesis;
+use crate::problem::Record;
 use crate::race::{Course, Seed};
 use crate::search::state::State;
+use crate::tuning::tuning;
 
 /// The place where a law was found at first may be a neighbour of its own.
 pub(crate) struct Elsewhere;
@@ -23,12 +27,25 @@ impl Step for Elsewhere {
     }
 
     fn is_wanted(&self, state: &State) -> bool {
-        law(state) != state.moved_about
+        state.may_be_claimed() && law(state) != state.moved_about
     }
 
     fn propose(&self, state: &mut State) -> Vec<Seed> {
         state.moved_about = law(state);
-        simplest(&state.found, state.samples()).map_or_else(Vec::new, |law| elsewhere(&state.course, law))
+        let course = state.course;
+        let Some(best) = simplest(&state.found, state.samples()) else { return Vec::new() };
+        let seeds = elsewhere(&course, best);
+        // What stands in another place asks for other parameters all around: some steps with patience, before it is held against one that is at its end. And where
+        // the stated parameters were right, the refit without the effect has led away from them: so from there, too, in its own place as well.
+        let problem = course.evaluator.problem;
+        let records: Vec<Record> = course.worst(&best.fit.residuals).into_iter().filter_map(|r| problem.fit.get(r).cloned()).collect();
+        let budget = course.evaluator.budget.next(state.work.share(tuning().search.share_of_elsewhere));
+        let coarse = Evaluator { substeps: course.coarse, records: &records, budget, ..course.evaluator.clone() };
+        let itself =
+            Seed::beside(problem, (&best.structure, &best.fit.values), course.effects_of(&best.structure, &best.fit.values), false);
+        let anew = seeds.iter().chain(std::iter::once(&itself)).map(|seed| Seed { stated: course.given.to_vec(), ..seed.clone() });
+        let near = brought_near(&course, &coarse, seeds.iter().cloned().chain(anew).collect());
+        seeds.into_iter().chain(near).collect()
     }
 }
 

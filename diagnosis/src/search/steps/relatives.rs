@@ -24,7 +24,7 @@ impl Step for Relatives {
     }
 
     fn is_wanted(&self, state: &State) -> bool {
-        state.related != state.best()
+        state.may_be_claimed() && state.related != state.best()
     }
 
     fn settle(&self, state: &mut State) {

@@ -1,0 +1,84 @@
+//! Where a fit of a joint with a body in it starts. A model without that body has already made the joint as soft, and its ends as heavy, as both springs
+//! and the body together look from outside (static condensation: Guyan 1965). Beside what it absorbed, the body would count twice; so a start takes that
+//! back: the joint's own spring is stiffer, the ends are lighter, and slow motion is as before.
+
+use super::types::{Form, Hypothesis};
+use crate::physics::physics_named;
+use crate::tuning::tuning;
+use backdrive_plant::model::{InputKind, Model};
+
+/// A start of a joint with a body in it.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Condensed {
+    /// Paths of parameters that the model states, and their values at this start, SI units.
+    pub stated: Vec<(String, f64)>,
+    /// Values of the hypothesis.
+    pub values: Vec<f64>,
+}
+
+impl Hypothesis {
+    /// Starts of a hypothesis that puts a body into a joint; none of any other. `stated` gives the value of a parameter of the model by its path; `absorbed` says whether
+    /// that is a fitted one, which gives back what it absorbed, or one that knows nothing of the body. `band` holds the lowest and highest angular frequency, rad/s, at
+    /// which a body on a joint that no spring holds may swing.
+    pub(crate) fn condensed(
+        &self,
+        model: &Model,
+        stated: &dyn Fn(&str) -> Option<f64>,
+        absorbed: bool,
+        band: (f64, f64),
+    ) -> Vec<Condensed> {
+        let Form::Series { joint, .. } = &self.form else { return Vec::new() };
+        let ends = joint.each_ref().map(|name| model.bodies.iter().position(|b| b.name == *name));
+        let springs = springs(model, ends, stated);
+        let stiffness: f64 = springs.iter().map(|(_, k)| k).sum();
+        // A body that an input moves has no inertia to give, and neither has ground.
+        let moved = |body: usize| model.inputs.iter().any(|i| i.kind == InputKind::Motion && i.on == body);
+        let inertia = |end: Option<usize>| {
+            let path = format!("bodies.{}", model.bodies.get(end?)?.name);
+            let own = stated(&path).filter(|own| *own > 0.0 && end.is_some_and(|body| !moved(body)))?;
+            Some((path, own))
+        };
+        let ends = ends.map(inertia);
+        let lightest = ends.iter().flatten().map(|(_, own)| *own).fold(f64::INFINITY, f64::min);
+        if !lightest.is_finite() {
+            return Vec::new();
+        }
+        let mut starts = Vec::new();
+        for part in tuning().search.condensed_inertia {
+            let inertia = part * lightest;
+            for softness in tuning().search.condensed_softness {
+                let (near, far) = match () {
+                    // Both springs in a row are as soft as the joint was.
+                    () if stiffness > 0.0 && absorbed => (stiffness / (1.0 - softness), stiffness / softness),
+                    () if stiffness > 0.0 => (stiffness, stiffness * (1.0 - softness) / softness),
+                    () => {
+                        let frequency = band.0.powf(1.0 - softness) * band.1.powf(softness);
+                        (0.0, inertia * frequency * frequency)
+                    }
+                };
+                let damping = 2.0 * tuning().search.condensed_damping * ((near + far) * inertia).sqrt();
+                let mut given = Vec::new();
+                for (path, own) in springs.iter().filter(|_| absorbed) {
+                    given.push((path.clone(), own * near / stiffness));
+                }
+                // The body moves with each end as far as that end's spring holds it.
+                for (end, share) in ends.iter().filter(|_| absorbed).zip([near, far].map(|k| k / (near + far))) {
+                    if let Some((path, own)) = end {
+                        given.push((path.clone(), (own - share * inertia).max(0.1 * own)));
+                    }
+                }
+                let values = [far, damping, inertia].iter().zip(&self.parameters).map(|(x, p)| x.clamp(p.range.0, p.range.1)).collect();
+                starts.push(Condensed { stated: given, values });
+            }
+        }
+        starts
+    }
+}
+
+/// Stiffnesses that hold a joint, by path and fitted value.
+fn springs(model: &Model, ends: [Option<usize>; 2], stated: &dyn Fn(&str) -> Option<f64>) -> Vec<(String, f64)> {
+    let holds = |name: &str| physics_named(name).is_some_and(|p| p.facts.holds);
+    let there = model.elements.iter().filter(|e| e.between == ends || e.between == [ends[1], ends[0]]).filter(|e| holds(e.law.kind().name));
+    let path = |name: &str| format!("elements.{name}.stiffness");
+    there.filter_map(|e| Some((path(&e.name), stated(&path(&e.name)).filter(|k| *k > 0.0)?))).collect()
+}

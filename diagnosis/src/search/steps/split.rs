@@ -1,0 +1,136 @@
+//! Joints with a body in them, from where the model has given back what it absorbed of it.
+
+use super::near::brought_near;
+use super::step::{Step, Terms};
+use crate::candidate::{Candidate, distinct_structures};
+use crate::effort::Effort;
+use crate::evaluator::Evaluator;
+use crate::problem::{Problem, Record};
+use crate::race::{Course, Seed, restricted};
+use crate::screen::Projector;
+use crate::search::state::State;
+use crate::structure::Structure;
+use crate::tuning::tuning;
+
+/// A compliance in series with a body behind it does nothing to first order that a softer joint and heavier ends do not do, so screening sees little of it, and a fit
+/// from beside what these absorbed goes back to them. Each joint is split, and starts from several frequencies of the body in it.
+pub(crate) struct Split {
+    name: &'static str,
+    /// Whether beside the best effects that were found, else beside the nominal model alone.
+    beside: bool,
+}
+
+impl Split {
+    /// Beside the nominal model.
+    pub const ALONE: Split = Split { name: "splitting joints in two", beside: false };
+    /// Beside what was found.
+    pub const BESIDE: Split = Split { name: "splitting joints beside the best", beside: true };
+}
+
+impl Step for Split {
+    fn name(&self) -> &'static str {
+        self.name
+    }
+
+    fn terms(&self) -> Terms {
+        Terms::rivals()
+    }
+
+    fn is_for_rivals(&self, state: &State) -> bool {
+        // A nominal model at the noise may have absorbed the body.
+        !self.beside && !state.may_be_claimed()
+    }
+
+    fn propose(&self, state: &mut State) -> Vec<Seed> {
+        let course = state.course;
+        if !self.beside {
+            // The stated parameters may be right as they are: then the compliance is beside them, and the refit without it went astray.
+            let refitted = course.nominal.structure.stated_of(course.evaluator.problem, &course.nominal.fit.values);
+            let mut seeds = split(&course, course.nominal, &refitted, true);
+            seeds.extend(split(&course, course.nominal, course.given, false));
+            return seeds;
+        }
+        let problem = course.evaluator.problem;
+        let bases = distinct_structures(&state.found, state.effects - 1).take(tuning().search.condensed_bases);
+        bases.flat_map(|base| split(&course, base, &base.structure.stated_of(problem, &base.fit.values), true)).collect()
+    }
+}
+
+/// A start of a structure: the seed, and how much it leaves, to first order with every free parameter adjusted.
+type Ranked = (f64, Seed);
+
+/// Each joint of a structure split in two beside these stated parameters, from the starts that leave least.
+fn split(course: &Course, base: &Candidate, stated: &[f64], absorbed: bool) -> Vec<Seed> {
+    let problem = course.evaluator.problem;
+    let few = course.worst(&base.fit.residuals);
+    let records: Vec<Record> = few.iter().filter_map(|r| problem.fit.get(*r).cloned()).collect();
+    let coarse = Evaluator { substeps: course.coarse, records: &records, ..course.evaluator.clone() };
+    let there = match absorbed {
+        true if few.len() == course.evaluator.records.len() => base.fit.jacobian.clone(),
+        true => restricted(course.evaluator, &base.fit, &few).jacobian,
+        false => {
+            let structure = Structure::new(problem, &records, base.structure.added.clone());
+            let own = base.structure.of_records(&base.fit.values);
+            let values = structure.values(problem, stated, &base.structure.added_of(&base.fit.values), &own);
+            let Some(fit) = coarse.fit(&structure, &values, Effort { steps: 0, ..tuning().fit.first }) else { return Vec::new() };
+            fit.jacobian
+        }
+    };
+    let samples = there.first().map_or(0, Vec::len);
+    let stride = samples.div_ceil(tuning().screening.residuals).max(1);
+    let projector = Projector::new(&there, stride);
+    let starts = starts(course, base, stated, absorbed);
+    let ranked = course.evaluator.budget.abreast(&starts, |budget, seed| -> Option<Ranked> {
+        let (structure, values) = seed.begin(course, &records);
+        let mut left: Vec<f64> = coarse.within(budget.clone()).residuals(&structure, &values)?.into_iter().step_by(stride).collect();
+        projector.apply(&mut left);
+        Some((left.iter().map(|r| r * r).sum(), seed.clone()))
+    });
+    let mut ranked: Vec<Ranked> = ranked.into_iter().flatten().flatten().collect();
+    ranked.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mut used = vec![0; course.hypotheses.len()];
+    ranked.retain(|(_, seed)| {
+        let Some(count) = seed.effects.last().and_then(|(h, _)| used.get_mut(*h)) else { return false };
+        *count += 1;
+        *count <= tuning().search.condensed_starts
+    });
+    let seeds = ranked.into_iter().map(|(_, seed)| seed);
+    if absorbed { seeds.collect() } else { brought_near(course, &coarse, seeds.take(tuning().search.condensed_far).collect()) }
+}
+
+/// All starts of all joints of a structure.
+fn starts(course: &Course, base: &Candidate, stated: &[f64], absorbed: bool) -> Vec<Seed> {
+    let problem = course.evaluator.problem;
+    let own = course.effects_of(&base.structure, &base.fit.values);
+    let place = |path: &str| problem.stated.iter().position(|s| s.path == path);
+    let is_free =
+        |path: &str| !base.structure.added.iter().any(|h| h.replaces.iter().any(|name| path.starts_with(&format!("elements.{name}."))));
+    let value = |path: &str| stated.get(place(path)?).copied().filter(|_| is_free(path));
+    let band = band(problem);
+    let mut seeds = Vec::new();
+    for (index, hypothesis) in course.hypotheses.iter().enumerate() {
+        if !base.structure.added.iter().all(|b| b.compatible(hypothesis)) {
+            continue;
+        }
+        for start in hypothesis.condensed(&problem.model, &value, absorbed, band) {
+            let mut given = stated.to_vec();
+            for (path, value) in &start.stated {
+                if let Some(at) = place(path)
+                    && let Some(slot) = given.get_mut(at)
+                {
+                    *slot = value.clamp(problem.stated[at].range.0, problem.stated[at].range.1);
+                }
+            }
+            let effects = [own.clone(), vec![(index, start.values)]].concat();
+            seeds.push(Seed { effects, stated: given, of_records: base.structure.of_records(&base.fit.values), coupled_first: false });
+        }
+    }
+    seeds
+}
+
+/// Angular frequencies that recordings can show, rad/s: ten swings in the longest, twenty samples to a swing.
+fn band(problem: &Problem) -> (f64, f64) {
+    let longest = problem.fit.iter().map(|r| r.len as f64 * r.period).fold(0.0, f64::max);
+    let period = problem.fit.iter().map(|r| r.period).fold(f64::INFINITY, f64::min);
+    (std::f64::consts::TAU * 10.0 / longest.max(period), std::f64::consts::TAU / (20.0 * period))
+}
