@@ -18,15 +18,8 @@ pub(crate) struct Condensed {
 
 impl Hypothesis {
     /// Starts of a hypothesis that puts a body into a joint; none of any other. `stated` gives the value of a parameter of the model by its path; `absorbed` says whether
-    /// that is a fitted one, which gives back what it absorbed, or one that knows nothing of the body. `band` holds the lowest and highest angular frequency, rad/s, at
-    /// which a body on a joint that no spring holds may swing.
-    pub(crate) fn condensed(
-        &self,
-        model: &Model,
-        stated: &dyn Fn(&str) -> Option<f64>,
-        absorbed: bool,
-        band: (f64, f64),
-    ) -> Vec<Condensed> {
+    /// that is a fitted one, which gives back what it absorbed, or one that knows nothing of the body.
+    pub(crate) fn condensed(&self, model: &Model, stated: &dyn Fn(&str) -> Option<f64>, absorbed: bool) -> Vec<Condensed> {
         let Form::Series { joint, .. } = &self.form else { return Vec::new() };
         let ends = joint.each_ref().map(|name| model.bodies.iter().position(|b| b.name == *name));
         let springs = springs(model, ends, stated);
@@ -40,21 +33,18 @@ impl Hypothesis {
         };
         let ends = ends.map(inertia);
         let lightest = ends.iter().flatten().map(|(_, own)| *own).fold(f64::INFINITY, f64::min);
-        if !lightest.is_finite() {
+        // Where no spring holds the joint, nothing was absorbed that would have to be given back.
+        if !lightest.is_finite() || stiffness <= 0.0 {
             return Vec::new();
         }
         let mut starts = Vec::new();
         for part in tuning().search.condensed_inertia {
             let inertia = part * lightest;
             for softness in tuning().search.condensed_softness {
-                let (near, far) = match () {
+                let (near, far) = match absorbed {
                     // Both springs in a row are as soft as the joint was.
-                    () if stiffness > 0.0 && absorbed => (stiffness / (1.0 - softness), stiffness / softness),
-                    () if stiffness > 0.0 => (stiffness, stiffness * (1.0 - softness) / softness),
-                    () => {
-                        let frequency = band.0.powf(1.0 - softness) * band.1.powf(softness);
-                        (0.0, inertia * frequency * frequency)
-                    }
+                    true => (stiffness / (1.0 - softness), stiffness / softness),
+                    false => (stiffness, stiffness * (1.0 - softness) / softness),
                 };
                 let damping = 2.0 * tuning().search.condensed_damping * ((near + far) * inertia).sqrt();
                 let mut given = Vec::new();

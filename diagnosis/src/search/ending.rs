@@ -32,7 +32,8 @@ pub(super) fn make_simpler(course: &Course, found: &mut Vec<Candidate>, work: &W
 
 /// Brings those that could still win, or tie with the best, to their ends. Far from the noise a fit may have ended at parameters that make up for
 /// what few substeps err by: it is judged, and goes on, with as many as the model asks for, even where the time is up.
-pub(super) fn bring_to_their_ends(evaluator: &Evaluator, found: &mut [Candidate], samples: usize, work: &Work) {
+pub(super) fn bring_to_their_ends(evaluator: &Evaluator, found: &mut [Candidate], nominal: &Candidate, work: &Work) {
+    let samples = nominal.fit.residuals.len();
     let exact_end = work.share(tuning().search.best_end).max(work.budget.spent() + work.share(tuning().search.refitted));
     let (last, exact) = (work.up_to(tuning().search.best_end), work.budget.extended(exact_end));
     let best = found.first().map_or(f64::INFINITY, |c| c.fit.cost);
@@ -47,6 +48,10 @@ pub(super) fn bring_to_their_ends(evaluator: &Evaluator, found: &mut [Candidate]
         let c = &found[i];
         let evaluator = evaluator.within(budget.clone());
         let cost = evaluator.residuals(&c.structure, &c.fit.values).map_or(f64::INFINITY, |r| evaluator.cost(&r));
+        // What is too little to be claimed has no need of its last digits.
+        if cost.min(c.fit.cost) - 2.0 * c.fit.predicted_decrease > (1.0 - tuning().claim.least_share) * nominal.fit.cost {
+            return None;
+        }
         let is_blurred = (cost - c.fit.cost).abs() > tuning().screening.substep_error * c.fit.cost;
         let by = match (is_blurred, open(c)) {
             (true, _) => budget.clone(),

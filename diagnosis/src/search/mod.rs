@@ -75,7 +75,7 @@ pub fn search(problem: &Problem, settings: &Settings, limit: Limit, report: &(dy
     let mut found = state.found;
     report("fitting the best to the end");
     ending::make_simpler(&course, &mut found, &work);
-    ending::bring_to_their_ends(evaluator, &mut found, samples, &work);
+    ending::bring_to_their_ends(evaluator, &mut found, refitted, &work);
     let (alone, fewer): (Vec<_>, Vec<_>) =
         ending::taken_back(evaluator, &mut found, &work).into_iter().partition(|(structure, _)| structure.added.is_empty());
     found.extend(ending::polished(evaluator, fewer));

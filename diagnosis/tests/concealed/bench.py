@@ -1,8 +1,15 @@
 """Driving a device: recordings of a true model with noise, and how far a model is from them."""
 import copy
+import math
 import numpy as np
+from scipy.fft import dct, idct
+from scipy.interpolate import CubicSpline
+import stepper
 from excitation import plan, signal, smooth
-from families import r4
+from families import HAND, r4
+from loop import Loop
+
+FINE = 10                  # points of the grid that an irregular clock is on, per mean sample time
 
 
 def rounded(a):
@@ -27,6 +34,10 @@ class Bench:
         self.level = [float(np.exp(rng.uniform(np.log(0.001), np.log(0.03)))) * snr for _ in device["model"]["outputs"]]
         self.grid = [np.exp(rng.uniform(np.log(0.1), np.log(3))) if o["kind"] == "position" and rng.random() < 0.8 else 0
                      for o in device["model"]["outputs"]]
+        self.differenced = [device["stage"] == "velocity" and o["kind"] == "velocity" for o in device["model"]["outputs"]]
+        for j, o in enumerate(device["model"]["outputs"]):
+            if self.differenced[j]:                    # over one period: it is half a sample late, which the model says
+                self.grid[j], o["delay"] = np.exp(rng.uniform(np.log(0.3), np.log(2))), 0.5 * self.ts
         self.sigma = self.resolution = None
         self.set_noise()
 
@@ -42,9 +53,27 @@ class Bench:
         U = {}
         for j, (q, a) in enumerate(zip(dev["model"]["inputs"], dev["amplitude"])):
             other = kind if j == 0 or kind in ("impacts",) or rng.random() < 0.4 else str(rng.choice(["sines", "multisine", "sweep", "triangle"]))
-            u = signal(other, factor * a, n, self.ts, dev["band"], rng)
-            U[q["name"]] = rounded(smooth(u, int(0.25 / dev["band"][1] / self.ts)) if q["kind"] == "motion" else u)
-        return U
+            band = dev["band"]
+            if dev["loop"]:                            # the hand moves it; on the motor a dither at most
+                other, band = (kind, (0.3, dev["hand"]["band"])) if q["name"] == HAND else ("multisine", (1, band[1]))
+            elif dev["hand"] and q["name"] == HAND:
+                other, band = "hand", (0, dev["hand"]["band"])
+            u = signal(other, factor * a, n, self.ts, band, rng)
+            if dev["loop"] and q["name"] == HAND:
+                u = smooth(u, int(0.1 / self.ts))
+            U[q["name"]] = rounded(smooth(u, int(0.25 / band[1] / self.ts)) if q["kind"] == "motion" else u)
+        return self.irregular(U, i, n) if dev["stage"] == "clock" else U
+
+    def irregular(self, U, i, n):
+        """The same played by a computer whose clock is not even and that skips samples, here and there and in bursts. `t`: where, on the fine grid."""
+        rng = np.random.default_rng(self.seeds[i][1] // 2)
+        steps = np.maximum(1, np.round(FINE * (1 + rng.uniform(0.1, 0.4) * rng.uniform(-1, 1, n)))).astype(int)
+        keep = rng.random(n) > rng.uniform(0.005, 0.04)
+        for at in rng.integers(1, n, int(rng.integers(1, 5))):
+            keep[at : at + int(rng.integers(5, 40))] = False
+        keep[0] = True
+        at = (np.cumsum(steps) - steps[0])[keep]
+        return dict({k: rounded(np.interp(at / FINE, np.arange(n), u)) for k, u in U.items()}, t=at)
 
     def controller(self, model, i, n):
         dev, c = self.device, self.device["control"]
@@ -65,14 +94,35 @@ class Bench:
             y, u = self.core.simulate(model, {}, self.ts, n, ctrl=c, nsub=nsub, outputs=outputs)
             return {c["input"]: u}, y
         U = self.excite(i, n)
-        return U, self.core.simulate(model, U, self.ts, n, nsub=nsub, outputs=outputs)[0]
+        if self.device["loop"]:
+            return self.session(model, i, U, nsub, outputs)
+        return U, self.predict(model, U, nsub, outputs)
+
+    def session(self, model, i, U, nsub, outputs):
+        """The same of a running loop, whose computer commands the motor from what the encoder reads."""
+        q, n = model["inputs"][0]["name"], len(U[HAND])
+        noise = np.random.default_rng(self.seeds[i][1]).standard_normal(n) * (self.sigma[0] if self.resolution else 0)
+        loop = Loop(self.device["loop"], self.device["model"], self.ts)
+        y, U = stepper.simulate(model, U, self.ts, n, nsub, outputs, (q, loop.command(noise, self.resolution[0] if self.resolution else 0, U[q])))
+        return U, y
 
     def steps(self, model, times=1):
         """Steps in a sample interval for what need not be exact."""
         return min(self.core.substeps(model, self.ts, True), times * self.core.substeps(model, self.ts, False))
 
-    def predict(self, model, U, nsub=None):
-        return self.core.simulate(model, U, self.ts, len(next(iter(U.values()))), nsub=nsub)[0]
+    def predict(self, model, U, nsub=None, outputs=None):
+        if "t" not in U:
+            return self.solve(model, U, self.ts, len(next(iter(U.values()))), nsub, outputs)
+        at, grid = np.asarray(U["t"], int), np.arange(int(U["t"][-1]) + 1)
+        between = dict(zero=lambda u: u[np.searchsorted(at, grid, side="right") - 1], linear=lambda u: np.interp(grid, at, u),
+                       cubic=lambda u: CubicSpline(at, u)(grid))
+        fine = {q["name"]: between[self.core.hold_of(q)](U[q["name"]]) for q in model["inputs"]}
+        return self.solve(model, fine, self.ts / FINE, len(grid), nsub and math.ceil(nsub / FINE), outputs)[at]
+
+    def solve(self, model, U, ts, n, nsub, outputs):
+        if stepper.needed(model):
+            return stepper.simulate(model, U, ts, n, nsub, outputs)[0]
+        return self.core.simulate(model, U, ts, n, nsub=nsub, outputs=outputs)[0]
 
     def set_noise(self):
         base = self.device["model"]
@@ -84,19 +134,51 @@ class Bench:
             most = 0.1 * self.device["amplitude"][0] * (self.ts + c["tau"]) / (1.5 * c["kd"])
             self.sigma[0] = r4(min(self.sigma[0], max(most, 0.0005 * std[0])))
             self.level[0] = self.sigma[0] / std[0]
-        self.resolution = [r4(g * s) if g else 0.0 for g, s in zip(self.grid, self.sigma)]
-        for o, r in zip(base["outputs"], self.resolution):
-            if r:
-                o["resolution"] = r
+        self.scale_noise(1.0, base)
 
-    def noise(self, i, y):
-        """The clean outputs as the sensors report them."""
+    def scale_noise(self, factor, *models):
+        """More noise, or less; encoder steps with it, which the models state."""
+        self.sigma, self.level = [r4(s * factor) for s in self.sigma], [level * factor for level in self.level]
+        self.resolution = [r4(g * s) if g else 0.0 for g, s in zip(self.grid, self.sigma)]
+        for m in models:
+            for o, r in zip(m["outputs"], self.resolution):
+                if r:
+                    o["resolution"] = r
+
+    def noise(self, i, y, travelled=None):
+        """The clean outputs as the sensors report them. `travelled`: what differentiated encoders count."""
         rng, out = np.random.default_rng(self.seeds[i][1]), np.array(y)
         for j in range(y.shape[1]):
-            out[:, j] += rng.standard_normal(len(y)) * self.sigma[j]
+            noise = rng.standard_normal(len(y)) * self.sigma[j]
+            if self.differenced[j]:                    # an encoder's counts, and their backward difference
+                step = self.resolution[j] * self.ts
+                counts = np.round((travelled[:, j] + noise * self.ts / np.sqrt(2)) / step)
+                out[:, j] = np.diff(counts, prepend=counts[0]) * self.resolution[j]
+                continue
+            out[:, j] += noise
             if self.resolution[j]:
                 out[:, j] = self.resolution[j] * np.round(out[:, j] / self.resolution[j])
         return out
+
+    def record(self, truth):
+        """All recordings of a device: inputs, clean outputs, and outputs as the sensors report them."""
+        runs = [self.run(truth, i) for i in range(len(self.files))]
+        counted = [dict(name=o["name"], kind="position", of=o["of"]) if d else o for o, d in zip(truth["outputs"], self.differenced)]
+        travelled = [self.run(truth, i, outputs=counted)[1] if any(self.differenced) else None for i in range(len(runs))]
+        inputs = [{k: rounded(u) for k, u in r[0].items()} for r in runs]
+        return inputs, [r[1] for r in runs], [self.noise(i, r[1], t) for i, (r, t) in enumerate(zip(runs, travelled))]
+
+    def deviations(self):
+        """Standard deviations of what the sensors add."""
+        return np.array([np.hypot(s, r / np.sqrt(6 if d else 12)) for s, r, d in zip(self.sigma, self.resolution, self.differenced)])
+
+    def told(self, difference):
+        """A difference of outputs without what a hand that nobody measured could have done: all that is no faster than the set says."""
+        if not self.device["hand"] or "stated" not in self.device["hand"]:
+            return difference
+        lines = dct(difference, axis=0, norm="ortho")
+        lines[: math.ceil(2 * len(difference) * self.ts * self.device["hand"]["stated"])] = 0
+        return idct(lines, axis=0, norm="ortho")
 
     def ranges(self, model):
         """How far, how fast and with what force things move at every place, from a quick run of all recordings."""
@@ -129,9 +211,9 @@ class Bench:
         return stat
 
 
-def mismatch(core, predicted, recorded):
+def mismatch(bench, predicted, recorded):
     """Mean nrmse over files and outputs."""
-    return float(np.mean([core.nrmse(p[:, j], r[:, j]) for p, r in zip(predicted, recorded) for j in range(p.shape[1])]))
+    return float(np.mean([np.sqrt(np.mean(bench.told(p - r) ** 2, axis=0)) / np.std(r, axis=0) for p, r in zip(predicted, recorded)]))
 
 
 def numbers_of(model):

@@ -2,14 +2,16 @@
 import copy
 import numpy as np
 from excitation import log_uniform
-from families import element, maxwell_slip, r4
+from families import HAND, element, maxwell_slip, r4
+from stepper import OWN, joint
 
 FRICTION = ["coulomb", "asymmetric_coulomb", "stribeck", "friction_deficit", "dahl", "lugre", "maxwell_slip", "preisach_lugre"]
 HYSTERESIS = ["dahl", "lugre", "maxwell_slip", "preisach_lugre", "hysteretic_spring", "bouc_wen"]
 VISCOUS = ["damper", "asymmetric_damper", "quadratic_drag", "back_emf"]
 ELASTIC = ["spring", "cubic_spring", "hysteretic_spring", "bouc_wen", "backlash", "contact", "hunt_crossley"]
-FAMILY = {**{k: FRICTION + HYSTERESIS[4:] for k in ("dahl", "lugre", "maxwell_slip")},
-          **{k: FRICTION for k in ("coulomb", "asymmetric_coulomb", "stribeck", "friction_deficit")},
+DRY = FRICTION + [*OWN, "gear_loss"]
+FAMILY = {**{k: DRY + HYSTERESIS[4:] for k in ("dahl", "lugre", "maxwell_slip")},
+          **{k: DRY for k in ("coulomb", "asymmetric_coulomb", "stribeck", "friction_deficit", *OWN)},
           **{k: VISCOUS for k in VISCOUS}, **{k: ELASTIC for k in ("spring", "cubic_spring", "contact", "hunt_crossley")},
           "backlash": ELASTIC + ["series_compliance"], "series_compliance": ["series_compliance", "backlash"],
           "hysteretic_spring": HYSTERESIS + ["cubic_spring"], "bouc_wen": HYSTERESIS + ["cubic_spring"],
@@ -21,7 +23,7 @@ OUTPUT_KEYS = ["offset", "delay", "gain"]
 OUTSIDE = ["tv_spring", "disturbance", "glitch"]
 # What a friction or spring effect stands in for, when the nominal model has that at its place.
 REPLACES = {"asymmetric_coulomb": ["coulomb"], "stribeck": ["coulomb"], "friction_deficit": ["coulomb"], "dahl": ["coulomb"],
-            "lugre": ["coulomb"], "maxwell_slip": ["coulomb"], "cubic_spring": ["spring"], "hysteretic_spring": ["spring"],
+            "lugre": ["coulomb"], "maxwell_slip": ["coulomb"], **{k: ["coulomb"] for k in OWN}, "cubic_spring": ["spring"], "hysteretic_spring": ["spring"],
             "bouc_wen": ["spring"], "tv_spring": ["spring"], "asymmetric_damper": ["damper"], "backlash": ["spring", "damper"]}
 TOP = {"asymmetric_coulomb": 0.8, "friction_deficit": 0.9, "asymmetric_damper": 0.8, "saturation": 0.7, "tv_spring": 0.9,
        "backlash": 1.5, "contact": 50.0, "hunt_crossley": 50.0}          # sizes that would leave sense behind
@@ -46,8 +48,8 @@ def joints(model):
     return seen
 
 
-def options(model):
-    """Every effect that makes sense here: (kind, place or signal name)."""
+def options(model, own=()):
+    """Every effect that makes sense here: (kind, place or signal name). `own`: laws of the second simulator, which are drawn where they are asked for."""
     free, held = free_bodies(model)
     grounds = [(b, "ground") for b in free]
     out = []
@@ -58,6 +60,7 @@ def options(model):
         out += [(k, p) for k in ("inertia", "series_compliance") if k == "inertia" or at(model, p, "spring")]
         if "maxwell_slip" not in had:
             out += [(k, p) for k in ("asymmetric_coulomb", "stribeck", "friction_deficit", "dahl", "lugre", "maxwell_slip")]
+            out += [(k, p) for k in OWN if k in own and (k == "warm_friction" or joint(model, p))]
         out += [("coulomb", p)] if not had else []
         out += [(k, p) for k, base in (("damper", "damper"), ("spring", "spring")) if not at(model, p, base) and not at(model, p, "hysteretic_spring")]
         out += [("asymmetric_damper", p)] if at(model, p, "damper") else []
@@ -77,11 +80,33 @@ def options(model):
     return out
 
 
+def is_scaled(model):
+    """Whether masses and stiffnesses cannot all be off by the same factor unseen, as they can where only forces go in and only motions come out."""
+    return any(q["kind"] == "motion" for q in model["inputs"]) or any(o["kind"] in ("force", "reaction") for o in model["outputs"])
+
+
+def torque_constant(model, rng):
+    """An input whose gain is off by 10 to 40 % beside dry friction that was left out, and whether the recordings can tell the gain: where there is no
+    other force to compare with, it is the same as all masses and stiffnesses being off together."""
+    inputs = [q for q in model["inputs"] if q["kind"] == "force"]
+    motors = [q["name"] for q in inputs if q["name"] != HAND]
+    places = [p for p in ((b, "ground") for b in free_bodies(model)[0]) if not at(model, p, "coulomb") and not at(model, p, "maxwell_slip")]
+    if not motors or not places:
+        return None, False
+    gain = dict(kind="gain", place=str(rng.choice(motors)), value=r4(1 + rng.choice([-1, 1]) * rng.uniform(0.1, 0.4)))
+    friction = dict(kind=str(rng.choice(["coulomb", "stribeck"])), place=places[rng.integers(len(places))])
+    tells = len(inputs) > 1 or is_scaled(model)
+    return [dict(e, seed=int(rng.integers(2**62)), size=log_uniform(rng, 0.05, 0.5)) for e in (friction, gain)], tells
+
+
 def add(model, effect, stat):
     """The model with the effect in it, and the effect's numbers. `stat`: ranges of motion and force at every place."""
     m, rng, s = copy.deepcopy(model), np.random.default_rng(effect["seed"]), effect["size"]
     kind, place = effect["kind"], effect["place"]
     name = "extra_" + kind
+    if "value" in effect:
+        next(q for q in m["inputs"] + m["outputs"] if q["name"] == place)[kind] = effect["value"]
+        return m, {kind: effect["value"]}
     if isinstance(place, str):
         return signal_effect(m, kind, place, s, stat, rng)
     a, b = place
@@ -125,6 +150,13 @@ def numbers(kind, s, x, v, peak, f, old, stat, place, m, rng):
         return dict(coulomb=r4(c), static=r4(c * (1 + (s if "force" in old else rng.uniform(0.4, 1.5)))), velocity=r4(v * log_uniform(rng, 0.15, 0.7)))
     if kind == "friction_deficit":
         return dict(coulomb=r4(c), rest=r4(c * (1 - (s if "force" in old else rng.uniform(0.3, 0.8)))), velocity=r4(v * log_uniform(rng, 0.15, 0.7)))
+    if kind == "load_friction":
+        load = stat[joint(m, place)][3] if "ground" not in joint(m, place) else f
+        return dict(force=r4(c if "force" in old else rng.uniform(0, 0.5) * s * f), coefficient=r4(min(s * f / load, 0.6)))
+    if kind == "warm_friction":                    # it warms within a recording
+        heat = c * 0.8 * v * stat["length"]
+        halves = 8 * s if "force" in old else rng.uniform(0.7, 4)
+        return dict(force=r4(c), half_heat=r4(heat / halves), cooling_time=r4(stat["length"] * log_uniform(rng, 0.3, 4)))
     if kind in ("dahl", "lugre"):
         force = c if "force" in old else s * f
         p = dict(stiffness=r4(force / (x * (0.6 * s if "force" in old else log_uniform(rng, 0.15, 0.9)))), coulomb=r4(force))
@@ -199,6 +231,10 @@ def right_answers(kind, place, p, nominal):
         e = dict(physics=kind, signal=place, accept=[dict(physics=[kind], signal=place)], family=FAMILY.get(kind, [kind]), parameters_as={kind: p})
         if kind in ("delay", "bandwidth") and len(inputs) == len(outputs) == 1:
             e["signal_any"] = inputs + outputs
+        # Of two forces, or of two motions, either has the gain: all masses and stiffnesses make up for it.
+        side = inputs if place in inputs else outputs
+        if kind == "gain" and len(side) == 2 and not is_scaled(nominal):
+            e["accept"] += [dict(physics=[kind], signal=name) for name in side if name != place]
         if kind == "back_emf":
             on = next(q["on"] for q in nominal["inputs"] if q["name"] == place)
             e["accept"].append(dict(physics=["damper"], between=[on, "ground"]))

@@ -54,6 +54,9 @@ def signal(kind, amplitude, n, ts, band, rng):
             width = max(4, int(min(0.01 * n, rng.uniform(0.2, 0.6) / high / ts)))
             u[k : k + width] = rng.choice([-1, 1]) * amplitude * rng.uniform(0.5, 1) * np.sin(np.pi * np.arange(width) / width)[: n - k]
         return u
+    if kind == "hand":                             # slow, and never the same: no faster than `high`
+        u = sum(np.sin(2 * np.pi * f * t + p) for f, p in zip(rng.uniform(0.05, 1, 24) * band[1], rng.uniform(0, 2 * np.pi, 24)))
+        return amplitude * u / np.std(u) * np.sin(0.5 * np.pi * np.minimum(1.0, t * band[1])) ** 2
     raise ValueError(kind)
 
 
@@ -67,6 +70,9 @@ def smooth(u, width):
 
 def plan(device, rng):
     """Names of the recordings with their kind and amplitude factor, those for the fit first: (fit, held out)."""
+    if device.get("loop"):
+        fit = [("explore", "hand", 0.7), ("press", "triangle", 1.2), ("tap", "impacts", 4.0), ("explore-2", "hand", 1.0)]
+        return fit[: int(rng.integers(3, 5))], [("again", "hand", 0.85)]
     motion = any(q["kind"] == "motion" for q in device["model"]["inputs"])
     kinds = MOTION_KINDS if motion else FORCE_KINDS[:-1] if device["control"] else FORCE_KINDS
     rest = list(rng.permutation([k for k in kinds if k not in ("sweep", "impacts")]))

@@ -1,8 +1,11 @@
 """True devices of the five families: numbers drawn log-uniform about typical ones."""
 import numpy as np
 from excitation import log_uniform
+from loop import draw_loop
 
 FAMILIES = ["master", "compensator", "ballscrew", "testbench", "chain"]
+STAGES = dict(hand=["master"], loop=["master"], clock=FAMILIES, velocity=["master", "ballscrew", "testbench", "chain"])
+HAND = "hand_force"
 
 
 def r4(x):
@@ -163,17 +166,61 @@ def chain(rng, six=False):
              amplitude=[push * log_uniform(rng, 0.5, 1) for _ in inputs])
 
 
-def draw_device(family, rng, six=False, controlled=False):
+def with_hand(model, use, force):
+    """A hand that pushes on the handle."""
+    model["inputs"].append(dict(name=HAND, kind="force", on="handle", hold="linear"))
+    use["amplitude"].append(r4(force))
+
+
+def rigid(model, rng):
+    """A master of one to three bodies: cable and linkage may be stiff."""
+    for a, b in [("motor", "drum"), ("drum", "handle")][: int(rng.choice(3, p=[0.4, 0.3, 0.3]))]:
+        model["bodies"][b] = r4(model["bodies"][b] + model["bodies"].pop(a))
+        model["elements"] = [e for e in model["elements"] if set(e["between"]) != {a, b}]
+        for e in model["elements"]:
+            e["between"] = [b if q == a else q for q in e["between"]]
+        for q, key in [(q, "on") for q in model["inputs"]] + [(o, "of") for o in model["outputs"]]:
+            q[key] = b if q[key] == a else q[key]
+
+
+def staged(stage, model, use, rng):
+    """The device where it is not alone on a quiet bench. False where it cannot be there."""
+    kinds = {e["kind"] for e in model["elements"]}
+    if stage in ("clock", "velocity") and "control" in use or stage == "loop" and "hysteretic_spring" in kinds:
+        return False
+    if stage == "hand":                            # in no column of the files; the set states a bandwidth that is larger than the hand's
+        band = rng.uniform(1.5, 3)
+        with_hand(model, use, use["amplitude"][0] * log_uniform(rng, 0.2, 1))
+        use["hand"] = dict(input=HAND, band=r4(band), stated=round(band * rng.uniform(1.6, 2.2), 1))
+    if stage == "loop":
+        del model["outputs"][1:]
+        rigid(model, rng)
+        model["inputs"][0]["hold"], use["ts"] = "zero", float(rng.choice([0.0005, 0.001]))
+        with_hand(model, use, log_uniform(rng, 1, 6))
+        use["hand"] = dict(input=HAND, band=r4(rng.uniform(3, 6)))
+        use["loop"] = draw_loop(model, use["ts"], use["amplitude"][1], rng)
+        use["amplitude"][0] = r4(use["amplitude"][1] * float(rng.choice([0, log_uniform(rng, 0.02, 0.1)])))       # of a dither on the motor
+    if stage == "velocity":                        # sampled so fast that a mean over a sample is the velocity in its middle
+        use["ts"] = min(use["ts"], r4(1 / (30 * use["band"][1])))
+        for o in model["outputs"]:
+            if o["kind"] == "position":
+                o.update(kind="velocity", name=o["name"].replace("position", "velocity"))
+        return any(o["kind"] == "velocity" for o in model["outputs"])
+    return True
+
+
+def draw_device(family, rng, six=False, controlled=False, stage=None):
     """A true device: model, sample time, band, amplitudes, and how it is controlled (None: open loop)."""
     while True:
         model, use = chain(rng, six) if family == "chain" else globals()[family](rng)
-        if not controlled or "control" in use:
+        if (not controlled or "control" in use) and staged(stage, model, use, rng):
             break
     if controlled:
         use["control"]["frequency"] = min(2 * use["control"]["frequency"], 15)
     model["source"] = "nominal data sheet values"
     return dict(family=family, model=model, ts=use["ts"], band=use["band"], amplitude=use["amplitude"],
-                samples=use.get("samples", int(rng.choice([7066, 8833]))), control=use.get("control"))
+                samples=use.get("samples", int(rng.choice([7066, 8833]))), control=use.get("control"), stage=stage,
+                hand=use.get("hand"), loop=use.get("loop"))
 
 
 def wrong_numbers(model, rng, all_wrong=False):

@@ -13,7 +13,7 @@ def residual(bench, model, inputs, recorded, scale, nsub):
             p = bench.predict(model, U, nsub)
         except bench.core.SimError:
             p = np.full_like(y, 1e3 * np.max(scale))
-        out.append(((p - y) / scale)[::KEEP].ravel())
+        out.append((bench.told(p - y) / scale)[::KEEP].ravel())
     r = np.concatenate(out)
     return np.clip(r / np.sqrt(len(r)), -1e6, 1e6)
 
@@ -53,7 +53,7 @@ def retune(bench, base, inputs, recorded, scale, start=None, evaluations=4):
 def score(bench, predicted, recorded):
     """(fit, held out) nrmse of a prediction, as resim.py computes it."""
     k = bench.fit
-    return mismatch(bench.core, predicted[:k], recorded[:k]), mismatch(bench.core, predicted[k:], recorded[k:])
+    return mismatch(bench, predicted[:k], recorded[:k]), mismatch(bench, predicted[k:], recorded[k:])
 
 
 def predictions(bench, model, inputs, exact=False):

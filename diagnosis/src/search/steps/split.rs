@@ -5,8 +5,8 @@ use super::step::{Step, Terms};
 use crate::candidate::{Candidate, distinct_structures};
 use crate::effort::Effort;
 use crate::evaluator::Evaluator;
-use crate::problem::{Problem, Record};
-use crate::race::{Course, Seed, restricted};
+use crate::problem::Record;
+use crate::race::{Course, Seed, distinct, restricted};
 use crate::screen::Projector;
 use crate::search::state::State;
 use crate::structure::Structure;
@@ -47,7 +47,11 @@ impl Step for Split {
             // The stated parameters may be right as they are: then the compliance is beside them, and the refit without it went astray.
             let refitted = course.nominal.structure.stated_of(course.evaluator.problem, &course.nominal.fit.values);
             let mut seeds = split(&course, course.nominal, &refitted, true);
-            seeds.extend(split(&course, course.nominal, course.given, false));
+            if state.is_quiet() {
+                distinct(&mut seeds);
+            } else {
+                seeds.extend(split(&course, course.nominal, course.given, false));
+            }
             return seeds;
         }
         let problem = course.evaluator.problem;
@@ -106,13 +110,12 @@ fn starts(course: &Course, base: &Candidate, stated: &[f64], absorbed: bool) -> 
     let is_free =
         |path: &str| !base.structure.added.iter().any(|h| h.replaces.iter().any(|name| path.starts_with(&format!("elements.{name}."))));
     let value = |path: &str| stated.get(place(path)?).copied().filter(|_| is_free(path));
-    let band = band(problem);
     let mut seeds = Vec::new();
     for (index, hypothesis) in course.hypotheses.iter().enumerate() {
         if !base.structure.added.iter().all(|b| b.compatible(hypothesis)) {
             continue;
         }
-        for start in hypothesis.condensed(&problem.model, &value, absorbed, band) {
+        for start in hypothesis.condensed(&problem.model, &value, absorbed) {
             let mut given = stated.to_vec();
             for (path, value) in &start.stated {
                 if let Some(at) = place(path)
@@ -126,11 +129,4 @@ fn starts(course: &Course, base: &Candidate, stated: &[f64], absorbed: bool) -> 
         }
     }
     seeds
-}
-
-/// Angular frequencies that recordings can show, rad/s: ten swings in the longest, twenty samples to a swing.
-fn band(problem: &Problem) -> (f64, f64) {
-    let longest = problem.fit.iter().map(|r| r.len as f64 * r.period).fold(0.0, f64::max);
-    let period = problem.fit.iter().map(|r| r.period).fold(f64::INFINITY, f64::min);
-    (std::f64::consts::TAU * 10.0 / longest.max(period), std::f64::consts::TAU / (20.0 * period))
 }
