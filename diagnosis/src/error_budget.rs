@@ -76,9 +76,9 @@ pub fn error_budget(evaluator: &Evaluator, fitted: &Candidate, holds: &[Told]) -
     all
 }
 
-/// What of it is no white noise of the sensor, so that an effect may imitate it: the largest of the outputs, noise variances.
+/// What of it is no white noise of the sensor, so that an effect may imitate it: the largest of the outputs, noise variances. An input that runs on is early, which no effect is.
 pub fn beside_noise(all: &[BudgetedError]) -> f64 {
-    let outside = |e: &&BudgetedError| e.source != Source::Rounding;
+    let outside = |e: &&BudgetedError| !matches!(e.source, Source::Rounding | Source::Hold);
     let largest = |output: &str| all.iter().filter(outside).filter(|e| e.output == output).map(|e| e.noise_sd * e.noise_sd).sum::<f64>();
     all.iter().map(|e| largest(&e.output)).fold(0.0, f64::max)
 }
