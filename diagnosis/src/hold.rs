@@ -28,9 +28,18 @@ pub fn assumed(problem: &Problem) -> Vec<usize> {
     problem.model.inputs.iter().enumerate().filter_map(is_assumed).collect()
 }
 
-/// The same problem with these inputs as straight lines between their samples.
+/// The same problem with these inputs as straight lines between their samples, in the model's text too: what is written of it simulates as this one does.
 pub fn linear(problem: &Problem, inputs: &[usize]) -> Problem {
     let mut other = problem.clone();
+    let is_one = |name: Option<&str>| inputs.iter().any(|i| problem.model.inputs.get(*i).map(|input| input.name.as_str()) == name);
+    if let Ok(mut document) = problem.text.parse::<toml_edit::DocumentMut>()
+        && let Some(tables) = document.get_mut("inputs").and_then(|item| item.as_array_of_tables_mut())
+    {
+        for table in tables.iter_mut().filter(|t| is_one(t.get("name").and_then(|n| n.as_str()))) {
+            table.insert("hold", toml_edit::value("linear"));
+        }
+        other.text = document.to_string();
+    }
     for input in inputs {
         if let Some(input) = other.model.inputs.get_mut(*input) {
             input.hold = Hold::Linear;

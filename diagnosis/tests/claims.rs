@@ -7,7 +7,7 @@ use backdrive_diagnosis::problem::{Problem, Record};
 use backdrive_diagnosis::search::{Settings, search};
 use backdrive_diagnosis::verdict::{Parameter, Verdict, Word, timing, verdict};
 use backdrive_diagnosis::work::Limit;
-use backdrive_plant::model::Model;
+use backdrive_plant::model::{Hold, Model};
 use backdrive_plant::recording::Recording;
 use backdrive_plant::set::Initial;
 use backdrive_plant::stepper::{Options, simulate};
@@ -205,6 +205,9 @@ fn an_input_that_runs_on_between_its_samples_is_no_missing_physics() {
     let done = diagnose(bench.problem(1), &Settings::default(), None, &|_| {}).unwrap();
     assert!(done.verdict.word.is_structure_right() && done.verdict.findings.is_empty(), "{:#?}", done.verdict);
     assert!(done.remarks.iter().any(|remark| remark.about == "hold" && remark.signal == "push"), "{:#?}", done.remarks);
+    // What is written of the model simulates as it was simulated here.
+    let written = Model::from_toml(&done.problem.text, "written").unwrap();
+    assert_eq!((written.inputs[0].hold, done.problem.model.inputs[0].hold), (Hold::Linear, Hold::Linear));
     // What the file says is not asked for again.
     let stated = CHAIN.replace("on = \"a\"\n", "on = \"a\"\nhold = \"linear\"\n");
     let problem = Bench { nominal: &stated, ..bench }.problem(1);
