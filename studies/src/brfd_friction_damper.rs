@@ -1,11 +1,10 @@
 //! The banded rotary friction device: from a stiff linkage and the same friction either way to the play and the friction of each direction.
 
-use crate::run::{Ask, LIKELY, diagnose, diagnosed_model, findings, instead, parameter, percent, refit, refitted, said, write};
+use crate::run::{Ask, LIKELY, diagnose, diagnosed_model, errors_of, findings, instead, parameter, percent, refit, refitted, said, write};
 use crate::table::Report;
 use crate::{Context, Study, StudyError, csv_columns};
-use backdrive_diagnosis::compare::{predictions, qualities};
 use backdrive_diagnosis::evaluator::Evaluator;
-use backdrive_diagnosis::problem::{Problem, Record};
+use backdrive_diagnosis::problem::Problem;
 use backdrive_diagnosis::structure::{Role, Structure};
 use backdrive_diagnosis::tuning::tuning;
 use backdrive_diagnosis::verdict::MODEL_FILE;
@@ -125,7 +124,7 @@ fn run(context: &Context) -> Result<Report, StudyError> {
     let problem = Problem::open(&context.out.join("set.toml"), Some(&context.out.join(MODEL_FILE)))
         .map_err(|e| StudyError::Diagnosis(e.to_string()))?;
     for (records, fitted) in [(&problem.fit, true), (&problem.held_out, false)] {
-        for (name, nrmse) in each(&problem, records)? {
+        for (name, nrmse) in errors_of(&problem, records)? {
             let what = format!("nrmse, {name}{}", if fitted { ", fitted" } else { "" });
             report.figure(&what, nrmse);
             report.line(&what, format!("{:.1} %", 100.0 * nrmse), "", "", None);
@@ -250,19 +249,8 @@ fn with_own_friction(context: &Context, model: &Model, file: &str) -> Result<([f
         let at = own.free.iter().position(|n| matches!(&n.role, Role::Condition(p, _) if p == path));
         at.and_then(|i| fit.values.get(i).copied()).unwrap_or(f64::NAN)
     };
-    let nrmse = each(&fixed, &fixed.held_out)?.first().map_or(f64::NAN, |e| e.1);
+    let nrmse = errors_of(&fixed, &fixed.held_out)?.first().map_or(f64::NAN, |e| e.1);
     Ok((paths.map(value), nrmse))
-}
-
-/// Normalised error of a problem's own model for each of its records; what is free in a record is fitted to it.
-fn each(problem: &Problem, records: &[Record]) -> Result<Vec<(String, f64)>, StudyError> {
-    let given: Vec<f64> = problem.stated.iter().map(|s| s.given).collect();
-    let structure = Structure::new(problem, &problem.fit, Vec::new());
-    let predicted = predictions(problem, records, &structure, &structure.values(problem, &given, &[], &[]))
-        .ok_or_else(|| StudyError::Diagnosis("the diagnosed model cannot be simulated".to_string()))?;
-    let all = qualities(problem, records, &predicted, &problem.noise_sd, false);
-    let name = |record: &str| backdrive::recordings::file_name(record).to_string();
-    Ok(all.into_iter().map(|q| (name(&q.record), q.nrmse)).collect())
 }
 
 #[cfg(test)]

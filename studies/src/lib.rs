@@ -14,6 +14,7 @@ mod study;
 
 mod ball_screw;
 mod brfd_friction_damper;
+mod dfki_double_pendulum;
 mod emps;
 mod engine_bench;
 mod kuka_kr300;
@@ -22,6 +23,7 @@ mod papers;
 mod piezo_p885;
 mod silverbox;
 pub mod steering;
+mod tue_bilateral;
 
 pub use error::StudyError;
 pub use study::{Context, Study};
@@ -34,11 +36,13 @@ use table::Report;
 pub const STUDIES: &[&Study] = &[
     &ball_screw::STUDY,
     &brfd_friction_damper::STUDY,
+    &dfki_double_pendulum::STUDY,
     &emps::STUDY,
     &kuka_kr300::STUDY,
     &odrive_cogging::STUDY,
     &piezo_p885::STUDY,
     &silverbox::STUDY,
+    &tue_bilateral::STUDY,
     &papers::ball_screw::STUDY,
     &papers::steering_compensator::STUDY,
     &papers::impulse_engine::STUDY,

@@ -3,9 +3,13 @@
 use crate::{Context, StudyError};
 use backdrive::diagnose::{Diagnosed, REPORT, diagnose_into};
 use backdrive::recordings;
+use backdrive_diagnosis::audit::{Remark, audit};
+use backdrive_diagnosis::compare::{predictions, qualities};
 use backdrive_diagnosis::diagnose::Diagnosis;
 use backdrive_diagnosis::physics::PHYSICS;
+use backdrive_diagnosis::problem::{Problem, Record};
 use backdrive_diagnosis::search::Settings;
+use backdrive_diagnosis::structure::Structure;
 use backdrive_diagnosis::verdict::{Estimate, Finding, MODEL_FILE, Parameter, Verdict};
 use backdrive_plant::model::Model;
 use std::path::{Path, PathBuf};
@@ -35,6 +39,20 @@ pub struct Ask<'a> {
 /// # Errors
 /// When a file cannot be read or written, or the diagnosis fails.
 pub fn diagnose(context: &Context, ask: &Ask) -> Result<Diagnosis, StudyError> {
+    let (out, set) = placed(context, ask)?;
+    let opened = recordings::open(std::slice::from_ref(&set), None, None, &[])?;
+    let settings = Settings {
+        without: ask.without.iter().map(|s| s.to_string()).collect(),
+        effects: ask.effects,
+        effort: ask.effort * context.longer,
+        ..Settings::default()
+    };
+    let Diagnosed { found, .. } = diagnose_into(opened, &settings, &out, Some(&out.join(REPORT)), &AtomicBool::new(false))?;
+    Ok(found)
+}
+
+/// Puts the model and the set of a diagnosis into its folder of results: the folder, and the set there.
+fn placed(context: &Context, ask: &Ask) -> Result<(PathBuf, PathBuf), StudyError> {
     let out = if ask.name.is_empty() { context.out.to_path_buf() } else { context.out.join(ask.name) };
     std::fs::create_dir_all(&out).map_err(|e| StudyError::Write(format!("{}: cannot be made: {e}", out.display())))?;
     // What the study made itself, a set of what it simulated or a model that it found, lies with its results.
@@ -46,15 +64,17 @@ pub fn diagnose(context: &Context, ask: &Ask) -> Result<Diagnosis, StudyError> {
     let resolved = resolve(&given(ask.set)?, &[context.out, context.data]).map_err(|e| StudyError::File(format!("{}: {e}", ask.set)))?;
     let set = out.join("set.toml");
     write(&set, &resolved)?;
-    let opened = recordings::open(std::slice::from_ref(&set), None, None, &[])?;
-    let settings = Settings {
-        without: ask.without.iter().map(|s| s.to_string()).collect(),
-        effects: ask.effects,
-        effort: ask.effort * context.longer,
-        ..Settings::default()
-    };
-    let Diagnosed { found, .. } = diagnose_into(opened, &settings, &out, Some(&out.join(REPORT)), &AtomicBool::new(false))?;
-    Ok(found)
+    Ok((out, set))
+}
+
+/// What the audit of a verdict says of the recordings of a set; nothing is fitted.
+///
+/// # Errors
+/// When a file cannot be read or written, or the set and the model do not go together.
+pub fn remarks(context: &Context, ask: &Ask) -> Result<Vec<Remark>, StudyError> {
+    let (_, set) = placed(context, ask)?;
+    let problem = Problem::open(&set, None).map_err(|e| StudyError::Diagnosis(e.to_string()))?;
+    Ok(audit(&problem))
 }
 
 /// The nominal model refitted, its structure as it is, as `backdrive fit` does: no physics is considered.
@@ -150,6 +170,27 @@ pub fn parameter(verdict: &Verdict, physics: &str, key: &str) -> Option<(f64, [f
         Parameter::One(Estimate { value, ci95: [Some(low), Some(high)], .. }) => Some((*value, [*low, *high])),
         Parameter::One(_) | Parameter::List(_) => None,
     }
+}
+
+/// Value of a finding's parameter, of a list the sum; `None` where there is none.
+pub fn total(verdict: &Verdict, physics: &str, key: &str) -> Option<f64> {
+    match verdict.findings.iter().find(|finding| finding.physics == physics)?.parameters.get(key)? {
+        Parameter::One(one) => Some(one.value),
+        Parameter::List(list) => Some(list.value.iter().sum()),
+    }
+}
+
+/// Normalised error of a problem's own model for each of its records.
+///
+/// # Errors
+/// When the model cannot be simulated.
+pub fn errors_of(problem: &Problem, records: &[Record]) -> Result<Vec<(String, f64)>, StudyError> {
+    let given: Vec<f64> = problem.stated.iter().map(|s| s.given).collect();
+    let structure = Structure::new(problem, &problem.fit, Vec::new());
+    let predicted = predictions(problem, records, &structure, &structure.values(problem, &given, &[], &[]))
+        .ok_or_else(|| StudyError::Diagnosis("the diagnosed model cannot be simulated".to_string()))?;
+    let all = qualities(problem, records, &predicted, &problem.noise_sd, false);
+    Ok(all.into_iter().map(|q| (recordings::file_name(&q.record).to_string(), q.nrmse)).collect())
 }
 
 /// An error of a verdict in percent; NaN where there is none.

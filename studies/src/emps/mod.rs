@@ -1,6 +1,7 @@
 //! EMPS: a ball-screw axis, the field's reference benchmark. What its published models leave out, from motion in to reaction out.
 
 mod null;
+mod open_loop;
 mod pipeline;
 mod prepare;
 
@@ -41,7 +42,9 @@ fn run(context: &Context) -> Result<Report, StudyError> {
     told(&mut report, context, &symmetric, &train, &pulses)?;
     let linear = Ask { name: "linear", model: "linear.toml", ..symmetric.clone() };
     told(&mut report, context, &linear, &train, &pulses)?;
-    null::run(&mut report, context, &diagnosed_model(context, &symmetric)?, &train, &pulses)?;
+    let found = diagnosed_model(context, &symmetric)?;
+    open_loop::run(&mut report, context, &found, &train, &pulses)?;
+    null::run(&mut report, context, &found, &train, &pulses)?;
     Ok(report)
 }
 
