@@ -4,24 +4,12 @@ use super::account::Done;
 use super::compiled::Compiled;
 use super::constraints::Work;
 use super::contact::{Bounds, FrictionContact};
+use super::motion::Motion;
 use super::slots::{SLOTS, Slots, prescribed_slot};
 use super::state::Plant;
 
 /// Stands for a number of free bodies that is not known when the code is compiled.
 const ANY: usize = 0;
-
-/// A substep while it is computed, by place; SI units.
-struct Motion {
-    /// Mean force, N, and what of it the inputs push with.
-    force: Slots,
-    pushed: Slots,
-    /// Position in the middle, and mean velocity.
-    middle: Slots,
-    mean_velocity: Slots,
-    /// Position at the end where it is prescribed, of a free body what is added to it; velocity at the end.
-    end: Slots,
-    end_velocity: Slots,
-}
 
 impl Plant {
     /// One period by substeps.
@@ -52,7 +40,8 @@ impl Plant {
     #[inline]
     fn substep<const N: usize>(&mut self, from: f64, to: f64) {
         let n = if N == ANY { self.fixed.free.min(SLOTS) } else { N };
-        let mut motion = self.driven(n, from, to);
+        let Some(mut motion) = self.motion.take() else { return };
+        self.drive(n, from, to, &mut motion);
         self.paths_to_the_middle(&mut motion);
         self.move_freely(n, &mut motion);
         if self.fixed.constraints.len() > 0 {
@@ -60,21 +49,21 @@ impl Plant {
         }
         self.count_energy(&motion);
         self.arrive(n, &motion);
+        self.motion = Some(motion);
     }
 
     /// The motion as far as it is known before: what inputs push and prescribe, and how free bodies would go on.
     #[inline(always)]
-    fn driven(&mut self, n: usize, from: f64, to: f64) -> Motion {
+    fn drive(&mut self, n: usize, from: f64, to: f64, motion: &mut Motion) {
         let h = self.substep;
         let half = 0.5 * h;
-        let mut motion = Motion {
-            force: self.fixed.constant,
-            pushed: [0.0; SLOTS],
-            middle: [0.0; SLOTS],
-            mean_velocity: [0.0; SLOTS],
-            end: [0.0; SLOTS],
-            end_velocity: [0.0; SLOTS],
-        };
+        for i in 0..n {
+            motion.force[i] = self.fixed.constant[i];
+            motion.end[i] = 0.0;
+        }
+        for drive in &self.drives {
+            motion.pushed[drive.slot] = 0.0;
+        }
         for drive in &mut self.drives {
             let slot = drive.slot;
             if drive.moves {
@@ -95,7 +84,6 @@ impl Plant {
             motion.middle[i] = self.x[i] + half * self.v[i];
             motion.mean_velocity[i] = self.v[i];
         }
-        motion
     }
 
     /// Explicit paths come to the middle of the substep and act from there; those with a constraint to its start.
@@ -250,14 +238,16 @@ impl Plant {
     fn arrive(&mut self, n: usize, motion: &Motion) {
         let h = self.substep;
         let half = 0.5 * h;
-        let mut end = motion.end;
         for i in 0..n {
-            end[i] += self.x[i] + half * (self.v[i] + motion.end_velocity[i]);
+            self.x[i] = motion.end[i] + (self.x[i] + half * (self.v[i] + motion.end_velocity[i]));
+            self.v[i] = motion.end_velocity[i];
         }
-        self.x = end;
-        self.v = motion.end_velocity;
+        for drive in self.drives.iter().filter(|drive| drive.moves) {
+            self.x[drive.slot] = motion.end[drive.slot];
+            self.v[drive.slot] = motion.end_velocity[drive.slot];
+        }
         for path in &mut self.paths {
-            let x = end[path.first] - end[path.second];
+            let x = self.x[path.first] - self.x[path.second];
             // An explicit one has already come to the middle.
             let left = if path.constraint.is_some() { h } else { half };
             path.law.advance(&mut path.memory, path.reached, x, left);
@@ -267,7 +257,9 @@ impl Plant {
 
     /// Forces of the inputs at `s` of this period, seen from before.
     pub(super) fn note_pushes(&mut self, s: f64) {
-        self.pushed = [0.0; SLOTS];
+        for drive in &self.drives {
+            self.pushed[drive.slot] = 0.0;
+        }
         for drive in &self.drives {
             if !drive.moves {
                 self.pushed[drive.slot] += drive.force_before(s);

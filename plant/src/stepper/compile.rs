@@ -7,6 +7,7 @@ use super::dense;
 use super::drive::Drive;
 use super::error::CompileError;
 use super::instant::Endpoint;
+use super::motion::Motion;
 use super::options::Options;
 use super::path::PathElement;
 use super::propagator::Propagator;
@@ -358,6 +359,7 @@ fn plant(model: &Model, period: f64, options: &Options) -> Result<Plant, Compile
         frictions,
         paths,
         work: Box::new(Work::new()),
+        motion: Some(Box::new(Motion::new())),
         instant: Some(Box::new(Endpoint::new())),
         sense,
         energy: None,

@@ -17,7 +17,8 @@ const ROUNDS: usize = 12;
 const TOLERANCE: f64 = 1e-14;
 /// The same for a law of the path, against the force that would stop its ends.
 const TOLERANCE_OF_LAWS: f64 = 4e-12;
-/// How exactly one law is solved, as a share of the velocity across it: steep laws round their force more coarsely than a velocity.
+/// How exactly one law is solved, as a share of the velocities in it: steep laws round their force more coarsely than a velocity, and
+/// sweeps go on until forces change by less than a few times this.
 const EXACT: f64 = 1e-12;
 /// Elements whose force changes by more than this share per share of velocity are solved implicitly.
 const STIFF: f64 = 0.1;
@@ -282,24 +283,26 @@ fn solve_law(path: &mut PathElement, w: f64, own: f64, start: f64) -> f64 {
     }
     let mut best_force = start;
     let unknown = path.rounding();
+    let rise = path.rise;
     let mut excess = |u: f64, best: &mut f64| {
         *best = trial_force(path, u);
         u + own * *best - w
     };
-    let scale = 1e-15 * (w.abs() + own * start.abs()) + unknown;
+    let scale = EXACT * (w.abs() + own * start.abs()) + unknown;
     let mut a = w - own * start;
     let mut at_a = excess(a, &mut best_force);
     if at_a.abs() <= scale {
         return best_force;
     }
-    // The first step treats the force as constant, the next bracket the solution by widening.
-    let mut b = a - at_a;
+    // The first step trusts the slope of the last solution, the next bracket the solution by widening.
+    let mut b = a - at_a / rise;
     let mut at_b = excess(b, &mut best_force);
+    let slope = (at_b - at_a) / (b - a);
     let mut reach = 1.0;
     let mut evaluations = 2;
     while at_a * at_b > 0.0 && evaluations < EVALUATIONS {
         if at_b.abs() <= scale {
-            return best_force;
+            break;
         }
         let secant = if at_b == at_a { b - at_b } else { b - at_b * (b - a) / (at_b - at_a) };
         let step = (secant - b).abs().min(4.0 * reach * at_b.abs().max((b - a).abs()));
@@ -321,5 +324,6 @@ fn solve_law(path: &mut PathElement, w: f64, own: f64, start: f64) -> f64 {
         (b, at_b) = (next, value);
         evaluations += 1;
     }
+    path.rise = if (0.5..1e6).contains(&slope) { slope } else { 1.0 };
     best_force
 }

@@ -104,7 +104,7 @@ impl Drive {
     #[inline]
     fn moments(&self, from: f64, to: f64, centre: f64) -> (f64, f64) {
         let (segment, shift) = self.delayed(from < self.delay_rest);
-        if segment.c[1] == 0.0 && segment.c[2] == 0.0 && segment.c[3] == 0.0 {
+        if segment.is_held() {
             let impulse = self.limited(segment.c[0]) * (to - from);
             return (impulse, impulse * (0.5 * (from + to) - centre));
         }
@@ -128,10 +128,26 @@ impl Drive {
         (impulse / length, 12.0 * moment / (length * length * length))
     }
 
+    /// Mean force over `from..to`, in one segment, N.
+    #[inline]
+    fn mean_in_one(&self, from: f64, to: f64) -> f64 {
+        let (segment, shift) = self.delayed(from < self.delay_rest);
+        if segment.is_held() {
+            return self.limited(segment.c[0]);
+        }
+        let [a, b, c] = [from, 0.5 * (from + to), to].map(|s| self.limited(segment.value(s - shift)));
+        (a + 4.0 * b + c) / 6.0
+    }
+
     /// Mean force over the substep `from..to` behind the lag, N.
     #[inline]
     pub(super) fn mean(&mut self, from: f64, to: f64) -> f64 {
-        let wanted = self.line(from, to).0;
+        let rest = self.delay_rest;
+        let wanted = if from < rest && rest < to {
+            (self.mean_in_one(from, rest) * (rest - from) + self.mean_in_one(rest, to) * (to - rest)) / (to - from)
+        } else {
+            self.mean_in_one(from, to)
+        };
         if self.rate.is_infinite() {
             return wanted;
         }

@@ -23,9 +23,11 @@ impl Plant {
     /// The same into a place that is there already.
     pub(super) fn balance(&self, now: &mut Endpoint) {
         let fixed = &self.fixed;
-        now.acceleration = self.prescribed_acceleration;
         let mut force = [0.0; SLOTS];
         let prescribed = GROUND - fixed.prescribed;
+        for i in prescribed..GROUND {
+            now.acceleration[i] = self.prescribed_acceleration[i];
+        }
         for i in 0..fixed.free {
             let (stiffness, damping, mass) = (&fixed.stiffness[i], &fixed.damping[i], &fixed.mass[i]);
             let mut f = fixed.constant[i] + self.pushed[i];

@@ -24,6 +24,7 @@ mod energy;
 mod error;
 mod exact;
 mod instant;
+mod motion;
 mod options;
 mod path;
 mod propagator;

@@ -23,6 +23,8 @@ pub(super) struct PathElement {
     pub(super) ahead: f64,
     /// Whether that is the end of the substep, because it is too stiff for more.
     pub(super) unresolved: bool,
+    /// How fast the left side of its implicit equation (see `constraints.rs`) rose when it was solved last; 1 without its force.
+    pub(super) rise: f64,
     /// What its force took out of the bodies so far, J.
     pub(super) absorbed: f64,
 }
@@ -43,6 +45,7 @@ impl PathElement {
             constraint: None,
             ahead: 0.0,
             unresolved: false,
+            rise: 1.0,
             absorbed: 0.0,
         }
     }

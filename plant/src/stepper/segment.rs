@@ -18,6 +18,12 @@ impl Segment {
         Segment { c: [from, (to - from) / period, 0.0, 0.0] }
     }
 
+    /// Whether it stays at its first value.
+    #[inline]
+    pub fn is_held(&self) -> bool {
+        self.c[1] == 0.0 && self.c[2] == 0.0 && self.c[3] == 0.0
+    }
+
     /// Value at `s`.
     #[inline]
     pub fn value(&self, s: f64) -> f64 {

@@ -6,6 +6,7 @@ use super::constraints::Work;
 use super::contact::FrictionContact;
 use super::drive::Drive;
 use super::instant::Endpoint;
+use super::motion::Motion;
 use super::path::PathElement;
 use super::propagator::Propagator;
 use super::segment::Segment;
@@ -33,6 +34,8 @@ pub struct Plant {
     pub(super) frictions: Vec<FrictionContact>,
     pub(super) paths: Vec<PathElement>,
     pub(super) work: Box<Work>,
+    /// Space for a substep; always there between substeps.
+    pub(super) motion: Option<Box<Motion>>,
     /// Space for the balance of forces at a sample; always there between calls.
     pub(super) instant: Option<Box<Endpoint>>,
     pub(super) sense: Sense,
@@ -68,6 +71,7 @@ impl Plant {
             path.reached = self.x[path.first] - self.x[path.second];
             path.force = 0.0;
             path.velocity_before = 0.0;
+            path.rise = 1.0;
             path.absorbed = 0.0;
         }
         self.restart_energy();
