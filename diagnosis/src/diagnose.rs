@@ -7,6 +7,7 @@ use crate::locate::{self, Location, locate};
 use crate::per_record::{PerRecord, fit_each};
 use crate::problem::Problem;
 use crate::search::{Search, SearchError, Settings, search};
+use crate::thinned::thinned;
 use crate::tuning::tuning;
 use crate::verdict::{Files, Verdict, VerdictError, timing, verdict};
 use crate::work::{Budget, Limit};
@@ -54,6 +55,13 @@ pub fn diagnose(
     let limit = settings.limit(stop);
     report("looking at the recordings");
     let mut remarks = audit(&problem);
+    let (problem, dead) = problem.without_dead_outputs();
+    for signal in dead {
+        let text = "stands still throughout while others move: it is left out of every fit and of the verdict".to_string();
+        remarks.push(Remark { weight: Weight::Caution, records: Vec::new(), signal, about: "constant", text });
+    }
+    let (problem, fewer) = thinned(problem);
+    remarks.extend(fewer);
     let (problem, search) = with_inputs_as_they_run(problem, settings, limit, report, &mut remarks)?;
     remarks.extend(timing(&problem, &search));
     report("locating the missing force");

@@ -41,6 +41,7 @@ pub mod signal;
 pub mod simulate;
 pub mod statistics;
 pub mod structure;
+pub(crate) mod thinned;
 pub mod tuning;
 pub mod unknown;
 pub mod verdict;

@@ -129,4 +129,51 @@ impl Problem {
         let lag = (0..model.outputs.len()).map(|output| lag_of(&model, &fit, output)).collect();
         Ok(Problem { text, model_path, model, fit, held_out, stated, initial, unknown: Vec::new(), left_out: Vec::new(), noise_sd, lag })
     }
+
+    /// The same without the outputs that stand at one value throughout while another moves: a sensor that is dead or at its rail says nothing of the device, and
+    /// has no noise to hold a residual against. The names of what was left out.
+    pub fn without_dead_outputs(self) -> (Problem, Vec<String>) {
+        let is_still = |output: usize| {
+            let mut samples = self.fit.iter().chain(&self.held_out).filter_map(|r| r.compared(output)).peekable();
+            samples.peek().is_some() && samples.all(|s| s.iter().all(|x| Some(x) == s.first()))
+        };
+        let (still, moving): (Vec<usize>, Vec<usize>) = (0..self.model.outputs.len())
+            .filter(|output| self.fit.iter().any(|r| r.outputs.get(*output).is_some_and(Option::is_some)))
+            .partition(|output| is_still(*output));
+        if still.is_empty() || moving.is_empty() {
+            return (self, Vec::new());
+        }
+        let names = still.iter().map(|output| self.model.outputs[*output].name.clone()).collect();
+        let without = |records: Vec<Record>| -> Vec<Record> { records.into_iter().map(|record| record.without_outputs(&still)).collect() };
+        (Problem { fit: without(self.fit), held_out: without(self.held_out), ..self }, names)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use backdrive_plant::recording::Recording;
+
+    #[test]
+    fn a_sensor_at_its_rail_is_left_out_and_a_lone_one_is_not() {
+        let text = "name = 'cart'\n[bodies]\ncart = 2.0\n[[inputs]]\nname = 'f'\nkind = 'force'\non = 'cart'\n\
+                    [[outputs]]\nname = 'x'\nkind = 'position'\nof = 'cart'\n[[outputs]]\nname = 'v'\nkind = 'velocity'\nof = 'cart'\n";
+        let model = Model::from_toml(text, "cart.toml").unwrap();
+        let problem = |x: &dyn Fn(f64) -> f64| {
+            let t: Vec<f64> = (0..200).map(|i| 0.01 * f64::from(i)).collect();
+            let signals = vec![
+                ("f".to_string(), t.clone()),
+                ("x".to_string(), t.iter().map(|t| x(*t)).collect()),
+                ("v".to_string(), vec![9.999847; 200]),
+            ];
+            let record = Record::new(&Recording::new("r", t, signals).unwrap(), &model, Vec::new()).unwrap();
+            Problem::new(text.to_string(), "cart.toml".into(), model.clone(), vec![record.clone()], vec![record], Initial::Rest).unwrap()
+        };
+        let (left, dead) = problem(&|t| t * t).without_dead_outputs();
+        assert_eq!(dead, ["v"]);
+        assert!(left.fit.iter().chain(&left.held_out).all(|r| r.outputs[0].is_some() && r.outputs[1].is_none()));
+        // Where nothing moves the device may be stuck, and the audit says what there is to say.
+        let (left, dead) = problem(&|_| 0.0).without_dead_outputs();
+        assert!(dead.is_empty() && left.fit[0].outputs[1].is_some());
+    }
 }

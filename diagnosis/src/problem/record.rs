@@ -111,6 +111,17 @@ impl Record {
         outputs.get(output)?.as_deref()
     }
 
+    /// The same without some of its outputs, by their index in the model.
+    pub(super) fn without_outputs(mut self, outputs: &[usize]) -> Record {
+        for output in outputs {
+            self.outputs.get_mut(*output).map(Option::take);
+            if let Some(logged) = &mut self.logged {
+                Arc::make_mut(logged).outputs.get_mut(*output).map(Option::take);
+            }
+        }
+        self
+    }
+
     /// A part of the recording, with the motion that the bodies begin with and the samples that do not count.
     pub fn part(&self, range: std::ops::Range<usize>, begins: Vec<(usize, f64, f64)>, skip: usize) -> Record {
         let of = |samples: &Vec<f64>| samples.get(range.clone()).map(<[f64]>::to_vec).unwrap_or_default();

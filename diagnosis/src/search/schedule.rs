@@ -4,8 +4,8 @@ use super::journal::Outcome;
 use super::settings::Settings;
 use super::state::State;
 use super::steps::{
-    Anew, Elsewhere, Exchanges, Finer, GivenBack, Laws, More, MorePairs, Pairs, Plain, Race, Relatives, Richer, Ripples, Singles, Split,
-    Step,
+    Anew, Elsewhere, Exchanges, Finer, Given, GivenBack, Laws, More, MorePairs, Pairs, Plain, Race, Relatives, Richer, Ripples, Singles,
+    Split, Step,
 };
 use crate::candidate::key_of;
 use crate::race::{Course, distinct};
@@ -14,8 +14,19 @@ use std::collections::HashSet;
 
 /// The steps of a search for so many effects, in their order. Where the residual is noise, only what may be wrong with single effects is asked.
 fn steps(is_quiet: bool, effects: usize) -> Vec<&'static dyn Step> {
-    let mut steps: Vec<&'static dyn Step> =
-        vec![&Ripples, &Singles::NEXT, &GivenBack, &Split::ALONE, &Laws, &Singles::NEXT, &Plain, &Relatives, &Elsewhere, &Relatives];
+    let mut steps: Vec<&'static dyn Step> = vec![
+        &Ripples,
+        &Singles::NEXT,
+        &GivenBack,
+        &Split::ALONE,
+        &Laws,
+        &Singles::NEXT,
+        &Plain,
+        &Given,
+        &Relatives,
+        &Elsewhere,
+        &Relatives,
+    ];
     if is_quiet {
         return steps;
     }

@@ -22,6 +22,8 @@ group! {
         coupled_steps: [usize; 3] = [1, 2, 3], "steps", Cost("more for fewer structures");
         /// Steps of the nominal model's first fit, from the given parameters and from where it was coupled: on the worst recordings, then on all.
         nominal_first: [usize; 2] = [12, 3], "steps", Cost("it starts far off");
+        /// Steps of effects alone, where they begin beside stated parameters that may be right.
+        effects_first: usize = 6, "steps", Cost("as beaten_steps");
         /// The nominal model's refit far from the noise.
         nominal_far: Effort = Effort { steps: 8, tolerance: 3.0 }, "steps, mean squares", Cost("its last thousandths say nothing there");
         /// The nominal model's fit coupled to the measured motion.
@@ -73,9 +75,9 @@ group! {
         /// Weights of an unknown input that are moved together for derivatives, one in so many.
         knots_apart: usize = 6, "knots", Numerics("a cubic B-spline acts over four; two more for what the device remembers");
         /// Substeps per sample of first steps and of screening, at most.
-        coarse_substeps: usize = 2, "substeps", Cost("first steps only have to find the valley; see screening.substep_error");
+        coarse_substeps: usize = 1, "substeps", Cost("first steps only have to find the valley; see screening.substep_error");
         /// Substeps per sample of fits on their way, at most.
-        middle_substeps: usize = 4, "substeps", Cost("as coarse_substeps");
+        middle_substeps: usize = 2, "substeps", Cost("as coarse_substeps");
         /// Substeps per sample of a fit that is brought to its end, at most.
         fine_substeps: usize = 64, "substeps", Numerics("what the stiffest physics asks for; models ask for fewer");
         /// Normalised residuals beyond so many of their median deviation count linearly, where dry friction acts on a prescribed body.

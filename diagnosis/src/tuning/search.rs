@@ -6,7 +6,7 @@ group! {
     /// How much is tried and when it ends. Shares are of the work that a search may do ([`Search::work`] times the effort asked for).
     Search {
         /// Work of a search with an effort of 1.
-        work: u64 = 1_200_000_000, "simulation steps", Cost("about 20 s on two threads of a laptop");
+        work: u64 = 800_000_000, "simulation steps", Cost("about 12 s on two threads of a laptop");
         /// Wall-clock limit of a search, where nothing else is said.
         patience: u64 = 600, "s", Cost("far longer than the default effort takes on a slow machine");
         /// Simulation steps of two threads of a laptop in a second: for progress bars only.
@@ -31,6 +31,8 @@ group! {
         share_of_relatives: f64 = 0.08, "of the work", Cost("another effect may be what is missing");
         /// Share in which a law is brought near at other places, before it is held against the best.
         share_of_elsewhere: f64 = 0.05, "of the work", Cost("some steps at each of some places");
+        /// Structures that also start beside the stated parameters as given.
+        from_the_given: usize = 6, "structures", Cost("one fit each, of some steps");
         /// Share of the step that resolves laws more finely, far from the noise.
         share_of_finer: f64 = 0.15, "of the work", Cost("as share_of_relatives");
         /// Work in which every law at a place takes its first step.

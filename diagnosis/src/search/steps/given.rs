@@ -1,0 +1,39 @@
+//! What was found, beside the stated parameters as given.
+
+use super::near::brought_near;
+use super::step::{Step, Terms};
+use crate::candidate::Candidate;
+use crate::evaluator::Evaluator;
+use crate::problem::Record;
+use crate::race::Seed;
+use crate::search::state::State;
+use crate::tuning::tuning;
+
+/// The refit of a model that lacks something leads away from stated parameters that were right, and an effect found beside those may end in another valley, or have a
+/// richer law in its place. So the nearest are also fitted from the parameters as given.
+pub(crate) struct Given;
+
+impl Step for Given {
+    fn name(&self) -> &'static str {
+        "fitting beside the parameters as given"
+    }
+
+    fn terms(&self) -> Terms {
+        Terms { share: 2.0 * tuning().search.share_of_elsewhere, ..Terms::rivals() }
+    }
+
+    fn propose(&self, state: &mut State) -> Vec<Seed> {
+        let course = state.course;
+        let problem = course.evaluator.problem;
+        let Some(best) = state.found.first() else { return Vec::new() };
+        let records: Vec<Record> = course.worst(&best.fit.residuals).into_iter().filter_map(|r| problem.fit.get(r).cloned()).collect();
+        let budget = course.evaluator.budget.next(state.work.share(tuning().search.share_of_elsewhere));
+        let coarse = Evaluator { substeps: course.coarse, records: &records, budget, ..course.evaluator.clone() };
+        let as_given = |c: &Candidate| {
+            let effects = course.effects_of(&c.structure, &c.fit.values);
+            Seed { stated: course.given.to_vec(), ..Seed::beside(problem, (&c.structure, &c.fit.values), effects, false) }
+        };
+        let near = |c: &&Candidate| c.fit.cost < tuning().search.behind_far * best.fit.cost;
+        brought_near(&course, &coarse, state.found.iter().filter(near).take(tuning().search.from_the_given).map(as_given).collect())
+    }
+}
