@@ -17,6 +17,7 @@ fn steps(is_quiet: bool, effects: usize) -> Vec<&'static dyn Step> {
     let mut steps: Vec<&'static dyn Step> = vec![
         &Ripples,
         &Singles::NEXT,
+        &Plain,
         &GivenBack,
         &Split::ALONE,
         &Laws,
@@ -111,7 +112,7 @@ fn take(step: &dyn Step, state: &mut State) -> Outcome {
     }
     // Where the best leaves much over, another effect may be what is missing: other laws in its place have their share of the work, and no more.
     let more_to_come = state.found.first().is_none_or(|c| c.fit.cost > tuning().noise.near * state.samples() as f64);
-    let share = state.work.share(if more_to_come { terms.share } else { 1.0 });
+    let share = state.work.share(if more_to_come || terms.is_capped { terms.share } else { 1.0 });
     let budget = terms.ends.map_or_else(|| course.evaluator.budget.clone(), |end| state.work.up_to(end));
     let evaluator = course.evaluator.within(budget.next(share));
     let course = Course { evaluator: &evaluator, ..course };

@@ -16,9 +16,9 @@ group! {
         /// Share of what is left that one of many fits side by side may take.
         of_one: f64 = 0.25, "of what is left", Cost("one fit of a slow law must not starve the others");
         /// Share after which no step is begun.
-        last_step: f64 = 0.7, "of the work", Cost("the rest is for bringing the best to their ends");
+        last_step: f64 = 0.6, "of the work", Cost("the rest is for bringing the best to their ends");
         /// Share after which no step for rivals of the best is begun.
-        last_rival: f64 = 0.85, "of the work", Cost("a simpler law that does as well is worth more than another effect");
+        last_rival: f64 = 0.88, "of the work", Cost("a simpler law that does as well is worth more than another effect");
         /// Share at which fits of rivals end.
         rivals_end: f64 = 0.92, "of the work", Cost("as last_rival");
         /// Share at which the best are at their ends.
@@ -31,20 +31,24 @@ group! {
         share_of_relatives: f64 = 0.08, "of the work", Cost("another effect may be what is missing");
         /// Share in which a law is brought near at other places, before it is held against the best.
         share_of_elsewhere: f64 = 0.05, "of the work", Cost("some steps at each of some places");
+        /// Share in which joints are split and brought near, and the same for fitting them on.
+        share_of_splits: f64 = 0.1, "of the work", Cost("as share_of_relatives");
+        /// Share of a step that tries other effects, while the best leaves more than noise.
+        share_of_effects: f64 = 0.25, "of the work", Cost("laws of many parameters must not starve all other steps");
         /// Structures that also start beside the stated parameters as given.
-        from_the_given: usize = 6, "structures", Cost("one fit each, of some steps");
+        from_the_given: usize = 10, "structures", Cost("one fit each, of some steps");
         /// Share of the step that resolves laws more finely, far from the noise.
         share_of_finer: f64 = 0.15, "of the work", Cost("as share_of_relatives");
         /// Work in which every law at a place takes its first step.
-        laws: u64 = 120_000_000, "simulation steps", Cost("a tenth of the work");
+        laws: u64 = 80_000_000, "simulation steps", Cost("a tenth of the work");
         /// Work in which each record is fitted by itself.
-        per_record: u64 = 200_000_000, "simulation steps", Cost("a sixth of the work");
+        per_record: u64 = 100_000_000, "simulation steps", Cost("an eighth of the work, after the search");
         /// Share of the work for refits that begin with few of the stated numbers.
         few_first: f64 = 0.05, "-", Cost("a sixth of what single effects get; models of usual stiffness need a hundredth");
         /// Steps in which an effect that may be nothing is taken back, as shares of its size.
         taken_back: [f64; 4] = [0.6, 0.3, 0.1, 0.02], "-", Numerics("each fit starts from the one before: the last step is within what the next can follow");
         /// Work in which the next experiment is looked for.
-        experiment: u64 = 100_000_000, "simulation steps", Cost("a twelfth of the work");
+        experiment: u64 = 100_000_000, "simulation steps", Cost("an eighth of the work, after the search");
         /// Share of the best promise that a single effect has to reach, beyond the first few.
         promise: f64 = 0.5, "-", Cost("those that promise less are tried beside others");
         /// Structures of a step that go on after their first steps.

@@ -33,7 +33,7 @@ impl Step for Split {
     }
 
     fn terms(&self) -> Terms {
-        Terms::rivals()
+        Terms { is_capped: true, share: tuning().search.share_of_splits, ..Terms::rivals() }
     }
 
     fn is_for_rivals(&self, state: &State) -> bool {
@@ -42,7 +42,10 @@ impl Step for Split {
     }
 
     fn propose(&self, state: &mut State) -> Vec<Seed> {
-        let course = state.course;
+        // Many starts of many joints: what has simpler explanations must not starve for it.
+        let budget = state.course.evaluator.budget.next(state.work.share(tuning().search.share_of_splits));
+        let evaluator = state.course.evaluator.within(budget);
+        let course = Course { evaluator: &evaluator, ..state.course };
         if !self.beside {
             // The stated parameters may be right as they are: then the compliance is beside them, and the refit without it went astray.
             let refitted = course.nominal.structure.stated_of(course.evaluator.problem, &course.nominal.fit.values);

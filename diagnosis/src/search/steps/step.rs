@@ -20,6 +20,8 @@ pub(crate) enum Race {
 pub(crate) struct Terms {
     /// Share of the work that they may take where the best is far from the noise and another effect may be what is missing.
     pub share: f64,
+    /// Whether they may take no more than that near the noise, too.
+    pub is_capped: bool,
     /// Share of the whole work at which their fits end, where that is not the schedule's.
     pub ends: Option<f64>,
     /// How they are fitted at first.
@@ -31,12 +33,12 @@ pub(crate) struct Terms {
 impl Terms {
     /// Of effects that may be what is missing.
     pub fn effects() -> Terms {
-        Terms { share: 1.0, ends: None, race: Race::Coupled, tries_again: false }
+        Terms { share: tuning().search.share_of_effects, is_capped: false, ends: None, race: Race::Coupled, tries_again: false }
     }
 
     /// Of the best in another form, from where it is.
     pub fn forms_of_the_best(share: f64) -> Terms {
-        Terms { share, ends: None, race: Race::Free, tries_again: true }
+        Terms { share, is_capped: false, ends: None, race: Race::Free, tries_again: true }
     }
 
     /// Of rivals that the best has to win over.
