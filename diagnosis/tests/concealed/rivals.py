@@ -26,7 +26,7 @@ from effects import right_answers
 from excitation import log_uniform
 from families import r4, wrong_numbers
 from measure import WORKSPACE, diagnose, named, read, verdict
-from pairs import KINDS, NESTED, SIGNALS, WEIGHTS, Draw, numbers, put
+from pairs import HIDDEN, KINDS, NESTED, SIGNALS, WEIGHTS, Draw, numbers, put
 
 ROOT = os.path.join(WORKSPACE, "..", "shared", "concealed")
 FIT, HELD = 2, 1           # recordings of a case
@@ -132,6 +132,7 @@ def make(core, kind, rng):
     plant = Plant(core, base, ts)
     size = rng.uniform(*sizes)
     order = [kinds[i] for i in rng.permutation(len(kinds))[:2]]
+    order.sort(key=lambda q: q[0] != HIDDEN.get(kind, q[0]))
     if kind == "one-force":
         damper = sized(plant, base, "damper", ("carriage", "ground"), size * d.amplitude, plays, rng)
         both = {"damper": damper, "back_emf": dict(kind="back_emf", place="drive", numbers=dict(back_emf=damper["numbers"]["damping"]))}
@@ -231,17 +232,15 @@ def built(example):
 def experiment(core, o, name, said):
     """The proposed experiment, played on the hidden device: the case with its recordings. None where there is nothing to play."""
     plan = said.get("next_experiment") or {}
-    sensor = plan.get("sensor") or {}
-    excitation = plan.get("file") or sensor.get("file")
-    if not excitation:
+    if "file" not in plan:
         return None
+    sensor, rate = plan.get("sensor"), plan["rate_hz"]
     device = read(os.path.join(o.out, "truth", name + ".json"))
     first, folder = os.path.join(o.out, "cases", name), os.path.join(o.verdicts, name, "with-experiment")
     shutil.rmtree(folder, ignore_errors=True)
     shutil.copytree(first, folder)
     samples = os.path.join(o.verdicts, name, "played.csv")
-    rate = plan.get("rate_hz") or sensor["rate_hz"]
-    subprocess.run([o.play, os.path.join(o.verdicts, name, excitation), "--rate", repr(rate), "--out", samples], check=True)
+    subprocess.run([o.play, os.path.join(o.verdicts, name, plan["file"]), "--rate", repr(rate), "--out", samples], check=True)
     table = core.read_csv(samples)
     inputs = {q["name"]: rounded(table.get(q["name"], np.zeros(len(table["t"])))) for q in device["truth"]["inputs"]}
     truth, sigma = device["truth"], list(device["sigma"])
@@ -254,7 +253,7 @@ def experiment(core, o, name, said):
             f.write(core.dump_model(nominal))
         sigma.append(sensor["noise_sd"])
     plant = Plant(core, truth, 1.0 / rate)
-    repeats = plan.get("repeats") or sensor.get("repeats") or 1
+    repeats = plan["repeats"]
     rng = np.random.default_rng([device["seed"] % 2**32, 7])
     files = ["next-%d.csv" % (i + 1) for i in range(repeats + 1)]
     for file in files:
@@ -300,13 +299,6 @@ def judged(said, answer):
     return "boldly wrong" if word in ("parameters", "nothing_missing") else word
 
 
-def realised(core, device, samples, plan):
-    """What the experiment does to the rival that is not there: how far it stays away from the device in all recordings and the experiment, standard deviations."""
-    table = core.read_csv(samples)
-    new = {q["name"]: rounded(table.get(q["name"], np.zeros(len(table["t"])))) for q in device["base"]["inputs"]}
-    return new
-
-
 def score(o):
     core = core_of(o.simulator)
     rows, firsts, lasts, kinds, separations = [], {}, {}, {}, []
@@ -318,10 +310,10 @@ def score(o):
             continue
         a, b = judged(first, answer), judged(second if second else first, answer)
         plan = first.get("next_experiment") or {}
-        predicted = (plan.get("separation_sd") or (plan.get("sensor") or {}).get("separation_sd") or 0) * (plan.get("repeats") or 1) ** 0.5
+        predicted = (plan.get("separation_sd") or 0) * (plan.get("repeats") or 1) ** 0.5
         real = None
         samples = os.path.join(o.verdicts, name, "played.csv")
-        if first["verdict"] == "ambiguous" and os.path.exists(samples) and not o.quick:
+        if first["verdict"] == "ambiguous" and "sensor" not in plan and os.path.exists(samples) and not o.quick:
             real = separation(core, o, device, name, samples, plan)
             separations.append((predicted, real))
         firsts[a], lasts[b] = firsts.get(a, 0) + 1, lasts.get(b, 0) + 1
