@@ -33,7 +33,6 @@ FIT, HELD = 2, 1           # recordings of a case
 NEAR = (0.4, 2.0)          # standard deviations between the rivals over all recordings together
 SEEN = 25.0                # standard deviations between the device and the best that the nominal structure can do, at least
 LEVELS = (1e-3, 0.3)      # noise over the standard deviation of the signal
-LIKE = ("stiffness", "damping", "force", "coulomb", "static", "velocity", "positive", "negative", "coefficient", "gap")
 
 
 class Redraw(Exception):
