@@ -115,7 +115,7 @@ def one_amplitude(d):
     n, ts = 1400, r4(1 / (70 * d.f0))
     plays = [d.amplitude * np.cos(2 * np.pi * q * d.f0 * np.arange(n) * ts) for q in (1.0, 1.04, 1.02)]
     place = ("carriage", "ground")
-    return d.model("carriage"), [(k, place) for k in ("damper", "quadratic_drag")], plays, ts, (0.04, 0.12)
+    return d.model("carriage"), [(k, place) for k in ("damper", "quadratic_drag")], plays, ts, (0.2, 0.45)
 
 
 def side_of_a_joint(kind):

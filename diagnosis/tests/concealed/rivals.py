@@ -32,7 +32,7 @@ ROOT = os.path.join(WORKSPACE, "..", "shared", "concealed")
 FIT, HELD = 2, 1           # recordings of a case
 NEAR = (0.4, 2.0)          # standard deviations between the rivals over all recordings together
 SEEN = 25.0                # standard deviations between the device and the best that the nominal structure can do, at least
-LEVELS = (1e-3, 0.3)      # noise over the standard deviation of the signal
+LEVELS = (1e-3, 0.7)      # noise over the standard deviation of the signal
 
 
 class Redraw(Exception):
@@ -204,7 +204,9 @@ def draw(o):
         name, why, seeds = "case-%03d" % (i + 1), [], np.random.default_rng(seed)
         if os.path.exists(os.path.join(o.out, "truth", name + ".json")):
             continue
-        for _ in range(60):
+        for tried in range(120):
+            if tried == 30:                            # a kind that will not be drawn makes room for another
+                kind = str(seeds.choice([k for k in names if k != kind] or names))
             try:
                 case = make(core, kind, np.random.default_rng(seeds.integers(2**62)))
             except (Redraw, core.SimError, FloatingPointError, np.linalg.LinAlgError) as e:
