@@ -15,7 +15,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         return Err(format!("--rate must be above 0, is {rate}").into());
     }
     let experiments = load_experiments(Path::new(file))?;
-    let [experiment] = experiments.as_slice() else { return Err(format!("{file}: holds {} experiments, not one", experiments.len()).into()) };
+    let [experiment] = experiments.as_slice() else {
+        return Err(format!("{file}: holds {} experiments, not one", experiments.len()).into());
+    };
     let mut columns: Vec<Vec<f64>> = Vec::new();
     let mut text = String::from("t");
     for (input, excitation) in &experiment.drives {

@@ -154,7 +154,13 @@ impl<'a> Planner<'a> {
     ///
     /// # Errors
     /// Why they cannot be separated, where no sensor would.
-    pub(super) fn with_sensor(&self, rivals: &[Rival], cases: &[Case], Pair { a, b, directed, .. }: Pair, reached: f64) -> Result<Experiment, Reason> {
+    pub(super) fn with_sensor(
+        &self,
+        rivals: &[Rival],
+        cases: &[Case],
+        Pair { a, b, directed, .. }: Pair,
+        reached: f64,
+    ) -> Result<Experiment, Reason> {
         let (a, b) = (&rivals[a], &rivals[b]);
         let [one, other] = words::names(a.structure, b.structure);
         let mut said = format!("No excitation tells {one} and {other} apart with the sensors there are");
@@ -169,7 +175,8 @@ impl<'a> Planner<'a> {
         let spread: Vec<&Case> = all.iter().step_by((all.len() / 4).max(1)).take(4).copied().collect();
         let trials: Vec<&Trial> = spread.iter().map(|c| &c.trial).collect();
         let best = if directed { None } else { sensor::best(&self.setup, &trials, [a, b]) };
-        let Some((sensor, case)) = best.filter(|s| s.separation >= tuning().experiment.wanted).and_then(|s| Some((s.clone(), *spread.get(s.trial)?)))
+        let Some((sensor, case)) =
+            best.filter(|s| s.separation >= tuning().experiment.wanted).and_then(|s| Some((s.clone(), *spread.get(s.trial)?)))
         else {
             if !directed {
                 said.push_str("; nor does any further sensor of position, velocity or element force");
@@ -186,7 +193,11 @@ impl<'a> Planner<'a> {
         let between = rivals.iter().map(|r| r.structure.name()).collect();
         let level = sensor.separation * (a.unit.max(b.unit) / case.trial.record.len.max(1) as f64).sqrt();
         let plan = self.experiment(case, said, between, sensor.separation, &difference, level);
-        Ok(Experiment { output: sensor.new.of.clone().or_else(|| sensor.new.element.clone()).unwrap_or_default(), sensor: Some(sensor.new), ..plan })
+        Ok(Experiment {
+            output: sensor.new.of.clone().or_else(|| sensor.new.element.clone()).unwrap_or_default(),
+            sensor: Some(sensor.new),
+            ..plan
+        })
     }
 
     /// The experiment that separates a pair best; `inseparable` is a pair that it does not.

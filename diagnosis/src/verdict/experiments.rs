@@ -28,7 +28,12 @@ pub(super) fn next_experiment<'a, 's>(
     }
 }
 
-fn planned<'a, 's>(problem: &'a Problem, search: &'s Search, decision: &mut Decision<'s>, budget: &Budget<'a>) -> Result<Experiment, Reason> {
+fn planned<'a, 's>(
+    problem: &'a Problem,
+    search: &'s Search,
+    decision: &mut Decision<'s>,
+    budget: &Budget<'a>,
+) -> Result<Experiment, Reason> {
     let best = decision.best;
     let apart = |rivals: &[&Candidate]| separate(problem, &[&[best], rivals].concat(), &search.noise_sd, budget);
     let mut inseparable = None;

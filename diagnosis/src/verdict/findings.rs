@@ -86,7 +86,11 @@ pub(super) fn share_with_rivals(search: &Search, best: &Candidate, rivals: &[&Ca
                 let share = round_significant((before - after) * weight(rival) / others, 3);
                 match finding.alternatives.iter_mut().find(|a| a.physics == h.physics.name && a.place.same(&h.place)) {
                     Some(there) => there.confidence = round_significant((there.confidence + share).min(finding.confidence), 3),
-                    None => finding.alternatives.push(Alternative { physics: h.physics.name.to_string(), place: h.place.clone(), confidence: share }),
+                    None => finding.alternatives.push(Alternative {
+                        physics: h.physics.name.to_string(),
+                        place: h.place.clone(),
+                        confidence: share,
+                    }),
                 }
             }
         }
