@@ -8,7 +8,7 @@ use backdrive_diagnosis::diagnose::diagnose;
 use backdrive_diagnosis::problem::Problem;
 use backdrive_diagnosis::search::Settings;
 use backdrive_diagnosis::tuning::Tuning;
-use backdrive_diagnosis::verdict::{MODEL_FILE, VERDICT_FILE};
+use backdrive_diagnosis::verdict::{EXPERIMENT_FILE, MODEL_FILE, VERDICT_FILE, rival_file};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -47,6 +47,12 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     std::fs::create_dir_all(&out)?;
     std::fs::write(out.join(VERDICT_FILE), serde_json::to_string_pretty(&said.verdict)?)?;
     std::fs::write(out.join(MODEL_FILE), &said.files.model)?;
+    for (number, rival) in said.files.rivals.iter().enumerate() {
+        std::fs::write(out.join(rival_file(number + 1)), rival)?;
+    }
+    if let Some(experiment) = &said.files.experiment {
+        std::fs::write(out.join(EXPERIMENT_FILE), experiment)?;
+    }
     let seconds = began.elapsed().as_secs_f64();
     std::fs::write(out.join("time.txt"), format!("{seconds:.2}\n"))?;
     println!("{set}: {} ({seconds:.1} s)", said.verdict.sentence);

@@ -2,6 +2,7 @@
 
 use crate::audit::{Remark, Weight, audit};
 use crate::candidate::price;
+use crate::contenders::with_contenders;
 use crate::hold;
 use crate::locate::{self, Location, locate};
 use crate::per_record::{PerRecord, fit_each};
@@ -63,6 +64,8 @@ pub fn diagnose(
     let (problem, fewer) = thinned(problem);
     remarks.extend(fewer);
     let (problem, search) = with_inputs_as_they_run(problem, settings, limit, report, &mut remarks)?;
+    report("fitting what could stand in its place");
+    let search = with_contenders(&problem, search, &settings.without, &Budget::new(tuning().experiment.contender_work, limit));
     remarks.extend(timing(&problem, &search));
     report("locating the missing force");
     let location = located(&problem, &search);

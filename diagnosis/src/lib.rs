@@ -10,6 +10,7 @@
 pub mod audit;
 pub mod candidate;
 pub mod compare;
+pub mod contenders;
 pub(crate) mod coupled;
 pub mod coupling;
 mod derivatives;

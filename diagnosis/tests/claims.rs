@@ -5,8 +5,9 @@ use backdrive_diagnosis::error_budget::Source;
 use backdrive_diagnosis::hold;
 use backdrive_diagnosis::problem::{Problem, Record};
 use backdrive_diagnosis::search::{Settings, search};
-use backdrive_diagnosis::verdict::{Parameter, Verdict, Word, timing, verdict};
+use backdrive_diagnosis::verdict::{NextExperiment, Parameter, Verdict, Word, timing, verdict};
 use backdrive_diagnosis::work::Limit;
+use backdrive_plant::excitation::Excitation;
 use backdrive_plant::model::{Hold, Model};
 use backdrive_plant::recording::Recording;
 use backdrive_plant::set::Initial;
@@ -233,4 +234,65 @@ fn a_body_in_a_joint_is_found_where_stiffness_and_inertia_have_absorbed_it() {
     let [Some(low), Some(high)] = stiffness.ci95 else { panic!("{stiffness:?}") };
     assert!([800.0, 980.0].iter().any(|k| (low..high).contains(k) && (stiffness.value - k).abs() < 0.1 * k), "{stiffness:?}");
     assert!(said.remaining.unwrap().noise_sd.unwrap() < 1.1);
+}
+
+const PUSHED: &str = r#"
+name = "pushed"
+motion = "translation"
+[bodies]
+carriage = 0.5
+[[elements]]
+name = "drag"
+kind = "damper"
+between = ["carriage", "ground"]
+damping = 4.0
+[[inputs]]
+name = "push"
+kind = "force"
+on = "carriage"
+[[outputs]]
+name = "speed"
+kind = "velocity"
+of = "carriage"
+"#;
+
+/// While a body only moves one way, dry friction and a constant force are one number; once it also moves back they are not.
+#[test]
+fn what_one_direction_cannot_tell_is_ambiguous_until_the_experiment_that_was_proposed() {
+    let truth = format!("{PUSHED}\n[[elements]]\nname = \"rub\"\nkind = \"coulomb\"\nbetween = [\"carriage\", \"ground\"]\nforce = 0.6\n");
+    let push = |f: f64| -> Vec<Course> {
+        vec![Box::new(move |t| if t < 0.08 { 12.0 } else { 3.0 + 0.3 * (TAU * f * t).sin() + 0.2 * (TAU * 2.3 * f * t).sin() })]
+    };
+    let bench =
+        Bench { truth: &truth, nominal: PUSHED, noise_sd: 1e-3, input_noise: 0.0, excitations: vec![push(1.0), push(1.7), push(1.3)] };
+    let first = diagnose(bench.problem(5), &Settings::default(), None, &|_| {}).unwrap();
+    let said = &first.verdict;
+    println!("{} {:?}", said.sentence, said.next_experiment);
+    assert_eq!(said.word, Word::Ambiguous, "{}", said.sentence);
+    let finding = &said.findings[0];
+    let named: Vec<&str> =
+        std::iter::once(&finding.physics).chain(finding.alternatives.iter().map(|a| &a.physics)).map(String::as_str).collect();
+    assert!(named.contains(&"coulomb") && named.contains(&"bias") && finding.confidence < 0.6, "{finding:?}");
+    let Some(NextExperiment::Planned(plan)) = &said.next_experiment else { panic!("{:?}", said.next_experiment) };
+    assert!(plan.sensor.is_none() && plan.separation_sd.is_some_and(|sd| sd >= 1.5), "{plan:?}");
+
+    // The same as it is played, twice: once to fit, once held out.
+    let excitation: Excitation = plan.excitation.parse().unwrap();
+    let played = excitation.samples(plan.rate_hz).unwrap();
+    let mut problem = bench.problem(5);
+    for seed in [71, 72] {
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let device = Model::from_toml(&truth, "truth").unwrap();
+        let clean = simulate(&device, std::slice::from_ref(&played), 1.0 / plan.rate_hz, &Options::default()).unwrap();
+        let t = (0..played.len()).map(|k| k as f64 / plan.rate_hz).collect();
+        let signals = vec![("push".to_string(), played.clone()), ("speed".to_string(), noisy(&clean[0], 1e-3, &mut random))];
+        let record = Record::new(&Recording::new(format!("next-{seed}"), t, signals).unwrap(), &problem.model, Vec::new()).unwrap();
+        if seed == 71 { problem.fit.push(record) } else { problem.held_out.push(record) }
+    }
+    let wider =
+        Problem::new(PUSHED.to_string(), "nominal.toml".into(), problem.model, problem.fit, problem.held_out, Initial::Rest).unwrap();
+    let second = diagnose(wider, &Settings::default(), None, &|_| {}).unwrap().verdict;
+    println!("{}", second.sentence);
+    assert_eq!((second.word, second.findings[0].physics.as_str()), (Word::Missing, "coulomb"), "{}", second.sentence);
+    assert!(second.findings[0].confidence > finding.confidence);
 }

@@ -6,7 +6,10 @@
 //! excitations within the range of the recordings (`menu.rs`) the one is taken that separates the worst pair best per second. Separation counts in
 //! standard deviations: the root of the cost that the wrong rival would have above the right one.
 //!
-//! Where no excitation separates them, a further sensor that would is named.
+//! Where no excitation separates them, a further sensor that would is part of the experiment.
+//!
+//! Of two laws of which one contains the other, the richer one can always imitate the simpler one. They are told apart where the simpler one cannot imitate what the richer
+//! one, as it was fitted, would do.
 
 mod determine;
 mod extra_output;
@@ -22,5 +25,5 @@ mod types;
 mod words;
 
 pub use determine::excite;
-pub use separate::separate;
-pub use types::{Experiment, Reason};
+pub use separate::{confirm, separate};
+pub use types::{Experiment, NewSensor, Reason};

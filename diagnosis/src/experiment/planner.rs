@@ -23,6 +23,17 @@ pub(super) fn same(a: &Structure, b: &Structure) -> bool {
     classes(a) == classes(b)
 }
 
+/// Two rivals, by their index.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Pair {
+    pub a: usize,
+    pub b: usize,
+    /// Whether only the first has to fail to imitate the second, which contains it.
+    pub directed: bool,
+    /// Separation from which an experiment tells them apart, standard deviations in one playing.
+    pub least: f64,
+}
+
 /// An experiment with what each rival predicts for it.
 pub(super) struct Case {
     pub trial: Trial,
@@ -33,16 +44,16 @@ pub(super) struct Case {
 /// How well a case, by its index, separates each pair of rivals, standard deviations.
 pub(super) struct Evaluated {
     pub case: usize,
-    pub pairs: Vec<((usize, usize), f64)>,
+    pub pairs: Vec<(Pair, f64)>,
 }
 
 impl Evaluated {
-    pub(super) fn of(&self, pair: (usize, usize)) -> f64 {
+    pub(super) fn of(&self, pair: Pair) -> f64 {
         self.pairs.iter().find(|p| p.0 == pair).map_or(0.0, |p| p.1)
     }
 
     /// Squared separation of the worst of some pairs per second.
-    pub(super) fn score(&self, pairs: &[(usize, usize)], cases: &[Case]) -> f64 {
+    pub(super) fn score(&self, pairs: &[Pair], cases: &[Case]) -> f64 {
         let worst = pairs.iter().map(|p| self.of(*p)).fold(f64::INFINITY, f64::min);
         worst * worst / (cases[self.case].trial.seconds() + tuning().experiment.setting_up)
     }
@@ -105,11 +116,11 @@ impl<'a> Planner<'a> {
 
     /// How well experiments separate the rivals, to first order in their parameters. An experiment whose difference of predictions is smaller than what
     /// another separates is not evaluated. Sorts `cases` by that difference, largest first.
-    pub(super) fn evaluate(&self, rivals: &[Rival], cases: &mut [Case], pairs: &[(usize, usize)], least: f64) -> Vec<Evaluated> {
+    pub(super) fn evaluate(&self, rivals: &[Rival], cases: &mut [Case], pairs: &[Pair]) -> Vec<Evaluated> {
         let potential = |case: &Case| {
-            let one = |(a, b): &(usize, usize)| {
-                let difference: f64 = case.predictions[*a].iter().zip(&case.predictions[*b]).map(|(x, y)| (x - y).powi(2)).sum();
-                difference / rivals[*a].unit.max(rivals[*b].unit)
+            let one = |p: &Pair| {
+                let difference: f64 = case.predictions[p.a].iter().zip(&case.predictions[p.b]).map(|(x, y)| (x - y).powi(2)).sum();
+                difference / rivals[p.a].unit.max(rivals[p.b].unit)
             };
             pairs.iter().map(one).fold(f64::INFINITY, f64::min) / (case.trial.seconds() + tuning().experiment.setting_up)
         };
@@ -117,7 +128,7 @@ impl<'a> Planner<'a> {
         let mut all: Vec<Evaluated> = Vec::new();
         let mut at = 0;
         while at < cases.len() && (at == 0 || self.setup.budget.spent() < self.ends.1) {
-            let best = all.iter().filter(|e| e.pairs.iter().all(|p| p.1 >= least)).map(|e| e.score(pairs, cases)).fold(0.0, f64::max);
+            let best = all.iter().filter(|e| e.pairs.iter().all(|p| p.1 >= p.0.least)).map(|e| e.score(pairs, cases)).fold(0.0, f64::max);
             if pairs.is_empty() || potential(&cases[at]) < best {
                 break;
             }
@@ -127,19 +138,29 @@ impl<'a> Planner<'a> {
                 let case = &cases[*s];
                 let one = |(r, rival): (usize, &Rival)| rival.jacobian(&self.setup, &case.trial, &rival.own, &case.predictions[r]);
                 let jacobians: Vec<Vec<Vec<f64>>> = rivals.par_iter().enumerate().map(one).collect();
-                let left = |a: usize, b: usize| {
+                let left = |Pair { a, b, directed, .. }: Pair| {
                     let difference: Vec<f64> = case.predictions[b].iter().zip(&case.predictions[a]).map(|(x, y)| x - y).collect();
-                    rivals[a].unexplained(&jacobians[a], &difference).min(rivals[b].unexplained(&jacobians[b], &difference))
+                    let one = rivals[a].unexplained(&jacobians[a], &difference);
+                    if directed { one } else { one.min(rivals[b].unexplained(&jacobians[b], &difference)) }
                 };
-                let sd = |p: &(usize, usize)| (*p, (left(p.0, p.1) / rivals[p.0].unit.max(rivals[p.1].unit)).sqrt());
+                let sd = |p: &Pair| (*p, (left(*p) / rivals[p.a].unit.max(rivals[p.b].unit)).sqrt());
                 Evaluated { case: *s, pairs: pairs.iter().map(sd).collect() }
             }));
         }
         all
     }
 
-    /// Why two rivals cannot be separated, and by which sensor they could.
-    pub(super) fn no_experiment(&self, rivals: &[Rival], cases: &[Case], (a, b): (usize, usize), reached: f64) -> Reason {
+    /// The experiment with a further sensor that separates two rivals which no excitation does.
+    ///
+    /// # Errors
+    /// Why they cannot be separated, where no sensor would.
+    pub(super) fn with_sensor(
+        &self,
+        rivals: &[Rival],
+        cases: &[Case],
+        Pair { a, b, directed, .. }: Pair,
+        reached: f64,
+    ) -> Result<Experiment, Reason> {
         let (a, b) = (&rivals[a], &rivals[b]);
         let [one, other] = words::names(a.structure, b.structure);
         let mut said = format!("No excitation tells {one} and {other} apart with the sensors there are");
@@ -149,20 +170,34 @@ impl<'a> Planner<'a> {
             said.push_str(&format!(" (at most {} standard deviations)", short(reached)));
         }
         // Some of the excitations, from the longest on.
-        let mut trials: Vec<&Trial> = cases.iter().map(|s| &s.trial).collect();
-        trials.sort_by(|x, y| y.seconds().total_cmp(&x.seconds()));
-        let spread: Vec<&Trial> = trials.iter().step_by((trials.len() / 4).max(1)).take(4).copied().collect();
-        let found = sensor::best(&self.setup, &spread, [a, b]).filter(|s| s.separation >= tuning().experiment.wanted);
-        match found {
-            Some(sensor) => said.push_str(&format!(
-                "; measuring {} as well would ({} standard deviations with {}).",
-                sensor.words,
-                short(sensor.separation),
-                spread.get(sensor.trial).map_or(String::new(), |t| words::described(&self.setup.problem.model, t))
-            )),
-            None => said.push_str("; nor does any further sensor of position, velocity or element force."),
-        }
-        Reason(said)
+        let mut all: Vec<&Case> = cases.iter().collect();
+        all.sort_by(|x, y| y.trial.seconds().total_cmp(&x.trial.seconds()));
+        let spread: Vec<&Case> = all.iter().step_by((all.len() / 4).max(1)).take(4).copied().collect();
+        let trials: Vec<&Trial> = spread.iter().map(|c| &c.trial).collect();
+        let best = if directed { None } else { sensor::best(&self.setup, &trials, [a, b]) };
+        let Some((sensor, case)) =
+            best.filter(|s| s.separation >= tuning().experiment.wanted).and_then(|s| Some((s.clone(), *spread.get(s.trial)?)))
+        else {
+            if !directed {
+                said.push_str("; nor does any further sensor of position, velocity or element force");
+            }
+            return Err(Reason(format!("{said}.")));
+        };
+        said.push_str(&format!(
+            "; measuring {} as well would ({} standard deviations with {}).",
+            sensor.words,
+            short(sensor.separation),
+            words::described(&self.setup.problem.model, &case.trial)
+        ));
+        let difference: Vec<f64> = Vec::new();
+        let between = rivals.iter().map(|r| r.structure.name()).collect();
+        let level = sensor.separation * (a.unit.max(b.unit) / case.trial.record.len.max(1) as f64).sqrt();
+        let plan = self.experiment(case, said, between, sensor.separation, &difference, level);
+        Ok(Experiment {
+            output: sensor.new.of.clone().or_else(|| sensor.new.element.clone()).unwrap_or_default(),
+            sensor: Some(sensor.new),
+            ..plan
+        })
     }
 
     /// The experiment that separates a pair best; `inseparable` is a pair that it does not.
@@ -170,9 +205,9 @@ impl<'a> Planner<'a> {
         &self,
         rivals: &[Rival],
         case: &Case,
-        (a, b): (usize, usize),
+        Pair { a, b, directed, .. }: Pair,
         separation: f64,
-        inseparable: Option<(usize, usize)>,
+        inseparable: Option<Pair>,
     ) -> Experiment {
         let difference: Vec<f64> = case.predictions[a].iter().zip(&case.predictions[b]).map(|(x, y)| x - y).collect();
         let unit = rivals[a].unit.max(rivals[b].unit);
@@ -182,16 +217,17 @@ impl<'a> Planner<'a> {
         let repeats = repeats(separation);
         let again = if repeats > 1 { format!(", {repeats} times") } else { String::new() };
         let mut sentence = format!(
-            "Play {}{again}: {one} and {other} then part by {} standard deviations ({} noise standard deviations rms, most of it in {output}), each refitted to it",
+            "Play {}{again}: {one} and {other} then part by {} standard deviations ({} noise standard deviations rms, most of it in {output}), {}",
             words::described(&self.setup.problem.model, &case.trial),
             short(separation * f64::from(repeats).sqrt()),
-            short(level)
+            short(level),
+            if directed { "the simpler one refitted to it" } else { "each refitted to it" }
         );
         if let Some(why) = words::separator(rivals[a].structure, rivals[b].structure) {
             sentence.push_str(&format!("; {why}"));
         }
         sentence.push('.');
-        if let Some((c, d)) = inseparable {
+        if let Some(Pair { a: c, b: d, .. }) = inseparable {
             let [one, other] = words::names(rivals[c].structure, rivals[d].structure);
             sentence.push_str(&format!(" It does not tell {one} and {other} apart."));
         }
@@ -226,6 +262,7 @@ impl<'a> Planner<'a> {
             separation,
             level,
             output: self.most(case, change),
+            sensor: None,
             repeats: repeats(separation),
             duration: case.trial.seconds(),
             rate_hz: self.rate_hz,

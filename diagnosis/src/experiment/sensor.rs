@@ -3,6 +3,7 @@
 use super::extra_output::output;
 use super::rivals::Rival;
 use super::setup::{Setup, Trial};
+use super::types::NewSensor;
 use crate::tuning::tuning;
 use backdrive_plant::describe::unit_for;
 use backdrive_plant::model::{InputKind, OutputKind};
@@ -13,6 +14,8 @@ use backdrive_plant::write::round_significant;
 pub(super) struct Sensor {
     /// Such as `the position of "load"`, with how good it must be.
     pub words: String,
+    /// The same for a program.
+    pub new: NewSensor,
     /// Standard deviations between the rivals with it.
     pub separation: f64,
     /// Which of the trials shows it.
@@ -72,7 +75,7 @@ pub(super) fn best(setup: &Setup, trials: &[&Trial], pair: [&Rival; 2]) -> Optio
             let separation = (left.fold(f64::INFINITY, f64::min) / unit).sqrt();
             if found.as_ref().is_none_or(|f| separation > f.separation) {
                 let noise_sd = wide.sensors.noise_sd[setup.sensors.noise_sd.len() + e];
-                found = Some(Sensor { words: words(setup, kind, noise_sd), separation, trial: index });
+                found = Some(Sensor { words: words(setup, kind, noise_sd), new: new(setup, kind, noise_sd), separation, trial: index });
             }
         }
     }
@@ -95,6 +98,20 @@ fn like(setup: &Setup, kind: &OutputKind) -> Option<f64> {
         .filter(|((o, noise_sd), there)| **there && same(&o.kind) && noise_sd.is_finite())
         .map(|((_, noise_sd), _)| *noise_sd)
         .reduce(f64::min)
+}
+
+/// A sensor as an output of a model file has it.
+fn new(setup: &Setup, kind: &OutputKind, noise_sd: f64) -> NewSensor {
+    let model = &setup.problem.model;
+    let body = |b: &usize| model.bodies.get(*b).map(|b| b.name.clone());
+    let (name, of, element) = match kind {
+        OutputKind::Position(b) => ("position", body(b), None),
+        OutputKind::Velocity(b) => ("velocity", body(b), None),
+        OutputKind::Acceleration(b) => ("acceleration", body(b), None),
+        OutputKind::Reaction(b) => ("reaction", body(b), None),
+        OutputKind::Force(list) => ("force", None, list.first().and_then(|e| model.elements.get(*e)).map(|e| e.name.clone())),
+    };
+    NewSensor { kind: name.to_string(), of, element, noise_sd: round_significant(noise_sd, 2) }
 }
 
 fn words(setup: &Setup, kind: &OutputKind, noise_sd: f64) -> String {

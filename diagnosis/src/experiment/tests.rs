@@ -2,6 +2,7 @@
 
 use super::separate::separate_fitted;
 use super::*;
+use crate::candidate::{Candidate, candidate};
 use crate::evaluator::Evaluator;
 use crate::fit::Fit;
 use crate::hypothesis::{Hypothesis, Scales};
@@ -203,9 +204,46 @@ fn the_sensor_that_would_help_is_named() {
     let late = TWO.replace("on = \"motor\"", "on = \"motor\"\ndelay = 0.004");
     let problem = problem(TWO, &late, (0..4000).map(|k| (1e-5 * f64::from(k * k)).sin() * 2.0).collect(), 2e-5);
     let (a, b) = (fitted(&problem, &["delay@force"]), fitted(&problem, &["delay@position"]));
-    let said = separate_fitted(&problem, &[(&a.0, &a.1), (&b.0, &b.1)], &problem.noise_sd, &soon()).unwrap_err().to_string();
-    println!("{said}");
-    assert!(said.contains("measuring the"), "{said}");
+    let plan = separate_fitted(&problem, &[(&a.0, &a.1), (&b.0, &b.1)], &problem.noise_sd, &soon()).unwrap();
+    println!("{plan:#?}");
+    assert!(plan.sentence.contains("measuring the") && plan.separation >= tuning().experiment.wanted, "{plan:?}");
+    // A program can add it: an output that is not there yet, of a body or of an element that is.
+    let sensor = plan.sensor.unwrap();
+    let named = |name: &Option<String>, all: &[&str]| name.as_ref().is_some_and(|name| all.contains(&name.as_str()));
+    let is_motion = ["position", "velocity"].contains(&sensor.kind.as_str()) && named(&sensor.of, &["motor", "load"]);
+    assert!(is_motion || sensor.kind == "force" && named(&sensor.element, &["belt", "loss", "anchor"]), "{sensor:?}");
+    assert!(sensor.noise_sd > 0.0 && (sensor.kind.as_str(), sensor.of.as_deref()) != ("position", Some("motor")), "{sensor:?}");
+    assert_eq!(columns(&plan.text, &problem.model).len(), 1, "{}", plan.text);
+}
+
+/// A candidate as a search has it.
+fn as_candidate(problem: &Problem, (structure, fit): (Structure, Fit)) -> Candidate {
+    candidate(&Evaluator::new(problem), structure, fit)
+}
+
+#[test]
+fn a_law_that_contains_another_is_told_from_it_by_what_the_other_cannot_imitate() {
+    // Pushed one way only: lopsided friction is dry friction there, and its other side is as it was started.
+    let push: Vec<f64> = (0..3000).map(|k| if k < 40 { 3.0 } else { 0.6 + 0.1 * (0.02 * f64::from(k)).sin() }).collect();
+    let free = MASS.replace("kind = \"spring\"", "kind = \"damper\"").replace("stiffness = 200.0", "damping = 0.8");
+    let rubbing = format!("{free}{RUB}");
+    let problem = problem(&free, &rubbing, push, 1e-4);
+    let simple = as_candidate(&problem, fitted(&problem, &["coulomb@mass-ground"]));
+    let mut rich = as_candidate(&problem, fitted(&problem, &["asymmetric_coulomb@mass-ground"]));
+    let back = rich.structure.free.len() - 1;
+    rich.fit.values[back] = 0.4 * simple.fit.values[simple.fit.values.len() - 1];
+    let plan = confirm(&problem, [&simple, &rich], true, &problem.noise_sd, &soon()).unwrap();
+    println!("{plan:#?}");
+    assert!(
+        plan.separation >= tuning().experiment.wanted && plan.repeats == 1 && plan.sentence.contains("the simpler one refitted"),
+        "{plan:?}"
+    );
+    // As equals they are not told apart: the richer one imitates the other in any experiment.
+    assert!(confirm(&problem, [&simple, &rich], false, &problem.noise_sd, &soon()).is_err());
+    // And where the richer one is the simpler one, there is nothing to tell.
+    rich.fit.values[back] = simple.fit.values[simple.fit.values.len() - 1];
+    rich.fit.values[back - 1] = rich.fit.values[back];
+    assert!(confirm(&problem, [&simple, &rich], true, &problem.noise_sd, &soon()).is_err());
 }
 
 #[test]

@@ -21,12 +21,27 @@ pub struct Experiment {
     pub level: f64,
     /// The output in which most of it shows.
     pub output: String,
+    /// A sensor that has to be added for it; `None` where those there are do.
+    pub sensor: Option<NewSensor>,
     /// How often it has to be played for `experiment.wanted` standard deviations.
     pub repeats: u32,
     /// Length of one playing, s.
     pub duration: f64,
     /// Sampling rate that it was planned for, Hz.
     pub rate_hz: f64,
+}
+
+/// A sensor that the device does not have.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NewSensor {
+    /// Its kind, as an output of a model has it: `position`, `velocity`, `force`.
+    pub kind: String,
+    /// The body that it is on; `None` for a force.
+    pub of: Option<String>,
+    /// The element whose force it reads; `None` for a motion.
+    pub element: Option<String>,
+    /// The noise that it may have at most for the experiment to tell as much as is said, standard deviation, SI unit.
+    pub noise_sd: f64,
 }
 
 /// Why there is no experiment, in one sentence that says what would help.

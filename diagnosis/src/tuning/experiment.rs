@@ -31,6 +31,14 @@ group! {
         substeps: [usize; 2] = [4, 16], "substeps", Cost("as fit.middle_substeps");
         /// Standard deviation of a parameter, as a share of it, from which it is taken as open.
         open: f64 = 0.05, "-", Judgement("5 % is what a data sheet says");
+        /// Explanations that no fit was made of and that are fitted before anything is claimed, at most.
+        contenders: usize = 8, "structures", Cost("simple laws at a place and its neighbours");
+        /// How far such an explanation may be behind to be fitted to its end.
+        contender_behind: f64 = 40.0, "criterion", Judgement("twice claim.softened: with few substeps and steps not taken yet a fit is known no better");
+        /// Starts from which each of them is tried.
+        contender_starts: usize = 3, "starts", Cost("the first are the most plausible");
+        /// Work for these fits.
+        contender_work: u64 = 30_000_000, "simulation steps", Cost("a fortieth of the work");
         /// Noise of a sensor that is not there, as a share of what it would read, where no other of its kind is.
         sensor_noise: f64 = 0.01, "-", Judgement("a common sensor");
     }

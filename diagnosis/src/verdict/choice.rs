@@ -7,6 +7,7 @@ use crate::hypothesis::{Hypothesis, Physics};
 use crate::physics::{PHYSICS, withheld};
 use crate::predictive::{Gain, gain};
 use crate::search::Search;
+use crate::statistics::advantage;
 use crate::tuning::tuning;
 use std::collections::HashSet;
 
@@ -120,18 +121,13 @@ fn worth(search: &Search, base: &Candidate, better: &Candidate) -> bool {
         && predicts(search, base, better)
 }
 
-/// Structures of as many effects that cannot be told from the best: another place, or a law that is no richer form of its own.
+/// Structures of as many effects that cannot be told from the best: another place, or a law that does not contain its own.
 pub(super) fn alike<'s>(search: &'s Search, best: &Candidate) -> Vec<&'s Candidate> {
-    let ids = |c: &Candidate| c.structure.added.iter().map(|h| h.id.clone()).collect::<HashSet<String>>();
-    let own = ids(best);
-    let differs = |c: &Candidate| {
-        let other: Vec<&Hypothesis> = c.structure.added.iter().filter(|h| !own.contains(&h.id)).collect();
-        let mine: Vec<&Hypothesis> = best.structure.added.iter().filter(|h| !ids(c).contains(&h.id)).collect();
-        match (other.as_slice(), mine.as_slice()) {
-            ([rival], [own]) => !(rival.place.same(&own.place) && contains(rival.physics, own)) && rival.class != own.class,
-            ([], _) => false,
-            _ => true,
+    let differs = |c: &Candidate| match exchanged(best, c) {
+        (own, other) if own.len() == 1 && other.len() == 1 => {
+            !(other[0].place.same(&own[0].place) && has_as_limit(other[0].physics, own[0].physics)) && other[0].class != own[0].class
         }
+        (_, other) => !other.is_empty(),
     };
     let mut seen = HashSet::new();
     // A fit that is not at its end may still come as near.
@@ -143,7 +139,55 @@ pub(super) fn alike<'s>(search: &'s Search, best: &Candidate) -> Vec<&'s Candida
             && is_plausible(c)
             && differs(c)
     };
-    search.found.iter().filter(close).filter(|c| seen.insert(c.structure.name())).take(tuning().claim.rivals).collect()
+    let all: Vec<&Candidate> = search.found.iter().filter(close).filter(|c| seen.insert(c.structure.name())).collect();
+    let is_finer = |c: &Candidate| all.iter().any(|other| c.structure.free.len() > other.structure.free.len() && is_finer_than(other, c));
+    all.iter().copied().filter(|c| !is_finer(c)).take(tuning().claim.rivals).collect()
+}
+
+/// Whether two structures differ in one effect, and the first has a special or limiting case of the other's there: what that one explains is no other explanation.
+fn is_finer_than(simple: &Candidate, rich: &Candidate) -> bool {
+    match exchanged(simple, rich) {
+        (own, other) if own.len() == 1 && other.len() == 1 => {
+            other[0].place.same(&own[0].place) && own[0].physics != other[0].physics && has_as_limit(other[0].physics, own[0].physics)
+        }
+        _ => false,
+    }
+}
+
+/// A law with more numbers that fits as well as the one that is claimed.
+pub(super) struct Richer<'s> {
+    pub candidate: &'s Candidate,
+    /// Whether the one that is claimed is a special or limiting case of it, in the same place.
+    pub contains: bool,
+}
+
+/// Structures that lose for their numbers alone: one effect exchanged for a law with more of them, which fits as well. That a simpler law is preferred says nothing of
+/// what the device does where it was not recorded. The simplest first.
+pub(super) fn richer<'s>(search: &'s Search, best: &Candidate) -> Vec<Richer<'s>> {
+    let mut all: Vec<Richer> = Vec::new();
+    for c in search.found.iter().filter(|c| c.structure.added.len() == best.structure.added.len() && is_plausible(c)) {
+        let (own, other) = exchanged(best, c);
+        let ([own], [other]) = (own.as_slice(), other.as_slice()) else { continue };
+        let fits = advantage(c.fit.cost, 0, best.fit.cost, 0, search.samples, best.correlation_time) + unseen_evidence(search, c, best);
+        if c.structure.free.len() > best.structure.free.len() && other.class != own.class && fits < tuning().claim.alike {
+            let contains = other.place.same(&own.place) && has_as_limit(other.physics, own.physics);
+            all.push(Richer { candidate: c, contains });
+        }
+    }
+    all.sort_by(|a, b| {
+        let of = |r: &Richer| (r.candidate.structure.free.len(), r.candidate.fit.cost);
+        of(a).0.cmp(&of(b).0).then(of(a).1.total_cmp(&of(b).1))
+    });
+    all.truncate(tuning().claim.rivals);
+    all
+}
+
+/// The effects in which two structures differ: of the first, and of the second.
+pub(super) fn exchanged<'c>(best: &'c Candidate, other: &'c Candidate) -> (Vec<&'c Hypothesis>, Vec<&'c Hypothesis>) {
+    let only = |c: &'c Candidate, o: &Candidate| -> Vec<&'c Hypothesis> {
+        c.structure.added.iter().filter(|h| o.structure.added.iter().all(|q| q.id != h.id)).collect()
+    };
+    (only(best, other), only(other, best))
 }
 
 /// The structures of as many effects that come nearest to the best, at most two.
@@ -154,6 +198,11 @@ pub(super) fn nearest<'s>(search: &'s Search, best: &Candidate) -> Vec<&'s Candi
     rivals.sort_by(|a, b| evidence(search, a, best).total_cmp(&evidence(search, b, best)));
     rivals.truncate(2);
     rivals
+}
+
+/// Whether a physics has another one as a special or limiting case, or is the same.
+fn has_as_limit(rich: &Physics, own: &Physics) -> bool {
+    withheld(&[own.name]).contains(&rich.name)
 }
 
 /// Whether a physics has another one, or one of its family at the same place, as a special or limiting case.

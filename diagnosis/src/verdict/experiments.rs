@@ -1,12 +1,12 @@
 //! The next experiment, or why none would help.
 
-use super::choice::nearest;
+use super::choice::{exchanged, nearest, richer};
 use super::decision::Decision;
 use super::remaining::next_effect;
 use super::rounded::rounded;
-use super::types::{NextExperiment, Planned, Refused, Word};
+use super::types::{NextExperiment, Planned, Refused, Sensor, Word};
 use crate::candidate::Candidate;
-use crate::experiment::{Experiment, Reason, excite, separate};
+use crate::experiment::{Experiment, NewSensor, Reason, confirm, excite, separate};
 use crate::problem::Problem;
 use crate::search::Search;
 use crate::work::Budget;
@@ -15,11 +15,11 @@ use crate::work::Budget;
 pub const EXPERIMENT_FILE: &str = "next-experiment.toml";
 
 /// What would tell rivals apart, confirm what remains, determine numbers or move the device, or why nothing would, and the excitation file; looked for
-/// with this budget.
-pub(super) fn next_experiment<'a>(
+/// with this budget. The decision is settled by it: two explanations are ambiguous where an experiment tells them apart.
+pub(super) fn next_experiment<'a, 's>(
     problem: &'a Problem,
-    search: &Search,
-    decision: &Decision,
+    search: &'s Search,
+    decision: &mut Decision<'s>,
     budget: &Budget<'a>,
 ) -> (Option<NextExperiment>, Option<String>) {
     match planned(problem, search, decision, budget) {
@@ -28,13 +28,42 @@ pub(super) fn next_experiment<'a>(
     }
 }
 
-fn planned<'a>(problem: &'a Problem, search: &Search, decision: &Decision, budget: &Budget<'a>) -> Result<Experiment, Reason> {
+fn planned<'a, 's>(
+    problem: &'a Problem,
+    search: &'s Search,
+    decision: &mut Decision<'s>,
+    budget: &Budget<'a>,
+) -> Result<Experiment, Reason> {
     let best = decision.best;
     let apart = |rivals: &[&Candidate]| separate(problem, &[&[best], rivals].concat(), &search.noise_sd, budget);
+    let mut inseparable = None;
+    if decision.word == Word::Ambiguous {
+        let rivals = if decision.alike.is_empty() { nearest(search, best) } else { decision.alike.clone() };
+        match apart(&rivals) {
+            Ok(plan) => {
+                decision.alike = rivals;
+                return Ok(plan);
+            }
+            Err(reason) => {
+                // Where all say the same of the kind of physics and of its place, that is said; else nobody can tell.
+                decision.word = if rivals.iter().all(|c| is_kin(best, c)) { Word::Missing } else { Word::CannotTell };
+                inseparable = Some(reason);
+            }
+        }
+    }
+    if decision.word == Word::Missing || inseparable.is_some() {
+        for rival in richer(search, best) {
+            if let Ok(plan) = confirm(problem, [best, rival.candidate], rival.contains, &search.noise_sd, budget) {
+                (decision.word, decision.alike) = (Word::Ambiguous, vec![rival.candidate]);
+                return Ok(plan);
+            }
+        }
+    }
+    if let Some(reason) = inseparable {
+        return Err(reason);
+    }
     match decision.word {
-        Word::Ambiguous if decision.alike.is_empty() => apart(&nearest(search, best)),
-        Word::Ambiguous => apart(&decision.alike),
-        Word::CannotTell => determine(problem, search, best, budget),
+        Word::Ambiguous | Word::CannotTell => determine(problem, search, best, budget),
         // Where something remains, what resembles it most is to be confirmed or ruled out; else what is not well known yet is to be measured.
         Word::Missing | Word::Unexplained | Word::Parameters | Word::NothingMissing => match next_effect(search, best) {
             Some(more) if !decision.at_floor => apart(&[more]),
@@ -44,6 +73,12 @@ fn planned<'a>(problem: &'a Problem, search: &Search, decision: &Decision, budge
             }),
         },
     }
+}
+
+/// Whether two structures differ in laws of one family in the same places alone.
+fn is_kin(best: &Candidate, other: &Candidate) -> bool {
+    let (own, rest) = exchanged(best, other);
+    own.len() == rest.len() && own.iter().all(|h| rest.iter().any(|o| o.place.same(&h.place) && o.physics.family == h.physics.family))
 }
 
 /// The experiment that determines what the recordings leave open.
@@ -67,5 +102,6 @@ fn in_file(plan: &Experiment) -> Planned {
         repeats: plan.repeats,
         duration_s: rounded(plan.duration, 6),
         rate_hz: plan.rate_hz,
+        sensor: plan.sensor.clone().map(|NewSensor { kind, of, element, noise_sd }| Sensor { kind, of, element, noise_sd }),
     }
 }

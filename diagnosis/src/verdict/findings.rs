@@ -1,6 +1,6 @@
 //! What was found: each physics with its place, its parameters, and what else could stand there.
 
-use super::choice::{chosen, evidence};
+use super::choice::{chosen, evidence, exchanged};
 use super::confidence::{Figures, figures, probability, without};
 use super::plausible::is_timing;
 use super::rounded::rounded;
@@ -63,6 +63,38 @@ fn finding(search: &Search, best: &Candidate, spread: &Uncertainty, which: usize
         replaces: hypothesis.replaces.clone(),
         confidence: round_significant(confidence, 3),
         alternatives: rivals.iter().zip(&weights).take(tuning().claim.alternatives).map(alternative).collect(),
+    }
+}
+
+/// What is not told apart is not sure: the probability that a finding or one of its rivals is right is shared among them by how near they come.
+pub(super) fn share_with_rivals(search: &Search, best: &Candidate, rivals: &[&Candidate], findings: &mut [Finding]) {
+    let weight = |c: &Candidate| (-evidence(search, c, best).max(0.0) / tuning().claim.softened).exp();
+    for finding in findings {
+        let is_it = |h: &Hypothesis| h.physics.name == finding.physics && h.place.same(&finding.place);
+        let Some(own) = best.structure.added.iter().find(|h| is_it(h)) else { continue };
+        let against: Vec<&Candidate> = rivals.iter().copied().filter(|c| exchanged(best, c).0.iter().any(|h| h.id == own.id)).collect();
+        let others: f64 = against.iter().map(|c| weight(c)).sum();
+        let all = finding.confidence + finding.alternatives.iter().map(|a| a.confidence).sum::<f64>();
+        let (before, after) = (finding.confidence, all.min(1.0) / (1.0 + others));
+        if others == 0.0 || after >= before {
+            continue;
+        }
+        finding.confidence = round_significant(after, 3);
+        // What it loses goes to those.
+        for rival in against {
+            for h in exchanged(best, rival).1 {
+                let share = round_significant((before - after) * weight(rival) / others, 3);
+                match finding.alternatives.iter_mut().find(|a| a.physics == h.physics.name && a.place.same(&h.place)) {
+                    Some(there) => there.confidence = round_significant((there.confidence + share).min(finding.confidence), 3),
+                    None => finding.alternatives.push(Alternative {
+                        physics: h.physics.name.to_string(),
+                        place: h.place.clone(),
+                        confidence: share,
+                    }),
+                }
+            }
+        }
+        finding.alternatives.sort_by(|a, b| b.confidence.total_cmp(&a.confidence));
     }
 }
 

@@ -78,10 +78,13 @@ pub fn verdict(
     location: Option<&Location>,
     limit: Limit,
 ) -> Result<(Verdict, Files), VerdictError> {
-    let decision = decide(problem, search);
+    let mut decision = decide(problem, search);
     let (best, changes) = (decision.best, decision.changes);
     let budget = Budget::new(tuning().search.experiment, limit);
-    let (next_experiment, experiment) = next_experiment(problem, search, &decision, &budget);
+    let (next_experiment, experiment) = next_experiment(problem, search, &mut decision, &budget);
+    if matches!(decision.word, Word::Ambiguous | Word::CannotTell) {
+        findings::share_with_rivals(search, best, &decision.alike, &mut decision.findings);
+    }
     let held_out = held_out(problem, search, best, changes);
     let model = model_text(problem, best, &decision.spread, changes)?;
     let rivals = rival_models(problem, search, best);

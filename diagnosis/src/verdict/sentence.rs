@@ -36,6 +36,10 @@ pub(super) fn sentence(decision: &Decision, planned: bool) -> String {
             let what = findings.first().map_or_else(|| "something".to_string(), known);
             format!("the model leaves out {what}{others}: the recordings cannot tell which{next}{still}{unseen}")
         }
+        Word::CannotTell if !findings.is_empty() => {
+            let what = findings.first().map_or_else(|| "something".to_string(), known);
+            format!("the model leaves out {what}: neither the recordings nor a further one like them can tell which{still}{unseen}")
+        }
         Word::CannotTell => "the recordings hardly move the device: they cannot tell what is missing".to_string(),
         Word::Missing if decision.at_floor && !still.is_empty() => {
             format!("the model leaves out {all}; with it the recordings are explained down to what the device repeats")

@@ -5,7 +5,7 @@ mod next_experiment;
 mod place;
 
 pub use finding::{Alternative, Detectable, Estimate, Estimates, Finding, Interval, Moved, Parameter};
-pub use next_experiment::{NextExperiment, Planned, Refused};
+pub use next_experiment::{NextExperiment, Planned, Refused, Sensor};
 
 use crate::audit::{self, Weight};
 use crate::error_budget::BudgetedError;
@@ -93,9 +93,10 @@ pub enum Word {
     NothingMissing,
     /// Something is missing and no known physics explains it; `where` still says where it shows.
     Unexplained,
-    /// Two or more explanations fit alike; `findings[0].alternatives` lists them, `next_experiment` says what would tell them apart.
+    /// Two or more explanations fit alike, and `next_experiment` tells them apart, in simulation, each refitted to it; `findings[0].alternatives` lists them.
     Ambiguous,
-    /// The recordings do not excite what would be needed to say; `next_experiment` says what would.
+    /// The recordings do not excite what would be needed to say, and `next_experiment` says what would; or explanations of different kind or place fit alike that no
+    /// experiment within the range of the recordings tells apart, and it says why.
     CannotTell,
 }
 

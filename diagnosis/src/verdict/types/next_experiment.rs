@@ -48,7 +48,7 @@ pub struct Planned {
     pub separation_sd: Option<f64>,
     /// Root mean square of that difference, in standard deviations of the sensor noise.
     pub level_floors: Option<f64>,
-    /// The output in which most of it shows.
+    /// The output in which most of it shows; of a sensor that has to be added, the body or the element that it is on.
     pub output: String,
     /// How often it has to be played.
     pub repeats: u32,
@@ -56,6 +56,24 @@ pub struct Planned {
     pub duration_s: Option<f64>,
     /// Sampling rate that it was planned for, Hz.
     pub rate_hz: f64,
+    /// A sensor that has to be added for it: no excitation tells with those that are there. Not in files where those there are do.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sensor: Option<Sensor>,
+}
+
+/// A sensor that the device does not have, as an output of a model file has it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Sensor {
+    /// Its kind: `position`, `velocity`, `force`.
+    pub kind: String,
+    /// The body that it is on, of a motion.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub of: Option<String>,
+    /// The element whose force it reads.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub element: Option<String>,
+    /// The noise with which the separation was computed, standard deviation, SI unit.
+    pub noise_sd: f64,
 }
 
 /// Why no excitation would tell.

@@ -63,6 +63,14 @@ fn the_next_experiment_is_an_excitation_or_a_reason() {
         "separation_sd":7.1,"level_floors":2.0,"output":"y","repeats":3,"duration_s":2.0,"rate_hz":1000.0}"#;
     let read: NextExperiment = serde_json::from_str(planned).unwrap();
     assert_eq!((read.sentence(), read.file()), ("Play it.", Some("next-experiment.toml")));
+    assert!(!serde_json::to_string(&read).unwrap().contains("sensor"));
+    // With a sensor that has to be added.
+    let text =
+        planned.replace("\"rate_hz\":1000.0", "\"rate_hz\":1000.0,\"sensor\":{\"kind\":\"force\",\"element\":\"belt\",\"noise_sd\":0.01}");
+    let read: NextExperiment = serde_json::from_str(&text).unwrap();
+    let NextExperiment::Planned(Planned { sensor: Some(sensor), .. }) = &read else { panic!("{read:?}") };
+    assert_eq!((sensor.kind.as_str(), sensor.of.as_deref(), sensor.element.as_deref()), ("force", None, Some("belt")));
+    assert_eq!(serde_json::from_str::<NextExperiment>(&serde_json::to_string(&read).unwrap()).unwrap(), read);
 }
 
 #[test]
