@@ -6,6 +6,7 @@
 
 `draw` writes OUT/cases (nominal model, set, recordings) and OUT/truth. `run` diagnoses each case, plays the experiment that the verdict proposes on the hidden device,
 adds the recordings to a copy of the case and diagnoses that. `score` opens the truth, once all verdicts are written.
+Cases that have their verdicts are not diagnosed again.
 """
 import argparse
 import copy
@@ -269,6 +270,8 @@ def run(o):
     for case in sorted(glob.glob(os.path.join(o.out, "cases", o.pattern))):
         name = os.path.basename(case)
         out = os.path.join(o.verdicts, name)
+        if verdict(os.path.join(out, "second")) or "file" not in ((verdict(out) or {}).get("next_experiment") or {"file": 0}):
+            continue                                   # a run that was stopped goes on
         seconds = diagnose(o.program, case, out, o.more)
         said = verdict(out)
         folder = said and experiment(core, o, name, said)

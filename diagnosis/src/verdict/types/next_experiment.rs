@@ -58,7 +58,7 @@ pub struct Planned {
     pub rate_hz: f64,
     /// A sensor that has to be added for it: no excitation tells with those that are there. Not in files where those there are do.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub sensor: Option<Sensor>,
+    pub sensor: Option<Box<Sensor>>,
 }
 
 /// A sensor that the device does not have, as an output of a model file has it.
