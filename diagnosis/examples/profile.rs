@@ -37,14 +37,25 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             let half = spread.half(number);
             let ratio = 2.0 * half / (high - low);
             let name = format!("{:?}", best.structure.free[number].role);
-            println!("{set}\t{}\t{name}\t{own:.6}\t{:.6} {:.6}\t{low:.6} {high:.6}\t{ratio:.2}", best.structure.name(), own - half, own + half);
+            println!(
+                "{set}\t{}\t{name}\t{own:.6}\t{:.6} {:.6}\t{low:.6} {high:.6}\t{ratio:.2}",
+                best.structure.name(),
+                own - half,
+                own + half
+            );
             ratios.push(ratio);
         }
     }
     ratios.sort_by(f64::total_cmp);
     let at = |share: f64| ratios.get((share * ratios.len() as f64) as usize).copied().unwrap_or(f64::NAN);
     let wide = ratios.iter().filter(|r| **r > 2.0).count();
-    println!("{} numbers; width over the profile's: 10 % {:.2}, median {:.2}, 90 % {:.2}; wider than twice: {wide}", ratios.len(), at(0.1), at(0.5), at(0.9));
+    println!(
+        "{} numbers; width over the profile's: 10 % {:.2}, median {:.2}, 90 % {:.2}; wider than twice: {wide}",
+        ratios.len(),
+        at(0.1),
+        at(0.5),
+        at(0.9)
+    );
     Ok(())
 }
 
