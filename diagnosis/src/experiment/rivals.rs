@@ -8,6 +8,7 @@ use crate::normal_equations::normal_equations;
 use crate::problem::Problem;
 use crate::statistics::correlation_time;
 use crate::structure::{FreeParameter, Structure};
+use crate::tuning::tuning;
 use backdrive_plant::model::{Model, OutputKind};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -99,6 +100,53 @@ impl<'a> Rival<'a> {
         let short = DVector::from_fn(right.len(), |j, _| right[j] / scale[j]);
         // Without a Cholesky factor no separation is claimed.
         scaled.cholesky().map_or(0.0, |c| (whole - short.dot(&c.solve(&short))).clamp(0.0, whole))
+    }
+
+    /// The same of the difference from what another predicts, `target`, after as many Gauss-Newton steps as lower it: where a law has a threshold or an end, the first says
+    /// little. `pick` takes the outputs that count.
+    pub(super) fn unexplained_after_steps(
+        &self,
+        setup: &Setup,
+        trial: &Trial,
+        target: &[f64],
+        pick: &dyn Fn(&[f64]) -> Vec<f64>,
+    ) -> Option<f64> {
+        let wanted = pick(target);
+        let from = DVector::from_column_slice(&self.own);
+        let cost = |own: &[f64], prediction: &[f64]| {
+            let away = DVector::from_column_slice(own) - &from;
+            let left: f64 = pick(prediction).iter().zip(&wanted).map(|(a, b)| (a - b) * (a - b)).sum();
+            left + away.dot(&(&self.information * &away))
+        };
+        let mut own = self.own.clone();
+        let mut prediction = setup.prediction(&self.model(setup.problem, &own)?, trial)?;
+        let mut least = cost(&own, &prediction);
+        for _ in 0..tuning().experiment.imitating_steps {
+            let jacobian: Vec<Vec<f64>> = self.jacobian(setup, trial, &own, &prediction).iter().map(|c| pick(c)).collect();
+            let difference: Vec<f64> = wanted.iter().zip(pick(&prediction)).map(|(a, b)| a - b).collect();
+            let (mut matrix, mut right) = normal_equations(&jacobian, &difference, None);
+            matrix += &self.information;
+            right -= &self.information * (DVector::from_column_slice(&own) - &from);
+            let size = matrix.diagonal().max();
+            for j in 0..own.len() {
+                matrix[(j, j)] += 1e-12 * size;
+            }
+            let Some(step) = matrix.cholesky().map(|c| c.solve(&right)) else { break };
+            let shorter = (0..4).find_map(|half| {
+                let moved = |(j, n): (usize, &FreeParameter)| (own[j] + step[j] * 0.5f64.powi(half)).clamp(n.bounds().0, n.bounds().1);
+                let next: Vec<f64> = self.structure.free.iter().enumerate().map(moved).collect();
+                let there = setup.prediction(&self.model(setup.problem, &next)?, trial)?;
+                let now = cost(&next, &there);
+                (now < least).then_some((next, there, now))
+            });
+            let Some((next, there, now)) = shorter else { break };
+            let is_end = now > 0.99 * least;
+            (own, prediction, least) = (next, there, now);
+            if is_end {
+                break;
+            }
+        }
+        Some(least)
     }
 
     /// The same by a true refit to the recordings and to what `other` predicts for the experiment: what the cost then is above its own

@@ -38,7 +38,7 @@ pub(super) fn best(setup: &Setup, trials: &[&Trial], pair: [&Rival; 2]) -> Optio
     // Each by itself, where both rivals have what it would read.
     let kinds = extra(setup);
     let lag = setup.sensors.lag.iter().copied().max().unwrap_or(0);
-    let mut found: Option<Sensor> = None;
+    let mut found: Vec<(Sensor, Setup, usize)> = Vec::new();
     for (index, trial) in trials.iter().enumerate() {
         if index > 0 && setup.budget.is_over() {
             break;
@@ -73,13 +73,24 @@ pub(super) fn best(setup: &Setup, trials: &[&Trial], pair: [&Rival; 2]) -> Optio
             });
             let unit = pair[0].unit.max(pair[1].unit);
             let separation = (left.fold(f64::INFINITY, f64::min) / unit).sqrt();
-            if found.as_ref().is_none_or(|f| separation > f.separation) {
-                let noise_sd = wide.sensors.noise_sd[setup.sensors.noise_sd.len() + e];
-                found = Some(Sensor { words: words(setup, kind, noise_sd), new: new(setup, kind, noise_sd), separation, trial: index });
-            }
+            let noise_sd = wide.sensors.noise_sd[setup.sensors.noise_sd.len() + e];
+            let sensor = Sensor { words: words(setup, kind, noise_sd), new: new(setup, kind, noise_sd), separation, trial: index };
+            found.push((sensor, wide.clone(), from));
         }
     }
-    found
+    found.sort_by(|a, b| b.0.separation.total_cmp(&a.0.separation));
+    // To first order a law with a threshold does not imitate one that it contains.
+    let confirmed = found.into_iter().take(tuning().experiment.finalists).filter_map(|(sensor, wide, from)| {
+        let trial = trials.get(sensor.trial)?;
+        let own = setup.outputs(&trial.record).len() * trial.record.len;
+        let pick = |all: &[f64]| [&all[..own], &all[from..from + trial.record.len]].concat();
+        let [a, b] = pair;
+        let left = [(a, b), (b, a)].map(|(one, other)| one.unexplained_after_steps(&wide, trial, &other.prediction(&wide, trial)?, &pick));
+        let [Some(left), Some(other)] = left else { return None };
+        let separation = (left.min(other) / a.unit.max(b.unit)).sqrt().min(sensor.separation);
+        Some(Sensor { separation, ..sensor })
+    });
+    confirmed.max_by(|a, b| a.separation.total_cmp(&b.separation))
 }
 
 impl Setup<'_> {

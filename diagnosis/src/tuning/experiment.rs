@@ -13,6 +13,8 @@ group! {
         rivals: usize = 4, "structures", Cost("each pair is simulated for each excitation");
         /// Experiments that are compared by a true refit.
         finalists: usize = 3, "experiments", Cost("two fits each");
+        /// Steps in which one explanation tries to imitate another where a sensor is added, at most.
+        imitating_steps: usize = 8, "Gauss-Newton steps", Cost("one simulation per parameter each");
         /// Time that it takes to set an experiment up.
         setting_up: f64 = 2.0, "s", Judgement("without it the shortest would always be chosen");
         /// Largest ratio of predicted to recorded peaks of positions and speeds.
