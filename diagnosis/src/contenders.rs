@@ -29,7 +29,36 @@ pub fn with_contenders<'a>(problem: &'a Problem, search: Search, without: &[Stri
     search.simulations += budget.simulations();
     search.found.extend(more);
     sort(&mut search.found, search.samples);
+    if let Some(nominal) = nominal_from_there(problem, &search, budget) {
+        search.nominal = nominal;
+    }
     search
+}
+
+/// The nominal model from where the nearest fits have its parameters, if it comes nearer so: a law that ends as nothing has only led the rest out of a wrong valley.
+fn nominal_from_there<'a>(problem: &'a Problem, search: &Search, budget: &Budget<'a>) -> Option<Candidate> {
+    let nominal = &search.nominal;
+    let budget = budget.extended(budget.spent() + tuning().experiment.contender_work);
+    let evaluator = Evaluator { noise_sd: search.noise_sd.clone(), budget, ..Evaluator::new(problem) };
+    let mut nearest: Vec<&Candidate> = search.found.iter().filter(|c| c.fit.cost < nominal.fit.cost).collect();
+    nearest.sort_by(|a, b| a.fit.cost.total_cmp(&b.fit.cost));
+    // One simulation each tells from where it comes near.
+    let starts = nearest.iter().take(tuning().search.finalists).filter_map(|c| {
+        let (stated, of_records) = (c.structure.stated_of(problem, &c.fit.values), c.structure.of_records(&c.fit.values));
+        let start = nominal.structure.values(problem, &stated, &[], &of_records);
+        let cost = evaluator.cost(&evaluator.residuals(&nominal.structure, &start)?);
+        Some((cost, start))
+    });
+    let (cost, start) = starts.min_by(|a, b| a.0.total_cmp(&b.0))?;
+    if cost > tuning().search.behind_far * nominal.fit.cost {
+        return None;
+    }
+    let fit = evaluator.fit(&nominal.structure, &start, tuning().fit.to_the_end)?;
+    (fit.cost < (1.0 - tuning().fit.relative_tolerance) * nominal.fit.cost).then(|| {
+        let mut nearer = candidate(&evaluator, nominal.structure.clone(), fit);
+        nearer.unseen = unseen(problem, &problem.held_out, &nearer.structure, &nearer.fit.values, &search.noise_sd);
+        nearer
+    })
 }
 
 /// Fits that foresee to come as near as the best and are not there: they go on. One that then finds little of what it had foreseen does not foresee well, and is taken

@@ -77,7 +77,10 @@ pub(super) fn everywhere(base: &Candidate, better: &Candidate) -> Option<Gain> {
 fn predicts(search: &Search, base: &Candidate, better: &Candidate) -> bool {
     let no_physics = beside_noise(&search.errors);
     let of_use = |a: f64, b: f64| a.sqrt() - b.sqrt() > tuning().claim.useful * b.sqrt().max(1.0) && a - b > no_physics;
-    let fitted = || gain(&base.blocks, &better.blocks).is_none_or(|gain| gain.is_sure());
+    let fitted = || {
+        let removed = (base.fit.cost - better.fit.cost) / search.samples.max(1) as f64;
+        removed > no_physics && gain(&base.blocks, &better.blocks).is_none_or(|gain| gain.is_sure())
+    };
     match (&base.unseen, &better.unseen) {
         (Some(a), Some(b)) if of_use(a.mean_square, b.mean_square) => {
             // A device that drifts freely may end elsewhere after the least difference. Where the fits explain all there is, it is enough that the unseen
@@ -162,8 +165,11 @@ pub(super) struct Richer<'s> {
 }
 
 /// Structures that lose for their numbers alone: one effect exchanged for a law with more of them, which fits as well. That a simpler law is preferred says nothing of
-/// what the device does where it was not recorded. The simplest first.
+/// what the device does where it was not recorded. The simplest first; none where the best leaves more than noise, for there a richer law fits what is none of its own.
 pub(super) fn richer<'s>(search: &'s Search, best: &Candidate) -> Vec<Richer<'s>> {
+    if best.levels.iter().any(|level| *level > tuning().noise.unexplained) {
+        return Vec::new();
+    }
     let mut all: Vec<Richer> = Vec::new();
     for c in search.found.iter().filter(|c| c.structure.added.len() == best.structure.added.len() && is_plausible(c)) {
         let (own, other) = exchanged(best, c);

@@ -11,7 +11,8 @@ pub(super) fn is_plausible(candidate: &Candidate) -> bool {
     added(candidate).all(|(hypothesis, parameter, number, value)| {
         let range = hypothesis.physics.facts.plausible.iter().find(|(key, _, _)| *key == parameter.key);
         let inside = range.is_none_or(|(_, least, most)| (*least..=*most).contains(&value));
-        inside && !(parameter.key == hypothesis.physics.size && parameter.index.is_none() && at_end(parameter, number, value))
+        // At the end at which it does nothing, it has only led the rest out of a wrong valley.
+        inside && !(parameter.key == hypothesis.physics.size && parameter.index.is_none() && number.at_bound(value).is_some())
     }) && !candidate.may_be_nothing
 }
 
