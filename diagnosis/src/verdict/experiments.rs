@@ -52,9 +52,14 @@ fn planned<'a, 's>(
         }
     }
     if decision.word == Word::Missing || inseparable.is_some() {
-        for rival in richer(search, best) {
+        // Of laws that contain one another the simpler is claimed as long as nothing speaks against it, and the experiment is to rule the richer one out; a law of more
+        // numbers that is another explanation leaves it open.
+        let (contained, others): (Vec<_>, Vec<_>) = richer(search, best).into_iter().partition(|rival| rival.contains);
+        for rival in others.into_iter().chain(contained) {
             if let Ok(plan) = confirm(problem, [best, rival.candidate], rival.contains, &search.noise_sd, budget) {
-                (decision.word, decision.alike) = (Word::Ambiguous, vec![rival.candidate]);
+                if !rival.contains {
+                    (decision.word, decision.alike) = (Word::Ambiguous, vec![rival.candidate]);
+                }
                 return Ok(plan);
             }
         }
