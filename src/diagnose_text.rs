@@ -3,6 +3,7 @@
 use backdrive_diagnosis::audit::Weight;
 use backdrive_diagnosis::diagnose::Diagnosis;
 use backdrive_diagnosis::error_budget::{BudgetedError, Source};
+use backdrive_diagnosis::hypothesis::Family;
 use backdrive_diagnosis::intervals::Uncertainty;
 use backdrive_diagnosis::parameters::rows;
 use backdrive_diagnosis::verdict::{Alternative, Estimate, Finding, HeldOut, Interval, NextExperiment, Parameter, Remaining, Where};
@@ -123,8 +124,20 @@ fn held_out(held: &HeldOut) -> String {
     )
 }
 
+/// How sure a finding is: `well supported (97 %)`; where its kind is surer than its law, `dry friction there: well supported (97 %); this law of it: weakly
+/// supported (41 %)`.
+pub fn confidence(finding: &Finding) -> String {
+    let own = supported(finding.confidence);
+    match finding.family.and_then(Family::words) {
+        Some(kind) if finding.family_confidence > finding.confidence + 0.1 => {
+            format!("{kind} there: {}; this law of it: {own}", supported(finding.family_confidence))
+        }
+        _ => own,
+    }
+}
+
 /// `well supported (97 %)`, in words and percent.
-pub fn confidence(share: f64) -> String {
+fn supported(share: f64) -> String {
     let word = match share {
         s if s > 0.95 => "well supported",
         s if s > 0.8 => "supported",
@@ -171,7 +184,7 @@ pub fn parameters(finding: &Finding) -> Vec<String> {
 fn described(finding: &Finding) -> String {
     let instead = if finding.replaces.is_empty() { String::new() } else { format!(", in place of {}", finding.replaces.join(" and ")) };
     let named = words::named(&finding.physics, &finding.place);
-    format!("{named}{instead}: {}; {}", parameters(finding).join(", "), confidence(finding.confidence))
+    format!("{named}{instead}: {}; {}", parameters(finding).join(", "), confidence(finding))
 }
 
 /// When, at which frequencies and in which state.
@@ -234,9 +247,13 @@ mod tests {
             parameters: BTreeMap::from([("force".to_string(), force)]),
             replaces: Vec::new(),
             confidence: 0.97,
+            family: None,
+            family_confidence: 0.0,
             alternatives: Vec::new(),
         };
         assert_eq!(described(&finding), "dry friction at the drum: force 101 mN (95 %: 98.0 mN to 104 mN); well supported (97 %)");
+        let of_some_law = Finding { confidence: 0.13, family: Some(Family::Friction), family_confidence: 0.97, ..finding };
+        assert_eq!(confidence(&of_some_law), "dry friction there: well supported (97 %); this law of it: hardly supported (13 %)");
         let stiff = Parameter::One(Estimate { value: 2.0, ci95: [Some(1.5), None], at_bound: true, unit: "N".to_string() });
         assert_eq!(parameter(&stiff), "2.00 N (95 %: above 1.50 N), at the bound of what was tried");
         let ci95 = vec![[Some(0.5), Some(1.5)], [Some(1.0), Some(3.0)]];

@@ -63,6 +63,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             "{} hypotheses, {} simulations; noise_sd {:.3?}, as given {:.3?}",
             found.hypotheses, found.simulations, found.noise_sd, found.levels_given
         );
+        for entry in &found.journal {
+            eprintln!("   {:<44} {:?} -> {} {:.3}", entry.step, entry.outcome, entry.best, entry.residual);
+        }
         let nominal = &found.nominal;
         eprintln!(
             "nominal: {:.4} {:.3?} correlation {:.1} slow {:.1}",

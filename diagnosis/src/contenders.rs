@@ -29,36 +29,7 @@ pub fn with_contenders<'a>(problem: &'a Problem, search: Search, without: &[Stri
     search.simulations += budget.simulations();
     search.found.extend(more);
     sort(&mut search.found, search.samples);
-    if let Some(nominal) = nominal_from_there(problem, &search, budget) {
-        search.nominal = nominal;
-    }
     search
-}
-
-/// The nominal model from where the nearest fits have its parameters, if it comes nearer so: a law that ends as nothing has only led the rest out of a wrong valley.
-fn nominal_from_there<'a>(problem: &'a Problem, search: &Search, budget: &Budget<'a>) -> Option<Candidate> {
-    let nominal = &search.nominal;
-    let budget = budget.extended(budget.spent() + tuning().experiment.contender_work);
-    let evaluator = Evaluator { noise_sd: search.noise_sd.clone(), budget, ..Evaluator::new(problem) };
-    let mut nearest: Vec<&Candidate> = search.found.iter().filter(|c| c.fit.cost < nominal.fit.cost).collect();
-    nearest.sort_by(|a, b| a.fit.cost.total_cmp(&b.fit.cost));
-    // One simulation each tells from where it comes near.
-    let starts = nearest.iter().take(tuning().search.finalists).filter_map(|c| {
-        let (stated, of_records) = (c.structure.stated_of(problem, &c.fit.values), c.structure.of_records(&c.fit.values));
-        let start = nominal.structure.values(problem, &stated, &[], &of_records);
-        let cost = evaluator.cost(&evaluator.residuals(&nominal.structure, &start)?);
-        Some((cost, start))
-    });
-    let (cost, start) = starts.min_by(|a, b| a.0.total_cmp(&b.0))?;
-    if cost > tuning().search.behind_far * nominal.fit.cost {
-        return None;
-    }
-    let fit = evaluator.fit(&nominal.structure, &start, tuning().fit.to_the_end)?;
-    (fit.cost < (1.0 - tuning().fit.relative_tolerance) * nominal.fit.cost).then(|| {
-        let mut nearer = candidate(&evaluator, nominal.structure.clone(), fit);
-        nearer.unseen = unseen(problem, &problem.held_out, &nearer.structure, &nearer.fit.values, &search.noise_sd);
-        nearer
-    })
 }
 
 /// Fits that foresee to come as near as the best and are not there: they go on. One that then finds little of what it had foreseen does not foresee well, and is taken
@@ -108,7 +79,7 @@ fn contenders<'a>(problem: &'a Problem, search: &Search, without: &[String], bud
     // What ends farther behind than this is no rival, whatever it is.
     let effective = (search.samples as f64 / best.correlation_time.max(1.0)).max(2.0);
     let limit = 1.0 + tuning().experiment.contender_behind / effective;
-    let coarse = Evaluator { substeps: tuning().fit.coarse_substeps, ..evaluator.clone() };
+    let coarse = Evaluator { substeps: problem.coarse_substeps(), ..evaluator.clone() };
     let Some(there) = coarse.residuals(&best.structure, &best.fit.values).map(|r| coarse.cost(&r)).filter(|_| !seeds.is_empty()) else {
         return Vec::new();
     };
@@ -154,7 +125,7 @@ fn fit(evaluator: &Evaluator, (best, limit): (&Candidate, f64), seed: &Seed) -> 
     *added.get_mut(seed.slot)? = seed.hypothesis.clone();
     let structure = Structure::new(problem, &problem.fit, added);
     let (stated, of_records) = (best.structure.stated_of(problem, &best.fit.values), best.structure.of_records(&best.fit.values));
-    let coarse = Evaluator { substeps: tuning().fit.coarse_substeps, ..evaluator.clone() };
+    let coarse = Evaluator { substeps: problem.coarse_substeps(), ..evaluator.clone() };
     let mut nearest: Option<Fit> = None;
     for start in starts_beside(&effect, &own, seed.hypothesis).iter().take(tuning().experiment.contender_starts) {
         *values.get_mut(seed.slot)? = match seed.hypothesis.place.same(&effect.place) {

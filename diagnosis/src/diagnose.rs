@@ -10,7 +10,7 @@ use crate::problem::Problem;
 use crate::search::{Search, SearchError, Settings, search};
 use crate::thinned::thinned;
 use crate::tuning::tuning;
-use crate::verdict::{Files, Verdict, VerdictError, timing, verdict};
+use crate::verdict::{Files, Verdict, VerdictError, timing, verdict, without_what_may_be_nothing};
 use crate::work::{Budget, Limit};
 use std::sync::atomic::AtomicBool;
 
@@ -58,6 +58,7 @@ pub fn diagnose(
     let mut remarks = audit(&problem);
     let (problem, dead) = problem.without_dead_outputs();
     for signal in dead {
+        remarks.retain(|r| !(r.about == "constant" && r.signal == signal));
         let text = "stands still throughout while others move: it is left out of every fit and of the verdict".to_string();
         remarks.push(Remark { weight: Weight::Caution, records: Vec::new(), signal, about: "constant", text });
     }
@@ -66,6 +67,8 @@ pub fn diagnose(
     let (problem, search) = with_inputs_as_they_run(problem, settings, limit, report, &mut remarks)?;
     report("fitting what could stand in its place");
     let search = with_contenders(&problem, search, &settings.without, &Budget::new(tuning().experiment.contender_work, limit));
+    let mut search = search;
+    without_what_may_be_nothing(&problem, &mut search);
     remarks.extend(timing(&problem, &search));
     report("locating the missing force");
     let location = located(&problem, &search);

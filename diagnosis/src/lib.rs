@@ -8,6 +8,7 @@
 #![cfg_attr(not(test), warn(clippy::print_stdout, clippy::print_stderr))]
 
 pub mod audit;
+pub(crate) mod beginnings;
 pub mod candidate;
 pub mod compare;
 pub mod contenders;

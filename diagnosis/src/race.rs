@@ -1,15 +1,14 @@
 //! Many structures, fitted a little each; the better ones more, the best to their end.
 
+use crate::beginnings::Beginnings;
 use crate::candidate::{Candidate, candidate, key_of};
 use crate::effort::Effort;
 use crate::evaluator::Evaluator;
 use crate::fit::Fit;
 use crate::hypothesis::Hypothesis;
 use crate::problem::{Problem, Record};
-use crate::screen::worst_records;
 use crate::structure::{Role, Structure};
 use crate::tuning::tuning;
-use backdrive_plant::set::Initial;
 use std::collections::HashSet;
 
 /// A structure to be fitted: its hypotheses, where each starts, and the stated parameters to start from.
@@ -101,27 +100,22 @@ impl Lead {
 }
 
 impl Course<'_> {
-    /// The recordings on which a fit leaves most, two at most where they may be cut: first steps need no more.
-    pub(crate) fn worst(&self, residuals: &[f64]) -> Vec<usize> {
-        match can_be_cut(self.evaluator.problem) {
-            true => worst_records(self.evaluator, residuals, 2),
-            false => (0..self.evaluator.records.len()).collect(),
-        }
+    /// What first steps from a fit are held against, and how much simulations there may err.
+    pub(crate) fn beginnings(&self, residuals: &[f64]) -> Beginnings {
+        Beginnings::of_the_worst(self.evaluator, residuals)
     }
 
     /// Fits all seeds a little, some of them more, and fewer to their end.
     pub fn race(&self, seeds: Vec<Seed>) -> Vec<Candidate> {
         let (evaluator, further) = (self.evaluator, tuning().search.further);
-        // The first steps on the recordings with the largest residuals, with few substeps.
-        let few = worst_records(evaluator, &self.nominal.fit.residuals, 2);
-        let whole = few.len() == evaluator.records.len() || !can_be_cut(evaluator.problem);
-        let problem = evaluator.problem;
-        let some: Vec<Record> = if whole { problem.fit.clone() } else { few.iter().map(|r| problem.fit[*r].clone()).collect() };
+        // The first steps on parts of the recordings, with few substeps.
+        let beginnings = self.beginnings(&self.nominal.fit.residuals);
+        let some = beginnings.records(evaluator);
         let coarse = Evaluator { substeps: self.coarse, records: &some, widest: 1.0, ..evaluator.clone() };
-        let nominal_there = if whole { self.nominal.fit.clone() } else { restricted(evaluator, &self.nominal.fit, &few) };
+        let nominal_there = beginnings.restricted(evaluator, &self.nominal.fit);
         let entries = self.entries(&seeds, further + 2);
         let mut running = self.begun(&entries, &coarse, &nominal_there);
-        let substeps = tuning().fit.middle_substeps.max(self.coarse);
+        let substeps = evaluator.problem.middle_substeps().max(self.coarse);
         let middle = Evaluator { substeps, widest: tuning().fit.widest_midway, ..evaluator.clone() };
         let early = if self.along.is_some() { 0 } else { further + 4 };
         for (count, held_against, effort) in [(early, &coarse, tuning().fit.early), (further, &middle, tuning().fit.middle)] {
@@ -198,11 +192,6 @@ pub(crate) fn own_first(evaluator: &Evaluator, known: Option<(&Structure, &Fit)>
     only.fit_from_derivatives(structure, &start, tuning().fit.early, known).map_or(start, |fit| fit.values)
 }
 
-/// Whether first steps may be taken on some of the recordings only: nothing belongs to single ones.
-pub(crate) fn can_be_cut(problem: &Problem) -> bool {
-    problem.initial != Initial::Free && problem.unknown.is_empty() && problem.fit.iter().all(|r| r.conditions.is_empty())
-}
-
 /// Best first, each structure once, without those that have no chance against the best.
 fn drop_those_behind(running: &mut Vec<Running>) {
     running.sort_by(|a, b| predicted_cost(&a.1).total_cmp(&predicted_cost(&b.1)));
@@ -219,15 +208,6 @@ fn drop_those_behind(running: &mut Vec<Running>) {
 pub(crate) fn distinct_fits(fits: &mut Vec<(Structure, Fit)>) {
     let mut names = HashSet::new();
     fits.retain(|(structure, _)| names.insert(key_of(&structure.added)));
-}
-
-/// A fit's residuals and derivatives on some of its recordings.
-pub(crate) fn restricted(evaluator: &Evaluator, fit: &Fit, records: &[usize]) -> Fit {
-    let layout = evaluator.layout();
-    let pick = |all: &Vec<f64>| -> Vec<f64> {
-        layout.iter().filter(|l| records.contains(&l.0)).filter_map(|l| all.get(l.2.clone())).flatten().copied().collect()
-    };
-    Fit { residuals: pick(&fit.residuals), jacobian: fit.jacobian.iter().map(pick).collect(), ..fit.clone() }
 }
 
 /// What a fit would cost if most of what its next step foresees came true.

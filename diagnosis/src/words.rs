@@ -90,6 +90,8 @@ mod tests {
             parameters: BTreeMap::from([("gap".to_string(), Parameter::One(gap))]),
             replaces: Vec::new(),
             confidence: 0.9,
+            family: None,
+            family_confidence: 0.0,
             alternatives: Vec::new(),
         };
         assert_eq!(finding(&found), "backlash between motor and drum, 0.31 mm");

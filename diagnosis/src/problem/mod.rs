@@ -7,6 +7,7 @@ mod logged;
 mod outliers;
 mod record;
 mod stated;
+mod substeps;
 
 pub use error::ProblemError;
 pub use logged::Logged;
@@ -134,8 +135,9 @@ impl Problem {
     /// has no noise to hold a residual against. The names of what was left out.
     pub fn without_dead_outputs(self) -> (Problem, Vec<String>) {
         let is_still = |output: usize| {
-            let mut samples = self.fit.iter().chain(&self.held_out).filter_map(|r| r.compared(output)).peekable();
-            samples.peek().is_some() && samples.all(|s| s.iter().all(|x| Some(x) == s.first()))
+            // The same value in all of them: a device may also stand still in each recording, elsewhere in the next.
+            let mut samples = self.fit.iter().chain(&self.held_out).filter_map(|r| r.compared(output)).flatten();
+            samples.next().is_some_and(|first| samples.all(|x| x == first))
         };
         let (still, moving): (Vec<usize>, Vec<usize>) = (0..self.model.outputs.len())
             .filter(|output| self.fit.iter().any(|r| r.outputs.get(*output).is_some_and(Option::is_some)))
@@ -159,21 +161,26 @@ mod tests {
         let text = "name = 'cart'\n[bodies]\ncart = 2.0\n[[inputs]]\nname = 'f'\nkind = 'force'\non = 'cart'\n\
                     [[outputs]]\nname = 'x'\nkind = 'position'\nof = 'cart'\n[[outputs]]\nname = 'v'\nkind = 'velocity'\nof = 'cart'\n";
         let model = Model::from_toml(text, "cart.toml").unwrap();
-        let problem = |x: &dyn Fn(f64) -> f64| {
+        let problem = |x: &dyn Fn(f64) -> f64, rails: [f64; 2]| {
             let t: Vec<f64> = (0..200).map(|i| 0.01 * f64::from(i)).collect();
-            let signals = vec![
-                ("f".to_string(), t.clone()),
-                ("x".to_string(), t.iter().map(|t| x(*t)).collect()),
-                ("v".to_string(), vec![9.999847; 200]),
-            ];
-            let record = Record::new(&Recording::new("r", t, signals).unwrap(), &model, Vec::new()).unwrap();
-            Problem::new(text.to_string(), "cart.toml".into(), model.clone(), vec![record.clone()], vec![record], Initial::Rest).unwrap()
+            let record = |rail: f64| {
+                let signals = vec![
+                    ("f".to_string(), t.clone()),
+                    ("x".to_string(), t.iter().map(|t| x(*t)).collect()),
+                    ("v".to_string(), vec![rail; 200]),
+                ];
+                Record::new(&Recording::new("r", t.clone(), signals).unwrap(), &model, Vec::new()).unwrap()
+            };
+            let [fit, held_out] = rails.map(record);
+            Problem::new(text.to_string(), "cart.toml".into(), model.clone(), vec![fit], vec![held_out], Initial::Rest).unwrap()
         };
-        let (left, dead) = problem(&|t| t * t).without_dead_outputs();
+        let (left, dead) = problem(&|t| t * t, [9.999847; 2]).without_dead_outputs();
         assert_eq!(dead, ["v"]);
         assert!(left.fit.iter().chain(&left.held_out).all(|r| r.outputs[0].is_some() && r.outputs[1].is_none()));
+        // Still in each recording, and elsewhere in the next, is no rail.
+        assert!(problem(&|t| t * t, [1.0, 2.0]).without_dead_outputs().1.is_empty());
         // Where nothing moves the device may be stuck, and the audit says what there is to say.
-        let (left, dead) = problem(&|_| 0.0).without_dead_outputs();
+        let (left, dead) = problem(&|_| 0.0, [9.999847; 2]).without_dead_outputs();
         assert!(dead.is_empty() && left.fit[0].outputs[1].is_some());
     }
 }

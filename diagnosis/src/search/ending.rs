@@ -127,7 +127,7 @@ pub(super) fn nominal_at_its_end(nominal: &Nominal, found: &[Candidate], taken_b
     let others = found.iter().take(tuning().search.nominal_from).map(numbers);
     // Far from the noise its last thousandths say nothing.
     let effort = if nominal.is_far { tuning().fit.nominal_far } else { tuning().fit.to_the_end };
-    let substeps = if nominal.is_far { tuning().fit.middle_substeps } else { evaluator.substeps };
+    let substeps = if nominal.is_far { problem.middle_substeps() } else { evaluator.substeps };
     let last = Evaluator { substeps, ..evaluator.within(work.up_to(tuning().search.nominal_end)) };
     let mut better = None;
     let starts = others.chain(nominal.is_far.then(|| numbers(refitted)));

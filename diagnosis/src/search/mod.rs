@@ -66,7 +66,7 @@ pub fn search(problem: &Problem, settings: &Settings, limit: Limit, report: &(dy
         hypotheses: &hypotheses,
         nominal: refitted,
         given: &nominal.given,
-        coarse: tuning().fit.coarse_substeps,
+        coarse: problem.coarse_substeps(),
     };
     let mut tried = promised(&views, &hypotheses);
     let mut state = State::new(course, &views, &tried, &ripples, nominal.far, &work);

@@ -76,7 +76,7 @@ impl<'a> Coupler<'_, 'a> {
     fn couple(&self, from: &[f64], strength: f64, in_parts: bool) -> Option<CoupledNominal<'a>> {
         let (evaluator, structure, fit) = (self.evaluator, self.structure, &tuning().fit);
         let coupling = self.pulled.then(|| self.firm.with(strength * self.firm.strength));
-        let coarse = Evaluator { substeps: fit.coarse_substeps, widest: fit.widest_midway, coupling, ..evaluator.clone() };
+        let coarse = Evaluator { substeps: evaluator.problem.coarse_substeps(), widest: fit.widest_midway, coupling, ..evaluator.clone() };
         let view = if self.pulled { Effort { steps: 0, ..fit.nominal_view } } else { fit.nominal_view };
         let at = coarse.fit(structure, from, view)?;
         // The parts with the largest residuals are enough for screening; coupled, they begin as they were measured.
@@ -199,7 +199,7 @@ impl<'a> FirstFit<'a> {
 }
 
 fn at_middle<'a>(evaluator: &Evaluator<'a>) -> Evaluator<'a> {
-    Evaluator { substeps: tuning().fit.middle_substeps, ..evaluator.clone() }
+    Evaluator { substeps: evaluator.problem.middle_substeps(), ..evaluator.clone() }
 }
 
 /// How far a model moves on the recordings.

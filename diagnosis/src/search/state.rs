@@ -7,6 +7,7 @@ use super::view::View;
 use crate::candidate::{Candidate, advantage_over, done, key_of, sort};
 use crate::hypothesis::Hypothesis;
 use crate::race::{Course, Seed, distinct};
+use crate::structure::Structure;
 use crate::tuning::tuning;
 use std::collections::HashSet;
 
@@ -28,7 +29,7 @@ pub(super) struct State<'s, 'a> {
     pub found: Vec<Candidate>,
     /// Single effects, what promises most first.
     pub singles: std::vec::IntoIter<Seed>,
-    /// Laws of one parameter.
+    /// Laws that bring one number more than the nominal model has.
     pub plain: std::vec::IntoIter<Seed>,
     /// Effects at once.
     pub effects: usize,
@@ -68,7 +69,7 @@ impl<'s, 'a> State<'s, 'a> {
             singles,
             plain,
             effects: 1,
-            fine: tuning().fit.coarse_substeps,
+            fine: course.coarse,
             related,
             moved_about,
             left_out: false,
@@ -145,12 +146,13 @@ impl<'s, 'a> State<'s, 'a> {
     }
 
     /// To first order a law may do no more than the nominal model's parameters do together, so that screening sees nothing of it, and still be what is
-    /// missing: where the residual is small those of one number are fitted whatever they promise.
+    /// missing: where the residual is small those that bring one number more are fitted whatever they promise.
     fn of_one_number(&self) -> Vec<Seed> {
         let Some(view) = self.views.first().filter(|_| !self.far) else { return Vec::new() };
+        let (problem, known) = (self.course.evaluator.problem, self.course.nominal.structure.free.len());
         let one = |(index, h): (usize, &Hypothesis)| {
-            let start = h.starts.first().filter(|start| start.len() == 1)?;
-            Some(view.seed(vec![(index, start.clone())]))
+            let more = Structure::new(problem, &problem.fit, vec![h.clone()]).free.len().saturating_sub(known);
+            Some(view.seed(vec![(index, h.starts.first().filter(|_| more == 1)?.clone())]))
         };
         self.course.hypotheses.iter().enumerate().filter_map(one).collect()
     }

@@ -74,7 +74,11 @@ group! {
         start_prior: f64 = 0.3, "-", Judgement("wider than any start that was measured");
         /// Weights of an unknown input that are moved together for derivatives, one in so many.
         knots_apart: usize = 6, "knots", Numerics("a cubic B-spline acts over four; two more for what the device remembers");
-        /// Substeps per sample of first steps and of screening, at most.
+        /// Angle by which the measured motion may turn in a substep of first steps.
+        turn: f64 = 0.4, "rad", Numerics("a law stepped over by that is in error by about a twelfth of its square, a percent");
+        /// Most substeps that first steps take for that.
+        following_substeps: usize = 4, "substeps", Cost("as coarse_substeps");
+        /// Substeps per sample of first steps and of screening, at most, where the motion is slow.
         coarse_substeps: usize = 1, "substeps", Cost("first steps only have to find the valley; see screening.substep_error");
         /// Substeps per sample of fits on their way, at most.
         middle_substeps: usize = 2, "substeps", Cost("as coarse_substeps");

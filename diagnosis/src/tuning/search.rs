@@ -51,6 +51,10 @@ group! {
         experiment: u64 = 100_000_000, "simulation steps", Cost("an eighth of the work, after the search");
         /// Share of the best promise that a single effect has to reach, beyond the first few.
         promise: f64 = 0.5, "-", Cost("those that promise less are tried beside others");
+        /// Samples on which first steps are taken, at least, where recordings may be cut.
+        first_samples: usize = 4000, "samples", Cost("first steps only rank structures");
+        /// Mean square residual there, as a share of that of the whole recordings.
+        first_share: f64 = 0.5, "-", Judgement("what is to be explained has to be seen there; half of it is not by chance");
         /// Structures of a step that go on after their first steps.
         further: usize = 4, "structures", Cost("first steps do not rank surely");
         /// Structures of a step that are fitted to their end.

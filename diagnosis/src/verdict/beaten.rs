@@ -34,6 +34,8 @@ pub enum Why {
     PredictsWorse,
     /// It is not worth its parameters: a simpler one does as well.
     NotWorthIts,
+    /// It does better, and not surely enough, or not by enough, to be claimed.
+    NotSure,
 }
 
 impl Why {
@@ -44,6 +46,7 @@ impl Why {
             Why::ExplainsLess => "explains less",
             Why::PredictsWorse => "fits better, predicts worse",
             Why::NotWorthIts => "no better than what has fewer parameters",
+            Why::NotSure => "better, but not surely enough or not by enough to be claimed",
         }
     }
 }
@@ -57,7 +60,7 @@ pub fn beaten(search: &Search) -> Vec<Beaten> {
             () if std::ptr::eq(c, best) => Why::Claimed,
             () if evidence(search, c, best) <= 0.0 && c.structure.free.len() >= best.structure.free.len() => Why::NotWorthIts,
             () if c.fit.cost < best.fit.cost && by_unseen > 0.0 => Why::PredictsWorse,
-            () if c.fit.cost < best.fit.cost => Why::NotWorthIts,
+            () if c.fit.cost < best.fit.cost => Why::NotSure,
             () => Why::ExplainsLess,
         };
         Beaten {

@@ -32,19 +32,21 @@ pub struct Figures {
     pub beside: f64,
     /// Whether one of its parameters is at the end of its range.
     pub at_bound: f64,
+    /// As `preferred`, over its nearest rival of another place or family.
+    pub over_other: f64,
 }
 
 impl Figures {
     /// In the order of [`NAMES`].
-    pub fn list(&self) -> [f64; 10] {
-        let Figures { with, over_rival, over_kin, preferred, removes, left, correlated, memory, beside, at_bound } = *self;
-        [with, over_rival, over_kin, preferred, removes, left, correlated, memory, beside, at_bound]
+    pub fn list(&self) -> [f64; 11] {
+        let Figures { with, over_rival, over_kin, preferred, removes, left, correlated, memory, beside, at_bound, over_other } = *self;
+        [with, over_rival, over_kin, preferred, removes, left, correlated, memory, beside, at_bound, over_other]
     }
 }
 
 /// Names of the figures.
-pub const NAMES: [&str; 10] =
-    ["with", "over_rival", "over_kin", "preferred", "removes", "left", "correlated", "memory", "beside", "at_bound"];
+pub const NAMES: [&str; 11] =
+    ["with", "over_rival", "over_kin", "preferred", "removes", "left", "correlated", "memory", "beside", "at_bound", "over_other"];
 
 /// Standard errors beyond which more do not make it surer.
 const MOST: f64 = 20.0;
@@ -70,6 +72,7 @@ pub(super) fn figures(search: &Search, best: &Candidate, which: usize, rivals: &
         memory: f64::from(u8::from(own.physics.facts.memory)),
         beside: (best.structure.added.len() - 1) as f64,
         at_bound: f64::from(u8::from(super::plausible::is_at_bound_of(best, which))),
+        over_other: least(&mut rivals.iter().filter(|(h, _)| !is_kin(h)).map(|(_, c)| behind(c)), 1e4f64.ln_1p()),
     }
 }
 
@@ -84,7 +87,15 @@ pub(super) fn without<'s>(search: &'s Search, best: &Candidate, which: usize) ->
 
 /// The probability that a finding with these figures is right in physics and place.
 pub(super) fn probability(figures: &Figures) -> f64 {
-    let [constant, coefficients @ ..] = &tuning().claim.confidence;
+    logistic(&tuning().claim.confidence, figures)
+}
+
+/// The probability that some physics of its family is at its place, whichever.
+pub(super) fn probability_of_family(figures: &Figures) -> f64 {
+    logistic(&tuning().claim.family_confidence, figures)
+}
+
+fn logistic([constant, coefficients @ ..]: &[f64; 12], figures: &Figures) -> f64 {
     let sum: f64 = coefficients.iter().zip(figures.list()).map(|(a, x)| a * x).sum();
     1.0 / (1.0 + (-(constant + sum)).exp())
 }

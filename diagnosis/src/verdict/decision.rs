@@ -7,6 +7,7 @@ use super::types::{Finding, Word};
 use crate::candidate::Candidate;
 use crate::error_budget::beside_noise;
 use crate::evaluator::Evaluator;
+use crate::hypothesis::Parameter;
 use crate::intervals::Uncertainty;
 use crate::problem::Problem;
 use crate::repeatability::floors;
@@ -37,6 +38,38 @@ pub(super) struct Decision<'s> {
     pub(super) floors: Vec<f64>,
     /// Whether the model's text is to hold the fitted parameters.
     pub(super) changes: bool,
+}
+
+/// Marks structures of which an effect, by its own interval, may be nothing, as long as one of those would be claimed: what is claimed then has none.
+pub fn without_what_may_be_nothing(problem: &Problem, search: &mut Search) {
+    let evaluator = Evaluator { noise_sd: search.noise_sd.clone(), ..Evaluator::new(problem) };
+    for _ in 0..search.found.len() {
+        let best = chosen(search);
+        if best.structure.added.is_empty() {
+            return;
+        }
+        let mut spread = Uncertainty::measured(&evaluator, best);
+        spread.beside(best, &near(search, best));
+        if !(0..best.structure.added.len()).any(|which| may_be_nothing(best, &spread, which)) {
+            return;
+        }
+        let name = best.structure.name();
+        for c in search.found.iter_mut().filter(|c| c.structure.name() == name) {
+            c.may_be_nothing = true;
+        }
+    }
+}
+
+/// Whether the interval of an effect's size holds the value at which it does nothing.
+fn may_be_nothing(best: &Candidate, spread: &Uncertainty, which: usize) -> bool {
+    best.structure.free.iter().enumerate().any(|(number, n)| {
+        let Role::Added(h, p) = n.role else { return false };
+        let Some(hypothesis) = best.structure.added.get(h).filter(|_| h == which) else { return false };
+        let is_size = |p: &&Parameter| p.key == hypothesis.physics.size && p.index.is_none();
+        let Some(neutral) = hypothesis.parameters.get(p).filter(is_size).and_then(|p| p.neutral) else { return false };
+        let [low, high] = spread.interval(best, number);
+        low <= neutral && neutral <= high
+    })
 }
 
 /// Decides.

@@ -1,7 +1,7 @@
 //! What was found: each physics with its place, its parameters, and what else could stand there.
 
 use super::choice::{chosen, evidence, exchanged};
-use super::confidence::{Figures, figures, probability, without};
+use super::confidence::{Figures, figures, probability, probability_of_family, without};
 use super::plausible::is_timing;
 use super::rounded::rounded;
 use super::types::{Alternative, Detectable, Estimate, Estimates, Finding, Moved, Parameter};
@@ -47,7 +47,8 @@ fn finding(search: &Search, best: &Candidate, spread: &Uncertainty, which: usize
     let hypothesis = &best.structure.added[which];
     let rivals = rivals(search, best, which);
     let near: Vec<(&Hypothesis, &Candidate)> = rivals.iter().map(|(h, c, _)| (h, *c)).collect();
-    let confidence = probability(&figures(search, best, which, &near));
+    let figures = figures(search, best, which, &near);
+    let confidence = probability(&figures);
     // What is left of the probability goes to the rivals that were fitted, the more the nearer they come, and to what was not.
     let weights: Vec<f64> = rivals.iter().map(|(_, _, behind)| (-behind.max(0.0) / tuning().claim.softened).exp()).collect();
     let sum = 1.0 + weights.iter().sum::<f64>();
@@ -62,6 +63,8 @@ fn finding(search: &Search, best: &Candidate, spread: &Uncertainty, which: usize
         parameters: parameters_of(best, spread, which),
         replaces: hypothesis.replaces.clone(),
         confidence: round_significant(confidence, 3),
+        family: Some(hypothesis.physics.family),
+        family_confidence: round_significant(probability_of_family(&figures).max(confidence), 3),
         alternatives: rivals.iter().zip(&weights).take(tuning().claim.alternatives).map(alternative).collect(),
     }
 }
@@ -74,8 +77,14 @@ pub(super) fn share_with_rivals(search: &Search, best: &Candidate, rivals: &[&Ca
         let Some(own) = best.structure.added.iter().find(|h| is_it(h)) else { continue };
         let against: Vec<&Candidate> = rivals.iter().copied().filter(|c| exchanged(best, c).0.iter().any(|h| h.id == own.id)).collect();
         let others: f64 = against.iter().map(|c| weight(c)).sum();
+        // Of its kind are laws in its place; what stands elsewhere, or is of another kind, shares what is known of that.
+        let is_of_its_kind =
+            |c: &&&Candidate| exchanged(best, c).1.iter().all(|h| h.place.same(&finding.place) && Some(h.physics.family) == finding.family);
+        let other_kinds: f64 = against.iter().filter(|c| !is_of_its_kind(c)).map(|c| weight(c)).sum();
+        let shared = 1.0 / (1.0 + other_kinds);
         let all = finding.confidence + finding.alternatives.iter().map(|a| a.confidence).sum::<f64>();
         let (before, after) = (finding.confidence, all.min(1.0) / (1.0 + others));
+        finding.family_confidence = round_significant(finding.family_confidence.min(shared).max(after.min(before)), 3);
         if others == 0.0 || after >= before {
             continue;
         }

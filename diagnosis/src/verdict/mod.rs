@@ -22,6 +22,7 @@ use crate::tuning::tuning;
 pub use beaten::{Beaten, Why, beaten};
 pub use choice::chosen;
 pub use confidence::{Figures, NAMES as FIGURES};
+pub use decision::without_what_may_be_nothing;
 pub use experiments::EXPERIMENT_FILE;
 pub use findings::figures_of;
 pub use models::VerdictError;

@@ -85,6 +85,8 @@ mod tests {
             parameters: BTreeMap::new(),
             replaces: Vec::new(),
             confidence,
+            family: None,
+            family_confidence: 0.0,
             alternatives: vec![Alternative { physics: "coulomb".to_string(), place: at("drum"), confidence: rival }],
         };
         assert!(first(0.04, 0.10).has_likelier_rival() && !first(0.97, 0.03).has_likelier_rival());

@@ -44,6 +44,8 @@ mod tests {
             parameters: BTreeMap::new(),
             replaces: Vec::new(),
             confidence: 0.9,
+            family: None,
+            family_confidence: 0.0,
             alternatives: Vec::new(),
         };
         let rubs = found("coulomb", Place::Between("drum".to_string(), "ground".to_string()));

@@ -2,9 +2,10 @@
 
     python calibrate.py fit   CASES,TRUTH,VERDICTS [CASES,TRUTH,VERDICTS ...]     # prints the coefficients for tuning/claim.rs
     python calibrate.py judge CASES,TRUTH,VERDICTS [CASES,TRUTH,VERDICTS ...]     # reliability by tenths, Brier score, wrong ones
+    python calibrate.py fit-family | judge-family ...                             # the same for `family_confidence`
 
 VERDICTS is what measure.py wrote: a folder per case with verdict.json and the log, which holds the figures of every finding. A finding is right
-where the scorer of shared/concealed takes physics and place for right. The sets that `fit` sees must not be those that `judge` sees.
+where the scorer of shared/concealed takes physics and place for right; its family is right where that takes the family for right at that place. The sets that `fit` sees must not be those that `judge` sees.
 It needs numpy and scipy.
 """
 import glob
@@ -20,9 +21,11 @@ SHARED = os.environ.get("BACKDRIVE_CONCEALED", os.path.normpath(os.path.join(HER
 sys.path.insert(0, SHARED)
 import score  # noqa: E402
 
-NAMES = ["with", "over_rival", "over_kin", "preferred", "removes", "left", "correlated", "memory", "beside", "at_bound"]
+NAMES = ["with", "over_rival", "over_kin", "preferred", "removes", "left", "correlated", "memory", "beside", "at_bound", "over_other"]
 # What can only speak for a finding, and what only against it: a coefficient of the other sign would be chance.
-SIGNS = np.array([1, 1, 1, 1, 1, -1, -1, -1, -1, -1])
+SIGNS = np.array([1, 1, 1, 1, 1, -1, -1, -1, -1, -1, 1])
+# Over other laws of its family in its place speaks for the law, and not for the family; where nothing of the family is nearest, `preferred` is the same as `over_other`.
+ABOUT_THE_LAW = {False: {"over_other"}, True: {"over_kin", "preferred", "memory"}}
 RIDGE = 0.5
 
 
@@ -33,11 +36,16 @@ def right(finding, truth):
     return any(score.exact(finding, e) for e in effects) or lopsided
 
 
+def right_family(finding, truth):
+    effects = [e for e in truth["effects"] if e.get("accept")] if truth["class"] != "outside" else []
+    return right(finding, truth) or any(score.family(finding, e) and score.place(finding) in score.places(e) for e in effects)
+
+
 def place_of(finding):
     return finding["signal"] if finding.get("signal") else "-".join(finding["between"])
 
 
-def findings(sets):
+def findings(sets, family):
     for one in sets:
         _, truths, verdicts = one.split(",")
         for path in sorted(glob.glob(os.path.join(truths, "*.json"))):
@@ -56,11 +64,11 @@ def findings(sets):
             for finding in verdict["findings"]:
                 numbers = figures.get((finding["physics"], place_of(finding)))
                 if numbers is not None:
-                    yield f"{os.path.basename(verdicts)}/{truth['case']}", truth, verdict, finding, numbers, right(finding, truth)
+                    yield f"{os.path.basename(verdicts)}/{truth['case']}", truth, verdict, finding, numbers, (right_family if family else right)(finding, truth)
 
 
-def fit(sets):
-    all_of = list(findings(sets))
+def fit(sets, family):
+    all_of = list(findings(sets, family))
     x = np.array([f[4] for f in all_of])
     y = np.array([f[5] for f in all_of], float)
 
@@ -68,7 +76,8 @@ def fit(sets):
         z = c[0] + x @ c[1:]
         return np.sum(np.logaddexp(0, z) - y * z) + RIDGE * np.sum(c[1:] ** 2)
 
-    bounds = [(None, None)] + [(0, None) if s > 0 else (None, 0) for s in SIGNS]
+    ends = [(0, 0) if name in ABOUT_THE_LAW[family] else (0, None) if s > 0 else (None, 0) for name, s in zip(NAMES, SIGNS)]
+    bounds = [(None, None)] + ends
     c = minimize(cost, np.zeros(1 + x.shape[1]), bounds=bounds, method="L-BFGS-B").x
     p = 1 / (1 + np.exp(-(c[0] + x @ c[1:])))
     print(f"{len(y)} findings, {int(y.sum())} right; Brier score {np.mean((p - y) ** 2):.4f} on the cases it was fitted to")
@@ -77,9 +86,10 @@ def fit(sets):
         print(f"  {name:<12} {v:8.3f}")
 
 
-def judge(sets):
-    all_of = list(findings(sets))
-    p = np.array([f[3]["confidence"] for f in all_of])
+def judge(sets, family):
+    all_of = list(findings(sets, family))
+    key = "family_confidence" if family else "confidence"
+    p = np.array([f[3][key] for f in all_of])
     y = np.array([f[5] for f in all_of], float)
     print(f"{len(y)} findings of {len({f[0] for f in all_of})} cases; Brier score {np.mean((p - y) ** 2):.4f}; always the mean: {np.mean(y) * (1 - np.mean(y)):.4f}")
     print("| confidence | findings | mean confidence | right |")
@@ -88,13 +98,14 @@ def judge(sets):
         inside = (p >= low) & ((p < low + 0.1) | (low > 0.85))
         if inside.any():
             print(f"| {low:.1f} to {low + 0.1:.1f} | {inside.sum()} | {p[inside].mean():.2f} | {y[inside].mean():.2f} |")
-    for name, truth, verdict, finding, _, good in sorted(all_of, key=lambda f: -f[3]["confidence"]):
-        if not good and finding["confidence"] >= 0.5:
+    for name, truth, verdict, finding, _, good in sorted(all_of, key=lambda f: -f[3][key]):
+        if not good and finding[key] >= 0.5:
             hidden = "+".join(f"{e['physics']}@{e.get('signal') or '-'.join(e['between'])}" for e in truth["effects"]) or "-"
-            print(f"wrong at {finding['confidence']:.2f}: {name} ({truth['class']}, {verdict['verdict']}): {finding['physics']}@{place_of(finding)} for {hidden}")
+            print(f"wrong at {finding[key]:.2f}: {name} ({truth['class']}, {verdict['verdict']}): {finding['physics']}@{place_of(finding)} for {hidden}")
 
 
 if __name__ == "__main__":
-    if len(sys.argv) < 3 or sys.argv[1] not in ("fit", "judge"):
+    what, _, family = sys.argv[1].partition("-") if len(sys.argv) > 2 else ("", "", "")
+    if what not in ("fit", "judge") or family not in ("", "family"):
         sys.exit(__doc__)
-    {"fit": fit, "judge": judge}[sys.argv[1]](sys.argv[2:])
+    {"fit": fit, "judge": judge}[what](sys.argv[2:], family == "family")

@@ -37,7 +37,7 @@ impl Step for Anew {
         let is_other = |c: &Candidate| other.is_some_and(|o| std::ptr::eq(o, c));
         let plain = simplest_of(fewer(), samples).filter(has_fewer).filter(|c| !is_other(c));
         let mut seeds = Vec::new();
-        let mut fine = tuning().fit.coarse_substeps;
+        let mut fine = course.coarse;
         for base in best.into_iter().chain(other).chain(plain) {
             let substeps = substeps_for(&view.evaluator, base);
             fine = fine.max(substeps);
@@ -72,14 +72,12 @@ fn screened(course: &Course, evaluator: &Evaluator, base: &Candidate, work: Step
 /// Fewest substeps per sample with which a simulation errs by less than the residual of a structure.
 fn substeps_for(evaluator: &Evaluator, candidate: &Candidate) -> usize {
     let of = |substeps: usize| Evaluator { substeps, ..evaluator.clone() }.residuals(&candidate.structure, &candidate.fit.values);
-    let Some(exact) = of(tuning().fit.fine_substeps) else { return tuning().fit.middle_substeps };
+    let Some(exact) = of(tuning().fit.fine_substeps) else { return evaluator.problem.middle_substeps() };
     let size: f64 = exact.iter().map(|x| x * x).sum();
     let errs = |substeps: &usize| {
         let off = of(*substeps).map_or(f64::INFINITY, |r| r.iter().zip(&exact).map(|(a, b)| (a - b) * (a - b)).sum());
         off > tuning().screening.substep_error * size
     };
-    [tuning().fit.coarse_substeps, tuning().fit.middle_substeps, 2 * tuning().fit.middle_substeps, 4 * tuning().fit.middle_substeps]
-        .into_iter()
-        .find(|s| !errs(s))
-        .unwrap_or(tuning().fit.fine_substeps)
+    let (coarse, middle) = (evaluator.problem.coarse_substeps(), evaluator.problem.middle_substeps());
+    [coarse, middle, 2 * middle, 4 * middle].into_iter().find(|s| !errs(s)).unwrap_or(tuning().fit.fine_substeps)
 }

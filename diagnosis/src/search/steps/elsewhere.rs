@@ -5,7 +5,6 @@ use super::step::{Step, Terms};
 use crate::candidate::{Candidate, key_of, simplest};
 use crate::evaluator::Evaluator;
 use crate::hypothesis::Hypothesis;
-use crate::problem::Record;
 use crate::race::{Course, Seed};
 use crate::search::state::State;
 use crate::tuning::tuning;
@@ -38,7 +37,7 @@ impl Step for Elsewhere {
         // What stands in another place asks for other parameters all around: some steps with patience, before it is held against one that is at its end. And where
         // the stated parameters were right, the refit without the effect has led away from them: so from there, too, in its own place as well.
         let problem = course.evaluator.problem;
-        let records: Vec<Record> = course.worst(&best.fit.residuals).into_iter().filter_map(|r| problem.fit.get(r).cloned()).collect();
+        let records = course.beginnings(&best.fit.residuals).records(course.evaluator);
         let budget = course.evaluator.budget.next(state.work.share(tuning().search.share_of_elsewhere));
         let coarse = Evaluator { substeps: course.coarse, records: &records, budget, ..course.evaluator.clone() };
         let itself =

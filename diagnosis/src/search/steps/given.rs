@@ -4,7 +4,6 @@ use super::near::brought_near;
 use super::step::{Step, Terms};
 use crate::candidate::Candidate;
 use crate::evaluator::Evaluator;
-use crate::problem::Record;
 use crate::race::Seed;
 use crate::search::state::State;
 use crate::tuning::tuning;
@@ -26,7 +25,7 @@ impl Step for Given {
         let course = state.course;
         let problem = course.evaluator.problem;
         let Some(best) = state.found.first() else { return Vec::new() };
-        let records: Vec<Record> = course.worst(&best.fit.residuals).into_iter().filter_map(|r| problem.fit.get(r).cloned()).collect();
+        let records = course.beginnings(&best.fit.residuals).records(course.evaluator);
         let budget = course.evaluator.budget.next(state.work.share(tuning().search.share_of_elsewhere));
         let coarse = Evaluator { substeps: course.coarse, records: &records, budget, ..course.evaluator.clone() };
         let as_given = |c: &Candidate| {

@@ -5,8 +5,7 @@ use super::step::{Step, Terms};
 use crate::candidate::{Candidate, distinct_structures};
 use crate::effort::Effort;
 use crate::evaluator::Evaluator;
-use crate::problem::Record;
-use crate::race::{Course, Seed, distinct, restricted};
+use crate::race::{Course, Seed, distinct};
 use crate::screen::Projector;
 use crate::search::state::State;
 use crate::structure::Structure;
@@ -69,12 +68,11 @@ type Ranked = (f64, Seed);
 /// Each joint of a structure split in two beside these stated parameters, from the starts that leave least.
 fn split(course: &Course, base: &Candidate, stated: &[f64], absorbed: bool) -> Vec<Seed> {
     let problem = course.evaluator.problem;
-    let few = course.worst(&base.fit.residuals);
-    let records: Vec<Record> = few.iter().filter_map(|r| problem.fit.get(*r).cloned()).collect();
+    let beginnings = course.beginnings(&base.fit.residuals);
+    let records = beginnings.records(course.evaluator);
     let coarse = Evaluator { substeps: course.coarse, records: &records, ..course.evaluator.clone() };
     let there = match absorbed {
-        true if few.len() == course.evaluator.records.len() => base.fit.jacobian.clone(),
-        true => restricted(course.evaluator, &base.fit, &few).jacobian,
+        true => beginnings.restricted(course.evaluator, &base.fit).jacobian,
         false => {
             let structure = Structure::new(problem, &records, base.structure.added.clone());
             let own = base.structure.of_records(&base.fit.values);

@@ -1,7 +1,7 @@
 //! Physics at places: what was found, what could be instead, what would have been seen, and their parameters.
 
 use super::place::PlaceInFile;
-use crate::hypothesis::Place;
+use crate::hypothesis::{Family, Place};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -24,6 +24,12 @@ pub struct Finding {
     /// How sure it is, 0 to 1, its rivals and what remains taken into account.
     #[serde(default)]
     pub confidence: f64,
+    /// What kind of physics it is; not in files of others.
+    #[serde(default)]
+    pub family: Option<Family>,
+    /// How sure it is that physics of this kind acts there, whatever its law, 0 to 1; at least `confidence`. 0 in files of others.
+    #[serde(default)]
+    pub family_confidence: f64,
     /// What could stand in its place, the likeliest first.
     #[serde(default)]
     pub alternatives: Vec<Alternative>,

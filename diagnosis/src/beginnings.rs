@@ -1,0 +1,75 @@
+//! What first steps of fits are held against: beginnings of the recordings that are explained worst, as many samples as it takes to rank structures.
+
+use crate::evaluator::Evaluator;
+use crate::fit::{Fit, dot};
+use crate::problem::{Problem, Record};
+use crate::screen::worst_records;
+use crate::tuning::tuning;
+use backdrive_plant::set::Initial;
+
+/// Beginnings of some recordings: which, and how many samples of each.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct Beginnings {
+    shown: Vec<(usize, usize)>,
+}
+
+impl Beginnings {
+    /// Of the two recordings on which these residuals are largest, so much that as large a residual is seen there per sample as in the whole of them, or nearly; all of
+    /// them where parameters belong to single recordings, or to their ends.
+    pub fn of_the_worst(evaluator: &Evaluator, residuals: &[f64]) -> Beginnings {
+        let whole = |r: usize| (r, evaluator.records.get(r).map_or(0, |record| record.len));
+        if !can_be_cut(evaluator.problem) {
+            return Beginnings { shown: (0..evaluator.records.len()).map(whole).collect() };
+        }
+        let worst = worst_records(evaluator, residuals, 2);
+        let least = tuning().search.first_samples / worst.len().max(1);
+        let shown = worst.into_iter().map(|r| (r, enough(evaluator, residuals, r, least))).collect();
+        Beginnings { shown }
+    }
+
+    /// They as recordings.
+    pub fn records(&self, evaluator: &Evaluator) -> Vec<Record> {
+        let part = |(r, len): &(usize, usize)| {
+            let record = evaluator.records.get(*r)?;
+            Some(if *len < record.len { record.part(0..*len, record.begins.clone(), record.skip) } else { record.clone() })
+        };
+        self.shown.iter().filter_map(part).collect()
+    }
+
+    /// A fit's residuals and derivatives there.
+    pub fn restricted(&self, evaluator: &Evaluator, fit: &Fit) -> Fit {
+        let layout = evaluator.layout();
+        let pick = |all: &Vec<f64>| -> Vec<f64> {
+            let parts =
+                self.shown.iter().flat_map(|(r, len)| layout.iter().filter(move |l| l.0 == *r).map(move |l| l.2.start..l.2.start + len));
+            parts.filter_map(|range| all.get(range)).flatten().copied().collect()
+        };
+        Fit { residuals: pick(&fit.residuals), jacobian: fit.jacobian.iter().map(pick).collect(), ..fit.clone() }
+    }
+}
+
+/// Whether first steps may be taken on some of the recordings only: nothing belongs to single ones.
+fn can_be_cut(problem: &Problem) -> bool {
+    problem.initial != Initial::Free && problem.unknown.is_empty() && problem.fit.iter().all(|r| r.conditions.is_empty())
+}
+
+/// Samples of a recording from its beginning, `least` or more by doubling, until their mean square residual is near that of the whole.
+fn enough(evaluator: &Evaluator, residuals: &[f64], r: usize, least: usize) -> usize {
+    let Some(record) = evaluator.records.get(r) else { return 0 };
+    // On times of its own it is simulated as a whole.
+    if record.logged.is_some() {
+        return record.len;
+    }
+    let layout = evaluator.layout();
+    let square_up_to = |len: usize| -> f64 {
+        let ranges = layout.iter().filter(|l| l.0 == r).map(|l| l.2.start..l.2.start + len);
+        ranges.filter_map(|range| residuals.get(range)).map(|part| dot(part, part)).sum::<f64>() / len.max(1) as f64
+    };
+    let wanted = tuning().search.first_share * square_up_to(record.len);
+    let mut len = least.max(1);
+    while len < record.len && square_up_to(len) < wanted {
+        len *= 2;
+    }
+    // A beginning that is nearly all of it saves nothing.
+    if 4 * len > 3 * record.len { record.len } else { len }
+}

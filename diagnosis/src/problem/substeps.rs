@@ -1,0 +1,40 @@
+//! How many substeps per sample first steps of fits take: as many as the measured motion turns in a sample asks for.
+
+use super::Problem;
+use crate::tuning::tuning;
+
+impl Problem {
+    /// Substeps per sample of first steps and of screening, at most.
+    pub fn coarse_substeps(&self) -> usize {
+        tuning().fit.coarse_substeps.max(self.following())
+    }
+
+    /// Substeps per sample of fits on their way, at most.
+    pub fn middle_substeps(&self) -> usize {
+        tuning().fit.middle_substeps.max(2 * self.following())
+    }
+
+    /// Substeps in which the motion turns by a part of its period that a law can be stepped over. Its angular frequency is that of its steps from sample to sample over its
+    /// size, both root mean square and without the noise, at the output that stands out of its noise most.
+    fn following(&self) -> usize {
+        let fit = &tuning().fit;
+        let best = (0..self.model.outputs.len()).filter_map(|output| self.turning(output)).max_by(|a, b| a.1.total_cmp(&b.1));
+        let angle = best.map_or(0.0, |(angle, _)| angle);
+        ((angle / fit.turn).ceil() as usize).clamp(1, fit.following_substeps)
+    }
+
+    /// By how much an output turns from sample to sample, rad, and its size over its noise.
+    fn turning(&self, output: usize) -> Option<(f64, f64)> {
+        let noise = self.noise_sd.get(output)?;
+        let (mut steps, mut size, mut count) = (0.0, 0.0, 0.0);
+        for samples in self.fit.iter().filter_map(|r| r.outputs.get(output)?.as_deref()) {
+            let mean = samples.iter().sum::<f64>() / samples.len().max(1) as f64;
+            size += samples.iter().map(|y| (y - mean) * (y - mean)).sum::<f64>();
+            steps += samples.iter().zip(samples.iter().skip(1)).map(|(a, b)| (b - a) * (b - a)).sum::<f64>();
+            count += samples.len() as f64;
+        }
+        let noise = noise * noise * count;
+        let (steps, size) = (steps - 2.0 * noise, size - noise);
+        (steps > 0.0 && size > 0.0 && noise > 0.0).then(|| ((steps / size).sqrt(), size / noise))
+    }
+}
