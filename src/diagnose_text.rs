@@ -203,6 +203,7 @@ pub fn errors(budget: &[BudgetedError]) -> Option<String> {
     let told = |source: Source| match source {
         Source::Integration => "integration",
         Source::Clock => "jitter of the clock",
+        Source::Differencing => "differences of counts in the place of a velocity",
         Source::Rounding => "rounding of the output",
         Source::Hold => "how the input runs between samples",
         Source::DrivingMotion => "noise of a motion that drives the model",

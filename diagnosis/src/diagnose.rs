@@ -4,6 +4,7 @@ use crate::audit::{Remark, Weight, audit};
 use crate::candidate::price;
 use crate::contenders::with_contenders;
 use crate::hold;
+use crate::let_go::let_go;
 use crate::locate::{self, Location, locate};
 use crate::per_record::{PerRecord, fit_each};
 use crate::problem::Problem;
@@ -68,6 +69,7 @@ pub fn diagnose(
     report("fitting what could stand in its place");
     let search = with_contenders(&problem, search, &settings.without, &Budget::new(tuning().experiment.contender_work, limit));
     let mut search = search;
+    let_go(&problem, &mut search, limit);
     without_what_may_be_nothing(&problem, &mut search);
     remarks.extend(timing(&problem, &search));
     report("locating the missing force");

@@ -9,7 +9,7 @@ use crate::signal::rms;
 use crate::simulate::{TWICE, predict};
 use crate::statistics::levels;
 use crate::tuning::tuning;
-use backdrive_plant::model::{InputKind, Model};
+use backdrive_plant::model::{InputKind, Model, OutputKind};
 use backdrive_plant::stepper::segments;
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
@@ -30,6 +30,8 @@ pub enum Source {
     Hold,
     /// Noise and rounding of a motion that drives the model: what another noise of the same size changes.
     DrivingMotion,
+    /// A velocity in steps, which is the difference of an encoder's counts: their mean over a sample in the place of the velocity at its middle.
+    Differencing,
 }
 
 /// An error at one output.
@@ -70,6 +72,10 @@ pub fn error_budget(evaluator: &Evaluator, fitted: &Candidate, holds: &[Told]) -
         step / 12.0f64.sqrt()
     };
     add(Source::Rounding, relative((0..problem.model.outputs.len()).map(steps).collect()));
+    if let Some(residuals) = evaluator.residuals(structure, values) {
+        let steps = |output: usize| steps(output) > 0.0;
+        add(Source::Differencing, levels(evaluator, &differencing(evaluator, &residuals, &steps)));
+    }
     // What it does is in the residual, and what of that is white is in the noise: it is no larger than all of it.
     let driven = structure.model(problem, values).map_or_else(Vec::new, |model| of_driving_motion(&model, &problem.fit));
     add(Source::DrivingMotion, relative(driven).into_iter().map(|error: f64| error.min(1.0)).collect());
@@ -78,9 +84,39 @@ pub fn error_budget(evaluator: &Evaluator, fitted: &Candidate, holds: &[Told]) -
 
 /// What of it is no white noise of the sensor, so that an effect may imitate it: the largest of the outputs, noise variances. An input that runs on is early, which no effect is.
 pub fn beside_noise(all: &[BudgetedError]) -> f64 {
-    let outside = |e: &&BudgetedError| !matches!(e.source, Source::Rounding | Source::Hold);
-    let largest = |output: &str| all.iter().filter(outside).filter(|e| e.output == output).map(|e| e.noise_sd * e.noise_sd).sum::<f64>();
-    all.iter().map(|e| largest(&e.output)).fold(0.0, f64::max)
+    largest(all, |source| !matches!(source, Source::Rounding | Source::Hold))
+}
+
+/// The same of what the recordings do not say as they were taken: two structures, each of which has bent its numbers to that, are not told apart by as much. Finer steps of
+/// the integration change both alike.
+pub fn of_sensors(all: &[BudgetedError]) -> f64 {
+    largest(all, |source| matches!(source, Source::Clock | Source::Differencing))
+}
+
+fn largest(all: &[BudgetedError], counts: impl Fn(Source) -> bool) -> f64 {
+    let of = |output: &str| all.iter().filter(|e| counts(e.source) && e.output == output).map(|e| e.noise_sd * e.noise_sd).sum::<f64>();
+    all.iter().map(|e| of(&e.output)).fold(0.0, f64::max)
+}
+
+/// What a mean over a sample differs from the value at its middle, in the place of each residual, normalised: a twenty-fourth of the second difference of the predicted
+/// velocity, the first term of its series. 0 for outputs that are no velocities in steps.
+fn differencing(evaluator: &Evaluator, residuals: &[f64], is_in_steps: &dyn Fn(usize) -> bool) -> Vec<f64> {
+    let outputs = &evaluator.problem.model.outputs;
+    let mut all = vec![0.0; residuals.len()];
+    for (r, output, range) in evaluator.layout() {
+        let is_velocity = outputs.get(output).is_some_and(|o| matches!(o.kind, OutputKind::Velocity(_)));
+        let samples = evaluator.records.get(r).and_then(|record| record.compared(output));
+        let (Some(samples), Some(left), Some(own)) = (samples, residuals.get(range.clone()), all.get_mut(range)) else { continue };
+        if !is_velocity || !is_in_steps(output) {
+            continue;
+        }
+        let noise_sd = evaluator.noise_sd.get(output).copied().unwrap_or(1.0);
+        let predicted: Vec<f64> = samples.iter().zip(left).map(|(y, r)| y / noise_sd - r).collect();
+        for (slot, three) in own.iter_mut().skip(1).zip(predicted.windows(3)) {
+            *slot = (three[0] - 2.0 * three[1] + three[2]) / 24.0;
+        }
+    }
+    all
 }
 
 /// What the irregularity of the clocks may put each output off by, in its unit.

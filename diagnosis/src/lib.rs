@@ -27,6 +27,7 @@ pub mod fit;
 pub mod hold;
 pub mod hypothesis;
 pub mod intervals;
+pub mod let_go;
 pub mod locate;
 pub mod noise;
 pub(crate) mod normal_equations;

@@ -2,7 +2,8 @@
 
 use super::plausible::{is_at_bound, is_plausible};
 use crate::candidate::{Candidate, advantage_over};
-use crate::error_budget::beside_noise;
+use crate::compare::HeldOut;
+use crate::error_budget::{beside_noise, of_sensors};
 use crate::hypothesis::{Hypothesis, Physics};
 use crate::physics::{PHYSICS, withheld};
 use crate::predictive::{Gain, gain};
@@ -60,9 +61,15 @@ fn mean_square(search: &Search, c: &Candidate) -> f64 {
     (c.fit.cost + unseen) / (search.samples + unseen_samples).max(1) as f64
 }
 
+/// The same, with its numbers let go where those of the other were, too.
+fn mean_square_let_go(search: &Search, c: &Candidate, beside: &Candidate) -> f64 {
+    let (Some(own), Some(_)) = on_unseen(c, beside) else { return mean_square(search, c) };
+    (c.fit.cost + own.mean_square * search.unseen_samples as f64) / (search.samples + search.unseen_samples).max(1) as f64
+}
+
 /// How much better one candidate predicts than another, over all blocks of all recordings.
 pub(super) fn everywhere(base: &Candidate, better: &Candidate) -> Option<Gain> {
-    match (&base.unseen, &better.unseen) {
+    match on_unseen(base, better) {
         (Some(a), Some(b)) => {
             let all = |own: &[Vec<f64>], unseen: &[Vec<f64>]| [own, unseen].concat();
             gain(&all(&base.blocks, &a.blocks), &all(&better.blocks, &b.blocks))
@@ -104,12 +111,34 @@ fn order(h: &Hypothesis) -> usize {
 /// What the fits and the held-out recordings say for a candidate against another one, as a difference of information
 /// criteria with effective samples.
 pub(super) fn evidence(search: &Search, base: &Candidate, better: &Candidate) -> f64 {
-    advantage_over(base, better, search.samples) + unseen_evidence(search, base, better)
+    let evidence = advantage_over(base, better, search.samples) + unseen_evidence(search, base, better);
+    // What irregular clocks and sensors come to tells no two apart.
+    let least = of_sensors(&search.errors);
+    let apart = mean_square_let_go(search, base, better) - mean_square_let_go(search, better, base);
+    if apart.abs() < least { evidence.clamp(-0.5 * tuning().claim.alike, 0.5 * tuning().claim.alike) } else { evidence }
+}
+
+/// What two candidates leave on the held-out recordings, with their numbers let go where both were.
+fn on_unseen<'c>(base: &'c Candidate, better: &'c Candidate) -> (Option<&'c HeldOut>, Option<&'c HeldOut>) {
+    match (&base.let_go, &better.let_go) {
+        (Some(a), Some(b)) => (Some(a), Some(b)),
+        _ => (base.unseen.as_ref(), better.unseen.as_ref()),
+    }
+}
+
+/// Whether a candidate of as many effects as the best fits nearly as well, and is told from it by the held-out recordings.
+pub(crate) fn decided_by_unseen(search: &Search, c: &Candidate, best: &Candidate) -> bool {
+    let alike = tuning().claim.alike;
+    c.structure.added.len() == best.structure.added.len()
+        && !c.structure.added.is_empty()
+        && c.unseen.is_some()
+        && advantage_over(c, best, search.samples) < alike
+        && (c.let_go.is_some() || unseen_evidence(search, c, best) > alike)
 }
 
 /// What the held-out recordings say alone; 0 where there are none.
 pub(super) fn unseen_evidence(search: &Search, base: &Candidate, better: &Candidate) -> f64 {
-    match (&base.unseen, &better.unseen) {
+    match on_unseen(base, better) {
         (Some(a), Some(b)) if a.mean_square > 0.0 && b.mean_square > 0.0 => {
             (search.unseen_samples as f64 / a.correlation_time.max(b.correlation_time)) * (a.mean_square / b.mean_square).ln()
         }

@@ -21,6 +21,7 @@ pub(crate) mod types;
 use crate::tuning::tuning;
 pub use beaten::{Beaten, Why, beaten};
 pub use choice::chosen;
+pub(crate) use choice::decided_by_unseen;
 pub use confidence::{Figures, NAMES as FIGURES};
 pub use decision::without_what_may_be_nothing;
 pub use experiments::EXPERIMENT_FILE;
