@@ -56,10 +56,6 @@ fn can_be_cut(problem: &Problem) -> bool {
 /// Samples of a recording from its beginning, `least` or more by doubling, until their mean square residual is near that of the whole.
 fn enough(evaluator: &Evaluator, residuals: &[f64], r: usize, least: usize) -> usize {
     let Some(record) = evaluator.records.get(r) else { return 0 };
-    // On times of its own it is simulated as a whole.
-    if record.logged.is_some() {
-        return record.len;
-    }
     let layout = evaluator.layout();
     let square_up_to = |len: usize| -> f64 {
         let ranges = layout.iter().filter(|l| l.0 == r).map(|l| l.2.start..l.2.start + len);

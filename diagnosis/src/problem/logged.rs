@@ -39,6 +39,12 @@ impl Logged {
         Logged { step, inputs, segments, at: t.iter().map(|t| (t - first) / step).collect(), outputs }
     }
 
+    /// The first samples of it.
+    pub(super) fn first(&self, samples: usize) -> Logged {
+        let cut = |outputs: &Option<Vec<f64>>| outputs.as_ref().map(|o| o[..samples.min(o.len())].to_vec());
+        Logged { at: self.at[..samples.min(self.at.len())].to_vec(), outputs: self.outputs.iter().map(cut).collect(), ..self.clone() }
+    }
+
     /// Points of the grid.
     pub fn len(&self) -> usize {
         self.at.last().map_or(0, |last| last.ceil() as usize + 2)

@@ -138,7 +138,8 @@ impl Record {
             begins,
             skip,
             before: self.before + range.start,
-            logged: None,
+            // From the middle on it is simulated coupled, which is on an even grid.
+            logged: self.logged.as_ref().filter(|_| range.start == 0).map(|logged| Arc::new(logged.first(range.end))),
             ..self.clone()
         }
     }

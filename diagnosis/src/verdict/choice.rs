@@ -162,18 +162,21 @@ pub(super) fn alike<'s>(search: &'s Search, best: &Candidate) -> Vec<&'s Candida
         (_, other) => !other.is_empty(),
     };
     let mut seen = HashSet::new();
-    // A fit that is not at its end may still come as near.
-    let effective = search.samples as f64 / best.correlation_time.max(1.0);
-    let still = |c: &Candidate| effective * (2.0 * c.fit.predicted_decrease / c.fit.cost).min(0.5);
     let close = |c: &&Candidate| {
         c.structure.added.len() == best.structure.added.len()
-            && evidence(search, c, best) - still(c) < tuning().claim.alike
+            && behind(search, c, best) < tuning().claim.alike
             && is_plausible(c)
             && differs(c)
     };
     let all: Vec<&Candidate> = search.found.iter().filter(close).filter(|c| seen.insert(c.structure.name())).collect();
     let is_finer = |c: &Candidate| all.iter().any(|other| c.structure.free.len() > other.structure.free.len() && is_finer_than(other, c));
     all.iter().copied().filter(|c| !is_finer(c)).take(tuning().claim.rivals).collect()
+}
+
+/// How far a structure is behind the best. A fit that is not at its end may still come nearer.
+pub(super) fn behind(search: &Search, c: &Candidate, best: &Candidate) -> f64 {
+    let effective = search.samples as f64 / best.correlation_time.max(1.0);
+    evidence(search, c, best) - effective * (2.0 * c.fit.predicted_decrease / c.fit.cost).min(0.5)
 }
 
 /// Whether two structures differ in one effect, and the first has a special or limiting case of the other's there: what that one explains is no other explanation.

@@ -1,6 +1,6 @@
 //! What was found: each physics with its place, its parameters, and what else could stand there.
 
-use super::choice::{chosen, evidence, exchanged};
+use super::choice::{behind, chosen, evidence, exchanged};
 use super::confidence::{Figures, figures, probability, probability_of_family, without};
 use super::plausible::is_timing;
 use super::rounded::rounded;
@@ -71,7 +71,7 @@ fn finding(search: &Search, best: &Candidate, spread: &Uncertainty, which: usize
 
 /// What is not told apart is not sure: the probability that a finding or one of its rivals is right is shared among them by how near they come.
 pub(super) fn share_with_rivals(search: &Search, best: &Candidate, rivals: &[&Candidate], findings: &mut [Finding]) {
-    let weight = |c: &Candidate| (-evidence(search, c, best).max(0.0) / tuning().claim.softened).exp();
+    let weight = |c: &Candidate| (-behind(search, c, best).max(0.0) / tuning().claim.softened).exp();
     for finding in findings {
         let is_it = |h: &Hypothesis| h.physics.name == finding.physics && h.place.same(&finding.place);
         let Some(own) = best.structure.added.iter().find(|h| is_it(h)) else { continue };
