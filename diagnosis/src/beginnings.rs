@@ -69,3 +69,50 @@ fn enough(evaluator: &Evaluator, residuals: &[f64], r: usize, least: usize) -> u
     // A beginning that is nearly all of it saves nothing.
     if 4 * len > 3 * record.len { record.len } else { len }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use backdrive_plant::model::Model;
+    use backdrive_plant::recording::Recording;
+
+    #[test]
+    fn a_beginning_holds_as_much_residual_per_sample_as_the_whole_or_half_of_it() {
+        let text = "name = 'cart'\n[bodies]\ncart = 2.0\n[[inputs]]\nname = 'f'\nkind = 'force'\non = 'cart'\n\
+                    [[outputs]]\nname = 'v'\nkind = 'velocity'\nof = 'cart'\n";
+        let model = Model::from_toml(text, "cart.toml").unwrap();
+        let record = |samples: usize| {
+            let t: Vec<f64> = (0..samples).map(|i| 1e-3 * i as f64).collect();
+            let signals = vec![("f".to_string(), t.iter().map(|t| t.sin()).collect()), ("v".to_string(), t.clone())];
+            Record::new(&Recording::new("r", t, signals).unwrap(), &model, Vec::new()).unwrap()
+        };
+        let of = |lengths: &[usize]| {
+            let fit: Vec<Record> = lengths.iter().map(|n| record(*n)).collect();
+            Problem::new(text.to_string(), "cart.toml".into(), model.clone(), fit, Vec::new(), Initial::Rest).unwrap()
+        };
+        let first = tuning().search.first_samples;
+        // Even residuals: as many as first steps take, over the two worst recordings.
+        let problem = of(&[4 * first, 100, 4 * first]);
+        let evaluator = Evaluator::new(&problem);
+        let even = vec![1.0; evaluator.len()];
+        let shown = Beginnings::of_the_worst(&evaluator, &even);
+        assert_eq!(shown.shown, [(0, first / 2), (2, first / 2)]);
+        // What shows late only has to be seen.
+        let mut late = vec![0.1; evaluator.len()];
+        late[3 * first..4 * first].fill(10.0);
+        let shown = Beginnings::of_the_worst(&evaluator, &late);
+        assert_eq!(shown.shown, [(0, 4 * first), (2, first / 2)]);
+        // A fit's residuals there.
+        let numbered = Fit {
+            values: Vec::new(),
+            cost: 0.0,
+            residuals: (0..evaluator.len()).map(|i| i as f64).collect(),
+            jacobian: Vec::new(),
+            predicted_decrease: 0.0,
+            steps: 0,
+        };
+        let there = shown.restricted(&evaluator, &numbered).residuals;
+        assert_eq!(there.len(), shown.records(&evaluator).iter().map(|r| r.len).sum::<usize>());
+        assert_eq!((there[0], there[4 * first]), (0.0, (4 * first + 100) as f64));
+    }
+}

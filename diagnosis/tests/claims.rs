@@ -296,3 +296,24 @@ fn what_one_direction_cannot_tell_is_ambiguous_until_the_experiment_that_was_pro
     assert_eq!((second.word, second.findings[0].physics.as_str()), (Word::Missing, "coulomb"), "{}", second.sentence);
     assert!(second.findings[0].confidence > finding.confidence);
 }
+
+#[test]
+fn a_velocity_in_steps_is_a_mean_over_a_sample_and_the_budget_says_so() {
+    // The fastest motion turns by 0.63 rad in a sample: the mean over one is off by a twenty-fourth of the square of that.
+    let (omega, step) = (TAU * 100.0, 1e-4);
+    let text = format!(
+        "name = 'cart'\n[bodies]\ncart = 1.0\n[[elements]]\nkind = 'damper'\nbetween = ['cart', 'ground']\ndamping = 5.0\n\
+         [[inputs]]\nname = 'f'\nkind = 'force'\non = 'cart'\nhold = 'linear'\n\
+         [[outputs]]\nname = 'v'\nkind = 'velocity'\nof = 'cart'\nresolution = {step}\n"
+    );
+    let excitation = |size: f64| -> Vec<Course> { vec![Box::new(move |t| size * omega * (omega * t).sin())] };
+    let bench =
+        Bench { truth: &text, nominal: &text, noise_sd: 1e-3, input_noise: 0.0, excitations: vec![excitation(0.1), excitation(0.2), excitation(0.15)] };
+    let said = bench.said(1);
+    assert!(said.findings.is_empty(), "{said:#?}");
+    let budgeted = said.error_budget.iter().find(|e| e.source == Source::Differencing).unwrap();
+    // Amplitudes of 0.1 and 0.2 m/s: the rms of their mean square over noise of 1 mm/s.
+    let turn = omega * 1e-3;
+    let expected = (0.5 * (0.1f64.powi(2) + 0.2f64.powi(2)) / 2.0).sqrt() * turn * turn / 24.0 / 1e-3;
+    assert!((budgeted.noise_sd / expected - 1.0).abs() < 0.15, "{budgeted:?}, expected {expected}");
+}

@@ -134,6 +134,11 @@ mod tests {
         let off = late.iter().map(|i| (predicted[*i] - steady[*i]).abs()).fold(0.0, f64::max);
         assert!(late.len() > 400 && off < 2e-3 * size, "{off} of {size}");
         assert_eq!(record.compared(0).unwrap(), steady);
+        // Its beginning alone is predicted as in the whole.
+        let beginning = record.part(0..500, Vec::new(), 0);
+        assert_eq!(beginning.compared(0).unwrap(), &steady[..500]);
+        let alone = predict(&model, &beginning, 16).unwrap();
+        assert!(alone.iter().zip(&predicted).all(|(a, b)| (a - b).abs() < 1e-9 * size) && alone.len() == 500);
     }
 
     #[test]

@@ -38,3 +38,33 @@ impl Problem {
         (steps > 0.0 && size > 0.0 && noise > 0.0).then(|| ((steps / size).sqrt(), size / noise))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::problem::Record;
+    use backdrive_plant::model::Model;
+    use backdrive_plant::recording::Recording;
+    use backdrive_plant::set::Initial;
+
+    #[test]
+    fn a_sine_asks_for_as_many_substeps_as_it_turns() {
+        let text = "name = 'cart'\n[bodies]\ncart = 2.0\n[[inputs]]\nname = 'f'\nkind = 'force'\non = 'cart'\n\
+                    [[outputs]]\nname = 'x'\nkind = 'position'\nof = 'cart'\n";
+        let model = Model::from_toml(text, "cart.toml").unwrap();
+        // A sine of this many samples in a period.
+        let of = |samples: f64| {
+            let t: Vec<f64> = (0..3000).map(|i| 1e-3 * f64::from(i)).collect();
+            let x: Vec<f64> = (0..3000).map(|i| (std::f64::consts::TAU * f64::from(i) / samples).sin()).collect();
+            let signals = vec![("f".to_string(), x.clone()), ("x".to_string(), x)];
+            let record = Record::new(&Recording::new("r", t, signals).unwrap(), &model, Vec::new()).unwrap();
+            let mut problem = Problem::new(text.to_string(), "cart.toml".into(), model.clone(), vec![record], Vec::new(), Initial::Rest).unwrap();
+            problem.lag = vec![0];
+            (problem.coarse_substeps(), problem.middle_substeps())
+        };
+        assert_eq!(of(300.0), (1, 2));
+        // 0.70 rad in a sample.
+        assert_eq!(of(9.0), (2, 4));
+        assert_eq!(of(4.1), (4, 8));
+    }
+}

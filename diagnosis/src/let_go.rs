@@ -1,0 +1,98 @@
+//! How well a structure predicts recordings that no fit has seen where its numbers may be as far off as the fitted recordings leave open.
+//!
+//! A prediction is off because the structure is wrong, or because its numbers are not known well. Of two structures that fit alike, the one whose numbers happened to end
+//! nearer says nothing of the device. So both are fitted to all recordings together, and held against each other by what they then leave on the unseen ones and what that
+//! costs on the others.
+
+use crate::candidate::Candidate;
+use crate::compare::{HeldOut, blocks};
+use crate::evaluator::Evaluator;
+use crate::problem::{Problem, Record};
+use crate::search::Search;
+use crate::statistics::correlation_time;
+use crate::structure::Structure;
+use crate::tuning::tuning;
+use crate::verdict::{chosen, decided_by_unseen};
+use crate::work::{Budget, Limit, Steps};
+use rayon::prelude::*;
+
+/// Lets the numbers go of what is chosen, and of structures of as many effects that the unseen recordings alone tell from it. Then of what is chosen for that.
+pub fn let_go(problem: &Problem, search: &mut Search, limit: Limit) {
+    for _ in 0..tuning().search.finalists {
+        let best = chosen(search);
+        let with: Vec<bool> = search.found.iter().map(|c| std::ptr::eq(c, best) || decided_by_unseen(search, c, best)).collect();
+        if with.iter().filter(|x| **x).count() < 2 {
+            return;
+        }
+        let noise_sd = search.noise_sd.clone();
+        let mut open: Vec<&mut Candidate> =
+            search.found.iter_mut().zip(with).filter(|(c, with)| *with && c.let_go.is_none()).map(|(c, _)| c).collect();
+        if open.is_empty() {
+            return;
+        }
+        open.par_iter_mut().for_each(|c| c.let_go = of(problem, c, &noise_sd, limit).or_else(|| c.unseen.clone()));
+    }
+}
+
+fn of(problem: &Problem, candidate: &Candidate, noise_sd: &[f64], limit: Limit) -> Option<HeldOut> {
+    let raw = candidate.unseen.as_ref()?;
+    let all: Vec<Record> = problem.fit.iter().chain(&problem.held_out).cloned().collect();
+    let (fitted, values) = (&candidate.structure, &candidate.fit.values);
+    let structure = Structure::new(problem, &all, fitted.added.clone());
+    // What belongs to single recordings is fitted to those in any case.
+    if structure.free.iter().chain(&fitted.free).any(|n| n.records.is_some()) || structure.free.len() != fitted.free.len() {
+        return None;
+    }
+    let evaluator = Evaluator { noise_sd: noise_sd.to_vec(), budget: Budget::new(Steps::MAX, limit), ..Evaluator::on(problem, &all) };
+    let together = evaluator.fit(&structure, values, tuning().fit.middle)?;
+    let (fit, unseen) = together.residuals.split_at_checked(candidate.fit.residuals.len())?;
+    let square = |residuals: &[f64]| residuals.iter().map(|r| r * r).sum::<f64>();
+    let price = (square(fit) - square(&candidate.fit.residuals)).max(0.0) / unseen.len().max(1) as f64;
+    let held = Evaluator { noise_sd: noise_sd.to_vec(), ..Evaluator::on(problem, &problem.held_out) };
+    let mean_square = square(unseen) / unseen.len().max(1) as f64 + price;
+    let priced = blocks(&held, unseen).into_iter().map(|list| list.into_iter().map(|square| square + price).collect()).collect();
+    (mean_square < raw.mean_square).then(|| HeldOut { mean_square, correlation_time: correlation_time(&held, unseen), blocks: priced })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::candidate::candidate;
+    use crate::compare::unseen;
+    use backdrive_plant::model::Model;
+    use backdrive_plant::recording::Recording;
+    use backdrive_plant::set::Initial;
+    use backdrive_plant::stepper::{Options, simulate};
+    use rand::SeedableRng;
+    use rand_distr::{Distribution, StandardNormal};
+
+    /// A cart of 2 kg that is hardly moved while it is fitted, and moved far when it is not: its numbers are not known well there.
+    #[test]
+    fn numbers_that_were_not_known_well_are_no_fault_of_the_structure() {
+        let text = "name = 'cart'\n[bodies]\ncart = 2.0\n[[elements]]\nname = 'spring'\nkind = 'spring'\nbetween = ['cart', 'ground']\nstiffness = 800.0\n\
+                    [[elements]]\nname = 'loss'\nkind = 'damper'\nbetween = ['cart', 'ground']\ndamping = 8.0\n\
+                    [[inputs]]\nname = 'f'\nkind = 'force'\non = 'cart'\n[[outputs]]\nname = 'x'\nkind = 'position'\nof = 'cart'\n";
+        let model = Model::from_toml(text, "cart.toml").unwrap();
+        let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(3);
+        let mut record = |size: f64| {
+            let t: Vec<f64> = (0..3000).map(|i| 1e-3 * f64::from(i)).collect();
+            let force: Vec<f64> = t.iter().map(|t| size * (17.0 * t + 2.0 * t * t).sin()).collect();
+            let clean = simulate(&model, &[force.clone()], 1e-3, &Options::default()).unwrap();
+            let x = clean[0].iter().map(|x| x + 1e-3 * <StandardNormal as Distribution<f64>>::sample(&StandardNormal, &mut random)).collect();
+            Record::new(&Recording::new("r", t, vec![("f".to_string(), force), ("x".to_string(), x)]).unwrap(), &model, Vec::new()).unwrap()
+        };
+        let (fit, held_out) = (vec![record(3.0)], vec![record(300.0)]);
+        let problem = Problem::new(text.to_string(), "cart.toml".into(), model.clone(), fit, held_out, Initial::Rest).unwrap();
+        let evaluator = Evaluator::new(&problem);
+        let structure = Structure::new(&problem, &problem.fit, Vec::new());
+        let given: Vec<f64> = problem.stated.iter().map(|s| s.given).collect();
+        let start = structure.values(&problem, &given, &[], &[]);
+        let fitted = evaluator.fit(&structure, &start, tuning().fit.to_the_end).unwrap();
+        let mut found = candidate(&evaluator, structure, fitted);
+        let seen = |c: &Candidate| unseen(&problem, &problem.held_out, &c.structure, &c.fit.values, &problem.noise_sd);
+        found.unseen = seen(&found);
+        let raw = found.unseen.as_ref().unwrap().mean_square;
+        let let_go = of(&problem, &found, &problem.noise_sd, Limit::default()).unwrap().mean_square;
+        assert!(raw > 1.5 && let_go < 1.2, "{raw} {let_go}");
+    }
+}
