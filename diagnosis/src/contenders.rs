@@ -74,6 +74,7 @@ fn contenders<'a>(problem: &'a Problem, search: &Search, without: &[String], bud
     let Ok(scales) = Scales::of(&model, &runs) else { return Vec::new() };
     let withheld: Vec<&str> = without.iter().map(String::as_str).collect();
     let hypotheses = physics::without(physics::all(&model, &scales), &withheld);
+    let hypotheses: Vec<Hypothesis> = hypotheses.into_iter().filter(|h| !problem.is_unmeasured(&h.place)).collect();
     let seeds = seeds(problem, search, best, &hypotheses);
     let evaluator = Evaluator { noise_sd: search.noise_sd.clone(), budget: budget.clone(), ..Evaluator::new(problem) };
     // What ends farther behind than this is no rival, whatever it is.

@@ -78,7 +78,8 @@ mod tests {
             let t: Vec<f64> = (0..3000).map(|i| 1e-3 * f64::from(i)).collect();
             let force: Vec<f64> = t.iter().map(|t| size * (17.0 * t + 2.0 * t * t).sin()).collect();
             let clean = simulate(&model, &[force.clone()], 1e-3, &Options::default()).unwrap();
-            let x = clean[0].iter().map(|x| x + 1e-3 * <StandardNormal as Distribution<f64>>::sample(&StandardNormal, &mut random)).collect();
+            let x =
+                clean[0].iter().map(|x| x + 1e-3 * <StandardNormal as Distribution<f64>>::sample(&StandardNormal, &mut random)).collect();
             Record::new(&Recording::new("r", t, vec![("f".to_string(), force), ("x".to_string(), x)]).unwrap(), &model, Vec::new()).unwrap()
         };
         let (fit, held_out) = (vec![record(3.0)], vec![record(300.0)]);

@@ -307,8 +307,13 @@ fn a_velocity_in_steps_is_a_mean_over_a_sample_and_the_budget_says_so() {
          [[outputs]]\nname = 'v'\nkind = 'velocity'\nof = 'cart'\nresolution = {step}\n"
     );
     let excitation = |size: f64| -> Vec<Course> { vec![Box::new(move |t| size * omega * (omega * t).sin())] };
-    let bench =
-        Bench { truth: &text, nominal: &text, noise_sd: 1e-3, input_noise: 0.0, excitations: vec![excitation(0.1), excitation(0.2), excitation(0.15)] };
+    let bench = Bench {
+        truth: &text,
+        nominal: &text,
+        noise_sd: 1e-3,
+        input_noise: 0.0,
+        excitations: vec![excitation(0.1), excitation(0.2), excitation(0.15)],
+    };
     let said = bench.said(1);
     assert!(said.findings.is_empty(), "{said:#?}");
     let budgeted = said.error_budget.iter().find(|e| e.source == Source::Differencing).unwrap();

@@ -15,6 +15,7 @@ pub use outliers::Outliers;
 pub use record::Record;
 pub use stated::Stated;
 
+use crate::hypothesis::Place;
 use crate::noise;
 use crate::tuning::tuning;
 use crate::unknown::Unknown;
@@ -55,6 +56,12 @@ pub struct Problem {
 }
 
 impl Problem {
+    /// Whether a place is an input that nobody measured: what happens to such a signal on its way is part of what is fitted as the signal itself.
+    pub fn is_unmeasured(&self, place: &Place) -> bool {
+        let names = self.unknown.iter().filter_map(|unknown| self.model.inputs.get(unknown.input)).map(|input| &input.name);
+        matches!(place, Place::Signal(signal) if names.into_iter().any(|name| name == signal))
+    }
+
     /// Opens a set whose `set.toml` names the model, or which is held against `model`.
     ///
     /// # Errors
@@ -179,6 +186,11 @@ mod tests {
         assert!(left.fit.iter().chain(&left.held_out).all(|r| r.outputs[0].is_some() && r.outputs[1].is_none()));
         // Still in each recording, and elsewhere in the next, is no rail.
         assert!(problem(&|t| t * t, [1.0, 2.0]).without_dead_outputs().1.is_empty());
+        // An effect on the way of a signal that nobody measured is part of what is fitted as that signal.
+        let mut unmeasured = problem(&|t| t * t, [1.0, 2.0]);
+        assert!(!unmeasured.is_unmeasured(&Place::Signal("f".to_string())));
+        unmeasured.unknown = vec![Unknown { input: 0, bandwidth_hz: 2.0 }];
+        assert!(unmeasured.is_unmeasured(&Place::Signal("f".to_string())) && !unmeasured.is_unmeasured(&Place::Signal("x".to_string())));
         // Where nothing moves the device may be stuck, and the audit says what there is to say.
         let (left, dead) = problem(&|_| 0.0, [9.999847; 2]).without_dead_outputs();
         assert!(dead.is_empty() && left.fit[0].outputs[1].is_some());

@@ -58,7 +58,8 @@ mod tests {
             let x: Vec<f64> = (0..3000).map(|i| (std::f64::consts::TAU * f64::from(i) / samples).sin()).collect();
             let signals = vec![("f".to_string(), x.clone()), ("x".to_string(), x)];
             let record = Record::new(&Recording::new("r", t, signals).unwrap(), &model, Vec::new()).unwrap();
-            let mut problem = Problem::new(text.to_string(), "cart.toml".into(), model.clone(), vec![record], Vec::new(), Initial::Rest).unwrap();
+            let mut problem =
+                Problem::new(text.to_string(), "cart.toml".into(), model.clone(), vec![record], Vec::new(), Initial::Rest).unwrap();
             problem.lag = vec![0];
             (problem.coarse_substeps(), problem.middle_substeps())
         };

@@ -118,7 +118,7 @@ fn hypotheses_for(nominal: &Nominal, settings: &Settings) -> Vec<Hypothesis> {
     let mut classes = HashSet::new();
     hypotheses.retain(|h| {
         let is_number = h.same_as.as_ref().is_some_and(|path| problem.stated.iter().any(|s| s.path == *path));
-        !is_number && classes.insert(h.class.clone())
+        !is_number && !problem.is_unmeasured(&h.place) && classes.insert(h.class.clone())
     });
     hypotheses
 }
