@@ -7,7 +7,6 @@ use super::types::{Finding, Word};
 use crate::candidate::Candidate;
 use crate::error_budget::beside_noise;
 use crate::evaluator::Evaluator;
-use crate::hypothesis::Parameter;
 use crate::intervals::Uncertainty;
 use crate::problem::Problem;
 use crate::repeatability::floors;
@@ -60,16 +59,18 @@ pub fn without_what_may_be_nothing(problem: &Problem, search: &mut Search) {
     }
 }
 
-/// Whether the interval of an effect's size holds the value at which it does nothing.
+/// Whether an effect may be nothing: the interval of each of its numbers that can undo it holds the value at which it does, that of its size among them.
 fn may_be_nothing(best: &Candidate, spread: &Uncertainty, which: usize) -> bool {
-    best.structure.free.iter().enumerate().any(|(number, n)| {
-        let Role::Added(h, p) = n.role else { return false };
-        let Some(hypothesis) = best.structure.added.get(h).filter(|_| h == which) else { return false };
-        let is_size = |p: &&Parameter| p.key == hypothesis.physics.size && p.index.is_none();
-        let Some(neutral) = hypothesis.parameters.get(p).filter(is_size).and_then(|p| p.neutral) else { return false };
+    let Some(hypothesis) = best.structure.added.get(which) else { return false };
+    let holds = |(number, n): (usize, &FreeParameter)| {
+        let Role::Added(h, p) = n.role else { return None };
+        let parameter = hypothesis.parameters.get(p).filter(|_| h == which)?;
+        let neutral = parameter.neutral?;
         let [low, high] = spread.interval(best, number);
-        low <= neutral && neutral <= high
-    })
+        Some((parameter.key == hypothesis.physics.size && parameter.index.is_none(), low <= neutral && neutral <= high))
+    };
+    let all: Vec<(bool, bool)> = best.structure.free.iter().enumerate().filter_map(holds).collect();
+    all.iter().any(|(is_size, _)| *is_size) && all.iter().all(|(_, held)| *held)
 }
 
 /// Decides.
