@@ -77,7 +77,7 @@ mod tests {
         let mut record = |size: f64| {
             let t: Vec<f64> = (0..3000).map(|i| 1e-3 * f64::from(i)).collect();
             let force: Vec<f64> = t.iter().map(|t| size * (17.0 * t + 2.0 * t * t).sin()).collect();
-            let clean = simulate(&model, &[force.clone()], 1e-3, &Options::default()).unwrap();
+            let clean = simulate(&model, std::slice::from_ref(&force), 1e-3, &Options::default()).unwrap();
             let x =
                 clean[0].iter().map(|x| x + 1e-3 * <StandardNormal as Distribution<f64>>::sample(&StandardNormal, &mut random)).collect();
             Record::new(&Recording::new("r", t, vec![("f".to_string(), force), ("x".to_string(), x)]).unwrap(), &model, Vec::new()).unwrap()
@@ -90,8 +90,7 @@ mod tests {
         let start = structure.values(&problem, &given, &[], &[]);
         let fitted = evaluator.fit(&structure, &start, tuning().fit.to_the_end).unwrap();
         let mut found = candidate(&evaluator, structure, fitted);
-        let seen = |c: &Candidate| unseen(&problem, &problem.held_out, &c.structure, &c.fit.values, &problem.noise_sd);
-        found.unseen = seen(&found);
+        found.unseen = unseen(&problem, &problem.held_out, &found.structure, &found.fit.values, &problem.noise_sd);
         let raw = found.unseen.as_ref().unwrap().mean_square;
         let let_go = of(&problem, &found, &problem.noise_sd, Limit::default()).unwrap().mean_square;
         assert!(raw > 1.5 && let_go < 1.2, "{raw} {let_go}");
