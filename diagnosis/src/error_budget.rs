@@ -56,7 +56,8 @@ pub fn error_budget(evaluator: &Evaluator, fitted: &Candidate, holds: &[Told]) -
         }
     };
     let fine = Evaluator { substeps: TWICE, ..evaluator.clone() };
-    if let (Some(a), Some(b)) = (evaluator.residuals(structure, values), fine.residuals(structure, values)) {
+    let there = evaluator.residuals(structure, values);
+    if let (Some(a), Some(b)) = (&there, fine.residuals(structure, values)) {
         let apart: Vec<f64> = a.iter().zip(&b).map(|(a, b)| a - b).collect();
         add(Source::Integration, levels(evaluator, &apart));
     }
@@ -72,9 +73,9 @@ pub fn error_budget(evaluator: &Evaluator, fitted: &Candidate, holds: &[Told]) -
         step / 12.0f64.sqrt()
     };
     add(Source::Rounding, relative((0..problem.model.outputs.len()).map(steps).collect()));
-    if let Some(residuals) = evaluator.residuals(structure, values) {
+    if let Some(residuals) = &there {
         let steps = |output: usize| steps(output) > 0.0;
-        add(Source::Differencing, levels(evaluator, &differencing(evaluator, &residuals, &steps)));
+        add(Source::Differencing, levels(evaluator, &differencing(evaluator, residuals, &steps)));
     }
     // What it does is in the residual, and what of that is white is in the noise: it is no larger than all of it.
     let driven = structure.model(problem, values).map_or_else(Vec::new, |model| of_driving_motion(&model, &problem.fit));
