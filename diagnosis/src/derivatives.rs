@@ -1,9 +1,12 @@
-//! Derivatives of the residuals by the parameters of a fit, by differences of simulations, in parallel.
+//! Derivatives of the residuals by the parameters of a fit: carried along with the motion (forward mode) where a parameter is one of a nonlinear model's
+//! bodies or elements, else by differences of simulations; in parallel.
 
 use crate::evaluator::{Evaluator, residuals_in};
 use crate::structure::{FreeParameter, Role, Structure};
 use crate::tuning::tuning;
+use backdrive_plant::elements;
 use backdrive_plant::model::Model;
+use backdrive_plant::stepper::LANES;
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -64,6 +67,67 @@ impl Evaluator<'_> {
             }
         }
         jacobian
+    }
+
+    /// The same by the quickest way that there is: carried along with the motion where that can be done and narrow differences do not mislead.
+    pub(crate) fn derivatives(
+        &self,
+        structure: &Structure,
+        own: &[f64],
+        residuals: &[f64],
+        which: &[usize],
+        stretch: f64,
+    ) -> Vec<Vec<f64>> {
+        let mut found = if stretch == 1.0 { self.carried(structure, own, residuals.len(), which) } else { vec![None; which.len()] };
+        let missing: Vec<usize> = which.iter().zip(&found).filter(|(_, column)| column.is_none()).map(|(j, _)| *j).collect();
+        let columns = self.columns(structure, own, residuals, &missing, stretch);
+        found.iter_mut().filter(|column| column.is_none()).zip(columns).for_each(|(place, column)| *place = Some(column));
+        found.into_iter().flatten().collect()
+    }
+
+    /// Derivatives that are carried along with the motion; `None` by parameters that belong to an input, an output or a single record, by all where the
+    /// model is linear, and where it cannot be simulated.
+    fn carried(&self, structure: &Structure, own: &[f64], residuals: usize, which: &[usize]) -> Vec<Option<Vec<f64>>> {
+        let mut found = vec![None; which.len()];
+        let values = to_external(structure, own);
+        let Some(model) = structure.model(self.problem, &values) else { return found };
+        if model.elements.iter().all(|e| matches!(e.law.role(), elements::Role::Linear(_))) || self.budget.is_halted() {
+            return found;
+        }
+        let mut lanes: Vec<(usize, (Model, f64))> = Vec::new();
+        for (at, j) in which.iter().enumerate() {
+            let number = &structure.free[*j];
+            if number.coarse || !matches!(number.role, Role::Stated(_) | Role::Added(..)) {
+                continue;
+            }
+            let (moved, step) = moved_values(structure, own, *j, tuning().fit.carried);
+            if let Some(moved) = structure.model(self.problem, &moved).filter(|m| m.inputs == model.inputs && m.outputs == model.outputs) {
+                lanes.push((at, (moved, step)));
+            }
+        }
+        if lanes.is_empty() {
+            return found;
+        }
+        // Groups of equal size.
+        let size = lanes.len().div_ceil(lanes.len().div_ceil(LANES));
+        let (places, lanes): (Vec<usize>, Vec<(Model, f64)>) = lanes.into_iter().unzip();
+        let groups: Vec<(&[usize], &[(Model, f64)])> = places.chunks(size).zip(lanes.chunks(size)).collect();
+        let spans = self.spans();
+        let jobs: Vec<(usize, usize)> = (0..self.records.len()).flat_map(|r| (0..groups.len()).map(move |g| (r, g))).collect();
+        let one = |(r, g): &(usize, usize)| self.record_derivatives(structure, (&model, groups[*g].1), &values, *r);
+        let parts: Vec<Option<Vec<Vec<f64>>>> = jobs.par_iter().map(one).collect();
+        for (g, (places, _)) in groups.iter().enumerate() {
+            let mine: Option<Vec<(usize, &Vec<Vec<f64>>)>> =
+                jobs.iter().zip(&parts).filter(|((_, of), _)| *of == g).map(|((r, _), part)| Some((*r, part.as_ref()?))).collect();
+            for (lane, at) in places.iter().enumerate() {
+                found[*at] = mine.as_ref().map(|mine| {
+                    let mut column = vec![0.0; residuals];
+                    mine.iter().for_each(|(r, part)| column[spans[*r].clone()].copy_from_slice(&part[lane]));
+                    column
+                });
+            }
+        }
+        found
     }
 
     /// Where the residuals of each record stand, all outputs together.
@@ -142,7 +206,7 @@ impl Evaluator<'_> {
         stretch: f64,
     ) -> Vec<Vec<f64>> {
         let mut all = vec![Vec::new(); own.len()];
-        for (j, column) in which.iter().zip(self.columns(structure, own, residuals, which, stretch)) {
+        for (j, column) in which.iter().zip(self.derivatives(structure, own, residuals, which, stretch)) {
             all[*j] = column;
         }
         all.iter_mut().filter(|c| c.is_empty()).for_each(|c| c.resize(residuals.len(), 0.0));

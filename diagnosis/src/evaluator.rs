@@ -103,11 +103,37 @@ impl<'a> Evaluator<'a> {
         let mut columns = structure.predict(self.problem, model, values, (record, r), along)?;
         for (column, output) in columns.chunks_exact_mut(record.len).zip(measured(record)) {
             let samples = if self.coupling.is_some() { record.outputs.get(output)?.as_deref()? } else { record.compared(output)? };
+            column.iter_mut().zip(samples).for_each(|(prediction, sample)| *prediction = sample - *prediction);
+        }
+        self.normalise(record, &mut columns)?;
+        Some(columns)
+    }
+
+    /// Derivatives of the residuals of one record by parameters that are given by models, each of which differs in one of them alone, and by how much; see
+    /// [`Structure::derivatives`].
+    pub(crate) fn record_derivatives(
+        &self,
+        structure: &Structure,
+        models: (&Model, &[(Model, f64)]),
+        values: &[f64],
+        r: usize,
+    ) -> Option<Vec<Vec<f64>>> {
+        let record = self.records.get(r)?;
+        let along = Along { substeps: self.substeps, coupling: self.coupling.as_ref(), budget: &self.budget };
+        let mut derivatives = structure.derivatives(self.problem, models, values, (record, r), along)?;
+        for columns in &mut derivatives {
+            columns.iter_mut().for_each(|d| *d = -*d);
+            self.normalise(record, columns)?;
+        }
+        Some(derivatives)
+    }
+
+    /// Differences between what was measured and what is predicted of a record, over the noise.
+    fn normalise(&self, record: &Record, columns: &mut [f64]) -> Option<()> {
+        for (column, output) in columns.chunks_exact_mut(record.len).zip(measured(record)) {
             let noise_sd = self.noise_sd.get(output).copied()?;
             let lag = if self.coupling.is_some() { 0 } else { self.problem.lag.get(output).copied().unwrap_or(0) };
-            for (prediction, sample) in column.iter_mut().zip(samples) {
-                *prediction = (sample - *prediction) / noise_sd;
-            }
+            column.iter_mut().for_each(|difference| *difference /= noise_sd);
             if lag > 0 {
                 // From the end, so that what is taken off is still the position's.
                 for i in (lag..column.len()).rev() {
@@ -116,7 +142,7 @@ impl<'a> Evaluator<'a> {
             }
             column.iter_mut().take(record.skip).for_each(|r| *r = 0.0);
         }
-        Some(columns)
+        Some(())
     }
 
     /// What residuals cost, priors apart.

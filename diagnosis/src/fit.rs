@@ -80,7 +80,7 @@ impl Evaluator<'_> {
             place.and_then(|p| fit.jacobian.get(p)).filter(|c| c.len() == residuals.len())
         };
         let missing: Vec<usize> = (0..own.len()).filter(|j| column(&structure.free[*j]).is_none()).collect();
-        let mut new = self.columns(structure, own, residuals, &missing, self.stretch).into_iter();
+        let mut new = self.derivatives(structure, own, residuals, &missing, self.stretch).into_iter();
         structure.free.iter().map(|n| column(n).cloned().or_else(|| new.next()).unwrap_or_else(|| vec![0.0; residuals.len()])).collect()
     }
 

@@ -6,7 +6,9 @@ use crate::tuning::tuning;
 use crate::work::{Budget, Steps};
 use backdrive_plant::model::Model;
 use backdrive_plant::set::Condition;
-use backdrive_plant::stepper::{Options, Plant, Segment, ahead, segments};
+use backdrive_plant::stepper::{LANES, Options, Plant, Segment, Tangents, ahead, segments};
+use std::borrow::Cow;
+use std::sync::Arc;
 
 /// What it takes to set a simulation up.
 const SETTING_UP: Steps = 200;
@@ -49,7 +51,7 @@ pub fn predict_under(model: &Model, record: &Record, conditions: &Conditions) ->
     let length = logged.map_or(record.len, Logged::len);
     let mut columns = vec![0.0; measured.len() * length];
     let mut values = vec![0.0; model.outputs.len()];
-    run(model, record, logged, conditions, length, &mut |plant, sample| {
+    run(model, &[], record, logged, conditions, length, &mut |plant, _, sample| {
         plant.outputs(&mut values);
         for (column, output) in measured.iter().enumerate() {
             columns[column * length + sample] = values[*output];
@@ -61,10 +63,37 @@ pub fn predict_under(model: &Model, record: &Record, conditions: &Conditions) ->
     columns.iter().all(|y| y.is_finite()).then_some(columns)
 }
 
+/// Derivatives of the same predictions by up to [`LANES`] parameters, carried along with the motion: `derivatives[parameter]` is as long as the
+/// predictions. Each parameter is given by a model that differs in it alone, and by how much. `None` where the motion cannot be followed, as that of a linear
+/// model or where a parameter belongs to an input or output, and where the model cannot be simulated.
+pub fn derivatives_under(model: &Model, moved: &[(Model, f64)], record: &Record, conditions: &Conditions) -> Option<Vec<Vec<f64>>> {
+    let measured: Vec<usize> = (0..model.outputs.len()).filter(|o| record.outputs.get(*o).is_some_and(Option::is_some)).collect();
+    let logged = record.logged.as_deref().filter(|_| conditions.coupling.is_none() && conditions.curves.is_empty());
+    let length = logged.map_or(record.len, Logged::len);
+    let mut columns = vec![vec![0.0; measured.len() * length]; moved.len()];
+    let (mut values, mut now) = (vec![0.0; model.outputs.len()], vec![vec![0.0; model.outputs.len()]; moved.len()]);
+    run(model, moved, record, logged, conditions, length, &mut |plant, tangents, sample| {
+        let Some(tangents) = tangents else { return };
+        plant.outputs(&mut values);
+        tangents.outputs(plant, &values, &mut now);
+        for (columns, now) in columns.iter_mut().zip(&now) {
+            for (column, output) in measured.iter().enumerate() {
+                columns[column * length + sample] = now[*output];
+            }
+        }
+    })?;
+    if let Some(logged) = logged {
+        for column in &mut columns {
+            *column = column.chunks_exact(length).flat_map(|column| logged.read(column)).collect();
+        }
+    }
+    columns.iter().flatten().all(|y| y.is_finite()).then_some(columns)
+}
+
 /// Position and velocity of each body at a sample of a record.
 pub fn motion_at(model: &Model, record: &Record, conditions: &Conditions, at: usize) -> Option<Vec<Start>> {
     let mut motion = Vec::new();
-    run(model, record, None, conditions, at + 1, &mut |plant, sample| {
+    run(model, &[], record, None, conditions, at + 1, &mut |plant, _, sample| {
         if sample == at {
             motion = (0..model.bodies.len()).map(|body| (body, plant.position(body), plant.velocity(body))).collect();
         }
@@ -72,44 +101,42 @@ pub fn motion_at(model: &Model, record: &Record, conditions: &Conditions, at: us
     motion.iter().all(|(_, x, v)| x.is_finite() && v.is_finite()).then_some(motion)
 }
 
-/// Simulates a model on the first samples of a record, or points of the grid of one that is `logged` at times of its own, and calls `show` with the plant at each.
+/// What a simulation shows at each sample: the plant, what follows it, and which sample.
+type Show<'s> = &'s mut dyn FnMut(&mut Plant, Option<&mut Tangents>, usize);
+
+/// A model under the conditions of a record, coupled where it is to be, and the paths of the bodies that pull it.
+fn conditioned<'m>(model: &'m Model, record: &Record, conditions: &Conditions) -> Option<(Cow<'m, Model>, Vec<Arc<Vec<Segment>>>)> {
+    let mut changed = Cow::Borrowed(model);
+    for (path, condition) in &record.conditions {
+        if let Condition::Value(value) = condition {
+            changed.to_mut().set_values_at(path, &[*value]).ok()?;
+        }
+    }
+    match conditions.coupling.filter(|(g, _)| !g.is_empty()) {
+        Some((coupling, index)) => coupling.attach(&changed, index, record.period).map(|(model, paths)| (Cow::Owned(model), paths)),
+        None => Some((changed, Vec::new())),
+    }
+}
+
+/// Simulates a model on the first samples of a record, or points of the grid of one that is `logged` at times of its own, and calls `show` at each.
+/// Derivatives by the parameters of `moved` come along; `None`, too, where they cannot.
 fn run(
     model: &Model,
+    moved: &[(Model, f64)],
     record: &Record,
     logged: Option<&Logged>,
     conditions: &Conditions,
     samples: usize,
-    show: &mut dyn FnMut(&mut Plant, usize),
+    show: Show,
 ) -> Option<()> {
-    let Conditions { starts, curves, substeps, coupling, budget } = *conditions;
+    let Conditions { starts, curves, substeps, budget, .. } = *conditions;
     let (inputs, driving, period, length) = match logged {
         Some(logged) => (&logged.inputs, &logged.segments, logged.step, logged.len()),
         None => (&record.inputs, &record.segments, record.period, record.len),
     };
     // So many substeps are meant per sample.
     let substeps = if substeps == TWICE || logged.is_none() { substeps } else { substeps.div_ceil(tuning().recordings.grid_steps) };
-    let conditioned;
-    let model = if record.conditions.iter().any(|(_, c)| matches!(c, Condition::Value(_))) {
-        let mut changed = model.clone();
-        for (path, condition) in &record.conditions {
-            if let Condition::Value(value) = condition {
-                changed.set_values_at(path, &[*value]).ok()?;
-            }
-        }
-        conditioned = changed;
-        &conditioned
-    } else {
-        model
-    };
-    let coupled;
-    let mut moved = Vec::new();
-    let model = match coupling.filter(|(g, _)| !g.is_empty()) {
-        Some((coupling, index)) => {
-            (coupled, moved) = coupling.attach(model, index, record.period)?;
-            &coupled
-        }
-        None => model,
-    };
+    let (model, pulled) = conditioned(model, record, conditions)?;
     let (mut own_inputs, mut own_segments) = (Vec::new(), Vec::new());
     if !curves.is_empty() {
         (own_inputs, own_segments) = (inputs.clone(), driving.clone());
@@ -119,35 +146,58 @@ fn run(
         }
     }
     let (recorded, pieces) = if curves.is_empty() { (inputs, driving) } else { (&own_inputs, &own_segments) };
-    let caught_up = ahead(model, recorded, period);
-    let (model, columns) = caught_up.as_ref().map_or((model, recorded), |(model, columns)| (model, columns));
+    let caught_up = ahead(&model, recorded, period);
+    let (ready, columns) = caught_up.as_ref().map_or((&*model, recorded), |(model, columns)| (model, columns));
     let late: Option<Vec<Vec<Segment>>> =
-        caught_up.as_ref().map(|_| model.inputs.iter().zip(columns).map(|(i, c)| segments(i.hold, c, period)).collect());
+        caught_up.as_ref().map(|_| ready.inputs.iter().zip(columns).map(|(i, c)| segments(i.hold, c, period)).collect());
     let driven = late.as_ref().unwrap_or(pieces);
-    let mut plant = Plant::new(model, period, &Options::default()).ok()?;
+    let mut plant = Plant::new(ready, period, &Options::default()).ok()?;
     let wanted = if substeps == TWICE { 2 * plant.substeps() } else { plant.substeps().min(substeps) };
     if wanted != plant.substeps() {
-        plant = Plant::new(model, period, &Options { substeps: Some(wanted), ..Options::default() }).ok()?;
+        plant = Plant::new(ready, period, &Options { substeps: Some(wanted), ..Options::default() }).ok()?;
     }
-    budget.simulated(SETTING_UP + samples.min(length) as u64 * plant.cost());
+    let mut tangents = None;
+    if !moved.is_empty() {
+        let mut lanes = Vec::with_capacity(moved.len().min(LANES));
+        for (changed, step) in moved {
+            let mut changed = conditioned(changed, record, conditions)?.0.into_owned();
+            if changed.inputs != model.inputs {
+                return None;
+            }
+            changed.inputs.clone_from(&ready.inputs);
+            lanes.push((changed, *step));
+        }
+        tangents = Some(Tangents::new(&plant, ready, &lanes, period)?);
+    }
+    let followed = moved.len() as u64;
+    budget.simulated((1 + followed) * SETTING_UP + samples.min(length) as u64 * (plant.cost() + followed * plant.cost_of_a_lane()));
     let mut first: Vec<f64> = columns.iter().map(|samples| samples.first().copied().unwrap_or(0.0)).collect();
-    first.extend(moved.iter().map(|path| path.first().map_or(0.0, |s| s.c[0])));
+    first.extend(pulled.iter().map(|path| path.first().map_or(0.0, |s| s.c[0])));
     plant.start_at(&first);
+    if let Some(tangents) = &mut tangents {
+        tangents.start_at(&first);
+    }
     for (body, position, velocity) in record.begins.iter().chain(starts) {
         plant.set_motion(*body, *position, *velocity);
+        if let Some(tangents) = &mut tangents {
+            tangents.set_motion(*body, *position, *velocity);
+        }
     }
-    let mut now = vec![Segment::default(); driven.len() + moved.len()];
+    let mut now = vec![Segment::default(); driven.len() + pulled.len()];
     for sample in 0..samples.min(length) {
-        show(&mut plant, sample);
+        show(&mut plant, tangents.as_mut(), sample);
         if sample % 256 == 0 && !plant.is_finite() {
             return None;
         }
         if sample + 1 < samples.min(length) {
-            let columns = driven.iter().chain(moved.iter().map(|path| path.as_ref()));
+            let columns = driven.iter().chain(pulled.iter().map(|path| path.as_ref()));
             for (segment, column) in now.iter_mut().zip(columns) {
                 *segment = column[sample];
             }
-            plant.step(&now);
+            match &mut tangents {
+                Some(tangents) => tangents.step(&mut plant, &now),
+                None => plant.step(&now),
+            }
         }
     }
     Some(())

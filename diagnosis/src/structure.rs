@@ -3,13 +3,14 @@
 use crate::coupling::Coupling;
 use crate::hypothesis::Hypothesis;
 use crate::problem::{Problem, Record, Stated};
-use crate::simulate::{Conditions, Curve, Start, predict_under};
+use crate::simulate::{Conditions, Curve, Start, derivatives_under, predict_under};
 use crate::tuning::tuning;
 use crate::unknown::Unknown;
 use crate::work::Budget;
 use backdrive_plant::model::Model;
 use backdrive_plant::set::{Condition, Initial};
 use backdrive_plant::stepper::segments;
+use std::borrow::Cow;
 
 /// What a number of a fit is.
 #[derive(Debug, Clone, PartialEq)]
@@ -113,6 +114,20 @@ pub struct Along<'r> {
     pub coupling: Option<&'r Coupling>,
     /// Counts the work.
     pub budget: &'r Budget<'r>,
+}
+
+/// A model in a record, with what belongs to that record alone.
+struct Own<'m> {
+    model: Cow<'m, Model>,
+    starts: Vec<Start>,
+    curves: Vec<Curve>,
+}
+
+impl Own<'_> {
+    fn conditions<'r>(&'r self, record: usize, along: Along<'r>) -> Conditions<'r> {
+        let Along { substeps, coupling, budget } = along;
+        Conditions { starts: &self.starts, curves: &self.curves, substeps, coupling: coupling.map(|g| (g, record)), budget }
+    }
 }
 
 /// A nominal model with physics added.
@@ -251,33 +266,45 @@ impl Structure {
     }
 
     /// Predictions of one of the records that the structure was made for, where it stands among them; see [`crate::simulate::predict`].
-    pub fn predict(
+    pub fn predict(&self, problem: &Problem, model: &Model, values: &[f64], record: (&Record, usize), along: Along) -> Option<Vec<f64>> {
+        let own = self.own_of(problem, model, values, record)?;
+        predict_under(&own.model, record.0, &own.conditions(record.1, along))
+    }
+
+    /// Derivatives of the same predictions by parameters, each given by a model that differs in it alone and by how much; see
+    /// [`crate::simulate::derivatives_under`].
+    pub fn derivatives(
         &self,
         problem: &Problem,
-        model: &Model,
+        (model, moved): (&Model, &[(Model, f64)]),
         values: &[f64],
-        (record, index): (&Record, usize),
+        record: (&Record, usize),
         along: Along,
-    ) -> Option<Vec<f64>> {
-        let mut starts: Vec<Start> = Vec::new();
-        let mut changed: Option<Model> = None;
+    ) -> Option<Vec<Vec<f64>>> {
+        let own = self.own_of(problem, model, values, record)?;
+        let lane = |(m, step): &(Model, f64)| Some((self.own_of(problem, m, values, record)?.model.into_owned(), *step));
+        let moved: Option<Vec<(Model, f64)>> = moved.iter().map(lane).collect();
+        derivatives_under(&own.model, &moved?, record.0, &own.conditions(record.1, along))
+    }
+
+    /// What values give a record of its own.
+    fn own_of<'m>(&self, problem: &Problem, model: &'m Model, values: &[f64], (record, index): (&Record, usize)) -> Option<Own<'m>> {
+        let mut own = Own { model: Cow::Borrowed(model), starts: Vec::new(), curves: Vec::new() };
         for (number, value) in self.free.iter().zip(values).filter(|(n, _)| n.records.is_some() && n.is_of(index)) {
             match &number.role {
-                Role::Condition(path, _) => changed.get_or_insert_with(|| model.clone()).set_values_at(path, &[*value]).ok()?,
-                Role::Position(body, _) => starts.push((*body, *value, 0.0)),
-                Role::Velocity(body, _) => match starts.iter_mut().find(|s| s.0 == *body) {
+                Role::Condition(path, _) => own.model.to_mut().set_values_at(path, &[*value]).ok()?,
+                Role::Position(body, _) => own.starts.push((*body, *value, 0.0)),
+                Role::Velocity(body, _) => match own.starts.iter_mut().find(|s| s.0 == *body) {
                     Some(start) => start.2 = *value,
-                    None => starts.push((*body, 0.0, *value)),
+                    None => own.starts.push((*body, 0.0, *value)),
                 },
                 Role::Stated(_) | Role::Added(..) | Role::Knot(..) => {}
             }
         }
         let curve =
             |(u, unknown): (usize, &Unknown)| (unknown.input, unknown.curve(&self.weights(values, u, index).collect::<Vec<_>>(), record));
-        let curves: Vec<Curve> = problem.unknown.iter().enumerate().map(curve).collect();
-        let Along { substeps, coupling, budget } = along;
-        let conditions = Conditions { starts: &starts, curves: &curves, substeps, coupling: coupling.map(|g| (g, index)), budget };
-        predict_under(changed.as_ref().unwrap_or(model), record, &conditions)
+        own.curves = problem.unknown.iter().enumerate().map(curve).collect();
+        Some(own)
     }
 
     /// Records with the curves that values give the inputs which nobody measured.

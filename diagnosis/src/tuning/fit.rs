@@ -52,6 +52,8 @@ group! {
         longest_log: f64 = 1.5, "logarithm", Numerics("a factor of 4.5: beyond it no linearisation holds");
         /// Largest step of another parameter, as a share of its range.
         longest: f64 = 0.5, "-", Numerics("as longest_log");
+        /// The difference of a law along the direction of a derivative that is carried along with the motion.
+        carried: f64 = 1e-3, "differences", Numerics("above the rounding of a law, far below the width of its kinks");
         /// Relative difference by which derivatives are taken.
         difference: f64 = 1e-3, "-", Numerics("well above the simulations' rounding, and a thousandth of a parameter is linear");
         /// Difference of a delay, in sample periods.

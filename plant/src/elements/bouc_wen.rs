@@ -144,6 +144,10 @@ impl PathLaw for BoucWen {
         *hysteretic_displacement = z;
     }
 
+    fn is_costly(&self) -> bool {
+        true
+    }
+
     #[inline]
     fn force(&self, memory: &[f64], x: f64, _v: f64) -> f64 {
         let hysteretic_displacement = memory.first().copied().unwrap_or(0.0);

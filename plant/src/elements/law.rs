@@ -114,6 +114,11 @@ pub trait PathLaw {
         self.force(memory, 0.5 * (from + to), v)
     }
 
+    /// Whether an evaluation takes far longer than the rest of a substep.
+    fn is_costly(&self) -> bool {
+        false
+    }
+
     /// Whether its force is in proportion to the path that led to it, so that [`PathLaw::linearised`] is exact and depends on frequency alone.
     fn is_viscoelastic(&self) -> bool {
         false

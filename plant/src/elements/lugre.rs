@@ -79,6 +79,10 @@ impl PathLaw for Lugre {
         }
     }
 
+    fn is_costly(&self) -> bool {
+        true
+    }
+
     #[inline]
     fn force(&self, memory: &[f64], _x: f64, v: f64) -> f64 {
         let bristle_force = self.stiffness * memory.first().copied().unwrap_or(0.0);

@@ -134,6 +134,11 @@ macro_rules! register {
                 match self { $(Law::$law(_law) => where_it_is!(path, $role, _law.creates_energy(amplitude, unit), None)),* }
             }
 
+            /// Whether an evaluation of a [`Role::Path`] takes far longer than the rest of a substep.
+            pub fn is_costly(&self) -> bool {
+                match self { $(Law::$law(_law) => where_it_is!(path, $role, _law.is_costly(), false)),* }
+            }
+
             /// Whether a [`Role::Path`] answers in proportion, by frequency alone.
             pub fn is_viscoelastic(&self) -> bool {
                 match self { $(Law::$law(_law) => where_it_is!(path, $role, _law.is_viscoelastic(), false)),* }

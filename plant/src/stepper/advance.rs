@@ -5,32 +5,42 @@ use super::compiled::Compiled;
 use super::constraints::Work;
 use super::contact::{Bounds, FrictionContact};
 use super::motion::Motion;
+use super::segment::Segment;
 use super::slots::{SLOTS, Slots, prescribed_slot};
 use super::state::Plant;
+use super::tangents::Follow;
 
 /// Stands for a number of free bodies that is not known when the code is compiled.
 const ANY: usize = 0;
 
 impl Plant {
+    /// One period by substeps, whatever the model, with somebody who follows them.
+    pub(super) fn step_followed<F: Follow>(&mut self, inputs: &[Segment], follower: &mut F) {
+        self.take(inputs);
+        self.step_by_substeps(follower);
+        self.periods += 1;
+    }
+
     /// One period by substeps.
-    pub(super) fn step_by_substeps(&mut self) {
+    pub(super) fn step_by_substeps<F: Follow>(&mut self, follower: &mut F) {
         for index in 0..self.substeps {
             let from = self.substep * index as f64;
             let to = if index + 1 == self.substeps { self.period } else { self.substep * (index + 1) as f64 };
             match self.fixed.free {
-                1 => self.substep::<1>(from, to),
-                2 => self.substep::<2>(from, to),
-                3 => self.substep::<3>(from, to),
-                4 => self.substep::<4>(from, to),
-                5 => self.substep::<5>(from, to),
-                6 => self.substep::<6>(from, to),
-                7 => self.substep::<7>(from, to),
-                8 => self.substep::<8>(from, to),
-                _ => self.substep::<ANY>(from, to),
+                1 => self.substep::<1, F>(from, to, follower),
+                2 => self.substep::<2, F>(from, to, follower),
+                3 => self.substep::<3, F>(from, to, follower),
+                4 => self.substep::<4, F>(from, to, follower),
+                5 => self.substep::<5, F>(from, to, follower),
+                6 => self.substep::<6, F>(from, to, follower),
+                7 => self.substep::<7, F>(from, to, follower),
+                8 => self.substep::<8, F>(from, to, follower),
+                _ => self.substep::<ANY, F>(from, to, follower),
             }
             if self.sense.watches_substeps() {
                 self.note_pushes(to);
                 self.note_outputs();
+                follower.noted(self);
             }
         }
         self.note_pushes(self.period);
@@ -38,7 +48,7 @@ impl Plant {
 
     /// `N` is the number of free bodies, or [`ANY`].
     #[inline]
-    fn substep<const N: usize>(&mut self, from: f64, to: f64) {
+    fn substep<const N: usize, F: Follow>(&mut self, from: f64, to: f64, follower: &mut F) {
         let n = if N == ANY { self.fixed.free.min(SLOTS) } else { N };
         let Some(mut motion) = self.motion.take() else { return };
         self.drive(n, from, to, &mut motion);
@@ -48,7 +58,9 @@ impl Plant {
             self.constrain(n, &mut motion);
         }
         self.count_energy(&motion);
+        follower.forces(self, n, &motion);
         self.arrive(n, &motion);
+        follower.arrived(self, n);
         self.motion = Some(motion);
     }
 
@@ -202,7 +214,8 @@ impl Plant {
         fixed.constraints.solve(work, &mut self.paths);
 
         let stops = self.frictions.iter().enumerate().any(|(c, contact)| contact.leaves_its_level(c, work));
-        if stops && stop(fixed, &self.frictions, work) {
+        work.stopped = stops && stop(fixed, &self.frictions, work);
+        if work.stopped {
             fixed.constraints.solve(work, &mut self.paths);
             for (c, (share, sliding)) in work.stop.iter_mut().enumerate().take(self.frictions.len()) {
                 if *share > 0.0 && *share < 1.0 {
@@ -273,6 +286,7 @@ impl Plant {
 #[cold]
 fn stop(fixed: &Compiled, frictions: &[FrictionContact], work: &mut Work) -> bool {
     let solved = work.force;
+    (work.first_force, work.first_bounds) = (work.force, work.bounds);
     let sliding = |contact: &FrictionContact, bounds: Bounds| if contact.mode > 0 { bounds.high } else { bounds.low };
     // By velocity, not by force: of several contacts in one place some may still have the level of sliding on.
     for (c, contact) in frictions.iter().enumerate() {
@@ -309,6 +323,7 @@ fn stop(fixed: &Compiled, frictions: &[FrictionContact], work: &mut Work) -> boo
         any = true;
     }
     work.force = solved;
+    work.shares = work.stop;
     any
 }
 

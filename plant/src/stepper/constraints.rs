@@ -55,6 +55,13 @@ pub(super) struct Work {
     pub(super) force: [f64; MAX_ELEMENTS],
     /// Of contacts that stop: share of the substep until then, and force until then, N. Else (0, 0).
     pub(super) stop: [(f64, f64); MAX_ELEMENTS],
+    /// Whether any contact stopped in the last substep; only then the three below are of it.
+    pub(super) stopped: bool,
+    /// The same as `stop`, kept.
+    pub(super) shares: [(f64, f64); MAX_ELEMENTS],
+    /// Forces and bounds before it was known that they stop.
+    pub(super) first_force: [f64; MAX_ELEMENTS],
+    pub(super) first_bounds: [Bounds; MAX_ELEMENTS],
 }
 
 impl Work {
@@ -64,6 +71,10 @@ impl Work {
             bounds: [Bounds::default(); MAX_ELEMENTS],
             force: [0.0; MAX_ELEMENTS],
             stop: [(0.0, 0.0); MAX_ELEMENTS],
+            stopped: false,
+            shares: [(0.0, 0.0); MAX_ELEMENTS],
+            first_force: [0.0; MAX_ELEMENTS],
+            first_bounds: [Bounds::default(); MAX_ELEMENTS],
         }
     }
 }
@@ -121,6 +132,24 @@ impl Constraints {
     #[inline]
     pub(super) fn own_compliance(&self, c: usize) -> f64 {
         self.compliance[c * self.ends.len() + c]
+    }
+
+    /// Mean velocity that a unit of the force of constraint `d` takes from across constraint `c`, m/s per N.
+    #[inline]
+    pub(super) fn compliance(&self, c: usize, d: usize) -> f64 {
+        self.compliance[c * self.ends.len() + d]
+    }
+
+    /// The places of a constraint's ends.
+    #[inline]
+    pub(super) fn ends(&self, c: usize) -> (usize, usize) {
+        self.ends[c]
+    }
+
+    /// Index among the path elements; `None` of a friction contact.
+    #[inline]
+    pub(super) fn path(&self, c: usize) -> Option<usize> {
+        c.checked_sub(self.frictions).and_then(|p| self.paths.get(p)).copied()
     }
 
     /// Relative velocity of a constraint's ends.
@@ -260,7 +289,7 @@ impl PathElement {
 
 /// Force of a path element over a substep whose mean relative velocity is `u`.
 #[inline]
-fn trial_force(path: &mut PathElement, u: f64) -> f64 {
+pub(super) fn trial_force(path: &mut PathElement, u: f64) -> f64 {
     let ahead = path.reached + path.ahead * u;
     // Most have one number, which is quicker copied than asked for its length.
     match (&mut path.trial[..], &path.memory[..]) {

@@ -93,15 +93,20 @@ impl Plant {
 
     /// Advances by one period. `inputs` are in the order of the model; a missing one stays at 0.
     pub fn step(&mut self, inputs: &[Segment]) {
-        for (index, drive) in self.drives.iter_mut().enumerate() {
-            drive.push(inputs.get(index).copied().unwrap_or_default());
-        }
+        self.take(inputs);
         if self.exact.is_some() && self.energy.is_none() {
             self.step_exactly();
         } else {
-            self.step_by_substeps();
+            self.step_by_substeps(&mut ());
         }
         self.periods += 1;
+    }
+
+    /// The inputs of the period that begins now.
+    pub(super) fn take(&mut self, inputs: &[Segment]) {
+        for (index, drive) in self.drives.iter_mut().enumerate() {
+            drive.push(inputs.get(index).copied().unwrap_or_default());
+        }
     }
 
     /// Position of a body of the model, m; not a number when there is no such body.
@@ -145,6 +150,12 @@ impl Plant {
     pub fn cost(&self) -> u64 {
         let implicit = self.paths.iter().filter(|p| p.constraint.is_some()).count();
         (self.substeps * (1 + self.frictions.len() + self.paths.len() + IMPLICIT * implicit)) as u64
+    }
+
+    /// The same of derivatives by one parameter that are carried along (see [`super::Tangents`]).
+    pub fn cost_of_a_lane(&self) -> u64 {
+        let implicit = self.paths.iter().filter(|p| p.constraint.is_some()).count();
+        (self.substeps * (1 + self.paths.len() + 2 * implicit)).div_ceil(2) as u64
     }
 
     /// Substeps in each period.
