@@ -85,7 +85,7 @@ impl Evaluator<'_> {
         found.into_iter().flatten().collect()
     }
 
-    /// Derivatives that are carried along with the motion; `None` by parameters that belong to an input, an output or a single record, by all where the
+    /// Derivatives that are carried along with the motion, in no more substeps than a direction of descent asks for; `None` by parameters that belong to an input, an output or a single record, by all where the
     /// model is linear, and where it cannot be simulated.
     fn carried(&self, structure: &Structure, own: &[f64], residuals: usize, which: &[usize]) -> Vec<Option<Vec<f64>>> {
         let mut found = vec![None; which.len()];
@@ -114,7 +114,9 @@ impl Evaluator<'_> {
         let groups: Vec<(&[usize], &[(Model, f64)])> = places.chunks(size).zip(lanes.chunks(size)).collect();
         let spans = self.spans();
         let jobs: Vec<(usize, usize)> = (0..self.records.len()).flat_map(|r| (0..groups.len()).map(move |g| (r, g))).collect();
-        let one = |(r, g): &(usize, usize)| self.record_derivatives(structure, (&model, groups[*g].1), &values, *r);
+        let few = self.substeps.min(self.problem.middle_substeps().max(tuning().fit.carried_substeps));
+        let coarser = Evaluator { substeps: few, ..self.clone() };
+        let one = |(r, g): &(usize, usize)| coarser.record_derivatives(structure, (&model, groups[*g].1), &values, *r);
         let parts: Vec<Option<Vec<Vec<f64>>>> = jobs.par_iter().map(one).collect();
         for (g, (places, _)) in groups.iter().enumerate() {
             let mine: Option<Vec<(usize, &Vec<Vec<f64>>)>> =
@@ -250,5 +252,68 @@ pub(crate) fn secant(jacobian: &mut [Vec<f64>], before: &[f64], after: &[f64], f
     }
     for (column, s) in jacobian.iter_mut().zip(&scaled).filter(|(_, s)| **s != 0.0) {
         column.iter_mut().zip(&missed).for_each(|(c, m)| *c += m * s / size);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fit::dot;
+    use crate::problem::{Problem, Record};
+    use backdrive_plant::recording::Recording;
+    use backdrive_plant::set::Initial;
+
+    /// A cart on a spring with grease and dry friction, whose sensor may be late.
+    const CART: &str = "name = 'cart'\n[bodies]\ncart = 2.0\n[[elements]]\nname = 'spring'\nkind = 'spring'\nbetween = ['cart', 'ground']\nstiffness = 800.0\n\
+                        [[elements]]\nname = 'grease'\nkind = 'damper'\nbetween = ['cart', 'ground']\ndamping = 8.0\n\
+                        [[elements]]\nname = 'rub'\nkind = 'coulomb'\nbetween = ['cart', 'ground']\nforce = 3.0\n\
+                        [[inputs]]\nname = 'f'\nkind = 'force'\non = 'cart'\nhold = 'linear'\n\
+                        [[outputs]]\nname = 'x'\nkind = 'position'\nof = 'cart'\n";
+
+    fn problem(text: &str) -> Problem {
+        let model = Model::from_toml(text, "cart.toml").unwrap();
+        let record = |frequency: f64| {
+            let t: Vec<f64> = (0..1500).map(|i| 1e-3 * f64::from(i)).collect();
+            let force: Vec<f64> = t.iter().map(|t| 20.0 * (frequency * t).sin() + 6.0 * (2.7 * frequency * t).sin()).collect();
+            let signals = vec![("f".to_string(), force.clone()), ("x".to_string(), force.iter().map(|f| f / 900.0).collect())];
+            Record::new(&Recording::new("r", t, signals).unwrap(), &model, Vec::new()).unwrap()
+        };
+        Problem::new(text.to_string(), "cart.toml".into(), model.clone(), vec![record(11.0), record(29.0)], Vec::new(), Initial::Rest)
+            .unwrap()
+    }
+
+    fn derivatives(problem: &Problem) -> (Structure, Vec<Option<Vec<f64>>>, Vec<Vec<f64>>) {
+        let structure = Structure::new(problem, &problem.fit, Vec::new());
+        let values = structure.values(problem, &[], &[], &[]);
+        let own: Vec<f64> = structure.free.iter().zip(&values).map(|(n, v)| n.to_internal(*v)).collect();
+        let evaluator = Evaluator::new(problem);
+        let residuals = evaluator.residuals(&structure, &values).unwrap();
+        let which: Vec<usize> = (0..own.len()).collect();
+        let carried = evaluator.carried(&structure, &own, residuals.len(), &which);
+        (structure.clone(), carried, evaluator.columns(&structure, &own, &residuals, &which, 0.1))
+    }
+
+    #[test]
+    fn what_is_carried_along_is_what_differences_find() {
+        let (structure, carried, differences) = derivatives(&problem(CART));
+        assert!(structure.free.len() >= 4);
+        for ((number, carried), difference) in structure.free.iter().zip(&carried).zip(&differences) {
+            let carried = carried.as_ref().expect("a number of the mechanism");
+            let apart: Vec<f64> = carried.iter().zip(difference).map(|(a, b)| a - b).collect();
+            assert!(dot(&apart, &apart) < 1e-4 * dot(difference, difference), "{:?}", number.role);
+        }
+    }
+
+    #[test]
+    fn sensors_and_linear_models_are_differenced() {
+        let late = CART.replace("kind = 'position'\nof = 'cart'\n", "kind = 'position'\nof = 'cart'\ngain = 1.1\n");
+        let (structure, carried, _) = derivatives(&problem(&late));
+        let of_sensor = |p: &Problem, n: &FreeParameter| matches!(n.role, Role::Stated(i) if p.stated[i].path.starts_with("outputs."));
+        let p = problem(&late);
+        for (number, carried) in structure.free.iter().zip(&carried) {
+            assert_eq!(carried.is_none(), of_sensor(&p, number), "{:?}", number.role);
+        }
+        let linear = CART.replace("kind = 'coulomb'", "kind = 'bias'");
+        assert!(derivatives(&problem(&linear)).1.iter().all(Option::is_none));
     }
 }

@@ -71,7 +71,10 @@ fn main() {
         ("bouc_wen, stiff", "kind = 'bouc_wen'\nstiffness = 1e6\nratio = 0.01\namplitude = 1.0\nbeta = 4e5\ngamma = 1e5\nexponent = 1.3"),
         ("lugre", "kind = 'lugre'\nstiffness = 2e5\ndamping = 80.0\ncoulomb = 1.5\nstatic = 2.5\nvelocity = 0.03"),
         ("maxwell_slip", "kind = 'maxwell_slip'\nstiffness = [900.0, 500.0, 200.0]\nforce = [0.5, 1.0, 1.5]"),
-        ("hysteretic_spring", "kind = 'hysteretic_spring'\nstiffness_positive = 300.0\nstiffness_negative = 260.0\noffset_positive = 0.8\noffset_negative = -0.7\nbandwidth = 900.0"),
+        (
+            "hysteretic_spring",
+            "kind = 'hysteretic_spring'\nstiffness_positive = 300.0\nstiffness_negative = 260.0\noffset_positive = 0.8\noffset_negative = -0.7\nbandwidth = 900.0",
+        ),
         ("backlash", "kind = 'backlash'\ngap = 0.004\nstiffness = 3000.0\ndamping = 8.0"),
     ];
     println!("{:<20} {:>6} {:>14} {:>20} {:>20}", "law", "bodies", "alone, ns", "with the law's", "with the others");

@@ -54,6 +54,8 @@ group! {
         longest: f64 = 0.5, "-", Numerics("as longest_log");
         /// The difference of a law along the direction of a derivative that is carried along with the motion.
         carried: f64 = 1e-3, "differences", Numerics("above the rounding of a law, far below the width of its kinks");
+        /// Substeps of derivatives that are carried along, at most.
+        carried_substeps: usize = 4, "substeps", Cost("a direction of descent need not be as exact as the residuals; where it misleads, fine differences follow");
         /// Relative difference by which derivatives are taken.
         difference: f64 = 1e-3, "-", Numerics("well above the simulations' rounding, and a thousandth of a parameter is linear");
         /// Difference of a delay, in sample periods.

@@ -30,6 +30,8 @@ pub struct BoucWen {
 const SHARE_PER_STAGE: f64 = 0.2;
 /// Stages at most: after a path that long it has settled to 1e-8.
 const STAGES_AT_MOST: f64 = 100.0;
+/// Slope of z, as a share of that at z = 0, below which it no longer moves but for rounding.
+const SETTLED: f64 = 1e-13;
 /// How far apart two displacements may be for one's power to give the other's by five terms, as a share over the exponent.
 const NEAR: f64 = 0.01;
 
@@ -136,6 +138,9 @@ impl PathLaw for BoucWen {
             let known = (z.abs(), self.power(z.abs()));
             let slope = |z: f64| self.slope(z, sign, self.power_near(z.abs(), known));
             let first = self.slope(z, sign, known.1);
+            if first.abs() <= SETTLED * self.amplitude {
+                break;
+            }
             let second = slope(z + 0.5 * dx * first);
             let third = slope(z + 0.5 * dx * second);
             let fourth = slope(z + dx * third);

@@ -4,11 +4,11 @@ use super::account::Done;
 use super::compiled::Compiled;
 use super::constraints::Work;
 use super::contact::{Bounds, FrictionContact};
+use super::follow::Follow;
 use super::motion::Motion;
 use super::segment::Segment;
 use super::slots::{SLOTS, Slots, prescribed_slot};
 use super::state::Plant;
-use super::tangents::Follow;
 
 /// Stands for a number of free bodies that is not known when the code is compiled.
 const ANY: usize = 0;

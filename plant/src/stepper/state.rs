@@ -16,6 +16,12 @@ use super::slots::{SLOTS, Slots};
 /// Evaluations of a law that a substep takes where it is solved implicitly, beyond one.
 const IMPLICIT: usize = 6;
 
+/// What a costly law adds to a substep, in steps of a linear network.
+const COSTLY: usize = 6;
+
+/// The balance of forces at a sample, in steps of a linear network.
+const BALANCE: usize = 3;
+
 /// A model at work. A clone goes on from the same state.
 #[derive(Debug, Clone)]
 pub struct Plant {
@@ -146,16 +152,26 @@ impl Plant {
     }
 
     /// About how much a step of one period computes, in steps of a linear network: contacts and paths add to each substep, those that are solved
-    /// implicitly several evaluations of their law.
+    /// implicitly several evaluations of their law, and costly laws more.
     pub fn cost(&self) -> u64 {
-        let implicit = self.paths.iter().filter(|p| p.constraint.is_some()).count();
-        (self.substeps * (1 + self.frictions.len() + self.paths.len() + IMPLICIT * implicit)) as u64
+        let (implicit, costly) = self.dear();
+        (self.substeps * (1 + self.frictions.len() + self.paths.len() + IMPLICIT * implicit + COSTLY * costly) + self.balances()) as u64
     }
 
-    /// The same of derivatives by one parameter that are carried along (see [`super::Tangents`]).
+    /// The same of derivatives by one parameter that are carried along (see [`crate::stepper::Tangents`]).
     pub fn cost_of_a_lane(&self) -> u64 {
-        let implicit = self.paths.iter().filter(|p| p.constraint.is_some()).count();
-        (self.substeps * (1 + self.paths.len() + 2 * implicit)).div_ceil(2) as u64
+        let (implicit, costly) = self.dear();
+        ((self.substeps * (1 + self.paths.len() + 2 * implicit + COSTLY * costly)).div_ceil(2) + self.balances()) as u64
+    }
+
+    /// What reading the outputs of a sample takes where it needs the balance of forces.
+    fn balances(&self) -> usize {
+        if self.sense.needs_forces { BALANCE } else { 0 }
+    }
+
+    /// How many laws are solved implicitly, and how many are costly.
+    fn dear(&self) -> (usize, usize) {
+        (self.paths.iter().filter(|p| p.constraint.is_some()).count(), self.paths.iter().filter(|p| p.law.is_costly()).count())
     }
 
     /// Substeps in each period.

@@ -1,7 +1,7 @@
 //! One law, differenced once for all lanes that leave its numbers alone.
 
-use super::path::PathElement;
 use crate::elements::Law;
+use crate::stepper::path::PathElement;
 
 /// Numbers of a memory up to which a law is differenced by each of them; with more, along each lane.
 pub(super) const SHARED_MEMORY: usize = 2;
