@@ -19,6 +19,9 @@ type Set = (usize, usize, usize);
 /// Weights that are moved together, and which of the parameters they are.
 type Together = (Set, Vec<usize>);
 
+/// Parameters that are carried along together: which columns they are, and the models a step further.
+type Group<'g> = (&'g [usize], &'g [(Model, f64)]);
+
 /// A parameter moved: all values as they stand in the model, the model, and the difference taken in the fit's own unit.
 type Moved = (Vec<f64>, Model, f64);
 
@@ -111,7 +114,7 @@ impl Evaluator<'_> {
         // Groups of equal size.
         let size = lanes.len().div_ceil(lanes.len().div_ceil(LANES));
         let (places, lanes): (Vec<usize>, Vec<(Model, f64)>) = lanes.into_iter().unzip();
-        let groups: Vec<(&[usize], &[(Model, f64)])> = places.chunks(size).zip(lanes.chunks(size)).collect();
+        let groups: Vec<Group> = places.chunks(size).zip(lanes.chunks(size)).collect();
         let spans = self.spans();
         let jobs: Vec<(usize, usize)> = (0..self.records.len()).flat_map(|r| (0..groups.len()).map(move |g| (r, g))).collect();
         let few = self.substeps.min(self.problem.middle_substeps().max(tuning().fit.carried_substeps));
@@ -119,14 +122,18 @@ impl Evaluator<'_> {
         let one = |(r, g): &(usize, usize)| coarser.record_derivatives(structure, (&model, groups[*g].1), &values, *r);
         let parts: Vec<Option<Vec<Vec<f64>>>> = jobs.par_iter().map(one).collect();
         for (g, (places, _)) in groups.iter().enumerate() {
-            let mine: Option<Vec<(usize, &Vec<Vec<f64>>)>> =
-                jobs.iter().zip(&parts).filter(|((_, of), _)| *of == g).map(|((r, _), part)| Some((*r, part.as_ref()?))).collect();
+            let mine = || jobs.iter().zip(&parts).filter(move |((_, of), _)| *of == g);
+            if mine().any(|(_, part)| part.is_none()) {
+                continue;
+            }
             for (lane, at) in places.iter().enumerate() {
-                found[*at] = mine.as_ref().map(|mine| {
-                    let mut column = vec![0.0; residuals];
-                    mine.iter().for_each(|(r, part)| column[spans[*r].clone()].copy_from_slice(&part[lane]));
-                    column
-                });
+                let mut column = vec![0.0; residuals];
+                for ((r, _), part) in mine() {
+                    if let Some(derivatives) = part.as_ref().and_then(|part| part.get(lane)) {
+                        column[spans[*r].clone()].copy_from_slice(derivatives);
+                    }
+                }
+                found[*at] = Some(column);
             }
         }
         found
@@ -282,7 +289,10 @@ mod tests {
             .unwrap()
     }
 
-    fn derivatives(problem: &Problem) -> (Structure, Vec<Option<Vec<f64>>>, Vec<Vec<f64>>) {
+    /// By each number: carried along, where it can be, and differenced.
+    type Both = (Structure, Vec<Option<Vec<f64>>>, Vec<Vec<f64>>);
+
+    fn derivatives(problem: &Problem) -> Both {
         let structure = Structure::new(problem, &problem.fit, Vec::new());
         let values = structure.values(problem, &[], &[], &[]);
         let own: Vec<f64> = structure.free.iter().zip(&values).map(|(n, v)| n.to_internal(*v)).collect();

@@ -101,11 +101,14 @@ pub fn motion_at(model: &Model, record: &Record, conditions: &Conditions, at: us
     motion.iter().all(|(_, x, v)| x.is_finite() && v.is_finite()).then_some(motion)
 }
 
+/// How bodies on motion inputs are moved, one after the other.
+type Paths = Vec<Arc<Vec<Segment>>>;
+
 /// What a simulation shows at each sample: the plant, what follows it, and which sample.
 type Show<'s> = &'s mut dyn FnMut(&mut Plant, Option<&mut Tangents>, usize);
 
 /// A model under the conditions of a record, coupled where it is to be, and the paths of the bodies that pull it.
-fn conditioned<'m>(model: &'m Model, record: &Record, conditions: &Conditions) -> Option<(Cow<'m, Model>, Vec<Arc<Vec<Segment>>>)> {
+fn conditioned<'m>(model: &'m Model, record: &Record, conditions: &Conditions) -> Option<(Cow<'m, Model>, Paths)> {
     let mut changed = Cow::Borrowed(model);
     for (path, condition) in &record.conditions {
         if let Condition::Value(value) = condition {

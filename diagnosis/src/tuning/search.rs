@@ -6,7 +6,7 @@ group! {
     /// How much is tried and when it ends. Shares are of the work that a search may do ([`Search::work`] times the effort asked for).
     Search {
         /// Work of a search with an effort of 1.
-        work: u64 = 800_000_000, "simulation steps", Cost("about 12 s on two threads of a laptop");
+        work: u64 = 1_200_000_000, "simulation steps", Cost("about 20 s on two threads of a laptop");
         /// Wall-clock limit of a search, where nothing else is said.
         patience: u64 = 600, "s", Cost("far longer than the default effort takes on a slow machine");
         /// Simulation steps of two threads of a laptop in a second: for progress bars only.
@@ -40,7 +40,7 @@ group! {
         /// Share of the step that resolves laws more finely, far from the noise.
         share_of_finer: f64 = 0.15, "of the work", Cost("as share_of_relatives");
         /// Work in which every law at a place takes its first step.
-        laws: u64 = 80_000_000, "simulation steps", Cost("a tenth of the work");
+        laws: u64 = 120_000_000, "simulation steps", Cost("a tenth of the work");
         /// Work in which each record is fitted by itself.
         per_record: u64 = 100_000_000, "simulation steps", Cost("an eighth of the work, after the search");
         /// Share of the work for refits that begin with few of the stated numbers.
