@@ -58,6 +58,8 @@ pub(super) struct Inbox {
     pub(super) speaker: Option<Speaker>,
     /// With when each was taken in: CLOCK_MONOTONIC, ns.
     pub(super) queue: VecDeque<(Result<Message, TransportError>, i64)>,
+    /// The latest of these times, ns.
+    pub(super) newest_ns: i64,
     pub(super) late: u64,
     pub(super) strangers: u64,
     pub(super) complained: Option<Instant>,
@@ -122,7 +124,9 @@ impl Inbox {
             let entry = match self.reader.try_take_one_with(Reads(self.topic.kind)) {
                 Ok(None) => return,
                 Ok(Some(change)) => {
-                    arrived_ns = taken_in_ns(change.receive_instant);
+                    // The middleware hands over in order what has overtaken each other on the way, and its times are read by two
+                    // clocks: nothing counts as there before what is used before it.
+                    arrived_ns = taken_in_ns(change.receive_instant).max(self.newest_ns);
                     let guid = change.writer_guid();
                     let message = change.into_value();
                     if !self.admits(guid, &message) {
@@ -133,6 +137,7 @@ impl Inbox {
                 Err(ReadError::Deserialization { reason }) => Err(self.broken(reason)),
                 Err(e) => Err(self.broken(e.to_string())),
             };
+            self.newest_ns = self.newest_ns.max(arrived_ns);
             if self.queue.len() == self.depth {
                 self.queue.pop_front();
             }

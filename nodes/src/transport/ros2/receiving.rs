@@ -28,6 +28,7 @@ impl Receiving {
             matched: 0,
             speaker: None,
             queue: VecDeque::new(),
+            newest_ns: i64::MIN,
             late: 0,
             strangers: 0,
             complained: None,
