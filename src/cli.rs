@@ -21,6 +21,7 @@ mod simulate;
 mod stability;
 mod test_bench;
 mod values;
+mod why;
 
 pub use bag::Bag;
 pub use bridge::Bridge;
@@ -39,6 +40,7 @@ pub use shell::{Completions, Man};
 pub use simulate::Simulate;
 pub use stability::Stability;
 pub use test_bench::TestBench;
+pub use why::Why;
 
 use clap::{Parser, Subcommand};
 
@@ -74,6 +76,9 @@ pub enum Command {
     /// Ask a bag whether its loop would be stable at another gain, and how far away the edge is.
     #[command(after_help = stability::HELP)]
     Stability(Stability),
+    /// Ask a bag why its loop shakes, and what would stop it: causes with their evidence, and remedies that were tried on the loop run again.
+    #[command(after_help = why::HELP)]
+    Why(Why),
     /// Write a model and a set for recordings of your own: asks what is driven and what is measured, and checks what it wrote.
     #[command(after_help = init::HELP)]
     Init(Init),

@@ -37,6 +37,7 @@ mod stability;
 mod stability_page;
 mod summary;
 mod test_bench;
+mod why;
 
 pub use run::{Done, run_here};
 
@@ -57,6 +58,7 @@ pub fn main() -> ExitCode {
         Command::Run(options) => run::run(&options),
         Command::Replay(options) => replay::replay(&options),
         Command::Stability(options) => stability::stability(&options),
+        Command::Why(options) => why::why(&options),
         Command::Init(options) => init::init(&options),
         Command::Diagnose(options) => diagnose::diagnose(&options),
         Command::Fit(options) => fit::fit(&options),

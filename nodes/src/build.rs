@@ -160,9 +160,16 @@ pub fn credit_listeners(graph: &Graph) -> usize {
 
 /// The plan of one of our own nodes (not of a recorder).
 pub fn plan(graph: &Graph, name: &str) -> Result<NodePlan, BuildError> {
+    plan_with(graph, name, cores_of(graph, name)?)
+}
+
+/// The cores of one of our own nodes, one per stage of its kind: for who puts something of his own around them.
+///
+/// # Errors
+/// There is no such node, or its device does not work.
+pub fn cores_of(graph: &Graph, name: &str) -> Result<Vec<Box<dyn Core>>, BuildError> {
     let node = graph.node(name).ok_or_else(|| BuildError::NoSuchNode(name.to_string()))?;
-    let cores = cores(graph, node).map_err(|error| BuildError::Device { node: node.name.clone(), error })?;
-    plan_with(graph, name, cores)
+    cores(graph, node).map_err(|error| BuildError::Device { node: node.name.clone(), error })
 }
 
 /// The plan of a node whose cores the caller brings, one per stage of the node's kind: how a program of

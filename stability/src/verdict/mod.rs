@@ -25,6 +25,7 @@ mod witness;
 mod word;
 
 pub use question::{Question, Swapped};
+pub use recorded::{recorded_outcome, recorded_traces};
 pub use types::{Answer, AnswerError, Apart, Disagreement, LoopCheck, Resimulated};
 pub use warning::Warning;
 pub use witness::Witness;

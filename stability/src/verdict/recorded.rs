@@ -7,16 +7,21 @@ use crate::session::Session;
 use crate::unjudged::Gaps;
 
 /// What the recording itself did: the same function as for a live run. What is missing in a recording is no run-away.
-pub(super) fn recorded_outcome(session: &Session) -> Option<Outcome> {
+pub fn recorded_outcome(session: &Session) -> Option<Outcome> {
+    Outcome::worst(recorded_traces(session).iter().map(|trace| judge(trace).held_back(session.cut_short)))
+}
+
+/// What a verdict on a recording is drawn from, per axis.
+pub fn recorded_traces(session: &Session) -> Vec<Trace> {
     let intents: Vec<Vec<f64>> = session.axes.iter().map(|a| a.intent.clone().unwrap_or_default()).collect();
     let way = (intents.len() > 1).then(|| way(&intents.iter().map(|x| held(x)).collect::<Vec<_>>()));
-    let judged = session.axes.iter().map(|axis| {
+    let traced = session.axes.iter().map(|axis| {
         let stale = |row: usize| axis.stale.get(row).copied().unwrap_or(false);
         let intent = axis.intent.as_ref().filter(|x| x.iter().any(|x| x.is_finite()));
         let loops = || [Some(&axis.master), Some(&axis.contact), Some(&axis.command), intent].into_iter().flatten();
         let lacks = |row: usize| stale(row) || loops().any(|c| c.get(row).is_none_or(|x| x.is_nan()));
         let touched = !contacts(axis, session.period_s).is_empty();
-        let trace = Trace {
+        Trace {
             period_s: session.period_s,
             intent: way.clone().unwrap_or_else(|| axis.intent.as_deref().map(held).unwrap_or_default()),
             position: held(&axis.master),
@@ -29,10 +34,9 @@ pub(super) fn recorded_outcome(session: &Session) -> Option<Outcome> {
             resolution: axis.resolution,
             noise: axis.noise,
             gaps: Gaps { at: (0..session.len()).map(lacks).collect(), bridged_s: session.bridged_s, planned: 0 },
-        };
-        judge(&trace).held_back(session.cut_short)
+        }
     });
-    Outcome::worst(judged)
+    traced.collect()
 }
 
 /// The column with what is missing in it filled by the value before it.

@@ -1,0 +1,70 @@
+//! The answer for a terminal.
+
+use backdrive_why::answer::Answer;
+use backdrive_why::cause::Cause;
+use backdrive_why::remedy::Remedy;
+use std::fmt::Write;
+
+/// Causes and remedies that are shown.
+const SHOWN: usize = 5;
+
+/// A cause that is less likely is not worth a line.
+const UNLIKELY: f64 = 0.03;
+
+/// The answer for a terminal.
+pub fn text(answer: &Answer) -> String {
+    let mut out = String::new();
+    let mut line = |label: &str, text: &str| {
+        let _ = writeln!(out, "{label:<12}{text}");
+    };
+    line("happens", &answer.happens);
+    if let Some(beneath) = &answer.beneath {
+        line("beneath", &format!("without that limit: {beneath}"));
+    }
+    match answer.edge {
+        Some(edge) => line("gain", &format!("mu*lambda = {:.3}; the loop as it was is stable up to {edge:.3}", answer.gain)),
+        None => line("gain", &format!("mu*lambda = {:.3}; no edge within a factor of 20", answer.gain)),
+    }
+    for (number, cause) in answer.causes.iter().filter(|c| c.confidence >= UNLIKELY).take(SHOWN).enumerate() {
+        line(if number == 0 { "cause" } else { "or" }, &of_cause(cause));
+    }
+    for text in answer.differs.iter().filter(|d| !answer.causes.iter().any(|c| c.evidence == **d)) {
+        line("differs", text);
+    }
+    let stop: Vec<&Remedy> = answer.remedies.iter().filter(|r| r.stops).take(SHOWN).collect();
+    for (number, remedy) in stop.iter().enumerate() {
+        line(if number == 0 { "remedy" } else { "or" }, &of_remedy(remedy));
+    }
+    if stop.is_empty() && !answer.remedies.is_empty() {
+        line("remedy", "none of what was tried stops it");
+    }
+    if let Some(again) = &answer.again {
+        let agrees = if answer.reproduced { "as recorded" } else { "which is NOT what was recorded: something is not known" };
+        line("run again", &format!("{again}, {agrees}"));
+    }
+    if let Some(why) = &answer.not_again {
+        line("run again", &format!("not: {why}"));
+    }
+    for note in &answer.notes {
+        line("note", note);
+    }
+    out.truncate(out.trim_end().len());
+    out
+}
+
+fn of_cause(cause: &Cause) -> String {
+    let place = if cause.place.is_empty() { String::new() } else { format!(" ({})", cause.place) };
+    format!("{}{place}, confidence {:.2}: {}; without it: {}", cause.kind.words(), cause.confidence, cause.evidence, cause.without)
+}
+
+fn of_remedy(remedy: &Remedy) -> String {
+    let hands =
+        if remedy.robust { "also with a grip 15 % softer or firmer and a gain a quarter higher" } else { "with this grip and gain only" };
+    format!(
+        "{}: {}, {hands}; {:.0} % of the force and {:.0} % of the motion are left",
+        remedy.text,
+        remedy.outcome,
+        100.0 * remedy.force_kept,
+        100.0 * remedy.motion_kept
+    )
+}

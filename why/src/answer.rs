@@ -1,0 +1,210 @@
+//! The answer: what happens, why, and what would stop it.
+
+use crate::alone::AloneError;
+use crate::as_it_was::as_it_was;
+use crate::cause::{Asked, Cause, CauseKind, causes, named, reproduces};
+use crate::change::Change;
+use crate::differences::{Difference, Differences, differences};
+use crate::happening::Happening;
+use crate::recorded::{Recorded, Told};
+use crate::remedy::{Remedy, remedies};
+use crate::trial::{Hand, Trial};
+use backdrive_control::operator::Intent;
+use backdrive_nodes::graph::Graph;
+use backdrive_stability::resimulate::{Gain, ResimulateError, RunOptions};
+use backdrive_stability::session::Session;
+use serde::Serialize;
+use std::sync::atomic::AtomicBool;
+
+/// The loop is run again for so many steps of a bag at most: many runs have to fit into half a minute.
+const MOST_STEPS: usize = 60_000;
+
+/// A bag of ours.
+pub struct Question<'a> {
+    /// Its signals.
+    pub session: &'a Session,
+    /// Its graph.
+    pub graph: &'a Graph,
+    /// Every sample and event.
+    pub recorded: &'a Recorded,
+    /// What the hand wanted, where that was recorded or recovered.
+    pub intents: Option<Vec<Intent>>,
+    /// The gain of most of it.
+    pub gain: Gain,
+}
+
+/// Why there is no answer.
+#[derive(Debug, thiserror::Error)]
+pub enum WhyError {
+    /// A node cannot be run by itself.
+    #[error(transparent)]
+    Alone(#[from] AloneError),
+    /// The loop cannot be run again.
+    #[error(transparent)]
+    Loop(#[from] ResimulateError),
+}
+
+/// The answer.
+#[derive(Debug, Clone, Serialize)]
+pub struct Answer {
+    /// The bag.
+    pub bag: String,
+    /// mu*lambda of most of it.
+    pub gain: f64,
+    /// What happens.
+    pub happening: Happening,
+    /// In a sentence.
+    pub happens: String,
+    /// Causes, the likeliest first; empty where nothing happens.
+    pub causes: Vec<Cause>,
+    /// What would happen were there no limits of force and rate, where one acts.
+    pub beneath: Option<Happening>,
+    /// What would stop it, the best first.
+    pub remedies: Vec<Remedy>,
+    /// Where the recording is not what the graph says.
+    pub differences: Vec<Difference>,
+    /// The same in words.
+    pub differs: Vec<String>,
+    /// What the loop as it was does when it is run again.
+    pub again: Option<String>,
+    /// Whether that is what was recorded.
+    pub reproduced: bool,
+    /// The critical mu*lambda of the loop as it was; `None` where there is none within a factor of 20.
+    pub edge: Option<f64>,
+    /// Why the loop was not run again, where it was not.
+    pub not_again: Option<String>,
+    /// What nodes told while it ran, kinds with their counts.
+    pub events: Vec<(String, usize)>,
+    /// What a reader has to know.
+    pub notes: Vec<String>,
+}
+
+/// Answers. `hear` is told what is being done.
+///
+/// # Errors
+/// A node that cannot be built; `cancel` was set.
+pub fn why(question: &Question, hear: &(dyn Fn(&str) + Sync), cancel: &AtomicBool) -> Result<Answer, WhyError> {
+    let Question { session, graph, recorded, gain, .. } = question;
+    let happening = Happening::of(session);
+    let Differences { found, notes } = differences(graph, recorded, hear, cancel)?;
+    let mut answer = Answer {
+        bag: session.name.clone(),
+        gain: gain.product(),
+        happens: happening.to_string(),
+        happening,
+        causes: Vec::new(),
+        beneath: None,
+        remedies: Vec::new(),
+        differs: found.iter().map(|d| named(d, graph).2).collect(),
+        differences: found,
+        again: None,
+        reproduced: false,
+        edge: None,
+        not_again: None,
+        events: counted(&recorded.events),
+        notes: session.notes.iter().cloned().chain(notes).collect(),
+    };
+    match again(question, &mut answer, hear, cancel) {
+        Ok(()) => {}
+        Err(ResimulateError::Cancelled) => return Err(ResimulateError::Cancelled.into()),
+        Err(e) => answer.not_again = Some(e.to_string()),
+    }
+    of_events(&mut answer, recorded);
+    Ok(answer)
+}
+
+/// Runs the loop again: as it was, without each suspect, with each remedy.
+fn again(question: &Question, answer: &mut Answer, hear: &(dyn Fn(&str) + Sync), cancel: &AtomicBool) -> Result<(), ResimulateError> {
+    let Question { session, graph, gain, .. } = question;
+    let steps = session.len().min(MOST_STEPS) as u64;
+    let hand = Hand { intents: question.intents.clone(), steps, rate_hz: graph.timing.rate_hz };
+    let was: Trial = as_it_was(graph, &answer.differences);
+    hear("the loop as it was");
+    let run = was.run(&hand, *gain, &RunOptions { keep_dither: true, ..RunOptions::default() }, cancel)?;
+    answer.again = Some(run.outcome.to_string());
+    answer.reproduced = reproduces(&answer.happening, &run.outcome, run.frequency_hz);
+    // A limit hides what happens beneath: then the causes are looked for without it.
+    let (mut loop_of_causes, mut always, mut happening) = (was.clone(), Vec::new(), answer.happening);
+    if let Happening::Saturation { .. } = happening {
+        let mut unlimited = was.clone();
+        Change::NoLimits.apply(&mut unlimited);
+        let run = unlimited.run(&hand, *gain, &RunOptions::default(), cancel)?;
+        let beneath = Happening::of_run(&run);
+        if beneath.is_trouble() {
+            (loop_of_causes, always, happening) = (unlimited, vec![Change::NoLimits], beneath);
+        }
+        answer.beneath = Some(beneath);
+    }
+    answer.edge = loop_of_causes.edge(&hand, gain.product(), cancel)?.critical_gain;
+    if !answer.happening.is_trouble() {
+        return Ok(());
+    }
+    hear("without each suspect");
+    let asked = Asked {
+        graph,
+        was: &loop_of_causes,
+        differences: &answer.differences,
+        hand: &hand,
+        gain: *gain,
+        happening: &happening,
+        always: &always,
+        edge: answer.edge,
+        reproduced: answer.reproduced,
+    };
+    answer.causes = causes(&asked, cancel)?;
+    hear("what would stop it");
+    answer.remedies = remedies(&was, &hand, *gain, answer.edge, &answer.causes, cancel)?;
+    Ok(())
+}
+
+fn counted(events: &[Told]) -> Vec<(String, usize)> {
+    let mut all: Vec<(String, usize)> = Vec::new();
+    for event in events {
+        match all.iter_mut().find(|(kind, _)| *kind == event.kind) {
+            Some((_, count)) => *count += 1,
+            None => all.push((event.kind.clone(), 1)),
+        }
+    }
+    all
+}
+
+/// Causes that the nodes themselves told of: they are known without running anything again.
+fn of_events(answer: &mut Answer, recorded: &Recorded) {
+    let cause = |kind: CauseKind, place: String, evidence: String| Cause {
+        kind,
+        place,
+        evidence,
+        without: "not run again: it is no part of a model".to_string(),
+        holds_without: false,
+        edge_without: None,
+        seen: true,
+        confidence: 0.0,
+        repairs: Vec::new(),
+    };
+    let mut told = Vec::new();
+    let twice = recorded.tracks.iter().filter(|t| t.sources.len() > 1);
+    told.extend(
+        twice.map(|t| cause(CauseKind::TwoPublishers, t.topic.clone(), format!("{} publishers speak on {}", t.sources.len(), t.topic))),
+    );
+    if let Some(event) = recorded.events.iter().find(|e| e.kind == "connection_broken" && e.text.contains("another publisher")) {
+        told.push(cause(CauseKind::TwoPublishers, event.topic.clone(), event.text.clone()));
+    }
+    let skipped: f64 = recorded.events.iter().filter(|e| e.kind == "steps_skipped").map(|e| e.value).sum();
+    if skipped > 0.0 {
+        told.push(cause(CauseKind::Clock, String::new(), format!("{skipped:.0} steps were skipped because a node was too far behind")));
+    }
+    if told.is_empty() {
+        return;
+    }
+    if !answer.happening.is_trouble() {
+        answer.differs.extend(told.into_iter().map(|c| c.evidence));
+        return;
+    }
+    // What was told weighs as much as everything that was inferred.
+    let share = 0.8;
+    answer.causes.iter_mut().for_each(|c| c.confidence *= 1.0 - share);
+    let each = share / told.len() as f64;
+    told.iter_mut().for_each(|c| c.confidence = each);
+    told.append(&mut answer.causes);
+    answer.causes = told;
+}

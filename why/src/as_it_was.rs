@@ -1,0 +1,58 @@
+//! The loop as it was: the graph of a bag with what was found to be otherwise.
+
+use crate::compared::AsIf;
+use crate::differences::{Difference, delay};
+use crate::faulty::Distortion;
+use crate::trial::Trial;
+use backdrive_nodes::graph::{Direction, Graph, NodeKind, Settings};
+
+/// Puts differences into a graph; those of which nothing simple is known stay out, and are not counted.
+pub fn as_it_was(graph: &Graph, differences: &[Difference]) -> Trial {
+    let mut trial = Trial { graph: graph.clone(), distortions: Vec::new() };
+    for difference in differences {
+        put(&mut trial, difference);
+    }
+    trial
+}
+
+/// Whether a difference can be put into a graph.
+pub fn is_modelled(difference: &Difference) -> bool {
+    difference.device.as_ref().is_some_and(|d| d.model.is_some()) || !matches!(difference.compared.as_if, AsIf::Otherwise | AsIf::Same)
+}
+
+fn put(trial: &mut Trial, difference: &Difference) {
+    if difference.way.is_some() {
+        let Some(node) = trial.graph.nodes.iter().position(|n| n.name == difference.node) else { return };
+        delay(&mut trial.graph, node, difference);
+        if let AsIf::Changed { gain, .. } = difference.compared.as_if
+            && gain != 1.0
+        {
+            trial.distortions.push(Distortion { gain, ..of(difference) });
+        }
+        return;
+    }
+    if let Some(model) = difference.device.as_ref().and_then(|d| d.model.as_ref()) {
+        for node in trial.graph.nodes.iter_mut().filter(|n| n.name == difference.node && n.kind == NodeKind::Master) {
+            if let Settings::Master(files) = &mut node.settings {
+                files.model = Some((**model).clone());
+                files.fragment = None;
+            }
+        }
+        return;
+    }
+    let none = of(difference);
+    let one = match difference.compared.as_if {
+        AsIf::Changed { gain, late } => Distortion { gain, late, ..none },
+        AsIf::Dead { from_row } => Distortion { dead_from: Some(from_row), ..none },
+        AsIf::Railed { low, high } => Distortion { rails: [low, high], ..none },
+        AsIf::Stepped { step } => Distortion { step, ..none },
+        AsIf::Noisy { deviation } => Distortion { noise: deviation, ..none },
+        AsIf::Same | AsIf::Unsteady { .. } | AsIf::Otherwise => return,
+    };
+    trial.distortions.push(one);
+}
+
+fn of(difference: &Difference) -> Distortion {
+    let stage = difference.kind.port(&difference.port, Direction::Output).map_or(0, |(stage, _)| stage);
+    Distortion { stage, ..Distortion::none(&difference.node, difference.quantity, difference.axis) }
+}

@@ -1,0 +1,215 @@
+//! Changes to a loop that would stop it, as things that can be done to any graph.
+
+use crate::trial::Trial;
+use backdrive_nodes::graph::{Graph, NodeKind, Settings};
+use backdrive_plant::elements::Law;
+use backdrive_plant::model::{Fragment, InputKind, Model};
+use backdrive_stability::resimulate::grip;
+use serde::Serialize;
+
+/// One change.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(tag = "change", rename_all = "snake_case")]
+pub enum Change {
+    /// The force scale times a factor.
+    Gain {
+        /// Factor on lambda.
+        factor: f64,
+        /// lambda then.
+        lambda: f64,
+    },
+    /// The canceller's prediction made of another model, with another grip.
+    Canceller {
+        /// What it is, for a person.
+        of: String,
+        /// The model; `None` where nothing is cancelled.
+        #[serde(skip)]
+        model: Option<Box<Model>>,
+        /// The grip; `None` where the model holds the hand.
+        #[serde(skip)]
+        grip: Option<Box<Fragment>>,
+        /// Corner of its high-pass, Hz; 0 for none.
+        high_pass_hz: f64,
+    },
+    /// Corner of the canceller's high-pass.
+    HighPass {
+        /// Hz; 0 for none.
+        hz: f64,
+    },
+    /// A way has only the delay that the graph says.
+    WayRepaired {
+        /// Node at its end.
+        node: String,
+        /// Input port at its end.
+        port: String,
+    },
+    /// Delays that the graph states times a factor.
+    Delays {
+        /// Factor.
+        factor: f64,
+    },
+    /// A sensor does what its model says.
+    SensorRepaired {
+        /// The node that reads it.
+        node: String,
+    },
+    /// Sensors that neither round nor are noisy.
+    FinerSensors,
+    /// Damping at the handle, played by the motor.
+    Damping {
+        /// N s/m or N m s/rad.
+        damping: f64,
+    },
+    /// A firmer or softer hand.
+    Grip {
+        /// Factor on its stiffness and damping.
+        factor: f64,
+    },
+    /// Another rate of the loop.
+    Rate {
+        /// Hz.
+        hz: f64,
+    },
+    /// Motors without limits of force and rate.
+    StrongerMotor,
+    /// No limit at all, of motors or of travel: not to be had, but it shows what a limit hides.
+    NoLimits,
+}
+
+impl Change {
+    /// Makes the change.
+    pub fn apply(&self, trial: &mut Trial) {
+        match self {
+            Change::Gain { factor, .. } => trial.graph.gains.lambda *= factor,
+            Change::Canceller { model, grip, high_pass_hz, .. } => cancellers(&mut trial.graph, |files, corner| {
+                files.model = model.as_deref().cloned();
+                files.fragment = grip.as_deref().cloned();
+                *corner = *high_pass_hz;
+            }),
+            Change::HighPass { hz } => cancellers(&mut trial.graph, |_, corner| *corner = *hz),
+            Change::WayRepaired { node, port } => {
+                let Some(index) = trial.graph.nodes.iter().position(|n| n.name == *node) else { return };
+                trial.graph.connections.iter_mut().filter(|c| c.to.0 == index && c.to.1 == *port).for_each(|c| c.impairment = None);
+            }
+            Change::Delays { factor } => {
+                for connection in &mut trial.graph.connections {
+                    if let Some(impairment) = &mut connection.impairment {
+                        impairment.delay_s *= factor;
+                        impairment.jitter_s *= factor;
+                        impairment.loss *= factor;
+                    }
+                    if connection.delay > 1 {
+                        connection.delay = ((connection.delay as f64 * factor) as u64).max(1);
+                    }
+                }
+            }
+            Change::SensorRepaired { node } => trial.distortions.retain(|d| d.node != *node),
+            Change::FinerSensors => {
+                for node in &mut trial.graph.nodes {
+                    if let Settings::Master(files) | Settings::Slave(files) = &mut node.settings {
+                        files.real_sensors = false;
+                    }
+                }
+                trial.distortions.retain(|d| d.step == 0.0 && d.noise == 0.0);
+            }
+            Change::Damping { damping } => damped(&mut trial.graph, *damping),
+            Change::Grip { factor } => firmer(&mut trial.graph, *factor),
+            Change::Rate { hz } => {
+                let times = hz / trial.graph.timing.rate_hz;
+                trial.graph.timing.rate_hz = *hz;
+                trial.graph.timing.steps = trial.graph.timing.steps.map(|s| (s as f64 * times).round() as u64);
+                // Delays of whole steps are of the network where there are several, and of the clock where there is one.
+                for connection in trial.graph.connections.iter_mut().filter(|c| c.delay > 1) {
+                    connection.delay = (connection.delay as f64 * times).round() as u64;
+                }
+            }
+            Change::StrongerMotor | Change::NoLimits => {
+                for node in &mut trial.graph.nodes {
+                    let (Settings::Master(files) | Settings::Slave(files)) = &mut node.settings else { continue };
+                    for axis in files.model.iter_mut().flat_map(|m| m.axes.iter_mut()) {
+                        (axis.force, axis.force_rate) = (None, None);
+                        if *self == Change::NoLimits {
+                            (axis.travel, axis.speed) = (None, None);
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    /// Whether it only puts right what is wrong.
+    pub fn is_repair(&self) -> bool {
+        matches!(self, Change::WayRepaired { .. } | Change::SensorRepaired { .. })
+    }
+}
+
+impl std::fmt::Display for Change {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Change::Gain { lambda, factor } => write!(f, "lower lambda to {lambda:.3} ({:.0} % of it)", 100.0 * factor),
+            Change::Canceller { of, model: None, .. } => write!(f, "{of}"),
+            Change::Canceller { of, high_pass_hz, .. } if *high_pass_hz > 0.0 => {
+                write!(f, "let the canceller predict with {of}, above {high_pass_hz:.1} Hz only (high_pass_hz)")
+            }
+            Change::Canceller { of, .. } => write!(f, "let the canceller predict with {of}"),
+            Change::HighPass { hz } if *hz > 0.0 => {
+                write!(f, "put the canceller's estimate through a high-pass of {hz:.1} Hz (high_pass_hz)")
+            }
+            Change::HighPass { .. } => write!(f, "take the high-pass off the canceller's estimate (high_pass_hz = 0)"),
+            Change::WayRepaired { node, port } => {
+                write!(f, "repair the way to {node}.{port}: no more delay, jitter or loss than the graph says")
+            }
+            Change::Delays { factor } if *factor == 0.0 => write!(f, "take out the delays, jitter and loss that the graph states"),
+            Change::Delays { factor } => {
+                write!(f, "bring delays, jitter and loss down to {:.0} % of what the graph states", 100.0 * factor)
+            }
+            Change::SensorRepaired { node } => write!(f, "repair the sensor that {node} reads"),
+            Change::FinerSensors => write!(f, "read the position with a finer sensor"),
+            Change::Damping { damping } => write!(f, "inject damping of {damping:.1} N s/m at the handle"),
+            Change::Grip { factor } if *factor > 1.0 => write!(f, "hold the handle {factor:.1} times as firmly"),
+            Change::Grip { factor } => write!(f, "hold the handle more softly, {factor:.1} times as firmly"),
+            Change::Rate { hz } => write!(f, "run the loop at {hz:.0} Hz"),
+            Change::NoLimits => write!(f, "without any limit"),
+            Change::StrongerMotor => write!(f, "a motor of more force"),
+        }
+    }
+}
+
+fn cancellers(graph: &mut Graph, mut change: impl FnMut(&mut backdrive_nodes::graph::DeviceFiles, &mut f64)) {
+    for node in &mut graph.nodes {
+        if let Settings::Canceller(files, corner) = &mut node.settings {
+            change(files, corner);
+        }
+    }
+}
+
+/// A damper between each handle and ground.
+fn damped(graph: &mut Graph, damping: f64) {
+    for node in graph.nodes.iter_mut().filter(|n| n.kind == NodeKind::Master) {
+        let Settings::Master(files) = &mut node.settings else { continue };
+        let Some(model) = &mut files.model else { continue };
+        let users: Vec<usize> = model.axes.iter().map(|a| a.user).collect();
+        for (number, user) in users.into_iter().enumerate() {
+            model.elements.push(backdrive_plant::model::Element {
+                name: format!("injected_damping_{number}"),
+                between: [Some(user), None],
+                law: Law::Damper(backdrive_plant::elements::Damper { damping }),
+            });
+        }
+    }
+}
+
+/// The hand grips `factor` times as firmly, be it a fragment or part of the model.
+pub fn firmer(graph: &mut Graph, factor: f64) {
+    for node in graph.nodes.iter_mut().filter(|n| n.kind == NodeKind::Master) {
+        let Settings::Master(files) = &mut node.settings else { continue };
+        if let Some(fragment) = &mut files.fragment {
+            grip::scale(fragment, factor);
+            continue;
+        }
+        let Some(model) = &mut files.model else { continue };
+        let hands: Vec<usize> = model.inputs.iter().filter(|i| i.kind == InputKind::Motion).map(|i| i.on).collect();
+        let of_hand = |between: &[Option<usize>; 2]| between.iter().flatten().any(|body| hands.contains(body));
+        model.elements.iter_mut().filter(|e| of_hand(&e.between)).for_each(|e| grip::scale_element(e, factor));
+    }
+}

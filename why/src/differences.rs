@@ -1,0 +1,200 @@
+//! Where the loop of a bag is not the loop of its graph: every node by itself on what it was given.
+
+use crate::alone::{AloneError, alone};
+use crate::compared::{AsIf, Compared, Sensor, compare};
+use crate::device::{DeviceFound, diagnose_master};
+use crate::recorded::{Quantity, Recorded};
+use backdrive_nodes::graph::{DeviceFiles, Graph, NodeKind, Settings};
+use backdrive_nodes::stage::Impairment;
+use serde::Serialize;
+use std::sync::atomic::AtomicBool;
+
+/// A node whose recorded output is not what its recorded inputs make of it.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Difference {
+    /// Name of the node.
+    pub node: String,
+    /// Its kind.
+    #[serde(skip)]
+    pub kind: NodeKind,
+    /// The output's port.
+    pub port: String,
+    /// Which of its quantities.
+    pub quantity: Quantity,
+    /// Number of the axis.
+    pub axis: usize,
+    /// By how much, and what simple thing explains it.
+    pub compared: Compared,
+    /// Input port that is late, where a delay explains it and the way to that port is where it fits.
+    pub way: Option<String>,
+    /// What a diagnosis says of the device, where nothing simple explains it.
+    pub device: Option<DeviceFound>,
+}
+
+/// All that was compared.
+#[derive(Debug, Clone, Default)]
+pub struct Differences {
+    /// Where something differs.
+    pub found: Vec<Difference>,
+    /// What could not be looked at, and why.
+    pub notes: Vec<String>,
+}
+
+/// Outputs whose samples tell something, by node kind: port, quantity, and the input whose way carries it.
+const TOLD: &[(NodeKind, &str, Quantity, &str, bool)] = &[
+    (NodeKind::Canceller, "motion", Quantity::Position, "measured", true),
+    (NodeKind::Scaling, "command", Quantity::Position, "motion", true),
+    (NodeKind::Scaling, "force", Quantity::Effort, "contact", true),
+    (NodeKind::Slave, "measured", Quantity::Effort, "command", false),
+    (NodeKind::Slave, "measured", Quantity::Position, "command", false),
+    (NodeKind::Master, "measured", Quantity::Effort, "force", true),
+    (NodeKind::Master, "measured", Quantity::Position, "force", false),
+];
+
+/// Compares every node of a graph with its bag; `hear` is told which.
+///
+/// # Errors
+/// A node that cannot be built.
+pub fn differences(graph: &Graph, recorded: &Recorded, hear: &dyn Fn(&str), stop: &AtomicBool) -> Result<Differences, AloneError> {
+    let mut all = Differences::default();
+    for (index, node) in graph.nodes.iter().enumerate() {
+        let told: Vec<_> = TOLD.iter().filter(|t| t.0 == node.kind).collect();
+        if told.is_empty() {
+            continue;
+        }
+        if !is_known(&node.settings) {
+            all.notes.push(format!("{}: is a program of its own, so what it should have put out is not known", node.name));
+            continue;
+        }
+        hear(&format!("{} by itself", node.name));
+        of_node(graph, index, recorded, &told, &mut all)?;
+    }
+    if all.found.iter().any(|d| d.kind == NodeKind::Master && d.quantity == Quantity::Position && needs_diagnosis(&d.compared)) {
+        hear("the master, physics by physics");
+        let device = diagnose_master(graph, recorded, stop);
+        for d in all.found.iter_mut().filter(|d| d.kind == NodeKind::Master && d.quantity == Quantity::Position) {
+            d.device.clone_from(&device);
+        }
+    }
+    Ok(all)
+}
+
+fn needs_diagnosis(compared: &Compared) -> bool {
+    matches!(compared.as_if, AsIf::Otherwise | AsIf::Noisy { .. })
+}
+
+/// Whether what explains it is a delay of a way.
+fn late(compared: &Compared) -> bool {
+    matches!(compared.as_if, AsIf::Changed { late: 1.., .. } | AsIf::Unsteady { .. })
+}
+
+/// A port of [`TOLD`].
+type Port = (NodeKind, &'static str, Quantity, &'static str, bool);
+
+/// Compares the outputs of one node. Where a way to it turns out to be late the node is looked at again with it so, so that one delay is not
+/// taken for several things.
+fn of_node(graph: &Graph, index: usize, recorded: &Recorded, told: &[&Port], all: &mut Differences) -> Result<(), AloneError> {
+    let node = &graph.nodes[index];
+    let mut as_it_is = graph.clone();
+    let mut ways: Vec<Difference> = Vec::new();
+    for _ in 0..=MOST_WAYS {
+        let mut found = Vec::new();
+        let put = alone(&as_it_is, &node.name, recorded)?;
+        for (_, port, quantity, input, exact) in told {
+            let topic = graph.topic_of(index, port).name;
+            let (Some(track), Some(predicted)) = (recorded.track(&topic), put.iter().find(|p| p.topic == topic)) else {
+                let note = format!("{topic} was not recorded, so {} cannot be looked at", node.name);
+                if !all.notes.contains(&note) {
+                    all.notes.push(note);
+                }
+                continue;
+            };
+            for axis in 0..node.axes {
+                let sensor = Sensor { exact: *exact, ..sensor_of(&node.settings, *quantity, axis) };
+                let predicted: Vec<f64> = predicted.samples.iter().map(|s| quantity.of(s, axis)).collect();
+                let Some(compared) = compare(track.column(*quantity, axis), &predicted, &sensor, graph.period_s()) else { continue };
+                if compared.as_if == AsIf::Same {
+                    continue;
+                }
+                found.push(Difference {
+                    node: node.name.clone(),
+                    kind: node.kind,
+                    port: (*port).to_string(),
+                    quantity: *quantity,
+                    axis,
+                    compared,
+                    way: late(&compared).then(|| (*input).to_string()),
+                    device: None,
+                });
+            }
+        }
+        // A slave whose motion is right and whose force is late has a force sensor that is late.
+        let moves_right = !found.iter().any(|d| d.quantity == Quantity::Position);
+        found.iter_mut().filter(|d| d.kind == NodeKind::Slave && d.quantity == Quantity::Effort && moves_right).for_each(|d| d.way = None);
+        let way = found.iter().filter(|d| d.way.is_some()).min_by(|a, b| a.compared.left.total_cmp(&b.compared.left)).cloned();
+        match way.filter(|_| ways.len() < MOST_WAYS) {
+            Some(way) => {
+                delay(&mut as_it_is, index, &way);
+                ways.push(way);
+            }
+            None => {
+                all.found.extend(ways);
+                all.found.extend(found);
+                return Ok(());
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Ways to one node that may be late at once.
+const MOST_WAYS: usize = 2;
+
+/// Makes a way in a graph as late as it was found.
+pub fn delay(graph: &mut Graph, node: usize, difference: &Difference) {
+    let (period_s, seed) = (graph.period_s(), graph.seed.wrapping_add(7));
+    let (Some(port), Some(more)) = (&difference.way, difference.impairment(period_s, seed)) else { return };
+    for connection in graph.connections.iter_mut().filter(|c| c.to.0 == node && c.to.1 == *port) {
+        let was = connection.impairment.unwrap_or(Impairment { delay_s: 0.0, jitter_s: 0.0, loss: 0.0, seed });
+        connection.impairment = Some(Impairment {
+            delay_s: was.delay_s + more.delay_s,
+            jitter_s: was.jitter_s.max(more.jitter_s),
+            loss: was.loss.max(more.loss),
+            seed: was.seed,
+        });
+    }
+}
+
+fn is_known(settings: &Settings) -> bool {
+    match settings {
+        Settings::Master(files) | Settings::Slave(files) => files.model.is_some(),
+        _ => true,
+    }
+}
+
+/// What the model says of the sensor of a master's position.
+fn sensor_of(settings: &Settings, quantity: Quantity, axis: usize) -> Sensor {
+    let (Settings::Master(DeviceFiles { model: Some(model), real_sensors: true, .. }), Quantity::Position) = (settings, quantity) else {
+        return Sensor::default();
+    };
+    let Some(axis) = model.axes.get(axis) else { return Sensor::default() };
+    let Some(output) = model.outputs.get(axis.measured) else { return Sensor::default() };
+    Sensor { resolution: axis.scale.abs() * output.resolution, noise: axis.scale.abs() * output.noise, exact: false }
+}
+
+impl Difference {
+    /// What the way to a port does besides what the graph says of it.
+    pub fn impairment(&self, period_s: f64, seed: u64) -> Option<Impairment> {
+        let s = |rows: usize| rows as f64 * period_s;
+        self.way.as_ref()?;
+        match self.compared.as_if {
+            AsIf::Changed { late, .. } => Some(Impairment { delay_s: s(late), jitter_s: 0.0, loss: 0.0, seed }),
+            AsIf::Unsteady { late, jitter, missing } => {
+                // What jitter lets be overtaken is dropped too.
+                let loss = if jitter == 0 { missing } else { 0.0 };
+                Some(Impairment { delay_s: s(late), jitter_s: s(jitter), loss, seed })
+            }
+            _ => None,
+        }
+    }
+}

@@ -1,0 +1,18 @@
+//! Why does a force-reflecting loop shake, and what would stop it?
+
+// Printing panics where the other end is full or gone.
+#![cfg_attr(not(test), warn(clippy::print_stdout, clippy::print_stderr))]
+
+pub mod alone;
+pub mod answer;
+pub mod as_it_was;
+pub mod cause;
+pub mod change;
+pub mod compared;
+pub mod device;
+pub mod differences;
+pub mod faulty;
+pub mod happening;
+pub mod recorded;
+pub mod remedy;
+pub mod trial;

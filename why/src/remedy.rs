@@ -1,0 +1,263 @@
+//! What would stop it: changes, each with the loop run again, ranked by what they leave of force and motion.
+
+use crate::cause::{Cause, CauseKind};
+use crate::change::Change;
+use crate::trial::{Hand, Trial};
+use backdrive_nodes::graph::{DeviceFiles, NodeKind, Settings};
+use backdrive_stability::outcome::Outcome;
+use backdrive_stability::resimulate::{Gain, ResimulateError, Run, RunOptions};
+use backdrive_stability::session::Session;
+use rayon::prelude::*;
+use serde::Serialize;
+use std::sync::atomic::AtomicBool;
+
+/// A remedy has to hold with hands that grip so firmly, as factors on the grip of the bag: a user's grip is not known better.
+const FIRMNESS: [f64; 3] = [1.0, 0.85, 1.15];
+
+/// And at a gain so much higher.
+const MARGIN: f64 = 1.25;
+
+/// A lower gain is so far below the edge.
+const BELOW: f64 = 0.8;
+
+/// Damping that is tried, N s/m, or as many thousandths of N m s/rad.
+const DAMPING: [f64; 5] = [2.0, 5.0, 10.0, 20.0, 50.0];
+
+/// Corner of a high-pass that is tried, Hz.
+const HIGH_PASS_HZ: f64 = 1.0;
+
+/// A remedy.
+#[derive(Debug, Clone, Serialize)]
+pub struct Remedy {
+    /// What to do; several things together where one is not enough.
+    pub changes: Vec<Change>,
+    /// In words.
+    pub text: String,
+    /// What the loop does then, with the hand of the bag.
+    pub outcome: String,
+    /// Whether it is stable then, with the hand of the bag and at its gain.
+    pub stops: bool,
+    /// Whether it is stable with a hand 15 % softer and firmer too, and at a gain a quarter higher.
+    pub robust: bool,
+    /// Share of the reflected force that is left, 0 to 1: against lambda times the contact force, with the lambda of the bag.
+    pub force_kept: f64,
+    /// Share of the hand's free motion that reaches the slave, 0 to 1: against the master without force.
+    pub motion_kept: f64,
+    /// Whether it puts right what was found to be wrong.
+    pub repairs_cause: bool,
+}
+
+impl Remedy {
+    /// What is left of force and motion together, 0 to 1.
+    pub fn kept(&self) -> f64 {
+        self.force_kept * self.motion_kept
+    }
+}
+
+/// Tries what would stop a loop; the best first. `causes` are the likeliest first.
+///
+/// # Errors
+/// A loop that cannot be run; `cancel` was set.
+pub fn remedies(
+    was: &Trial,
+    hand: &Hand,
+    gain: Gain,
+    edge: Option<f64>,
+    causes: &[Cause],
+    cancel: &AtomicBool,
+) -> Result<Vec<Remedy>, ResimulateError> {
+    let free = free_motion(was, hand, gain, cancel)?;
+    let tried = candidates(was, gain, edge, causes);
+    let one = |(changes, repairs_cause): &(Vec<Change>, bool)| -> Result<Option<Remedy>, ResimulateError> {
+        let mut trial = was.clone();
+        changes.iter().for_each(|c| c.apply(&mut trial));
+        let own = Gain { mu: gain.mu, lambda: lambda_of(changes, gain.lambda) };
+        let run = match trial.run(hand, own, &RunOptions { keep_signals: true, ..RunOptions::default() }, cancel) {
+            Ok(run) => run,
+            Err(ResimulateError::Cancelled) => return Err(ResimulateError::Cancelled),
+            // What cannot be built is no remedy.
+            Err(_) => return Ok(None),
+        };
+        let stops = is_fine(&trial, hand, own, &run, cancel)?;
+        let mut robust = stops;
+        if stops {
+            for factor in FIRMNESS.iter().filter(|f| **f != 1.0) {
+                let mut held = trial.clone();
+                Change::Grip { factor: *factor }.apply(&mut held);
+                robust &= holds(&held, hand, own, cancel)?;
+            }
+            let higher = Gain { lambda: own.lambda * if lowers(changes) { 1.0 } else { MARGIN }, ..own };
+            robust &= holds(&trial, hand, higher, cancel)?;
+        }
+        let (force_kept, motion_kept) =
+            run.signals.as_ref().map_or((0.0, 0.0), |s| (force_kept(s, gain.lambda), motion_kept(s, &free, gain.mu)));
+        Ok(Some(Remedy {
+            text: changes.iter().map(ToString::to_string).collect::<Vec<_>>().join(", and "),
+            changes: changes.clone(),
+            outcome: run.outcome.to_string(),
+            stops,
+            robust,
+            force_kept,
+            motion_kept,
+            repairs_cause: *repairs_cause,
+        }))
+    };
+    let all: Vec<Option<Remedy>> = tried.par_iter().map(one).collect::<Result<_, ResimulateError>>()?;
+    let mut all: Vec<Remedy> = all.into_iter().flatten().collect();
+    all.sort_by(|a, b| rank(b).total_cmp(&rank(a)));
+    // Of several strengths of the same kind that stop it the best is enough.
+    let mut kinds = Vec::new();
+    all.retain(|r| {
+        let kind = r.changes.first().map(std::mem::discriminant);
+        let again = r.changes.len() == 1
+            && matches!(r.changes.first(), Some(Change::Damping { .. } | Change::Grip { .. } | Change::Gain { .. }))
+            && kinds.contains(&kind);
+        kinds.push(kind);
+        !again
+    });
+    Ok(all)
+}
+
+/// What stops it robustly comes first, then what stops it; what puts the cause right before what lives with it; then by what is kept. To ask another grip of the hand is
+/// the last thing.
+fn rank(remedy: &Remedy) -> f64 {
+    let hand = remedy.changes.iter().any(|c| matches!(c, Change::Grip { .. }));
+    let more = f64::from(u8::try_from(remedy.changes.len()).unwrap_or(u8::MAX));
+    8.0 * f64::from(u8::from(remedy.stops))
+        + 4.0 * f64::from(u8::from(remedy.robust))
+        + 0.5 * f64::from(u8::from(remedy.repairs_cause))
+        + remedy.kept()
+        - 0.01 * more
+        - if hand { 2.0 } else { 0.0 }
+}
+
+fn lambda_of(changes: &[Change], lambda: f64) -> f64 {
+    changes.iter().fold(lambda, |l, c| if let Change::Gain { factor, .. } = c { l * factor } else { l })
+}
+
+fn lowers(changes: &[Change]) -> bool {
+    changes.iter().any(|c| matches!(c, Change::Gain { .. }))
+}
+
+fn candidates(was: &Trial, gain: Gain, edge: Option<f64>, causes: &[Cause]) -> Vec<(Vec<Change>, bool)> {
+    let mut all: Vec<(Vec<Change>, bool)> = Vec::new();
+    let graph = &was.graph;
+    // What was seen to be wrong, one by one and all together.
+    let seen: Vec<&Cause> = causes.iter().filter(|c| !c.repairs.is_empty()).collect();
+    for (number, cause) in seen.iter().enumerate() {
+        all.push((cause.repairs.clone(), number == 0 || cause.seen));
+    }
+    let together: Vec<Change> = seen.iter().filter(|c| c.seen).flat_map(|c| c.repairs.clone()).collect();
+    if together.len() > 1 {
+        all.push((together.clone(), true));
+    }
+    let master =
+        graph.node_of(NodeKind::Master).and_then(|n| if let Settings::Master(files) = &n.settings { Some(files.clone()) } else { None });
+    let canceller = graph
+        .node_of(NodeKind::Canceller)
+        .and_then(|n| if let Settings::Canceller(files, hz) = &n.settings { Some((files.clone(), *hz)) } else { None });
+    let knows = causes.first().is_some_and(|c| {
+        use CauseKind::*;
+        matches!(c.kind, DryFriction | Backlash | Hysteresis | Inertia | Compliance | OtherPhysics | Grip | OverCancelling)
+    });
+    if let (Some(DeviceFiles { model: Some(model), fragment, .. }), Some((_, hz))) = (&master, &canceller) {
+        let told = |high_pass_hz: f64| Change::Canceller {
+            of: format!("the model of the master as it was, {}", model.name),
+            model: Some(Box::new(model.clone())),
+            grip: fragment.clone().map(Box::new),
+            high_pass_hz,
+        };
+        for corner in [*hz, HIGH_PASS_HZ] {
+            all.push((vec![told(corner)], knows));
+            if !together.is_empty() {
+                all.push(([together.clone(), vec![told(corner)]].concat(), true));
+            }
+        }
+    }
+    if let Some((DeviceFiles { model: Some(_), .. }, hz)) = &canceller {
+        all.push((
+            vec![Change::Canceller { of: "switch the canceller off".to_string(), model: None, grip: None, high_pass_hz: 0.0 }],
+            false,
+        ));
+        all.push((vec![Change::HighPass { hz: if *hz > 0.0 { 0.0 } else { HIGH_PASS_HZ } }], false));
+    }
+    if graph.connections.iter().any(|c| c.impairment.is_some() || c.delay > 1) {
+        all.extend([0.5, 0.25].map(|factor| (vec![Change::Delays { factor }], false)));
+    }
+    all.push((vec![Change::Rate { hz: 2.0 * graph.timing.rate_hz }], false));
+    all.extend(DAMPING.map(|damping| (vec![Change::Damping { damping: damping * unit_of_damping(was) }], false)));
+    all.extend([1.5, 2.0, 0.6].map(|factor| (vec![Change::Grip { factor }], false)));
+    if let Some(edge) = edge.filter(|e| *e < gain.product() / BELOW) {
+        for share in [BELOW, 0.5, 0.25] {
+            let factor = share * edge / gain.product();
+            all.push((
+                vec![Change::Gain { factor, lambda: factor * gain.lambda }],
+                causes.first().is_some_and(|c| c.kind == CauseKind::GainTooHigh),
+            ));
+        }
+    }
+    all
+}
+
+/// 1 for a master that moves along a line, a thousandth for one that turns.
+fn unit_of_damping(was: &Trial) -> f64 {
+    let motion = was.graph.node_of(NodeKind::Master).and_then(|n| match &n.settings {
+        Settings::Master(files) => files.model.as_ref().map(|m| m.motion),
+        _ => None,
+    });
+    if motion == Some(backdrive_plant::model::Motion::Rotation) { 1e-3 } else { 1.0 }
+}
+
+/// Where the hand alone takes the master: the loop with next to no force reflected.
+fn free_motion(was: &Trial, hand: &Hand, gain: Gain, cancel: &AtomicBool) -> Result<Option<Session>, ResimulateError> {
+    let little = Gain { lambda: 1e-6 * gain.lambda, ..gain };
+    Ok(was.run(hand, little, &RunOptions { keep_signals: true, ..RunOptions::default() }, cancel)?.signals)
+}
+
+fn force_kept(session: &Session, lambda: f64) -> f64 {
+    let (mut felt, mut whole) = (0.0, 0.0);
+    for axis in &session.axes {
+        for (force, contact) in axis.force.iter().zip(&axis.contact).filter(|(f, c)| f.is_finite() && c.is_finite() && **c != 0.0) {
+            felt += force.abs();
+            whole += (lambda * contact).abs();
+        }
+    }
+    if whole > 0.0 { (felt / whole).min(1.0) } else { 1.0 }
+}
+
+/// How much of what the hand alone would do in free motion the slave is told to do.
+fn motion_kept(session: &Session, free: &Option<Session>, mu: f64) -> f64 {
+    let Some(free) = free else { return 1.0 };
+    let times = (free.period_s / session.period_s).max(1e-9);
+    let (mut error, mut whole) = (0.0, 0.0);
+    for (axis, alone) in session.axes.iter().zip(&free.axes) {
+        for (row, x) in axis.command.iter().enumerate() {
+            let other = (row as f64 / times) as usize;
+            let touches = |a: &backdrive_stability::session::AxisSignals, r: usize| a.contact.get(r).is_none_or(|f| *f != 0.0);
+            if touches(axis, row) || touches(alone, other) || !x.is_finite() {
+                continue;
+            }
+            let wanted = mu * alone.master.get(other).copied().unwrap_or(0.0);
+            error += (x - wanted) * (x - wanted);
+            whole += wanted * wanted;
+        }
+    }
+    if whole > 0.0 { (1.0 - (error / whole).sqrt()).clamp(0.0, 1.0) } else { 1.0 }
+}
+
+fn holds(trial: &Trial, hand: &Hand, gain: Gain, cancel: &AtomicBool) -> Result<bool, ResimulateError> {
+    is_fine(trial, hand, gain, &trial.run(hand, gain, &RunOptions::default(), cancel)?, cancel)
+}
+
+/// Whether nothing shakes: a limit may act, where nothing would happen without it.
+///
+/// # Errors
+/// As a run.
+pub fn is_fine(trial: &Trial, hand: &Hand, gain: Gain, run: &Run, cancel: &AtomicBool) -> Result<bool, ResimulateError> {
+    if !matches!(run.outcome, Outcome::Limited { beyond_travel: false, .. }) {
+        return Ok(run.outcome.is_stable());
+    }
+    let mut unlimited = trial.clone();
+    Change::NoLimits.apply(&mut unlimited);
+    Ok(unlimited.run(hand, gain, &RunOptions::default(), cancel)?.outcome.is_stable())
+}
