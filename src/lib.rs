@@ -39,6 +39,7 @@ mod summary;
 mod test_bench;
 mod why;
 
+pub use prove::hidden::{Hidden, Opened};
 pub use run::{Done, run_here};
 
 use cli::{Cli, Command};

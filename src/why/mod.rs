@@ -10,7 +10,7 @@ use backdrive_nodes::graph::Overrides;
 use backdrive_stability::resimulate::Gain;
 use backdrive_stability::resimulate::recover::{recorded_intents, recover_intent};
 use backdrive_stability::session::Session;
-use backdrive_why::answer::{Answer, Question, WhyError, why as answer};
+use backdrive_why::answer::{Answer, PATIENCE, Question, WhyError, why as answer};
 use backdrive_why::happening::Happening;
 use backdrive_why::recorded::Recorded;
 use std::sync::atomic::Ordering;
@@ -41,7 +41,7 @@ pub fn why(options: &cli::Why) -> Result<u8, Failure> {
         }
     }
     let gain = own_gain(&session, &graph);
-    let question = Question { session: &session, graph: &graph, recorded: &recorded, intents, gain };
+    let question = Question { session: &session, graph: &graph, recorded: &recorded, intents, gain, patience: PATIENCE };
     let found = progress::about(std::time::Duration::from_secs(20), |report| {
         answer(&question, report, &cancel).map_err(|e| match e {
             WhyError::Loop(_) if cancel.load(Ordering::SeqCst) => Failure { code: code::INTERRUPTED, message: "stopped".to_string() },

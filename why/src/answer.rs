@@ -10,11 +10,12 @@ use crate::recorded::{Recorded, Told};
 use crate::remedy::{Remedy, remedies};
 use crate::trial::{Hand, Trial};
 use backdrive_control::operator::Intent;
-use backdrive_nodes::graph::Graph;
+use backdrive_nodes::graph::{Graph, NodeKind};
 use backdrive_stability::resimulate::{Gain, ResimulateError, RunOptions};
 use backdrive_stability::session::Session;
 use serde::Serialize;
 use std::sync::atomic::AtomicBool;
+use std::time::Duration;
 
 /// The loop is run again for so many steps of a bag at most: many runs have to fit into half a minute.
 const MOST_STEPS: usize = 60_000;
@@ -31,7 +32,12 @@ pub struct Question<'a> {
     pub intents: Option<Vec<Intent>>,
     /// The gain of most of it.
     pub gain: Gain,
+    /// How long a diagnosis of the master may take on the clock.
+    pub patience: Duration,
 }
+
+/// How long a diagnosis takes where nobody says otherwise: a bag is to be answered within half a minute.
+pub const PATIENCE: Duration = Duration::from_secs(14);
 
 /// Why there is no answer.
 #[derive(Debug, thiserror::Error)]
@@ -84,9 +90,10 @@ pub struct Answer {
 /// # Errors
 /// A node that cannot be built; `cancel` was set.
 pub fn why(question: &Question, hear: &(dyn Fn(&str) + Sync), cancel: &AtomicBool) -> Result<Answer, WhyError> {
-    let Question { session, graph, recorded, gain, .. } = question;
-    let happening = Happening::of(session);
-    let Differences { found, notes } = differences(graph, recorded, hear, cancel)?;
+    let Question { session, graph, gain, .. } = question;
+    let recorded = &bounded(question);
+    let happening = Happening::of(session, recorded.rows);
+    let Differences { found, notes } = differences(graph, recorded, hear, question.patience, cancel)?;
     let mut answer = Answer {
         bag: session.name.clone(),
         gain: gain.product(),
@@ -112,6 +119,21 @@ pub fn why(question: &Question, hear: &(dyn Fn(&str) + Sync), cancel: &AtomicBoo
     of_events(&mut answer, recorded);
     Ok(answer)
 }
+
+/// The recording up to where it leaves all bounds.
+fn bounded(question: &Question) -> Recorded {
+    let spans = question.session.axes.iter().map(|axis| {
+        let of_hand = axis.intent.as_ref().map_or(0.0, |x| x.iter().filter(|x| x.is_finite()).fold(0.0_f64, |m, x| m.max(x.abs())));
+        let travel = axis.travel.map_or(f64::INFINITY, |[low, high]| high.abs().max(low.abs()));
+        if of_hand > 0.0 { (BEYOND_THE_HAND * of_hand).min(travel) } else { travel }
+    });
+    let bounds = spans.fold(0.0, f64::max);
+    let master = question.graph.nodes.iter().position(|n| n.kind == NodeKind::Master).map(|i| question.graph.topic_of(i, "measured").name);
+    question.recorded.clone().bounded(&master.unwrap_or_default(), if bounds > 0.0 { bounds } else { f64::INFINITY })
+}
+
+/// A master that is so many times as far away as the hand ever wanted has run away.
+const BEYOND_THE_HAND: f64 = 10.0;
 
 /// Runs the loop again: as it was, without each suspect, with each remedy.
 fn again(question: &Question, answer: &mut Answer, hear: &(dyn Fn(&str) + Sync), cancel: &AtomicBool) -> Result<(), ResimulateError> {

@@ -8,7 +8,7 @@ use backdrive_nodes::graph::{Direction, Graph, NodeKind, Settings};
 
 /// Puts differences into a graph; those of which nothing simple is known stay out, and are not counted.
 pub fn as_it_was(graph: &Graph, differences: &[Difference]) -> Trial {
-    let mut trial = Trial { graph: graph.clone(), distortions: Vec::new() };
+    let mut trial = Trial::of(graph.clone());
     for difference in differences {
         put(&mut trial, difference);
     }
@@ -17,7 +17,7 @@ pub fn as_it_was(graph: &Graph, differences: &[Difference]) -> Trial {
 
 /// Whether a difference can be put into a graph.
 pub fn is_modelled(difference: &Difference) -> bool {
-    difference.device.as_ref().is_some_and(|d| d.model.is_some()) || !matches!(difference.compared.as_if, AsIf::Otherwise | AsIf::Same)
+    difference.device.as_ref().is_some_and(|d| d.files.is_some()) || !matches!(difference.compared.as_if, AsIf::Otherwise | AsIf::Same)
 }
 
 fn put(trial: &mut Trial, difference: &Difference) {
@@ -31,12 +31,9 @@ fn put(trial: &mut Trial, difference: &Difference) {
         }
         return;
     }
-    if let Some(model) = difference.device.as_ref().and_then(|d| d.model.as_ref()) {
+    if let Some(found) = difference.device.as_ref().and_then(|d| d.files.as_ref()) {
         for node in trial.graph.nodes.iter_mut().filter(|n| n.name == difference.node && n.kind == NodeKind::Master) {
-            if let Settings::Master(files) = &mut node.settings {
-                files.model = Some((**model).clone());
-                files.fragment = None;
-            }
+            node.settings = Settings::Master((**found).clone());
         }
         return;
     }

@@ -79,7 +79,7 @@ pub struct Sensor {
 pub const SMALL: f64 = 0.02;
 
 /// A simple thing explains a difference where it leaves no more of it than this.
-const EXPLAINS: f64 = 0.25;
+const EXPLAINS: f64 = 0.1;
 
 /// Longest delay that is looked for, rows at most and s.
 const MOST_LATE: usize = 4000;
@@ -90,6 +90,9 @@ const LOOKED_AT: usize = 20_000;
 
 /// A rail is where a signal stands for this share of its rows.
 const RAIL_SHARE: f64 = 0.02;
+
+/// A signal that stands still is dead where it should move by so much of what it moves in all.
+const STANDS: f64 = 0.1;
 
 /// Compares.
 pub fn compare(recorded: &[f64], predicted: &[f64], sensor: &Sensor, period_s: f64) -> Option<Compared> {
@@ -110,7 +113,7 @@ pub fn compare(recorded: &[f64], predicted: &[f64], sensor: &Sensor, period_s: f
     if (share <= SMALL || error <= 3.0 * floor) && missing < SMALL {
         return said(AsIf::Same, share);
     }
-    if let Some(from_row) = dead_from(recorded, predicted, floor.max(1e-6 * size)) {
+    if let Some(from_row) = dead_from(recorded, predicted, (STANDS * size).max(10.0 * floor)) {
         return said(AsIf::Dead { from_row }, 0.0);
     }
     if let Some((low, high, left)) = rails(recorded, predicted, &both, scale, floor) {
@@ -172,11 +175,11 @@ fn missing_share(recorded: &[f64], predicted: &[f64]) -> f64 {
 }
 
 /// The row from which on the recorded signal stands still to its end, for a quarter of the record at least, while the other moves.
-fn dead_from(recorded: &[f64], predicted: &[f64], floor: f64) -> Option<usize> {
+fn dead_from(recorded: &[f64], predicted: &[f64], least: f64) -> Option<usize> {
     let last = recorded.iter().rev().find(|x| x.is_finite())?;
     let from = recorded.iter().rposition(|x| x.is_finite() && x != last).map_or(0, |r| r + 1);
     let long = recorded.len() - from >= recorded.len() / 4;
-    let moves = spread(predicted[from..].iter().copied().filter(|x| x.is_finite())) > 10.0 * floor;
+    let moves = spread(predicted[from..].iter().copied().filter(|x| x.is_finite())) > least;
     (long && moves).then_some(from)
 }
 

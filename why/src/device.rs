@@ -5,7 +5,7 @@ use backdrive_diagnosis::diagnose::diagnose;
 use backdrive_diagnosis::hypothesis::{Family, Place};
 use backdrive_diagnosis::problem::{Problem, Record};
 use backdrive_diagnosis::search::Settings;
-use backdrive_diagnosis::verdict::{Parameter, Word};
+use backdrive_diagnosis::verdict::Parameter;
 use backdrive_nodes::graph::{DeviceFiles, Graph, NodeKind, Settings as NodeSettings};
 use backdrive_plant::model::Model;
 use backdrive_plant::recording::{Jitter, Recording};
@@ -15,16 +15,14 @@ use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
 /// Of what a diagnosis computes by default: a bag is to be answered within half a minute, and there is one record.
-const EFFORT: f64 = 0.12;
+const EFFORT: f64 = 0.3;
 
-/// And on the clock, s.
-const PATIENCE_S: f64 = 12.0;
-
-/// Rows that are looked at; a longer record is thinned.
+/// Rows that are looked at, up to this time after the first touch, s: what shakes then shows all it can show within it.
 const ROWS: usize = 10_000;
+const AFTER_TOUCH_S: f64 = 0.4;
 
 /// What was found of a device.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, Serialize)]
 pub struct DeviceFound {
     /// The diagnosis' word, such as `missing`.
     pub word: String,
@@ -34,9 +32,9 @@ pub struct DeviceFound {
     pub physics: Vec<PhysicsFound>,
     /// Numbers of the model that are others: path, as the model has it, as it is.
     pub numbers: Vec<NumberFound>,
-    /// The model with all that, which holds the hand.
+    /// The device with all that.
     #[serde(skip)]
-    pub model: Option<Box<Model>>,
+    pub files: Option<Box<DeviceFiles>>,
 }
 
 /// A physics at a place.
@@ -70,9 +68,11 @@ pub struct NumberFound {
 }
 
 /// Diagnoses the master of a graph by its bag. `None` where the bag cannot say: the hand was not recorded, or there is no model.
-pub fn diagnose_master(graph: &Graph, recorded: &Recorded, stop: &AtomicBool) -> Option<DeviceFound> {
+pub fn diagnose_master(graph: &Graph, recorded: &Recorded, patience: Duration, stop: &AtomicBool) -> Option<DeviceFound> {
     let master = graph.nodes.iter().position(|n| n.kind == NodeKind::Master)?;
-    let NodeSettings::Master(DeviceFiles { model: Some(model), fragment, .. }) = &graph.nodes[master].settings else { return None };
+    let NodeSettings::Master(DeviceFiles { model: Some(model), fragment, substeps, real_sensors }) = &graph.nodes[master].settings else {
+        return None;
+    };
     let (held, hands) = match fragment {
         Some(grip) => model.held_by(grip),
         None => (model.clone(), model.own_hands()),
@@ -81,13 +81,15 @@ pub fn diagnose_master(graph: &Graph, recorded: &Recorded, stop: &AtomicBool) ->
     let measured = recorded.track(&topic("measured"))?;
     let wanted = graph.connections.iter().find(|c| c.to.0 == master && c.to.1 == "intent").map(|c| c.topic.name.clone());
     let intent = wanted.and_then(|t| recorded.track(&t));
-    let (begin, stride) = (0, (recorded.rows / ROWS).max(1));
-    // Thinned forces would lose what happens between: then only as many rows are taken as there is room for.
-    let rows = if stride > 1 { ROWS * 2 } else { recorded.rows }.min(recorded.rows);
+    let slave =
+        graph.nodes.iter().position(|n| n.kind == NodeKind::Slave).and_then(|i| recorded.track(&graph.topic_of(i, "measured").name));
+    let touch = slave.and_then(|t| t.effort.iter().filter_map(|c| c.iter().position(|f| f.is_finite() && *f != 0.0)).min());
+    let enough = touch.map_or(ROWS, |row| row + (AFTER_TOUCH_S / graph.period_s()) as usize);
+    let rows = enough.min(ROWS).min(recorded.rows);
     let whole = |column: &[f64]| -> Option<Vec<f64>> {
         let mut before = column.iter().copied().find(|x| x.is_finite())?;
         Some(
-            column[begin..rows.min(column.len())]
+            column[..rows.min(column.len())]
                 .iter()
                 .map(|x| {
                     before = if x.is_finite() { *x } else { before };
@@ -122,11 +124,11 @@ pub fn diagnose_master(graph: &Graph, recorded: &Recorded, stop: &AtomicBool) ->
     let model = Model::from_toml(&text, "the master with its grip").ok()?;
     let record = Record::new(&recording, &model, Vec::new()).ok()?;
     let problem = Problem::new(text, "master.toml".into(), model, vec![record], Vec::new(), Initial::Rest).ok()?;
-    let settings = Settings { effects: 2, effort: EFFORT, patience: Duration::from_secs_f64(PATIENCE_S), ..Settings::default() };
+    let settings = Settings { effects: 2, effort: EFFORT, patience, ..Settings::default() };
     let found = diagnose(problem, &settings, Some(stop), &|_| {}).ok()?;
     let verdict = &found.verdict;
-    let claims = verdict.word.claims() || verdict.word == Word::Unexplained;
-    let physics = verdict.findings.iter().filter(|_| claims).map(|f| PhysicsFound {
+    // The nearest explanation is told with its confidence, also where a diagnosis does not claim it.
+    let physics = verdict.findings.iter().map(|f| PhysicsFound {
         physics: f.physics.clone(),
         place: match &f.place {
             Place::Between(a, b) => format!("{a} and {b}"),
@@ -154,6 +156,9 @@ pub fn diagnose_master(graph: &Graph, recorded: &Recorded, stop: &AtomicBool) ->
         sentence: verdict.sentence.clone(),
         numbers: numbers.filter(|n| (n.found - n.declared).abs() > 0.03 * n.declared.abs()).collect(),
         physics,
-        model: Model::from_toml(&found.files.model, "the master as it was").ok().map(Box::new),
+        files: Model::from_toml(&found.files.model, "the master as it was").ok().map(|model| {
+            // It holds the hand.
+            Box::new(DeviceFiles { model: Some(model), fragment: None, substeps: *substeps, real_sensors: *real_sensors })
+        }),
     })
 }

@@ -3,14 +3,16 @@
 use crate::alone::{AloneError, alone};
 use crate::compared::{AsIf, Compared, Sensor, compare};
 use crate::device::{DeviceFound, diagnose_master};
+use crate::numbers::wrong_number;
 use crate::recorded::{Quantity, Recorded};
 use backdrive_nodes::graph::{DeviceFiles, Graph, NodeKind, Settings};
 use backdrive_nodes::stage::Impairment;
 use serde::Serialize;
 use std::sync::atomic::AtomicBool;
+use std::time::Duration;
 
 /// A node whose recorded output is not what its recorded inputs make of it.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, Serialize)]
 pub struct Difference {
     /// Name of the node.
     pub node: String,
@@ -48,14 +50,21 @@ const TOLD: &[(NodeKind, &str, Quantity, &str, bool)] = &[
     (NodeKind::Slave, "measured", Quantity::Effort, "command", false),
     (NodeKind::Slave, "measured", Quantity::Position, "command", false),
     (NodeKind::Master, "measured", Quantity::Effort, "force", true),
-    (NodeKind::Master, "measured", Quantity::Position, "force", false),
+    // Whether its force is late shows in the force itself.
+    (NodeKind::Master, "measured", Quantity::Position, "", false),
 ];
 
 /// Compares every node of a graph with its bag; `hear` is told which.
 ///
 /// # Errors
 /// A node that cannot be built.
-pub fn differences(graph: &Graph, recorded: &Recorded, hear: &dyn Fn(&str), stop: &AtomicBool) -> Result<Differences, AloneError> {
+pub fn differences(
+    graph: &Graph,
+    recorded: &Recorded,
+    hear: &dyn Fn(&str),
+    patience: Duration,
+    stop: &AtomicBool,
+) -> Result<Differences, AloneError> {
     let mut all = Differences::default();
     for (index, node) in graph.nodes.iter().enumerate() {
         let told: Vec<_> = TOLD.iter().filter(|t| t.0 == node.kind).collect();
@@ -69,10 +78,22 @@ pub fn differences(graph: &Graph, recorded: &Recorded, hear: &dyn Fn(&str), stop
         hear(&format!("{} by itself", node.name));
         of_node(graph, index, recorded, &told, &mut all)?;
     }
-    if all.found.iter().any(|d| d.kind == NodeKind::Master && d.quantity == Quantity::Position && needs_diagnosis(&d.compared)) {
-        hear("the master, physics by physics");
-        let device = diagnose_master(graph, recorded, stop);
-        for d in all.found.iter_mut().filter(|d| d.kind == NodeKind::Master && d.quantity == Quantity::Position) {
+    let is_master = |d: &Difference| d.kind == NodeKind::Master && d.quantity == Quantity::Position && may_be_the_device(&d.compared);
+    if let Some(place) = all.found.iter().position(is_master) {
+        hear("the master, number by number");
+        let Difference { node, axis, compared, .. } = all.found[place].clone();
+        // Ways that are late are part of what it was given.
+        let ways: Vec<Difference> = all.found.iter().filter(|d| d.way.is_some()).cloned().collect();
+        let as_it_is = crate::as_it_was::as_it_was(graph, &ways).graph;
+        // A gain of a sensor and a firmer hand are alike where everything grows as one exponential: what leaves less of it is the one.
+        let simple = !needs_diagnosis(&compared);
+        let number =
+            wrong_number(&as_it_is, &node, axis, recorded, compared.share).filter(|(_, left)| !simple || *left < 0.5 * compared.left);
+        let device = number.map(|(found, _)| found).or_else(|| {
+            (!simple).then(|| hear("the master, physics by physics"))?;
+            diagnose_master(&as_it_is, recorded, patience, stop)
+        });
+        for d in all.found.iter_mut().filter(|d| is_master(d)) {
             d.device.clone_from(&device);
         }
     }
@@ -81,6 +102,11 @@ pub fn differences(graph: &Graph, recorded: &Recorded, hear: &dyn Fn(&str), stop
 
 fn needs_diagnosis(compared: &Compared) -> bool {
     matches!(compared.as_if, AsIf::Otherwise | AsIf::Noisy { .. })
+}
+
+/// Whether the device itself may be what differs, and not only its sensor.
+fn may_be_the_device(compared: &Compared) -> bool {
+    needs_diagnosis(compared) || matches!(compared.as_if, AsIf::Changed { .. })
 }
 
 /// Whether what explains it is a delay of a way.
@@ -123,7 +149,7 @@ fn of_node(graph: &Graph, index: usize, recorded: &Recorded, told: &[&Port], all
                     quantity: *quantity,
                     axis,
                     compared,
-                    way: late(&compared).then(|| (*input).to_string()),
+                    way: (late(&compared) && !input.is_empty()).then(|| (*input).to_string()),
                     device: None,
                 });
             }

@@ -73,10 +73,14 @@ pub enum Happening {
 }
 
 impl Happening {
-    /// Of a recording.
-    pub fn of(session: &Session) -> Happening {
-        let traces = recorded_traces(session);
+    /// Of a recording, whose first `rows` rows are within all bounds.
+    pub fn of(session: &Session, rows: usize) -> Happening {
+        let mut traces = recorded_traces(session);
         let outcome = recorded_outcome(session).unwrap_or(Outcome::NotJudged { why: Unjudged::Empty });
+        for trace in &mut traces {
+            trace.position.truncate(rows);
+            trace.contact.truncate(rows);
+        }
         Happening::of_outcome(outcome, &traces)
     }
 

@@ -13,6 +13,7 @@ pub mod device;
 pub mod differences;
 pub mod faulty;
 pub mod happening;
+mod numbers;
 pub mod recorded;
 pub mod remedy;
 pub mod trial;

@@ -94,6 +94,24 @@ impl Recorded {
         Ok(recorded)
     }
 
+    /// The rows before everything leaves all bounds: `bounds` is what a position of `topic` keeps within. What comes after is no motion of a device any
+    /// more, and outweighs everything before it.
+    pub fn bounded(mut self, topic: &str, bounds: f64) -> Recorded {
+        let beyond = |track: &Track| track.position.iter().filter_map(|c| c.iter().position(|x| x.abs() > bounds)).min();
+        let infinite = |track: &Track| {
+            let columns = track.position.iter().chain(&track.effort);
+            columns.filter_map(|c| c.iter().position(|x| x.is_infinite())).min()
+        };
+        let ends =
+            self.tracks.iter().filter_map(|t| if t.topic == topic { beyond(t).into_iter().chain(infinite(t)).min() } else { infinite(t) });
+        if let Some(end) = ends.min() {
+            self.rows = end.max(1).min(self.rows);
+            let rows = self.rows;
+            self.tracks.iter_mut().for_each(|t| t.reach(rows));
+        }
+        self
+    }
+
     /// The samples of a topic.
     pub fn track(&self, topic: &str) -> Option<&Track> {
         self.tracks.iter().find(|t| t.topic == topic)

@@ -118,18 +118,20 @@ pub fn remedies(
     Ok(all)
 }
 
-/// What stops it robustly comes first, then what stops it; what puts the cause right before what lives with it; then by what is kept. To ask another grip of the hand is
-/// the last thing.
+/// What stops it comes first, then by what is kept: what holds with other hands too counts more, and what puts the cause right. To ask another grip
+/// of the hand is the last thing.
 fn rank(remedy: &Remedy) -> f64 {
     let hand = remedy.changes.iter().any(|c| matches!(c, Change::Grip { .. }));
     let more = f64::from(u8::try_from(remedy.changes.len()).unwrap_or(u8::MAX));
     8.0 * f64::from(u8::from(remedy.stops))
-        + 4.0 * f64::from(u8::from(remedy.robust))
+        + remedy.kept() * if remedy.robust { 1.0 } else { FRAGILE }
         + 0.5 * f64::from(u8::from(remedy.repairs_cause))
-        + remedy.kept()
         - 0.01 * more
         - if hand { 2.0 } else { 0.0 }
 }
+
+/// What a remedy keeps counts so much where it holds with this hand at this gain only.
+const FRAGILE: f64 = 0.6;
 
 fn lambda_of(changes: &[Change], lambda: f64) -> f64 {
     changes.iter().fold(lambda, |l, c| if let Change::Gain { factor, .. } = c { l * factor } else { l })

@@ -16,12 +16,20 @@ use std::sync::atomic::AtomicBool;
 const AROUND: f64 = 20.0;
 
 /// A loop.
-#[derive(Debug, Clone)]
+#[derive(Clone)]
 pub struct Trial {
     /// Nodes, connections, gains.
     pub graph: Graph,
     /// What happens to signals.
     pub distortions: Vec<Distortion>,
+    /// Cores of the caller's own in the place of some nodes: a device that is not simulated here.
+    pub own: Option<OwnCores>,
+}
+
+impl std::fmt::Debug for Trial {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Trial").field("graph", &self.graph.title).field("distortions", &self.distortions).finish_non_exhaustive()
+    }
 }
 
 /// What the hand does, and for how long.
@@ -36,6 +44,11 @@ pub struct Hand {
 }
 
 impl Trial {
+    /// A graph as it is.
+    pub fn of(graph: Graph) -> Trial {
+        Trial { graph, distortions: Vec::new(), own: None }
+    }
+
     /// Ready to be run with a hand; at another rate than the bag's the hand does the same in the same time.
     ///
     /// # Errors
@@ -45,18 +58,27 @@ impl Trial {
         let steps = ((hand.steps as f64 * times).round() as u64).max(1);
         let intents = hand.intents.as_ref().map(|all| all.iter().map(|i| at_rate(i, times)).collect());
         let scenario = Scenario::new(self.graph.clone(), intents, Some(steps))?;
+        Ok(match self.cores() {
+            Some(cores) => scenario.with_own_cores(cores),
+            None => scenario,
+        })
+    }
+
+    /// The cores of nodes that are not as the graph says; `None` where all are.
+    pub fn cores(&self) -> Option<OwnCores> {
         if self.distortions.is_empty() {
-            return Ok(scenario);
+            return self.own.clone();
         }
-        let all = self.distortions.clone();
-        let own: OwnCores = Arc::new(move |graph: &Graph, node: &Node, _| {
+        let (all, own) = (self.distortions.clone(), self.own.clone());
+        Some(Arc::new(move |graph: &Graph, node: &Node, firmness| {
             let here: Vec<Distortion> = all.iter().filter(|d| d.node == node.name).cloned().collect();
+            let given = own.as_ref().and_then(|own| own(graph, node, firmness));
             if here.is_empty() {
-                return None;
+                return given;
             }
-            Some(wrapped(graph, node, &here))
-        });
-        Ok(scenario.with_own_cores(own))
+            let cores = given.unwrap_or_else(|| cores_of(graph, &node.name).map_err(|e| e.to_string()));
+            Some(cores.map(|cores| wrapped(cores, graph, node, &here)))
+        }))
     }
 
     /// Runs it at a gain.
@@ -97,14 +119,13 @@ impl Trial {
     }
 }
 
-fn wrapped(graph: &Graph, node: &Node, distortions: &[Distortion]) -> Result<Vec<Box<dyn Core>>, String> {
-    let cores = cores_of(graph, &node.name).map_err(|e| e.to_string())?;
+fn wrapped(cores: Vec<Box<dyn Core>>, graph: &Graph, node: &Node, distortions: &[Distortion]) -> Vec<Box<dyn Core>> {
     let seed = graph.seed.wrapping_add(u64::from(source_id(&node.name)));
     let around = |(stage, core): (usize, Box<dyn Core>)| -> Box<dyn Core> {
         let here: Vec<Distortion> = distortions.iter().filter(|d| d.stage == stage).cloned().collect();
         if here.is_empty() { core } else { Box::new(Faulty::new(core, &here, seed)) }
     };
-    Ok(cores.into_iter().enumerate().map(around).collect())
+    cores.into_iter().enumerate().map(around).collect()
 }
 
 /// A hand that was recorded step by step, at another rate.
