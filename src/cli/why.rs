@@ -8,6 +8,7 @@ pub const HELP: &str = "Examples:
   backdrive run launch/contact.toml --lambda 6 --canceller none
   backdrive why contact.mcap
   backdrive why contact.mcap --html out/why.html
+  backdrive why contact.mcap --out out/as-it-was.toml
 
 Exit codes: 0 nothing shakes, 1 it does, 2 usage, 3 the bag is wrong, 5 the page cannot be written, 7 it cannot be told, 130 interrupted.";
 
@@ -19,6 +20,9 @@ pub struct Why {
     /// Write the answer as one HTML file that opens offline.
     #[arg(long, value_name = "FILE")]
     pub html: Option<PathBuf>,
+    /// Where the master is not what the graph says: write it as it was, with its grip, as a model file that drives a canceller.
+    #[arg(long, value_name = "FILE")]
+    pub out: Option<PathBuf>,
     /// Print the answer as JSON.
     #[arg(long)]
     pub json: bool,

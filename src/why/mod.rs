@@ -1,5 +1,6 @@
 //! `backdrive why`: what a recorded loop does, why, and what would stop it.
 
+mod page;
 mod text;
 
 use crate::failure::{Failure, code};
@@ -20,8 +21,8 @@ use text::text;
 pub fn why(options: &cli::Why) -> Result<u8, Failure> {
     let cancel = interrupt::heard()?;
     let path = &options.recording;
-    if let Some(html) = &options.html {
-        output::writable(html)?;
+    for file in options.html.iter().chain(&options.out) {
+        output::writable(file)?;
     }
     let reader = Reader::open(path).map_err(Failure::input)?;
     let graph = graph_of(&reader, &Overrides::default())?;
@@ -52,6 +53,18 @@ pub fn why(options: &cli::Why) -> Result<u8, Failure> {
         output::json(&found)?;
     } else {
         output::line(text(&found))?;
+    }
+    match (&options.out, &found.master) {
+        (Some(out), Some(model)) => {
+            output::file(out, model)?;
+            output::note(format_args!("wrote {}", out.display()));
+        }
+        (Some(out), None) => output::note(format_args!("{}: not written, for the master does what the graph says", out.display())),
+        (None, _) => {}
+    }
+    if let Some(html) = &options.html {
+        output::file(html, page::page(&found, &session, options.out.as_deref()).html())?;
+        output::note(format_args!("wrote {}", html.display()));
     }
     Ok(exit_code(&found))
 }

@@ -10,7 +10,7 @@ use crate::recorded::{Recorded, Told};
 use crate::remedy::{Remedy, remedies};
 use crate::trial::{Hand, Trial};
 use backdrive_control::operator::Intent;
-use backdrive_nodes::graph::{Graph, NodeKind};
+use backdrive_nodes::graph::{DeviceFiles, Graph, NodeKind};
 use backdrive_stability::resimulate::{Gain, ResimulateError, RunOptions};
 use backdrive_stability::session::Session;
 use serde::Serialize;
@@ -73,8 +73,14 @@ pub struct Answer {
     pub differs: Vec<String>,
     /// What the loop as it was does when it is run again.
     pub again: Option<String>,
+    /// Its signals.
+    #[serde(skip)]
+    pub again_signals: Option<Session>,
     /// Whether that is what was recorded.
     pub reproduced: bool,
+    /// The master as it was, with what holds it, where it is not what the graph says: a model file.
+    #[serde(skip)]
+    pub master: Option<String>,
     /// The critical mu*lambda of the loop as it was; `None` where there is none within a factor of 20.
     pub edge: Option<f64>,
     /// Why the loop was not run again, where it was not.
@@ -103,12 +109,14 @@ pub fn why(question: &Question, hear: &(dyn Fn(&str) + Sync), cancel: &AtomicBoo
         beneath: None,
         remedies: Vec::new(),
         differs: found.iter().map(|d| named(d, graph).2).collect(),
-        differences: found,
+        master: found.iter().find_map(|d| d.device.as_ref()?.files.as_ref()).and_then(|files| held(files)),
         again: None,
+        again_signals: None,
         reproduced: false,
         edge: None,
         not_again: None,
         events: counted(&recorded.events),
+        differences: found,
         notes: session.notes.iter().cloned().chain(notes).collect(),
     };
     match again(question, &mut answer, hear, cancel) {
@@ -118,6 +126,12 @@ pub fn why(question: &Question, hear: &(dyn Fn(&str) + Sync), cancel: &AtomicBoo
     }
     of_events(&mut answer, recorded);
     Ok(answer)
+}
+
+/// A device with what holds it, as a model file.
+fn held(files: &DeviceFiles) -> Option<String> {
+    let model = files.model.as_ref()?;
+    Some(files.fragment.as_ref().map_or_else(|| model.clone(), |grip| model.held_by(grip).0).to_toml())
 }
 
 /// The recording up to where it leaves all bounds.
@@ -142,7 +156,8 @@ fn again(question: &Question, answer: &mut Answer, hear: &(dyn Fn(&str) + Sync),
     let hand = Hand { intents: question.intents.clone(), steps, rate_hz: graph.timing.rate_hz };
     let was: Trial = as_it_was(graph, &answer.differences);
     hear("the loop as it was");
-    let run = was.run(&hand, *gain, &RunOptions { keep_dither: true, ..RunOptions::default() }, cancel)?;
+    let run = was.run(&hand, *gain, &RunOptions { keep_dither: true, keep_signals: true, ..RunOptions::default() }, cancel)?;
+    answer.again_signals = run.signals;
     answer.again = Some(run.outcome.to_string());
     answer.reproduced = reproduces(&answer.happening, &run.outcome, run.frequency_hz);
     // A limit hides what happens beneath: then the causes are looked for without it.

@@ -137,9 +137,15 @@ impl Change {
         }
     }
 
-    /// Whether it only puts right what is wrong.
-    pub fn is_repair(&self) -> bool {
-        matches!(self, Change::WayRepaired { .. } | Change::SensorRepaired { .. })
+    /// Whether it does the same as another, however the two are called.
+    pub fn does_the_same(&self, other: &Change) -> bool {
+        match (self, other) {
+            (
+                Change::Canceller { model: a, grip: g, high_pass_hz: h, .. },
+                Change::Canceller { model: b, grip: i, high_pass_hz: j, .. },
+            ) => a == b && g == i && h == j,
+            _ => self == other,
+        }
     }
 }
 

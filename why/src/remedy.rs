@@ -45,6 +45,9 @@ pub struct Remedy {
     pub motion_kept: f64,
     /// Whether it puts right what was found to be wrong.
     pub repairs_cause: bool,
+    /// What the loop did then; of the best remedy only.
+    #[serde(skip)]
+    pub signals: Option<Session>,
 }
 
 impl Remedy {
@@ -100,6 +103,7 @@ pub fn remedies(
             force_kept,
             motion_kept,
             repairs_cause: *repairs_cause,
+            signals: run.signals,
         }))
     };
     let all: Vec<Option<Remedy>> = tried.par_iter().map(one).collect::<Result<_, ResimulateError>>()?;
@@ -115,6 +119,7 @@ pub fn remedies(
         kinds.push(kind);
         !again
     });
+    all.iter_mut().skip(1).for_each(|r| r.signals = None);
     Ok(all)
 }
 
@@ -198,7 +203,15 @@ fn candidates(was: &Trial, gain: Gain, edge: Option<f64>, causes: &[Cause]) -> V
             ));
         }
     }
-    all
+    let mut different: Vec<(Vec<Change>, bool)> = Vec::new();
+    for (changes, repairs) in all {
+        let same =
+            |(other, _): &(Vec<Change>, bool)| other.len() == changes.len() && other.iter().zip(&changes).all(|(a, b)| a.does_the_same(b));
+        if !different.iter().any(|d| same(d)) {
+            different.push((changes, repairs));
+        }
+    }
+    different
 }
 
 /// 1 for a master that moves along a line, a thousandth for one that turns.
