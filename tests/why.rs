@@ -61,7 +61,11 @@ fn what_the_canceller_does_not_know_is_named() {
     let (said, _) = asked(&recorded(folder.path(), &["--lambda", "2", "--grip", "plant/grips/firm.toml"]), &[]);
     assert_eq!(said["causes"][0]["kind"].as_str(), Some("grip"), "{said}");
     // A limit hid the run-away.
-    assert_eq!((said["happening"]["happens"].as_str(), said["beneath"]["happens"].as_str()), (Some("saturation"), Some("run_away")), "{said}");
+    assert_eq!(
+        (said["happening"]["happens"].as_str(), said["beneath"]["happens"].as_str()),
+        (Some("saturation"), Some("run_away")),
+        "{said}"
+    );
 }
 
 /// Loops with something hidden, by the example that draws them. Of one round of kinds all but a few are named; the whole set is in docs/figures.md.

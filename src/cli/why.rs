@@ -9,14 +9,18 @@ pub const HELP: &str = "Examples:
   backdrive why contact.mcap
   backdrive why contact.mcap --html out/why.html
   backdrive why contact.mcap --out out/as-it-was.toml
+  backdrive why session/ --roles roles.toml
 
 Exit codes: 0 nothing shakes, 1 it does, 2 usage, 3 the bag is wrong, 5 the page cannot be written, 7 it cannot be told, 130 interrupted.";
 
 /// `backdrive why`
 #[derive(Debug, Args)]
 pub struct Why {
-    /// The bag of a run.
+    /// The bag of a run; with --roles somebody else's recording.
     pub recording: PathBuf,
+    /// Which topic is which, for a recording that we did not make: docs/roles-example.toml. Then the signals alone are asked, and no loop is run again.
+    #[arg(long, value_name = "FILE")]
+    pub roles: Option<PathBuf>,
     /// Write the answer as one HTML file that opens offline.
     #[arg(long, value_name = "FILE")]
     pub html: Option<PathBuf>,

@@ -7,14 +7,19 @@ use crate::failure::{Failure, code};
 use crate::summary::graph_of;
 use crate::{cli, interrupt, output, progress};
 use backdrive_bags::Reader;
-use backdrive_nodes::graph::Overrides;
+use backdrive_nodes::graph::{Graph, Overrides};
 use backdrive_stability::resimulate::Gain;
 use backdrive_stability::resimulate::recover::{recorded_intents, recover_intent};
+use backdrive_stability::roles::Roles;
 use backdrive_stability::session::Session;
 use backdrive_why::answer::{Answer, PATIENCE, Question, WhyError, why as answer};
+use backdrive_why::foreign::why_of_signals;
 use backdrive_why::happening::Happening;
 use backdrive_why::recorded::Recorded;
-use std::sync::atomic::Ordering;
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
 use text::text;
 
 /// Answers.
@@ -24,31 +29,16 @@ pub fn why(options: &cli::Why) -> Result<u8, Failure> {
     for file in options.html.iter().chain(&options.out) {
         output::writable(file)?;
     }
-    let reader = Reader::open(path).map_err(Failure::input)?;
-    let graph = graph_of(&reader, &Overrides::default())?;
-    let read = || -> Result<(Session, Recorded), Failure> {
-        let session = Session::from_bag(&reader, &graph).map_err(Failure::input)?;
-        Ok((session, Recorded::read(&reader).map_err(Failure::input)?))
-    };
-    let (mut session, recorded) = progress::busy(&format!("reading {}", path.display()), read)?;
-    let mut intents = recorded_intents(&session);
-    if intents.is_none() {
-        match recover_intent(&session, &graph) {
-            Ok(found) => {
-                session.notes.push("the hand was not recorded: it was recovered from x_m and F_f by the master's model".to_string());
-                intents = Some(found.intents);
-            }
-            Err(e) => session.notes.push(format!("the hand was not recorded and could not be recovered: {e}")),
+    let (found, session) = match &options.roles {
+        Some(roles) => {
+            let roles = Roles::load(roles)?;
+            let session =
+                progress::busy(&format!("reading {}", path.display()), || Session::from_roles(path, &roles)).map_err(Failure::input)?;
+            let gain = own_gain(&session, None);
+            (why_of_signals(&session, gain), session)
         }
-    }
-    let gain = own_gain(&session, &graph);
-    let question = Question { session: &session, graph: &graph, recorded: &recorded, intents, gain, patience: PATIENCE };
-    let found = progress::about(std::time::Duration::from_secs(20), |report| {
-        answer(&question, report, &cancel).map_err(|e| match e {
-            WhyError::Loop(_) if cancel.load(Ordering::SeqCst) => Failure { code: code::INTERRUPTED, message: "stopped".to_string() },
-            other => Failure::input(format!("{}: {other}", path.display())),
-        })
-    })?;
+        None => of_our_bag(path, &cancel)?,
+    };
     if options.json {
         output::json(&found)?;
     } else {
@@ -69,14 +59,51 @@ pub fn why(options: &cli::Why) -> Result<u8, Failure> {
     Ok(exit_code(&found))
 }
 
+/// The answer of a bag of ours, and its signals.
+fn of_our_bag(path: &Path, cancel: &Arc<AtomicBool>) -> Result<(Answer, Session), Failure> {
+    let hint = |f: Failure| Failure { message: format!("{}; a recording that we did not make needs --roles FILE", f.message), ..f };
+    let reader = Reader::open(path).map_err(Failure::input)?;
+    let graph = graph_of(&reader, &Overrides::default()).map_err(hint)?;
+    let read = || -> Result<(Session, Recorded), Failure> {
+        let session = Session::from_bag(&reader, &graph).map_err(Failure::input)?;
+        Ok((session, Recorded::read(&reader).map_err(Failure::input)?))
+    };
+    let (mut session, recorded) = progress::busy(&format!("reading {}", path.display()), read)?;
+    let mut intents = recorded_intents(&session);
+    if intents.is_none() {
+        match recover_intent(&session, &graph) {
+            Ok(found) => {
+                session.notes.push("the hand was not recorded: it was recovered from x_m and F_f by the master's model".to_string());
+                intents = Some(found.intents);
+            }
+            Err(e) => session.notes.push(format!("the hand was not recorded and could not be recovered: {e}")),
+        }
+    }
+    let gain = own_gain(&session, Some(&graph));
+    let question = Question { session: &session, graph: &graph, recorded: &recorded, intents, gain, patience: PATIENCE };
+    let found = progress::about(EXPECTED, |report| {
+        answer(&question, report, cancel).map_err(|e| match e {
+            WhyError::Loop(_) if cancel.load(Ordering::SeqCst) => Failure { code: code::INTERRUPTED, message: "stopped".to_string() },
+            other => Failure::input(format!("{}: {other}", path.display())),
+        })
+    })?;
+    Ok((found, session))
+}
+
+/// About how long an answer takes that needs a diagnosis.
+const EXPECTED: Duration = Duration::from_secs(20);
+
 /// The gain of most of a recording.
-fn own_gain(session: &Session, graph: &backdrive_nodes::graph::Graph) -> Gain {
+fn own_gain(session: &Session, graph: Option<&Graph>) -> Gain {
     let median = |column: &[f64]| {
         let mut values: Vec<f64> = column.iter().copied().filter(|x| x.is_finite()).collect();
         values.sort_by(f64::total_cmp);
         values.get(values.len() / 2).copied()
     };
-    Gain { mu: median(&session.mu).unwrap_or(graph.gains.mu), lambda: median(&session.lambda).unwrap_or(graph.gains.lambda) }
+    Gain {
+        mu: median(&session.mu).or(graph.map(|g| g.gains.mu)).unwrap_or(1.0),
+        lambda: median(&session.lambda).or(graph.map(|g| g.gains.lambda)).unwrap_or(1.0),
+    }
 }
 
 fn exit_code(found: &Answer) -> u8 {

@@ -159,7 +159,12 @@ fn pictures(page: &mut Page, found: &Answer, session: &Session) {
 
 fn causes(page: &mut Page, found: &Answer) {
     if found.causes.is_empty() {
-        page.text("Nothing shakes, so nothing is the cause.");
+        let trouble = found.happening.is_trouble();
+        page.text(&if trouble {
+            format!("The cause {}.", super::text::NO_CAUSE)
+        } else {
+            "Nothing shakes, so nothing is the cause.".to_string()
+        });
         return;
     }
     page.text(
@@ -185,7 +190,7 @@ fn causes(page: &mut Page, found: &Answer) {
 
 fn remedies(page: &mut Page, found: &Answer) {
     if found.remedies.is_empty() {
-        page.text("Nothing needs to be stopped.");
+        page.text(if found.happening.is_trouble() { "Nothing could be tried." } else { "Nothing needs to be stopped." });
         return;
     }
     let mut table = Table::new(["remedy", "the loop then", "stops it", "with other grips and more gain", "force left", "motion left"]);

@@ -11,6 +11,9 @@ const SHOWN: usize = 5;
 /// A cause that is less likely is not worth a line.
 const UNLIKELY: f64 = 0.03;
 
+/// Where the signals alone do not say why.
+pub const NO_CAUSE: &str = "cannot be told: what there is holds no model of the loop and no excitation that measures it";
+
 /// The answer for a terminal.
 pub fn text(answer: &Answer) -> String {
     let mut out = String::new();
@@ -23,10 +26,14 @@ pub fn text(answer: &Answer) -> String {
     }
     match answer.edge {
         Some(edge) => line("gain", &format!("mu*lambda = {:.3}; the loop as it was is stable up to {edge:.3}", answer.gain)),
+        None if answer.not_again.is_some() => line("gain", &format!("mu*lambda = {:.3}; where its edge lies is not known", answer.gain)),
         None => line("gain", &format!("mu*lambda = {:.3}; no edge within a factor of 20", answer.gain)),
     }
     for (number, cause) in answer.causes.iter().filter(|c| c.confidence >= UNLIKELY).take(SHOWN).enumerate() {
         line(if number == 0 { "cause" } else { "or" }, &of_cause(cause));
+    }
+    if answer.happening.is_trouble() && answer.causes.is_empty() {
+        line("cause", NO_CAUSE);
     }
     for text in answer.differs.iter().filter(|d| !answer.causes.iter().any(|c| c.evidence == **d)) {
         line("differs", text);

@@ -12,6 +12,7 @@ pub mod compared;
 pub mod device;
 pub mod differences;
 pub mod faulty;
+pub mod foreign;
 pub mod happening;
 mod numbers;
 pub mod recorded;

@@ -1,0 +1,142 @@
+//! The answer from somebody else's recording, which holds no graph: from its signals alone.
+
+use crate::answer::Answer;
+use crate::cause::{Cause, CauseKind};
+use crate::change::Change;
+use crate::compared::{AsIf, Sensor, compare};
+use crate::happening::Happening;
+use crate::remedy::Remedy;
+use backdrive_stability::frequency;
+use backdrive_stability::resimulate::Gain;
+use backdrive_stability::session::{AxisSignals, Session};
+
+/// A lower gain is so far below the edge that was measured.
+const BELOW: f64 = 0.8;
+
+/// A delay is a suspect from so many rows on; less is the one step that every sampled loop has.
+const LEAST_LATE: usize = 3;
+
+/// Answers of a session that was read by a roles file: what happens, how late and how large each way is, and where the measured loop has its edge.
+/// No loop is run again, for no model of it is known.
+pub fn why_of_signals(session: &Session, gain: Gain) -> Answer {
+    let happening = Happening::of(session, session.len());
+    let (measured, mut notes) = measured(session, gain);
+    let edge = measured.edge;
+    let mut causes: Vec<(Cause, f64)> = session.axes.iter().flat_map(|axis| of_axis(axis, session, gain, &happening)).collect();
+    let differs = causes.iter().map(|(c, _)| c.evidence.clone()).collect();
+    if let Some(edge) = edge.filter(|e| *e < gain.product()) {
+        let evidence = format!("by the measured frequency response the loop is stable up to mu*lambda = {edge:.3} only");
+        let holds = cause(CauseKind::GainTooHigh, String::new(), evidence, true);
+        causes.push((Cause { without: format!("stable below {edge:.3}"), edge_without: Some(edge), ..holds }, 1.0));
+    }
+    notes.push("no loop was run again: the recording holds no models".to_string());
+    let remedies = match edge.filter(|_| happening.is_trouble()) {
+        Some(edge) => vec![lower(gain, edge)],
+        None => Vec::new(),
+    };
+    let sum: f64 = causes.iter().map(|(_, w)| w).sum::<f64>().max(0.2);
+    let mut causes: Vec<Cause> = causes.into_iter().map(|(c, w)| Cause { confidence: SURE * w / sum, ..c }).collect();
+    causes.sort_by(|a, b| b.confidence.total_cmp(&a.confidence));
+    if !happening.is_trouble() {
+        causes.clear();
+    }
+    Answer {
+        bag: session.name.clone(),
+        gain: gain.product(),
+        happens: happening.to_string(),
+        happening,
+        causes,
+        beneath: None,
+        remedies,
+        differences: Vec::new(),
+        differs,
+        again: None,
+        again_signals: None,
+        reproduced: false,
+        master: None,
+        edge,
+        not_again: measured.why_not,
+        events: Vec::new(),
+        notes: session.notes.iter().cloned().chain(notes).collect(),
+    }
+}
+
+/// What was not run again is not sure.
+const SURE: f64 = 0.7;
+
+/// The edge of the measured loop.
+struct Measured {
+    edge: Option<f64>,
+    why_not: Option<String>,
+}
+
+fn measured(session: &Session, gain: Gain) -> (Measured, Vec<String>) {
+    match frequency::analyse(session, &frequency::Options::default()) {
+        Ok(found) => {
+            let at = found.at(gain.product());
+            let why_not = at.critical_gain.is_none().then(|| at.reason.clone());
+            let advice = at.advice.clone().map(|a| format!("to record for a better answer: {a}"));
+            (Measured { edge: at.critical_gain, why_not }, advice.into_iter().collect())
+        }
+        Err(e) => (Measured { edge: None, why_not: Some(e.to_string()) }, Vec::new()),
+    }
+}
+
+fn cause(kind: CauseKind, place: String, evidence: String, holds_without: bool) -> Cause {
+    let without = "not run again: no model of the loop is known".to_string();
+    Cause { kind, place, evidence, without, holds_without, edge_without: None, seen: true, confidence: 0.0, repairs: Vec::new() }
+}
+
+/// What an axis' signals say of its two ways: from the master's position to the command, and from the contact force to the master.
+fn of_axis(axis: &AxisSignals, session: &Session, gain: Gain, happening: &Happening) -> Vec<(Cause, f64)> {
+    let induced = |row: usize| axis.induced.as_ref().and_then(|i| i.get(row)).copied().filter(|x| x.is_finite()).unwrap_or(0.0);
+    let dither = |row: usize| axis.dither.as_ref().and_then(|d| d.get(row)).copied().filter(|x| x.is_finite()).unwrap_or(0.0);
+    let wanted: Vec<f64> = (0..axis.master.len()).map(|r| gain.mu * (axis.master[r] - induced(r))).collect();
+    let reflected: Vec<f64> = (0..axis.force.len()).map(|r| axis.force[r] - dither(r)).collect();
+    let felt: Vec<f64> = axis.contact.iter().map(|f| gain.lambda * f).collect();
+    let sensor = Sensor { resolution: axis.resolution, noise: axis.noise, exact: false };
+    let ways = [
+        ("the command x_c", "mu times the master's position", &axis.command, &wanted, sensor),
+        ("the force F_f on the master", "lambda times the contact force", &reflected, &felt, Sensor::default()),
+    ];
+    let mut all = Vec::new();
+    for (what, of, recorded, predicted, sensor) in ways {
+        let Some(found) = compare(recorded, predicted, &sensor, session.period_s) else { continue };
+        let at = |kind: CauseKind, text: String| cause(kind, format!("axis {}", axis.name), text, false);
+        match found.as_if {
+            AsIf::Changed { gain, .. } if gain < 0.0 => {
+                all.push((at(CauseKind::WrongSign, format!("{what} goes against {of}: it is {gain:.2} times that")), 6.0));
+            }
+            AsIf::Changed { late, .. } if late >= LEAST_LATE => {
+                let late_s = late as f64 * session.period_s;
+                // Of half a period of what oscillates, which is what it takes to turn a loop round.
+                let share = happening.frequency_hz().map_or(0.5, |hz| (2.0 * hz * late_s).min(3.0));
+                all.push((at(CauseKind::Delay, format!("{what} comes {:.1} ms after {of}", 1e3 * late_s)), share));
+            }
+            AsIf::Dead { from_row } => {
+                let text = format!("{what} stands still from {:.2} s on, while {of} moves", from_row as f64 * session.period_s);
+                all.push((at(CauseKind::DeadSensor, text), 6.0));
+            }
+            AsIf::Railed { .. } => all.push((at(CauseKind::Saturation, format!("{what} ends at a value beyond which {of} goes on")), 2.0)),
+            AsIf::Unsteady { .. } | AsIf::Changed { .. } | AsIf::Stepped { .. } | AsIf::Noisy { .. } | AsIf::Same | AsIf::Otherwise => {}
+        }
+    }
+    all
+}
+
+/// The one remedy that needs no model.
+fn lower(gain: Gain, edge: f64) -> Remedy {
+    let factor = (BELOW * edge / gain.product()).min(1.0);
+    let change = Change::Gain { factor, lambda: factor * gain.lambda };
+    Remedy {
+        text: change.to_string(),
+        changes: vec![change],
+        outcome: format!("by the measured frequency response stable, a fifth below its edge at {edge:.3}"),
+        stops: true,
+        robust: false,
+        force_kept: factor,
+        motion_kept: 1.0,
+        repairs_cause: false,
+        signals: None,
+    }
+}
