@@ -19,7 +19,7 @@ use backdrive_stability::resimulate::recover::recorded_intents;
 use backdrive_stability::resimulate::{Gain, OwnCores, RunOptions};
 use backdrive_stability::session::Session;
 use backdrive_why::answer::{Answer, Question, why};
-use backdrive_why::cause::CauseKind;
+use backdrive_why::cause_kind::CauseKind;
 use backdrive_why::change::{Change, firmer};
 use backdrive_why::faulty::Distortion;
 use backdrive_why::happening::Happening;

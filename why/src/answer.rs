@@ -2,10 +2,13 @@
 
 use crate::alone::AloneError;
 use crate::as_it_was::as_it_was;
-use crate::cause::{Asked, Cause, CauseKind, causes, named, reproduces};
+use crate::cause::{Asked, Cause, causes, reproduces};
+use crate::cause_kind::CauseKind;
 use crate::change::Change;
-use crate::differences::{Difference, Differences, differences};
+use crate::difference::Difference;
+use crate::differences::{Differences, differences};
 use crate::happening::Happening;
+use crate::named::named;
 use crate::recorded::{Recorded, Told};
 use crate::remedy::{Remedy, remedies};
 use crate::trial::{Hand, Trial};

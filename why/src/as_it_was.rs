@@ -1,7 +1,7 @@
 //! The loop as it was: the graph of a bag with what was found to be otherwise.
 
 use crate::compared::AsIf;
-use crate::differences::{Difference, delay};
+use crate::difference::{Difference, delay};
 use crate::faulty::Distortion;
 use crate::trial::Trial;
 use backdrive_nodes::graph::{Direction, Graph, NodeKind, Settings};

@@ -1,37 +1,15 @@
 //! Where the loop of a bag is not the loop of its graph: every node by itself on what it was given.
 
 use crate::alone::{AloneError, alone};
+use crate::as_it_was::as_it_was;
 use crate::compared::{AsIf, Compared, Sensor, compare};
-use crate::device::{DeviceFound, diagnose_master};
+use crate::device::diagnose_master;
+use crate::difference::{Difference, delay};
 use crate::numbers::wrong_number;
 use crate::recorded::{Quantity, Recorded};
 use backdrive_nodes::graph::{DeviceFiles, Graph, NodeKind, Settings};
-use backdrive_nodes::stage::Impairment;
-use serde::Serialize;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
-
-/// A node whose recorded output is not what its recorded inputs make of it.
-#[derive(Debug, Clone, Serialize)]
-pub struct Difference {
-    /// Name of the node.
-    pub node: String,
-    /// Its kind.
-    #[serde(skip)]
-    pub kind: NodeKind,
-    /// The output's port.
-    pub port: String,
-    /// Which of its quantities.
-    pub quantity: Quantity,
-    /// Number of the axis.
-    pub axis: usize,
-    /// By how much, and what simple thing explains it.
-    pub compared: Compared,
-    /// Input port that is late, where a delay explains it and the way to that port is where it fits.
-    pub way: Option<String>,
-    /// What a diagnosis says of the device, where nothing simple explains it.
-    pub device: Option<DeviceFound>,
-}
 
 /// All that was compared.
 #[derive(Debug, Clone, Default)]
@@ -84,7 +62,7 @@ pub fn differences(
         let Difference { node, axis, compared, .. } = all.found[place].clone();
         // Ways that are late are part of what it was given.
         let ways: Vec<Difference> = all.found.iter().filter(|d| d.way.is_some()).cloned().collect();
-        let as_it_is = crate::as_it_was::as_it_was(graph, &ways).graph;
+        let as_it_is = as_it_was(graph, &ways).graph;
         // A gain of a sensor and a firmer hand are alike where everything grows as one exponential: what leaves less of it is the one.
         let simple = !needs_diagnosis(&compared);
         let number =
@@ -176,21 +154,6 @@ fn of_node(graph: &Graph, index: usize, recorded: &Recorded, told: &[&Port], all
 /// Ways to one node that may be late at once.
 const MOST_WAYS: usize = 2;
 
-/// Makes a way in a graph as late as it was found.
-pub fn delay(graph: &mut Graph, node: usize, difference: &Difference) {
-    let (period_s, seed) = (graph.period_s(), graph.seed.wrapping_add(7));
-    let (Some(port), Some(more)) = (&difference.way, difference.impairment(period_s, seed)) else { return };
-    for connection in graph.connections.iter_mut().filter(|c| c.to.0 == node && c.to.1 == *port) {
-        let was = connection.impairment.unwrap_or(Impairment { delay_s: 0.0, jitter_s: 0.0, loss: 0.0, seed });
-        connection.impairment = Some(Impairment {
-            delay_s: was.delay_s + more.delay_s,
-            jitter_s: was.jitter_s.max(more.jitter_s),
-            loss: was.loss.max(more.loss),
-            seed: was.seed,
-        });
-    }
-}
-
 fn is_known(settings: &Settings) -> bool {
     match settings {
         Settings::Master(files) | Settings::Slave(files) => files.model.is_some(),
@@ -206,21 +169,4 @@ fn sensor_of(settings: &Settings, quantity: Quantity, axis: usize) -> Sensor {
     let Some(axis) = model.axes.get(axis) else { return Sensor::default() };
     let Some(output) = model.outputs.get(axis.measured) else { return Sensor::default() };
     Sensor { resolution: axis.scale.abs() * output.resolution, noise: axis.scale.abs() * output.noise, exact: false }
-}
-
-impl Difference {
-    /// What the way to a port does besides what the graph says of it.
-    pub fn impairment(&self, period_s: f64, seed: u64) -> Option<Impairment> {
-        let s = |rows: usize| rows as f64 * period_s;
-        self.way.as_ref()?;
-        match self.compared.as_if {
-            AsIf::Changed { late, .. } => Some(Impairment { delay_s: s(late), jitter_s: 0.0, loss: 0.0, seed }),
-            AsIf::Unsteady { late, jitter, missing } => {
-                // What jitter lets be overtaken is dropped too.
-                let loss = if jitter == 0 { missing } else { 0.0 };
-                Some(Impairment { delay_s: s(late), jitter_s: s(jitter), loss, seed })
-            }
-            _ => None,
-        }
-    }
 }

@@ -1,7 +1,8 @@
 //! The answer from somebody else's recording, which holds no graph: from its signals alone.
 
 use crate::answer::Answer;
-use crate::cause::{Cause, CauseKind};
+use crate::cause::Cause;
+use crate::cause_kind::CauseKind;
 use crate::change::Change;
 use crate::compared::{AsIf, Sensor, compare};
 use crate::happening::Happening;

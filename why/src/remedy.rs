@@ -1,6 +1,7 @@
 //! What would stop it: changes, each with the loop run again, ranked by what they leave of force and motion.
 
-use crate::cause::{Cause, CauseKind};
+use crate::cause::Cause;
+use crate::cause_kind::CauseKind;
 use crate::change::Change;
 use crate::trial::{Hand, Trial};
 use backdrive_nodes::graph::{DeviceFiles, NodeKind, Settings};

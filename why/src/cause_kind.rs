@@ -1,0 +1,83 @@
+//! The causes that are known, and what they are called.
+
+use serde::Serialize;
+
+/// What can be the cause.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum CauseKind {
+    /// mu*lambda is beyond what this device, as it is, allows.
+    GainTooHigh,
+    /// The way is long, or the rate low.
+    Delay,
+    /// Samples are lost or come in bursts.
+    Loss,
+    /// The hand grips otherwise than the canceller assumes.
+    Grip,
+    /// The canceller takes out more at rest than the force puts in.
+    OverCancelling,
+    /// A mass that the canceller does not know.
+    Inertia,
+    /// A compliance that the canceller does not know.
+    Compliance,
+    /// Dry friction that was left out.
+    DryFriction,
+    /// Backlash that was left out.
+    Backlash,
+    /// Hysteresis that was left out.
+    Hysteresis,
+    /// Other physics, or other numbers, than the canceller's model has.
+    OtherPhysics,
+    /// A filter's lag.
+    FilterLag,
+    /// A coarse or noisy position.
+    CoarseSensor,
+    /// A sensor that stands still.
+    DeadSensor,
+    /// A sensor that ends at a value.
+    RailedSensor,
+    /// A sensor of another scale.
+    ScaledSensor,
+    /// A sensor whose sign is turned round.
+    WrongSign,
+    /// A sensor that is late.
+    LateSensor,
+    /// A motor at its limit, or a device at the end of its travel.
+    Saturation,
+    /// The clock of a node.
+    Clock,
+    /// Two nodes that speak on one topic.
+    TwoPublishers,
+    /// A node does something else than its graph says, and none of these.
+    Unknown,
+}
+
+impl CauseKind {
+    /// For a person.
+    pub fn words(self) -> &'static str {
+        match self {
+            CauseKind::GainTooHigh => "the gain mu*lambda is too high for this device",
+            CauseKind::Delay => "delay in the loop",
+            CauseKind::Loss => "samples that are lost or come unevenly",
+            CauseKind::Grip => "another grip than the canceller assumes",
+            CauseKind::OverCancelling => "the canceller takes out too much at rest",
+            CauseKind::Inertia => "inertia that the canceller does not know",
+            CauseKind::Compliance => "compliance that the canceller does not know",
+            CauseKind::DryFriction => "dry friction that was left out",
+            CauseKind::Backlash => "backlash that was left out",
+            CauseKind::Hysteresis => "hysteresis that was left out",
+            CauseKind::OtherPhysics => "the master is not what the canceller's model says",
+            CauseKind::FilterLag => "lag of a filter",
+            CauseKind::CoarseSensor => "a position that is too coarse or too noisy",
+            CauseKind::DeadSensor => "a dead sensor",
+            CauseKind::RailedSensor => "a sensor at its rail",
+            CauseKind::ScaledSensor => "a sensor of the wrong scale",
+            CauseKind::WrongSign => "a signal of the wrong sign",
+            CauseKind::LateSensor => "a sensor that is late",
+            CauseKind::Saturation => "a limit of the device",
+            CauseKind::Clock => "the clock: a node could not keep its rate",
+            CauseKind::TwoPublishers => "two publishers on one topic",
+            CauseKind::Unknown => "a node that does something else than the graph says",
+        }
+    }
+}

@@ -1,0 +1,62 @@
+//! A place where a recording is not what its graph says.
+
+use crate::compared::{AsIf, Compared};
+use crate::device::DeviceFound;
+use crate::recorded::Quantity;
+use backdrive_nodes::graph::{Graph, NodeKind};
+use backdrive_nodes::stage::Impairment;
+use serde::Serialize;
+
+/// A node whose recorded output is not what its recorded inputs make of it.
+#[derive(Debug, Clone, Serialize)]
+pub struct Difference {
+    /// Name of the node.
+    pub node: String,
+    /// Its kind.
+    #[serde(skip)]
+    pub kind: NodeKind,
+    /// The output's port.
+    pub port: String,
+    /// Which of its quantities.
+    pub quantity: Quantity,
+    /// Number of the axis.
+    pub axis: usize,
+    /// By how much, and what simple thing explains it.
+    pub compared: Compared,
+    /// Input port that is late, where a delay explains it and the way to that port is where it fits.
+    pub way: Option<String>,
+    /// What a diagnosis says of the device, where nothing simple explains it.
+    pub device: Option<DeviceFound>,
+}
+
+impl Difference {
+    /// What the way to a port does besides what the graph says of it.
+    pub fn impairment(&self, period_s: f64, seed: u64) -> Option<Impairment> {
+        let s = |rows: usize| rows as f64 * period_s;
+        self.way.as_ref()?;
+        match self.compared.as_if {
+            AsIf::Changed { late, .. } => Some(Impairment { delay_s: s(late), jitter_s: 0.0, loss: 0.0, seed }),
+            AsIf::Unsteady { late, jitter, missing } => {
+                // What jitter lets be overtaken is dropped too.
+                let loss = if jitter == 0 { missing } else { 0.0 };
+                Some(Impairment { delay_s: s(late), jitter_s: s(jitter), loss, seed })
+            }
+            _ => None,
+        }
+    }
+}
+
+/// Makes a way in a graph as late as it was found.
+pub fn delay(graph: &mut Graph, node: usize, difference: &Difference) {
+    let (period_s, seed) = (graph.period_s(), graph.seed.wrapping_add(7));
+    let (Some(port), Some(more)) = (&difference.way, difference.impairment(period_s, seed)) else { return };
+    for connection in graph.connections.iter_mut().filter(|c| c.to.0 == node && c.to.1 == *port) {
+        let was = connection.impairment.unwrap_or(Impairment { delay_s: 0.0, jitter_s: 0.0, loss: 0.0, seed });
+        connection.impairment = Some(Impairment {
+            delay_s: was.delay_s + more.delay_s,
+            jitter_s: was.jitter_s.max(more.jitter_s),
+            loss: was.loss.max(more.loss),
+            seed: was.seed,
+        });
+    }
+}

@@ -1,0 +1,131 @@
+//! A difference as a cause: what it is, where, and what was seen of it.
+
+use crate::cause_kind::CauseKind;
+use crate::compared::AsIf;
+use crate::device::{DeviceFound, NumberFound, PhysicsFound};
+use crate::difference::Difference;
+use crate::recorded::Quantity;
+use backdrive_diagnosis::hypothesis::Family;
+use backdrive_nodes::graph::{Graph, NodeKind};
+
+/// What a difference is, where, and what was seen of it.
+pub fn named(difference: &Difference, graph: &Graph) -> (CauseKind, String, String) {
+    let period_s = graph.period_s();
+    let (node, share) = (&difference.node, 100.0 * difference.compared.share);
+    let what = match (difference.kind, difference.quantity) {
+        (NodeKind::Slave, Quantity::Effort) => "the contact force",
+        (NodeKind::Master, Quantity::Position) => "the master's position",
+        _ => "its output",
+    };
+    if let Some(port) = &difference.way {
+        let place = format!("{node}.{port}");
+        return match difference.compared.as_if {
+            AsIf::Unsteady { late, jitter, missing } if jitter > 0 => (
+                if missing > 0.3 && late == 0 { CauseKind::Loss } else { CauseKind::Delay },
+                place,
+                format!(
+                    "what comes to {node}.{port} is {:.1} to {:.1} ms later than the graph says, and {:.0} % never comes",
+                    1e3 * late as f64 * period_s,
+                    1e3 * (late + jitter) as f64 * period_s,
+                    100.0 * missing
+                ),
+            ),
+            AsIf::Unsteady { late, missing, .. } if late == 0 => {
+                (CauseKind::Loss, place, format!("{:.1} % of what {node}.{port} should get never comes", 100.0 * missing))
+            }
+            AsIf::Unsteady { late, .. } | AsIf::Changed { late, .. } => (
+                CauseKind::Delay,
+                place,
+                format!("what comes to {node}.{port} is {:.2} ms later than the graph says", 1e3 * late as f64 * period_s),
+            ),
+            _ => (CauseKind::Delay, place, String::new()),
+        };
+    }
+    if let Some(device) = &difference.device {
+        return of_device(device, node, share);
+    }
+    let place = node.clone();
+    match difference.compared.as_if {
+        AsIf::Dead { from_row } => {
+            (CauseKind::DeadSensor, place, format!("{what} at {node} stands still from {:.2} s on", from_row as f64 * period_s))
+        }
+        AsIf::Railed { low, high } => {
+            let end = if high.is_finite() { high } else { low };
+            (CauseKind::RailedSensor, place, format!("{what} at {node} ends at {end:.4}, where the model goes beyond"))
+        }
+        AsIf::Stepped { step } => {
+            (CauseKind::CoarseSensor, place, format!("{what} at {node} comes in steps of {step:.3e}, which its model does not have"))
+        }
+        AsIf::Noisy { deviation } => {
+            (CauseKind::CoarseSensor, place, format!("{what} at {node} has noise of {deviation:.3e} rms, which its model does not have"))
+        }
+        AsIf::Changed { gain, late: 0 } if gain < 0.0 => {
+            (CauseKind::WrongSign, place, format!("{what} at {node} is {gain:.2} times what the model says: its sign is turned round"))
+        }
+        AsIf::Changed { gain, late: 0 } => {
+            (CauseKind::ScaledSensor, place, format!("{what} at {node} is {gain:.3} times what the model says"))
+        }
+        AsIf::Changed { gain, late } if (gain - 1.0).abs() > 0.05 => {
+            let late = 1e3 * late as f64 * period_s;
+            let kind = if gain < 0.0 { CauseKind::WrongSign } else { CauseKind::ScaledSensor };
+            (kind, place, format!("{what} at {node} is {gain:.3} times what the model says, and {late:.2} ms late"))
+        }
+        AsIf::Changed { late, .. } => {
+            (CauseKind::LateSensor, place, format!("{what} at {node} is {:.2} ms late", 1e3 * late as f64 * period_s))
+        }
+        AsIf::Same | AsIf::Unsteady { .. } | AsIf::Otherwise => {
+            (CauseKind::Unknown, place, format!("{what} at {node} differs by {share:.0} % from what its inputs make of it"))
+        }
+    }
+}
+
+/// What a diagnosis of the master says, as a cause.
+fn of_device(device: &DeviceFound, node: &str, share: f64) -> (CauseKind, String, String) {
+    let kind_of = |f: &PhysicsFound| match (f.family, f.of_signal) {
+        (Some(Family::Friction), _) => CauseKind::DryFriction,
+        (Some(Family::Hysteresis), _) => CauseKind::Hysteresis,
+        (Some(Family::Contact), _) => CauseKind::Backlash,
+        (Some(Family::Inertia), _) => CauseKind::Inertia,
+        (Some(Family::Compliance), _) => CauseKind::Compliance,
+        (Some(Family::Scale), _) => CauseKind::ScaledSensor,
+        (Some(Family::Lag), true) => CauseKind::LateSensor,
+        (Some(Family::Limit), true) => CauseKind::Saturation,
+        _ => CauseKind::OtherPhysics,
+    };
+    let size = |f: &PhysicsFound| f.size.as_ref().map_or_else(String::new, |(name, value, unit)| format!(", {name} {value:.4} {unit}"));
+    if let Some(first) = device.physics.first() {
+        let text = format!(
+            "the master does {share:.0} % otherwise than its model; a diagnosis of the bag finds {} at {}{} (confidence {:.2})",
+            first.physics.replace('_', " "),
+            first.place,
+            size(first),
+            first.confidence
+        );
+        return (kind_of(first), first.place.clone(), text);
+    }
+    let moved = |n: &NumberFound| (n.found / n.declared).abs().ln().abs();
+    let most = device.numbers.iter().filter(|n| n.declared != 0.0 && n.found != 0.0).max_by(|a, b| moved(a).total_cmp(&moved(b)));
+    match most {
+        Some(n) => {
+            let kind = if n.of_grip {
+                CauseKind::Grip
+            } else if n.path.starts_with("bodies.") {
+                CauseKind::Inertia
+            } else {
+                CauseKind::OtherPhysics
+            };
+            let text = format!(
+                "the master does {share:.0} % otherwise than its model: {} is {:.4} where the graph says {:.4}",
+                n.path, n.found, n.declared
+            );
+            (kind, n.path.clone(), text)
+        }
+        None => {
+            let text = format!(
+                "the master does {share:.0} % otherwise than its model, and a diagnosis of the bag does not say why: {}",
+                device.sentence
+            );
+            (CauseKind::Unknown, node.to_string(), text)
+        }
+    }
+}
