@@ -111,7 +111,12 @@ pub fn compare(recorded: &[f64], predicted: &[f64], sensor: &Sensor, period_s: f
     let said = |as_if: AsIf, left: f64| Some(Compared { error, share, as_if, left });
     let missing = missing_share(recorded, predicted);
     if (share <= SMALL || error <= 3.0 * floor) && missing < SMALL {
-        return said(AsIf::Same, share);
+        // Steps are small beside the signal, and its differences are not.
+        let steps = if error > 3.0 * floor { stepped(recorded, predicted, &both, sensor) } else { None };
+        return match steps {
+            Some(step) => said(AsIf::Stepped { step }, 0.0),
+            None => said(AsIf::Same, share),
+        };
     }
     if let Some(from_row) = dead_from(recorded, predicted, (STANDS * size).max(10.0 * floor)) {
         return said(AsIf::Dead { from_row }, 0.0);

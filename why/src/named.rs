@@ -30,7 +30,7 @@ pub fn named(difference: &Difference, graph: &Graph) -> (CauseKind, String, Stri
                     100.0 * missing
                 ),
             ),
-            AsIf::Unsteady { late, missing, .. } if late == 0 => {
+            AsIf::Unsteady { late: 0, missing, .. } => {
                 (CauseKind::Loss, place, format!("{:.1} % of what {node}.{port} should get never comes", 100.0 * missing))
             }
             AsIf::Unsteady { late, .. } | AsIf::Changed { late, .. } => (

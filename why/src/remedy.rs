@@ -208,7 +208,7 @@ fn candidates(was: &Trial, gain: Gain, edge: Option<f64>, causes: &[Cause]) -> V
     for (changes, repairs) in all {
         let same =
             |(other, _): &(Vec<Change>, bool)| other.len() == changes.len() && other.iter().zip(&changes).all(|(a, b)| a.does_the_same(b));
-        if !different.iter().any(|d| same(d)) {
+        if !different.iter().any(same) {
             different.push((changes, repairs));
         }
     }
