@@ -1,6 +1,6 @@
 //! Changes to a graph, which several verbs take.
 
-use super::values::{not_negative, positive, rate};
+use super::values::{law, not_negative, positive, rate};
 use backdrive_nodes::graph::Overrides;
 use clap::{Args, ValueEnum};
 use std::path::PathBuf;
@@ -30,6 +30,10 @@ pub struct SwappedParts {
     /// Corner of a high-pass on the canceller's estimate; 0 for none.
     #[arg(long, value_name = "HZ", value_parser = not_negative, allow_negative_numbers = true)]
     pub high_pass: Option<f64>,
+    /// Law between master and slave: the one of the graph's coupling, or of a coupling that takes the place of its scaling; see
+    /// docs/couplings.md.
+    #[arg(long, value_name = "LAW", value_parser = law())]
+    pub coupling: Option<String>,
     /// Whether sensors round and are noisy as the model files say.
     #[arg(long, value_enum)]
     pub sensors: Option<Sensors>,
@@ -49,6 +53,7 @@ impl SwappedParts {
             canceller: self.canceller.clone(),
             canceller_grip: self.canceller_grip.clone(),
             high_pass_hz: self.high_pass,
+            coupling: self.coupling.clone(),
             sensors: self.sensors.map(|s| s.word().to_string()),
             limits: self.limits.map(|l| l.word().to_string()),
             ..Overrides::default()

@@ -77,6 +77,7 @@ impl Loaded {
             master: parts.master.is_some() || parts.grip.is_some(),
             canceller: parts.canceller.is_some() || parts.canceller_grip.is_some() || parts.high_pass.is_some(),
             slave: parts.slave.is_some() || parts.environment.is_some(),
+            coupling: parts.coupling.is_some(),
         };
         if let Some(asked) = &self.asked {
             swapped.canceller &= asked.node_of(NodeKind::Canceller).is_some();

@@ -1,0 +1,158 @@
+//! What couples master and slave over a link: laws that are rivals of plain scaling with a canceller.
+//!
+//! A law has two sides. The side at the master ([`Near`]) is told how the master moves and says which force it shall feel; the
+//! side at the slave ([`Far`]) is told what the slave touches and says where it shall be. They know of each other only by the
+//! [`Packet`]s that cross the link, so that delay, jitter and loss act on these and on nothing else.
+//!
+//! Everything here is in the slave's units: the node ([`node`]) multiplies the master's motion by mu before it hands it to a law,
+//! and the law's force by lambda behind it. Power at the master is then lambda/mu times power here, so that a law that is passive
+//! here is passive with any scales above 0 (Niemeyer & Slotine 2004, section 4). A force that acts along +x is positive.
+//!
+//! | law | file | source |
+//! |---|---|---|
+//! | position forward, force back | `direct.rs` | as plain scaling |
+//! | wave variables | `wave.rs`, `wave_line.rs` | Niemeyer & Slotine 1991, 1998, 2004 |
+//! | time-domain passivity | `passivity.rs` | Hannaford & Ryu 2002; Ryu, Artigas & Preusche 2010 |
+//! | position-position | `position_position.rs` | Lee & Spong 2006; Nuño, Basañez & Ortega 2011 |
+//! | four channels | `four_channel.rs` | Lawrence 1993; Hashtrudi-Zaad & Salcudean 2002 |
+//! | virtual coupling | `virtual_coupling.rs` | Colgate & Schenkel 1997; Adams & Hannaford 1999 |
+
+mod direct;
+pub mod four_channel;
+pub mod node;
+pub mod passivity;
+pub mod position_position;
+mod proxy;
+#[cfg(test)]
+mod tests;
+mod velocity;
+pub mod virtual_coupling;
+pub mod wave;
+pub mod wave_line;
+
+/// What a side knows of its own device at a step, in the slave's units.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Own {
+    /// Near: mu times the master's position; far: the slave's position; m or rad.
+    pub position: f64,
+    /// Its velocity, m/s or rad/s.
+    pub velocity: f64,
+    /// By how much the position has changed since the step before, m or rad.
+    pub moved: f64,
+    /// Near: force of the hand on the master, over lambda; far: force of the environment on the slave; N or N m.
+    pub force: f64,
+    /// Near: mu*lambda, by which an inertia of the master is divided to be one in the slave's units; far: not used.
+    pub power_scale: f64,
+}
+
+/// What one side sends to the other, one number each; what they mean is the law's affair and stands in its file.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Packet {
+    /// Travels as a sample's position.
+    pub position: f64,
+    /// Travels as a sample's velocity.
+    pub velocity: f64,
+    /// Travels as a sample's effort.
+    pub effort: f64,
+}
+
+/// A packet that has come in this step.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Heard {
+    /// The packet.
+    pub packet: Packet,
+    /// Steps of the sender between the packet before and this one: 1 where none was lost or overtaken.
+    pub steps: u64,
+}
+
+/// The side at the master.
+pub trait Near: Send {
+    /// One step of `period_s`: the force on the master's motor, N or N m in the slave's units, and what is sent. `heard` is the
+    /// packet that has come in this step, if one has.
+    fn step(&mut self, own: &Own, heard: Option<&Heard>, period_s: f64) -> (f64, Packet);
+}
+
+/// The side at the slave.
+pub trait Far: Send {
+    /// One step of `period_s`: where the slave shall be, m or rad, and what is sent.
+    fn step(&mut self, own: &Own, heard: Option<&Heard>, period_s: f64) -> (f64, Packet);
+}
+
+/// What a law's values by default are derived from.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Conditions {
+    /// Time of one step, s.
+    pub period_s: f64,
+    /// Longest time from a motion of the master to the force that answers it, by the graph's delays and jitter, s.
+    pub round_trip_s: f64,
+}
+
+/// A law with its settings.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Law {
+    /// Position forward, measured force back.
+    Direct,
+    /// Wave variables.
+    Wave(wave::Settings),
+    /// Passivity observer and controller at both ports.
+    Passivity(passivity::Settings),
+    /// Both positions are sent, a spring pulls them together.
+    PositionPosition(position_position::Settings),
+    /// Positions and forces both ways.
+    FourChannel(four_channel::Settings),
+    /// Spring and damper in front of what is touched, damping at the master.
+    VirtualCoupling(virtual_coupling::Settings),
+}
+
+impl Law {
+    /// Names in graph files, with the law as it is by default.
+    pub const ALL: [(&'static str, Law); 6] = [
+        ("direct", Law::Direct),
+        ("wave", Law::Wave(wave::Settings::DEFAULT)),
+        ("passivity", Law::Passivity(passivity::Settings::DEFAULT)),
+        ("position_position", Law::PositionPosition(position_position::Settings::DEFAULT)),
+        ("four_channel", Law::FourChannel(four_channel::Settings::DEFAULT)),
+        ("virtual_coupling", Law::VirtualCoupling(virtual_coupling::Settings::DEFAULT)),
+    ];
+
+    /// Its name in graph files.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Law::Direct => "direct",
+            Law::Wave(_) => "wave",
+            Law::Passivity(_) => "passivity",
+            Law::PositionPosition(_) => "position_position",
+            Law::FourChannel(_) => "four_channel",
+            Law::VirtualCoupling(_) => "virtual_coupling",
+        }
+    }
+
+    /// Whether it needs to know the force of the hand on the master.
+    pub fn needs_hand(&self) -> bool {
+        matches!(self, Law::FourChannel(_))
+    }
+
+    /// The side at the master.
+    pub fn near(&self, conditions: &Conditions) -> Box<dyn Near> {
+        match self {
+            Law::Direct => Box::new(direct::NearSide::default()),
+            Law::Wave(settings) => Box::new(wave::NearSide::new(settings)),
+            Law::Passivity(_) => Box::new(passivity::NearSide::default()),
+            Law::PositionPosition(settings) => Box::new(position_position::NearSide::new(settings, conditions)),
+            Law::FourChannel(settings) => Box::new(four_channel::NearSide::new(settings)),
+            Law::VirtualCoupling(settings) => Box::new(virtual_coupling::NearSide::new(settings, conditions)),
+        }
+    }
+
+    /// The side at the slave.
+    pub fn far(&self, conditions: &Conditions) -> Box<dyn Far> {
+        match self {
+            Law::Direct => Box::new(direct::FarSide::default()),
+            Law::Wave(settings) => Box::new(wave::FarSide::new(settings)),
+            Law::Passivity(settings) => Box::new(passivity::FarSide::new(settings)),
+            Law::PositionPosition(settings) => Box::new(position_position::FarSide::new(settings, conditions)),
+            Law::FourChannel(settings) => Box::new(four_channel::FarSide::new(settings)),
+            Law::VirtualCoupling(settings) => Box::new(virtual_coupling::FarSide::new(settings)),
+        }
+    }
+}

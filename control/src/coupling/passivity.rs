@@ -1,0 +1,124 @@
+//! Time-domain passivity: energy is observed at both ports, and what comes out is cut to what went in at the other.
+//!
+//! Hannaford & Ryu, "Time-domain passivity control of haptic interfaces", IEEE Trans. Robotics and Automation 18, 2002; with a
+//! delay, Ryu, Artigas & Preusche, "A passive bilateral control scheme for a teleoperator with time-varying communication delay",
+//! Mechatronics 20, 2010. The energy that has gone in at a port is sent along; as it only grows, an old value is never too much.
+//! So at each port, at every step: energy out <= energy that went in at the other port, as last heard, whatever the link does.
+//!
+//! At the master the controller takes force away (a damper beside the port), at the slave it takes motion away (a damper in line).
+//! Motion that was taken leaves the slave behind; it catches up as the energy allows (after Artigas, Ryu & Preusche 2010).
+//!
+//! Packets: forward position as position, energy in as effort; back the force of the environment as velocity, energy in as
+//! effort, and the slave's position.
+
+use super::{Far, Heard, Near, Own, Packet};
+
+/// Settings.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Settings {
+    /// Time in which a slave that was held back catches up, s.
+    pub catch_up_s: f64,
+}
+
+impl Settings {
+    /// A tenth of a second: no jump that a hand would feel.
+    pub const DEFAULT: Settings = Settings { catch_up_s: 0.1 };
+}
+
+/// The passivity observer of one port, J.
+#[derive(Debug, Clone, Default)]
+pub struct Observer {
+    /// Went in here.
+    pub energy_in: f64,
+    /// Came out here.
+    pub energy_out: f64,
+    /// Went in at the other port, as last heard.
+    pub allowed: f64,
+}
+
+impl Observer {
+    /// What may still come out, J: never below 0 but for rounding.
+    pub fn budget(&self) -> f64 {
+        self.allowed - self.energy_out
+    }
+
+    /// Hears how much went in at the other port.
+    fn hear(&mut self, energy: f64) {
+        self.allowed = self.allowed.max(energy);
+    }
+
+    /// The controller: the share of a work that would come out (J, positive) which may. Counts it.
+    fn pass(&mut self, work: f64) -> f64 {
+        if work <= 0.0 {
+            self.energy_in -= work;
+            return 1.0;
+        }
+        let passed = work.min(self.budget().max(0.0));
+        self.energy_out += passed;
+        passed / work
+    }
+}
+
+/// The side at the master.
+#[derive(Debug, Default)]
+pub struct NearSide {
+    observer: Observer,
+    contact: f64,
+}
+
+impl NearSide {
+    /// What it has observed.
+    pub fn observer(&self) -> &Observer {
+        &self.observer
+    }
+}
+
+impl Near for NearSide {
+    fn step(&mut self, own: &Own, heard: Option<&Heard>, _period_s: f64) -> (f64, Packet) {
+        if let Some(heard) = heard {
+            self.contact = heard.packet.velocity;
+            self.observer.hear(heard.packet.effort);
+        }
+        let force = self.contact * self.observer.pass(self.contact * own.moved);
+        (force, Packet { position: own.position, velocity: own.velocity, effort: self.observer.energy_in })
+    }
+}
+
+/// The side at the slave.
+#[derive(Debug)]
+pub struct FarSide {
+    observer: Observer,
+    catch_up_s: f64,
+    /// Where the slave shall be, and where the master was when last heard.
+    command: Option<f64>,
+    wanted: f64,
+}
+
+impl FarSide {
+    /// At rest.
+    pub fn new(settings: &Settings) -> FarSide {
+        FarSide { observer: Observer::default(), catch_up_s: settings.catch_up_s, command: None, wanted: 0.0 }
+    }
+
+    /// What it has observed.
+    pub fn observer(&self) -> &Observer {
+        &self.observer
+    }
+}
+
+impl Far for FarSide {
+    fn step(&mut self, own: &Own, heard: Option<&Heard>, period_s: f64) -> (f64, Packet) {
+        let before = self.command.unwrap_or(own.position);
+        let mut moved = 0.0;
+        if let Some(heard) = heard {
+            moved = if self.command.is_some() { heard.packet.position - self.wanted } else { 0.0 };
+            self.wanted = heard.packet.position;
+            self.observer.hear(heard.packet.effort);
+        }
+        let behind = self.wanted - before - moved;
+        let motion = moved + behind * (period_s / self.catch_up_s).min(1.0);
+        let command = before + motion * self.observer.pass(-own.force * motion);
+        self.command = Some(command);
+        (command, Packet { position: own.position, velocity: own.force, effort: self.observer.energy_in })
+    }
+}

@@ -1,0 +1,82 @@
+//! Keys of a coupling: which law, and the values of each law in a table of its name; and the link of a graph that has one.
+//!
+//! All tables are read and checked, whichever law is in force: so one word, `law`, swaps the law and nothing else.
+
+use super::{Graph, NodeKind};
+use crate::stage::Impairment;
+use backdrive_control::coupling::{Law, four_channel, passivity, position_position, virtual_coupling, wave};
+use backdrive_plant::elements::Range;
+use backdrive_plant::tomlfile::{FileError, Table};
+
+/// Corner of the low-pass of velocities where the file names none, Hz.
+const VELOCITY_HZ: f64 = 100.0;
+
+/// Reads `law`, `velocity_hz` and the laws' own tables: the law in force, and the corner of the velocities' low-pass, Hz.
+pub(super) fn read(table: &mut Table) -> Result<(Law, f64), FileError> {
+    let chosen = table.need_one_of("law", &Law::ALL)?;
+    let velocity_hz = table.number_or("velocity_hz", Range::Positive, VELOCITY_HZ)?;
+    let mut law = chosen;
+    for (name, default) in Law::ALL {
+        let Some(mut keys) = table.table(name)? else { continue };
+        let read = settings(default, &mut keys)?;
+        keys.finish()?;
+        if read.name() == chosen.name() {
+            law = read;
+        }
+    }
+    Ok((law, velocity_hz))
+}
+
+fn settings(law: Law, keys: &mut Table) -> Result<Law, FileError> {
+    Ok(match law {
+        Law::Direct => Law::Direct,
+        Law::Wave(d) => Law::Wave(wave::Settings {
+            impedance: keys.number_or("impedance", Range::Positive, d.impedance)?,
+            stiffness: keys.number_or("stiffness", Range::Positive, d.stiffness)?,
+            damping: keys.number("damping", Range::Positive)?,
+            mass: keys.number_or("mass", Range::Positive, d.mass)?,
+        }),
+        Law::Passivity(d) => {
+            Law::Passivity(passivity::Settings { catch_up_s: keys.number_or("catch_up_s", Range::Positive, d.catch_up_s)? })
+        }
+        Law::PositionPosition(d) => Law::PositionPosition(position_position::Settings {
+            stiffness: keys.number_or("stiffness", Range::Positive, d.stiffness)?,
+            damping: keys.number("damping", Range::NonNegative)?,
+            mass: keys.number_or("mass", Range::Positive, d.mass)?,
+        }),
+        Law::FourChannel(d) => Law::FourChannel(four_channel::Settings {
+            stiffness: keys.number_or("stiffness", Range::Positive, d.stiffness)?,
+            damping: keys.number("damping", Range::NonNegative)?,
+            mass: keys.number_or("mass", Range::Positive, d.mass)?,
+            master_mass: keys.number_or("master_mass", Range::NonNegative, d.master_mass)?,
+        }),
+        Law::VirtualCoupling(d) => Law::VirtualCoupling(virtual_coupling::Settings {
+            stiffness: keys.number_or("stiffness", Range::Positive, d.stiffness)?,
+            damping: keys.number_or("damping", Range::Positive, d.damping)?,
+            injection: keys.number("injection", Range::NonNegative)?,
+        }),
+    })
+}
+
+/// Longest time round the loop that the graph's delays and jitter make, s; 0 without a coupling.
+pub fn round_trip_s(graph: &Graph) -> f64 {
+    let at = |node: usize| graph.nodes.get(node).is_some_and(|n| n.kind == NodeKind::Coupling);
+    let in_loop = graph.connections.iter().filter(|c| at(c.to.0) && matches!(c.to.1.as_str(), "motion" | "contact") || at(c.from.0));
+    in_loop.map(|c| c.delay as f64 * graph.period_s() + c.impairment.map_or(0.0, |i| i.delay_s + i.jitter_s)).sum()
+}
+
+impl Graph {
+    /// Impairs the link of the graph's coupling, both ways alike; each way draws its own jitter and loss.
+    pub fn impair_link(&mut self, impairment: Option<Impairment>) {
+        for connection in &mut self.connections {
+            let way = match connection.from.1.as_str() {
+                "to_far" => 0,
+                "to_near" => 1,
+                _ => continue,
+            };
+            if self.nodes.get(connection.from.0).is_some_and(|n| n.kind == NodeKind::Coupling) {
+                connection.impairment = impairment.map(|i| Impairment { seed: i.seed.wrapping_mul(2).wrapping_add(way), ..i });
+            }
+        }
+    }
+}
