@@ -4,6 +4,7 @@
 mod bag;
 mod bridge;
 mod changes;
+mod compare;
 mod diagnose;
 mod doctor;
 mod fit;
@@ -24,6 +25,7 @@ mod values;
 
 pub use bag::Bag;
 pub use bridge::Bridge;
+pub use compare::Compare;
 pub use diagnose::Diagnose;
 pub use doctor::Doctor;
 pub use fit::Fit;
@@ -74,6 +76,9 @@ pub enum Command {
     /// Ask a bag whether its loop would be stable at another gain, and how far away the edge is.
     #[command(after_help = stability::HELP)]
     Stability(Stability),
+    /// Run the same hand through each law between master and slave, and through the canceller: edge, transparency, tracking, effort.
+    #[command(after_help = compare::HELP)]
+    Compare(Compare),
     /// Write a model and a set for recordings of your own: asks what is driven and what is measured, and checks what it wrote.
     #[command(after_help = init::HELP)]
     Init(Init),

@@ -30,10 +30,6 @@ pub struct SwappedParts {
     /// Corner of a high-pass on the canceller's estimate; 0 for none.
     #[arg(long, value_name = "HZ", value_parser = not_negative, allow_negative_numbers = true)]
     pub high_pass: Option<f64>,
-    /// Law between master and slave: the one of the graph's coupling, or of a coupling that takes the place of its scaling; see
-    /// docs/couplings.md.
-    #[arg(long, value_name = "LAW", value_parser = law())]
-    pub coupling: Option<String>,
     /// Whether sensors round and are noisy as the model files say.
     #[arg(long, value_enum)]
     pub sensors: Option<Sensors>,
@@ -53,7 +49,6 @@ impl SwappedParts {
             canceller: self.canceller.clone(),
             canceller_grip: self.canceller_grip.clone(),
             high_pass_hz: self.high_pass,
-            coupling: self.coupling.clone(),
             sensors: self.sensors.map(|s| s.word().to_string()),
             limits: self.limits.map(|l| l.word().to_string()),
             ..Overrides::default()
@@ -106,6 +101,10 @@ pub struct Changes {
     #[command(flatten)]
     #[allow(missing_docs)]
     pub parts: SwappedParts,
+    /// Law between master and slave: the one of the graph's coupling, or of a coupling that takes the place of its scaling; see
+    /// docs/couplings.md.
+    #[arg(long, value_name = "LAW", value_parser = law())]
+    pub coupling: Option<String>,
     /// Position scale from master to slave.
     #[arg(long, value_parser = not_negative, allow_negative_numbers = true)]
     pub mu: Option<f64>,
@@ -148,6 +147,7 @@ impl Changes {
         Overrides {
             mu: self.mu,
             lambda: self.lambda,
+            coupling: self.coupling.clone(),
             dither: self.dither.clone(),
             guard: self.guard.then_some(true),
             bag: self.bag.clone(),

@@ -2,6 +2,7 @@
 
 use backdrive_control::coupling::Law;
 use backdrive_nodes::graph::MAX_RATE_HZ;
+use backdrive_stability::compare::Rival;
 use clap::builder::PossibleValuesParser;
 
 /// s, how long a search may take on the clock where nothing else is said: the library's own.
@@ -27,6 +28,11 @@ pub fn positive(text: &str) -> Result<f64, String> {
 /// A law of a coupling.
 pub fn law() -> PossibleValuesParser {
     PossibleValuesParser::new(Law::ALL.map(|(name, _)| name))
+}
+
+/// What is compared: a law of a coupling, or the canceller.
+pub fn rival() -> PossibleValuesParser {
+    PossibleValuesParser::new(Rival::all().into_iter().map(Rival::word))
 }
 
 /// Steps per second.

@@ -3,7 +3,7 @@
 //! Packets: forward the position that the slave shall have; back the force of the environment on the slave as effort. It is passive
 //! with no delay at all, and only where the slave is where it shall be.
 
-use super::{Far, Heard, Near, Own, Packet};
+use super::{Far, Near, Own, Packet};
 
 /// The side at the master: it plays the newest contact force.
 #[derive(Debug, Default)]
@@ -12,9 +12,9 @@ pub(super) struct NearSide {
 }
 
 impl Near for NearSide {
-    fn step(&mut self, own: &Own, heard: Option<&Heard>, _period_s: f64) -> (f64, Packet) {
+    fn step(&mut self, own: &Own, heard: Option<&Packet>, _period_s: f64) -> (f64, Packet) {
         if let Some(heard) = heard {
-            self.contact = heard.packet.effort;
+            self.contact = heard.effort;
         }
         (self.contact, Packet { position: own.position, ..Packet::default() })
     }
@@ -27,9 +27,9 @@ pub(super) struct FarSide {
 }
 
 impl Far for FarSide {
-    fn step(&mut self, own: &Own, heard: Option<&Heard>, _period_s: f64) -> (f64, Packet) {
+    fn step(&mut self, own: &Own, heard: Option<&Packet>, _period_s: f64) -> (f64, Packet) {
         if let Some(heard) = heard {
-            self.command = Some(heard.packet.position);
+            self.command = Some(heard.position);
         }
         (self.command.unwrap_or(own.position), Packet { position: own.position, effort: own.force, ..Packet::default() })
     }

@@ -3,18 +3,19 @@
 //! Lawrence, "Stability and transparency in bilateral teleoperation", IEEE Trans. Robotics and Automation 9, 1993, with the choice
 //! that is transparent: C1 = Z_s + C_s, C2 = C3 = 1, C4 = -(Z_m + C_m). The slave's side is exact, for the inertia that stands for
 //! the slave is the law's own: x_s = x_m + d, where M d'' + B d' + K d = F_hand + F_environment. At the master C_m = B + K/s acts
-//! between the positions, and the term of its inertia Z_m = m s needs the master's acceleration. That is not differentiated but
-//! taken from the forces, m a = F_hand + F, which makes it a local feedback of the hand's force (Hashtrudi-Zaad & Salcudean,
+//! between the positions, and the term of its inertia Z_m = m s needs the slave's acceleration. That is not differentiated but taken
+//! from forces: a_s = a_m + d'' with m a_m = F_hand + F, for which the hand's force is known here (Hashtrudi-Zaad & Salcudean,
 //! "Transparency in time-delayed systems and the effect of local force feedback", IEEE Trans. Robotics and Automation 18, 2002).
-//! Without `master_mass` that term is left out, and the hand feels the master's inertia.
+//! As F then depends on the F of the step before, only a share of the inertia may be taken away, below 1. Without `master_mass` the
+//! term is left out, and the hand feels the master's inertia.
 //!
-//! With ideal parts and no delay the impedance that the hand feels is that of the environment. With a delay it is not passive.
+//! With ideal parts and no delay the impedance that the hand feels is that of the environment and what is left of the inertia. With a delay it is not passive.
 //!
 //! Packets: forward position, acceleration (as velocity) and force of the hand; back x_s + (B/K) v_s as position, the slave's
 //! acceleration (as velocity) and the force of the environment.
 
 use super::proxy::Proxy;
-use super::{Far, Heard, Near, Own, Packet};
+use super::{Far, Near, Own, Packet};
 
 /// Settings; all of the slave's units but the master's inertia.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -25,13 +26,15 @@ pub struct Settings {
     pub damping: Option<f64>,
     /// Inertia that stands for the slave, kg or kg m2.
     pub mass: f64,
-    /// Inertia of the master that is taken away, kg or kg m2 at the master; 0 for none.
+    /// Inertia of the master, kg or kg m2 at the master; 0 where it is not to be taken away.
     pub master_mass: f64,
+    /// Share of the master's inertia that is taken away, from 0 to below 1.
+    pub compensation: f64,
 }
 
 impl Settings {
     /// For a hand-held device in translation.
-    pub const DEFAULT: Settings = Settings { stiffness: 2000.0, damping: None, mass: 0.2, master_mass: 0.0 };
+    pub const DEFAULT: Settings = Settings { stiffness: 2000.0, damping: None, mass: 0.2, master_mass: 0.0, compensation: 0.8 };
 
     fn damping(&self) -> f64 {
         self.damping.unwrap_or(2.0 * (self.stiffness * self.mass).sqrt())
@@ -53,19 +56,18 @@ impl NearSide {
 }
 
 impl Near for NearSide {
-    fn step(&mut self, own: &Own, heard: Option<&Heard>, _period_s: f64) -> (f64, Packet) {
-        let Settings { stiffness, master_mass, .. } = self.settings;
-        self.slave = heard.map(|h| h.packet).or(self.slave);
+    fn step(&mut self, own: &Own, heard: Option<&Packet>, _period_s: f64) -> (f64, Packet) {
+        let Settings { stiffness, master_mass, compensation, .. } = self.settings;
+        self.slave = heard.copied().or(self.slave);
         let Some(slave) = self.slave else {
             return (0.0, Packet { position: own.position, velocity: 0.0, effort: own.force });
         };
         let here = own.position + self.settings.damping() / stiffness * own.velocity;
         let pull = slave.effort - stiffness * (here - slave.position);
         let (force, acceleration) = match master_mass > 0.0 && own.power_scale > 0.0 {
-            // F = pull - m (a - a_s) with m a = F_hand + F.
             true => {
                 let inertia = master_mass / own.power_scale;
-                let force = 0.5 * (pull + inertia * slave.velocity - own.force);
+                let force = pull + compensation * inertia * slave.velocity;
                 (force, (own.force + force) / inertia)
             }
             false => (pull, 0.0),
@@ -91,8 +93,8 @@ impl FarSide {
 }
 
 impl Far for FarSide {
-    fn step(&mut self, own: &Own, heard: Option<&Heard>, period_s: f64) -> (f64, Packet) {
-        self.master = heard.map(|h| h.packet).or(self.master);
+    fn step(&mut self, own: &Own, heard: Option<&Packet>, period_s: f64) -> (f64, Packet) {
+        self.master = heard.copied().or(self.master);
         let Settings { stiffness, .. } = self.settings;
         let position = own.position + self.settings.damping() / stiffness * own.velocity;
         let Some(master) = self.master else {

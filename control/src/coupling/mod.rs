@@ -56,26 +56,17 @@ pub struct Packet {
     pub effort: f64,
 }
 
-/// A packet that has come in this step.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Heard {
-    /// The packet.
-    pub packet: Packet,
-    /// Steps of the sender between the packet before and this one: 1 where none was lost or overtaken.
-    pub steps: u64,
-}
-
 /// The side at the master.
 pub trait Near: Send {
     /// One step of `period_s`: the force on the master's motor, N or N m in the slave's units, and what is sent. `heard` is the
     /// packet that has come in this step, if one has.
-    fn step(&mut self, own: &Own, heard: Option<&Heard>, period_s: f64) -> (f64, Packet);
+    fn step(&mut self, own: &Own, heard: Option<&Packet>, period_s: f64) -> (f64, Packet);
 }
 
 /// The side at the slave.
 pub trait Far: Send {
     /// One step of `period_s`: where the slave shall be, m or rad, and what is sent.
-    fn step(&mut self, own: &Own, heard: Option<&Heard>, period_s: f64) -> (f64, Packet);
+    fn step(&mut self, own: &Own, heard: Option<&Packet>, period_s: f64) -> (f64, Packet);
 }
 
 /// What a law's values by default are derived from.
@@ -137,7 +128,7 @@ impl Law {
         match self {
             Law::Direct => Box::new(direct::NearSide::default()),
             Law::Wave(settings) => Box::new(wave::NearSide::new(settings)),
-            Law::Passivity(_) => Box::new(passivity::NearSide::default()),
+            Law::Passivity(settings) => Box::new(passivity::NearSide::new(settings)),
             Law::PositionPosition(settings) => Box::new(position_position::NearSide::new(settings, conditions)),
             Law::FourChannel(settings) => Box::new(four_channel::NearSide::new(settings)),
             Law::VirtualCoupling(settings) => Box::new(virtual_coupling::NearSide::new(settings, conditions)),

@@ -1,7 +1,7 @@
 //! A coupling as a node: a stage at the master, a stage at the slave, and two connections between them that are the link.
 
 use super::velocity::Velocity;
-use super::{Conditions, Far, Heard, Law, Near, Own, Packet};
+use super::{Conditions, Far, Law, Near, Own, Packet};
 use crate::core::{Core, Events, Port, Tick};
 use crate::freshness::Freshness;
 use crate::scaling::{GainPlan, Ramp};
@@ -13,7 +13,6 @@ const LEAST_LAMBDA: f64 = 1e-9;
 /// The end of the link at one side.
 struct Link {
     fresh: Freshness,
-    newest_step: Option<u64>,
     hold_steps: u64,
     /// What was heard last comes of a side that hears nothing itself.
     outdated: bool,
@@ -22,16 +21,14 @@ struct Link {
 impl Link {
     fn new(stale_after_s: f64, period_s: f64) -> Link {
         let hold_steps = ((stale_after_s / period_s).round() as u64).max(1);
-        Link { fresh: Freshness::default(), newest_step: None, hold_steps, outdated: false }
+        Link { fresh: Freshness::default(), hold_steps, outdated: false }
     }
 
-    /// The new packets of all axes and how many steps of the sender they stand for, if any have come.
-    fn hear(&mut self, port: &Port) -> Option<(Sample, u64)> {
+    /// The new packets of all axes, if any have come.
+    fn hear(&mut self, port: &Port) -> Option<Sample> {
         let sample = *self.fresh.new_sample(port, |s| s.position[0])?;
-        let steps = self.newest_step.map_or(sample.step.saturating_add(1), |before| sample.step.saturating_sub(before));
-        self.newest_step = Some(sample.step);
         self.outdated = sample.flags & flag::STALE != 0;
-        Some((sample, steps))
+        Some(sample)
     }
 
     /// Whether packets came and have stopped coming.
@@ -40,11 +37,10 @@ impl Link {
     }
 }
 
-fn heard(sample: Option<&(Sample, u64)>, axis: usize) -> Option<Heard> {
-    let (sample, steps) = sample?;
+fn heard(sample: Option<&Sample>, axis: usize) -> Option<Packet> {
+    let sample = sample?;
     let packet = Packet { position: sample.position[axis], velocity: sample.velocity[axis], effort: sample.effort[axis] };
-    let whole = packet.position.is_finite() && packet.velocity.is_finite() && packet.effort.is_finite();
-    whole.then_some(Heard { packet, steps: *steps })
+    (packet.position.is_finite() && packet.velocity.is_finite() && packet.effort.is_finite()).then_some(packet)
 }
 
 fn say(sample: &mut Sample, axis: usize, packet: Packet) {

@@ -8,21 +8,28 @@
 //! At the master the controller takes force away (a damper beside the port), at the slave it takes motion away (a damper in line).
 //! Motion that was taken leaves the slave behind; it catches up as the energy allows (after Artigas, Ryu & Preusche 2010).
 //!
+//! A slave that may give out only what has come in at the master cannot press before a force was felt there, and none is felt before
+//! it presses: with a measured force the two wait for each other. So a damper at the master collects energy from its motion (Franken,
+//! Stramigioli, Misra, Secchi & Macchelli, "Bilateral telemanipulation with time delays: a two-layer approach combining passivity
+//! and transparency", IEEE Trans. Robotics 27, 2011), and what it takes counts as gone in.
+//!
 //! Packets: forward position as position, energy in as effort; back the force of the environment as velocity, energy in as
 //! effort, and the slave's position.
 
-use super::{Far, Heard, Near, Own, Packet};
+use super::{Far, Near, Own, Packet};
 
 /// Settings.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Settings {
     /// Time in which a slave that was held back catches up, s.
     pub catch_up_s: f64,
+    /// Damping at the master that collects energy for the slave, N s/m or N m s/rad in the slave's units; 0 for none.
+    pub harvest: f64,
 }
 
 impl Settings {
-    /// A tenth of a second: no jump that a hand would feel.
-    pub const DEFAULT: Settings = Settings { catch_up_s: 0.1 };
+    /// A tenth of a second, in which no jump is felt, and a damping below that of a hand.
+    pub const DEFAULT: Settings = Settings { catch_up_s: 0.1, harvest: 10.0 };
 }
 
 /// The passivity observer of one port, J.
@@ -60,13 +67,19 @@ impl Observer {
 }
 
 /// The side at the master.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct NearSide {
     observer: Observer,
     contact: f64,
+    harvest: f64,
 }
 
 impl NearSide {
+    /// At rest.
+    pub fn new(settings: &Settings) -> NearSide {
+        NearSide { observer: Observer::default(), contact: 0.0, harvest: settings.harvest }
+    }
+
     /// What it has observed.
     pub fn observer(&self) -> &Observer {
         &self.observer
@@ -74,12 +87,13 @@ impl NearSide {
 }
 
 impl Near for NearSide {
-    fn step(&mut self, own: &Own, heard: Option<&Heard>, _period_s: f64) -> (f64, Packet) {
+    fn step(&mut self, own: &Own, heard: Option<&Packet>, _period_s: f64) -> (f64, Packet) {
         if let Some(heard) = heard {
-            self.contact = heard.packet.velocity;
-            self.observer.hear(heard.packet.effort);
+            self.contact = heard.velocity;
+            self.observer.hear(heard.effort);
         }
-        let force = self.contact * self.observer.pass(self.contact * own.moved);
+        let force = self.contact - self.harvest * own.velocity;
+        let force = force * self.observer.pass(force * own.moved);
         (force, Packet { position: own.position, velocity: own.velocity, effort: self.observer.energy_in })
     }
 }
@@ -107,13 +121,13 @@ impl FarSide {
 }
 
 impl Far for FarSide {
-    fn step(&mut self, own: &Own, heard: Option<&Heard>, period_s: f64) -> (f64, Packet) {
+    fn step(&mut self, own: &Own, heard: Option<&Packet>, period_s: f64) -> (f64, Packet) {
         let before = self.command.unwrap_or(own.position);
         let mut moved = 0.0;
         if let Some(heard) = heard {
-            moved = if self.command.is_some() { heard.packet.position - self.wanted } else { 0.0 };
-            self.wanted = heard.packet.position;
-            self.observer.hear(heard.packet.effort);
+            moved = if self.command.is_some() { heard.position - self.wanted } else { 0.0 };
+            self.wanted = heard.position;
+            self.observer.hear(heard.effort);
         }
         let behind = self.wanted - before - moved;
         let motion = moved + behind * (period_s / self.catch_up_s).min(1.0);

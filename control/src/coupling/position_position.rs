@@ -9,7 +9,7 @@
 //! Packets: position and velocity of the own device, both ways.
 
 use super::proxy::Proxy;
-use super::{Conditions, Far, Heard, Near, Own, Packet};
+use super::{Conditions, Far, Near, Own, Packet};
 
 /// Settings; all of the slave's units.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -54,8 +54,8 @@ impl NearSide {
 }
 
 impl Near for NearSide {
-    fn step(&mut self, own: &Own, heard: Option<&Heard>, _period_s: f64) -> (f64, Packet) {
-        self.other = heard.map(|h| h.packet.position).or(self.other);
+    fn step(&mut self, own: &Own, heard: Option<&Packet>, _period_s: f64) -> (f64, Packet) {
+        self.other = heard.map(|h| h.position).or(self.other);
         let pull = self.other.map_or(0.0, |other| self.stiffness * (other - own.position));
         (pull - self.damping * own.velocity, Packet { position: own.position, velocity: own.velocity, effort: 0.0 })
     }
@@ -79,12 +79,12 @@ impl FarSide {
 }
 
 impl Far for FarSide {
-    fn step(&mut self, own: &Own, heard: Option<&Heard>, period_s: f64) -> (f64, Packet) {
+    fn step(&mut self, own: &Own, heard: Option<&Packet>, period_s: f64) -> (f64, Packet) {
         if !self.began {
             self.proxy.position = own.position;
             self.began = true;
         }
-        self.other = heard.map(|h| h.packet.position).or(self.other);
+        self.other = heard.map(|h| h.position).or(self.other);
         if let Some(other) = self.other {
             // The spring at the end of the step, which depends on the velocity that it causes.
             let (a, c) = self.proxy.answer(period_s);

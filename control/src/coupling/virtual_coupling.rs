@@ -11,7 +11,7 @@
 //!
 //! Packets: forward position and velocity; back the force of the coupling as effort, and the slave's position.
 
-use super::{Conditions, Far, Heard, Near, Own, Packet};
+use super::{Conditions, Far, Near, Own, Packet};
 
 /// Settings; all of the slave's units.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -54,14 +54,14 @@ impl NearSide {
 }
 
 impl Near for NearSide {
-    fn step(&mut self, own: &Own, heard: Option<&Heard>, _period_s: f64) -> (f64, Packet) {
-        self.coupling = heard.map_or(self.coupling, |h| h.packet.effort);
+    fn step(&mut self, own: &Own, heard: Option<&Packet>, _period_s: f64) -> (f64, Packet) {
+        self.coupling = heard.map_or(self.coupling, |h| h.effort);
         (self.coupling - self.injection * own.velocity, Packet { position: own.position, velocity: own.velocity, effort: 0.0 })
     }
 }
 
 /// The side at the slave: the coupling.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct FarSide {
     stiffness: f64,
     damping: f64,
@@ -77,8 +77,8 @@ impl FarSide {
 }
 
 impl Far for FarSide {
-    fn step(&mut self, own: &Own, heard: Option<&Heard>, period_s: f64) -> (f64, Packet) {
-        self.master = heard.map(|h| h.packet).or(self.master);
+    fn step(&mut self, own: &Own, heard: Option<&Packet>, period_s: f64) -> (f64, Packet) {
+        self.master = heard.copied().or(self.master);
         let Some(master) = self.master else {
             return (own.position, Packet { position: own.position, ..Packet::default() });
         };

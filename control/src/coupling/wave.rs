@@ -10,7 +10,7 @@
 
 use super::proxy::Proxy;
 use super::wave_line::{Receiver, Sender};
-use super::{Far, Heard, Near, Own, Packet};
+use super::{Far, Near, Own, Packet};
 
 /// Settings; all of the slave's units.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -46,7 +46,7 @@ impl NearSide {
 }
 
 impl Near for NearSide {
-    fn step(&mut self, own: &Own, heard: Option<&Heard>, period_s: f64) -> (f64, Packet) {
+    fn step(&mut self, own: &Own, heard: Option<&Packet>, period_s: f64) -> (f64, Packet) {
         let root = (2.0 * self.impedance).sqrt();
         let back = self.receiver.receive(heard, period_s);
         let against = self.impedance * own.velocity - root * back;
@@ -89,7 +89,7 @@ impl FarSide {
 }
 
 impl Far for FarSide {
-    fn step(&mut self, own: &Own, heard: Option<&Heard>, period_s: f64) -> (f64, Packet) {
+    fn step(&mut self, own: &Own, heard: Option<&Packet>, period_s: f64) -> (f64, Packet) {
         if !self.began {
             self.proxy.position = own.position;
             self.began = true;

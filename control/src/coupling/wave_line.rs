@@ -5,7 +5,7 @@
 //! loss (Niemeyer & Slotine, "Towards force-reflecting teleoperation over the internet", ICRA 1998). With a constant delay and no
 //! loss it is the line of Anderson & Spong 1989: what comes out is what went in, one delay later.
 
-use super::{Heard, Packet};
+use super::Packet;
 
 /// The sending end.
 #[derive(Debug, Clone, Default)]
@@ -28,21 +28,23 @@ impl Sender {
 pub struct Receiver {
     arrived: Sender,
     played: Sender,
-    /// Steps over which what has arrived is still to be played.
-    steps: u64,
 }
 
 impl Receiver {
-    /// The wave of this step. What came for several steps at once is played over as many steps.
-    pub fn receive(&mut self, heard: Option<&Heard>, period_s: f64) -> f64 {
+    /// The wave of this step: what is outstanding of the integral, all at once where the energy that has arrived allows it, else evenly over
+    /// the fewest steps for which it does.
+    ///
+    /// An integral I played evenly over n steps of T costs I^2/(2 n T). What was sent as n equal waves has just that energy, however
+    /// many of its packets come at once.
+    pub fn receive(&mut self, heard: Option<&Packet>, period_s: f64) -> f64 {
         if let Some(heard) = heard {
-            self.arrived = Sender { integral: heard.packet.position, energy: heard.packet.effort };
-            self.steps = self.steps.max(heard.steps);
+            self.arrived = Sender { integral: heard.position, energy: heard.effort };
         }
-        let wanted = (self.arrived.integral - self.played.integral) / (self.steps.max(1) as f64 * period_s);
-        let most = (2.0 * self.reserve().max(0.0) / period_s).sqrt();
-        self.steps = self.steps.saturating_sub(1);
-        let wave = wanted.clamp(-most, most);
+        let outstanding = self.outstanding();
+        let at_once = outstanding / period_s;
+        let cost = 0.5 * outstanding * at_once;
+        let reserve = self.reserve().max(0.0);
+        let wave = if cost > reserve { at_once * reserve / cost } else { at_once };
         self.played.send(wave, period_s);
         wave
     }

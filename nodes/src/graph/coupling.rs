@@ -36,9 +36,10 @@ fn settings(law: Law, keys: &mut Table) -> Result<Law, FileError> {
             damping: keys.number("damping", Range::Positive)?,
             mass: keys.number_or("mass", Range::Positive, d.mass)?,
         }),
-        Law::Passivity(d) => {
-            Law::Passivity(passivity::Settings { catch_up_s: keys.number_or("catch_up_s", Range::Positive, d.catch_up_s)? })
-        }
+        Law::Passivity(d) => Law::Passivity(passivity::Settings {
+            catch_up_s: keys.number_or("catch_up_s", Range::Positive, d.catch_up_s)?,
+            harvest: keys.number_or("harvest", Range::NonNegative, d.harvest)?,
+        }),
         Law::PositionPosition(d) => Law::PositionPosition(position_position::Settings {
             stiffness: keys.number_or("stiffness", Range::Positive, d.stiffness)?,
             damping: keys.number("damping", Range::NonNegative)?,
@@ -49,6 +50,7 @@ fn settings(law: Law, keys: &mut Table) -> Result<Law, FileError> {
             damping: keys.number("damping", Range::NonNegative)?,
             mass: keys.number_or("mass", Range::Positive, d.mass)?,
             master_mass: keys.number_or("master_mass", Range::NonNegative, d.master_mass)?,
+            compensation: compensation(keys, d.compensation)?,
         }),
         Law::VirtualCoupling(d) => Law::VirtualCoupling(virtual_coupling::Settings {
             stiffness: keys.number_or("stiffness", Range::Positive, d.stiffness)?,
@@ -56,6 +58,17 @@ fn settings(law: Law, keys: &mut Table) -> Result<Law, FileError> {
             injection: keys.number("injection", Range::NonNegative)?,
         }),
     })
+}
+
+/// The share of the master's inertia that is taken away.
+fn compensation(keys: &mut Table, default: f64) -> Result<f64, FileError> {
+    let share = keys.number_or("compensation", Range::NonNegative, default)?;
+    match share < 1.0 {
+        true => Ok(share),
+        false => {
+            Err(keys.error_at("compensation", format!("must be below 1, is {share}: all of an inertia cannot be taken away in steps")))
+        }
+    }
 }
 
 /// Longest time round the loop that the graph's delays and jitter make, s; 0 without a coupling.
