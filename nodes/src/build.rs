@@ -6,7 +6,6 @@ use crate::stage::{Clock, InputPort, NodePlan, OutputPort, PACE_PORT, Stage};
 use backdrive_control::canceller::Canceller;
 use backdrive_control::controller::Controller;
 use backdrive_control::core::{Core, Events, Port, Tick};
-use backdrive_control::coupling::Conditions;
 use backdrive_control::coupling::node::{FarNode, NearNode};
 use backdrive_control::cycle::CycleNode;
 use backdrive_control::device::{Device, DeviceError, DeviceOptions, DeviceRole};
@@ -247,7 +246,7 @@ fn cores(graph: &Graph, node: &Node) -> Result<Vec<Box<dyn Core>>, DeviceError> 
             ]
         }
         Settings::Coupling { law, velocity_hz } => {
-            let conditions = Conditions { period_s, round_trip_s: coupling::round_trip_s(graph) };
+            let conditions = coupling::conditions(graph);
             vec![
                 Box::new(NearNode::new(node.axes, law, graph.gains.clone(), &conditions, *velocity_hz, stale)),
                 Box::new(FarNode::new(node.axes, law, &conditions, stale)),

@@ -76,6 +76,8 @@ pub struct Conditions {
     pub period_s: f64,
     /// Longest time from a motion of the master to the force that answers it, by the graph's delays and jitter, s.
     pub round_trip_s: f64,
+    /// Steps from the motion of a step to the end of the step in which the force that answers it acts; 0 where it acts within the same step.
+    pub held_steps: u64,
 }
 
 /// A law with its settings.
@@ -128,7 +130,7 @@ impl Law {
         match self {
             Law::Direct => Box::new(direct::NearSide::default()),
             Law::Wave(settings) => Box::new(wave::NearSide::new(settings)),
-            Law::Passivity(settings) => Box::new(passivity::NearSide::new(settings)),
+            Law::Passivity(settings) => Box::new(passivity::NearSide::new(settings, conditions)),
             Law::PositionPosition(settings) => Box::new(position_position::NearSide::new(settings, conditions)),
             Law::FourChannel(settings) => Box::new(four_channel::NearSide::new(settings)),
             Law::VirtualCoupling(settings) => Box::new(virtual_coupling::NearSide::new(settings, conditions)),
@@ -140,7 +142,7 @@ impl Law {
         match self {
             Law::Direct => Box::new(direct::FarSide::default()),
             Law::Wave(settings) => Box::new(wave::FarSide::new(settings)),
-            Law::Passivity(settings) => Box::new(passivity::FarSide::new(settings)),
+            Law::Passivity(settings) => Box::new(passivity::FarSide::new(settings, conditions)),
             Law::PositionPosition(settings) => Box::new(position_position::FarSide::new(settings, conditions)),
             Law::FourChannel(settings) => Box::new(four_channel::FarSide::new(settings)),
             Law::VirtualCoupling(settings) => Box::new(virtual_coupling::FarSide::new(settings)),

@@ -2,9 +2,9 @@
 //!
 //! All tables are read and checked, whichever law is in force: so one word, `law`, swaps the law and nothing else.
 
-use super::{Graph, NodeKind};
+use super::{Connection, Graph, NodeKind};
 use crate::stage::Impairment;
-use backdrive_control::coupling::{Law, four_channel, passivity, position_position, virtual_coupling, wave};
+use backdrive_control::coupling::{Conditions, Law, four_channel, passivity, position_position, virtual_coupling, wave};
 use backdrive_plant::elements::Range;
 use backdrive_plant::tomlfile::{FileError, Table};
 
@@ -71,11 +71,20 @@ fn compensation(keys: &mut Table, default: f64) -> Result<f64, FileError> {
     }
 }
 
-/// Longest time round the loop that the graph's delays and jitter make, s; 0 without a coupling.
-pub fn round_trip_s(graph: &Graph) -> f64 {
+/// What the laws' values by default are derived from: the rate, and the delays round the loop.
+pub fn conditions(graph: &Graph) -> Conditions {
     let at = |node: usize| graph.nodes.get(node).is_some_and(|n| n.kind == NodeKind::Coupling);
-    let in_loop = graph.connections.iter().filter(|c| at(c.to.0) && matches!(c.to.1.as_str(), "motion" | "contact") || at(c.from.0));
-    in_loop.map(|c| c.delay as f64 * graph.period_s() + c.impairment.map_or(0.0, |i| i.delay_s + i.jitter_s)).sum()
+    let into = |port: &str| graph.connections.iter().find(move |c| at(c.to.0) && c.to.1 == port);
+    let from = |port: &str| graph.connections.iter().find(move |c| at(c.from.0) && c.from.1 == port);
+    let steps = |connection: Option<&Connection>| connection.map_or(0, |c| c.delay);
+    let in_loop = [into("motion"), from("to_far"), from("command"), into("contact"), from("to_near"), from("force")];
+    let impaired: f64 = in_loop.iter().flatten().filter_map(|c| c.impairment).map(|i| i.delay_s + i.jitter_s).sum();
+    let delayed: u64 = in_loop.iter().map(|c| steps(*c)).sum();
+    Conditions {
+        period_s: graph.period_s(),
+        round_trip_s: delayed as f64 * graph.period_s() + impaired,
+        held_steps: steps(into("motion")) + steps(from("force")) + 1,
+    }
 }
 
 impl Graph {

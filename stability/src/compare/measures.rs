@@ -14,7 +14,8 @@ const LEAST_DEPTH: f64 = 10e-6;
 /// Numbers of a run, of the axis that touches hardest. `None` where it cannot be told: no contact, no hold, nothing that rests.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct Measures {
-    /// Stiffness that the hand is shown while it holds still in contact over mu*lambda times that of the wall, no unit; 1 is transparent.
+    /// Stiffness that the hand is shown while it holds still in contact over mu*lambda times that of the wall, no unit; 1 is transparent. `None`
+    /// where the master rests before the wall's surface, as behind a canceller, which lets the slave go where the hand would have it.
     pub stiffness_share: Option<f64>,
     /// Drag in free motion before the first contact: force against the motion per velocity, N s/m or N m s/rad at the master; 0 is
     /// transparent.
@@ -79,7 +80,8 @@ fn stiffness_share(session: &Session, axis: &AxisSignals, tip: &[f64], first: us
     let wall = mean(&axis.contact)? / (mean(tip)? - surface);
     let shown = mean(&axis.force)? / depth;
     let share = shown / (mu * lambda * wall);
-    (depth.abs() > LEAST_DEPTH && share.is_finite()).then_some(share)
+    // Behind a canceller the master rests before the surface while the slave is in the wall: then it is shown none.
+    (depth.abs() > LEAST_DEPTH && share > 0.0).then_some(share)
 }
 
 /// Least squares of -F_f over the master's velocity before the first contact.

@@ -3,6 +3,9 @@ use crate::coupling::{Conditions, passivity, position_position, wave, wave_line}
 
 const PERIOD: f64 = 1e-3;
 
+/// Forces act within the step in which they are told.
+const AT_ONCE: Conditions = Conditions { period_s: PERIOD, round_trip_s: 0.4, held_steps: 0 };
+
 /// A wall that only pushes, with damping, at 5 mm.
 fn wall(position: f64, velocity: f64) -> f64 {
     if position > 0.005 { -(4000.0 * (position - 0.005) + 10.0 * velocity).max(0.0) } else { 0.0 }
@@ -50,7 +53,7 @@ fn observed_energy_never_falls_below_zero_at_either_port() {
     for (index, link) in LINKS.into_iter().enumerate() {
         for harvest in [0.0, 10.0] {
             let settings = passivity::Settings { harvest, ..passivity::Settings::DEFAULT };
-            let (mut near, mut far) = (passivity::NearSide::new(&settings), passivity::FarSide::new(&settings));
+            let (mut near, mut far) = (passivity::NearSide::new(&settings, &AT_ONCE), passivity::FarSide::new(&settings, &AT_ONCE));
             let rows = driven(&mut near, &mut far, link, PERIOD, &shaken(6000, PERIOD), wall);
             let mut put_in = 0.0;
             for (step, [v_m, f_m, v_s, f_s]) in rows.iter().enumerate() {
@@ -67,11 +70,31 @@ fn observed_energy_never_falls_below_zero_at_either_port() {
 }
 
 #[test]
+fn forces_that_act_later_are_counted_when_they_act() {
+    let conditions = Conditions { held_steps: 2, ..AT_ONCE };
+    for (index, link) in LINKS.into_iter().enumerate() {
+        let settings = passivity::Settings::DEFAULT;
+        let (mut near, mut far) = (passivity::NearSide::new(&settings, &conditions), passivity::FarSide::new(&settings, &conditions));
+        let rows = driven(&mut near, &mut far, link, PERIOD, &shaken(6000, PERIOD), wall);
+        let (mut at_master, mut put_in, mut least) = (0.0, 0.0, 0.0_f64);
+        for step in 2..rows.len() {
+            let worked = rows[step - 2][1] * rows[step][0] * PERIOD;
+            at_master += worked;
+            put_in += rows[step][3] * rows[step][2] * PERIOD - worked;
+            least = least.min(put_in);
+        }
+        let observed = near.observer();
+        assert!((at_master - (observed.energy_out - observed.energy_in)).abs() < 1e-9, "link {index}: {at_master} J, {observed:?}");
+        // Not more than two steps of motion beyond what was foreseen.
+        assert!(least > -2e-5, "link {index}: {least} J were created");
+    }
+}
+
+#[test]
 fn without_its_controllers_the_same_exchange_creates_energy() {
     // Position forward and force back over the same link: what observer and controller are there for.
     let direct = crate::coupling::Law::Direct;
-    let conditions = Conditions { period_s: PERIOD, round_trip_s: 0.4 };
-    let (mut near, mut far) = (direct.near(&conditions), direct.far(&conditions));
+    let (mut near, mut far) = (direct.near(&AT_ONCE), direct.far(&AT_ONCE));
     let rows = driven(near.as_mut(), far.as_mut(), LINKS[2], PERIOD, &shaken(6000, PERIOD), wall);
     let mut put_in = 0.0;
     let least = rows.iter().fold(0.0_f64, |least, [v_m, f_m, v_s, f_s]| {
@@ -84,7 +107,7 @@ fn without_its_controllers_the_same_exchange_creates_energy() {
 #[test]
 fn a_slave_with_energy_to_spare_is_where_it_shall_be() {
     let settings = passivity::Settings { harvest: 200.0, ..passivity::Settings::DEFAULT };
-    let (mut near, mut far) = (passivity::NearSide::new(&settings), passivity::FarSide::new(&settings));
+    let (mut near, mut far) = (passivity::NearSide::new(&settings, &AT_ONCE), passivity::FarSide::new(&settings, &AT_ONCE));
     let motion = shaken(600, PERIOD);
     let rows = driven(&mut near, &mut far, (0, 1, 0, 0.0), PERIOD, &motion, |_, _| 0.0);
     let come: f64 = rows.iter().map(|row| row[2] * PERIOD).sum();
@@ -93,7 +116,7 @@ fn a_slave_with_energy_to_spare_is_where_it_shall_be() {
 
 /// A hand (mass, damper, spring to a place that it wants) and a wall on both ends of a law; the energy of its motion after `steps`.
 fn swings(settings: &position_position::Settings, delay: u64, steps: u64) -> (f64, f64) {
-    let conditions = Conditions { period_s: PERIOD, round_trip_s: (2 * delay + 1) as f64 * PERIOD };
+    let conditions = Conditions { period_s: PERIOD, round_trip_s: (2 * delay + 1) as f64 * PERIOD, held_steps: 1 };
     let mut near = position_position::NearSide::new(settings, &conditions);
     let mut far = position_position::FarSide::new(settings, &conditions);
     let (mut there, mut back) = (Way::constant(delay), Way::constant(delay + 1));

@@ -5,7 +5,7 @@ use crate::scaling::GainPlan;
 use backdrive_msgs::{Sample, flag};
 
 const PERIOD: f64 = 1e-3;
-const CONDITIONS: Conditions = Conditions { period_s: PERIOD, round_trip_s: 0.0 };
+const CONDITIONS: Conditions = Conditions { period_s: PERIOD, round_trip_s: 0.0, held_steps: 2 };
 
 fn tick(step: u64) -> Tick {
     Tick { step, time_s: step as f64 * PERIOD, period_s: PERIOD }
