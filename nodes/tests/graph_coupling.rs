@@ -50,7 +50,8 @@ fn what_is_wrong_is_said_with_what_there_is() {
         let path = file("launch/coupling.toml");
         let text = std::fs::read_to_string(&path).unwrap().replace("law = \"wave\"", "law = \"four_channel\"");
         let without = text.replace("from = \"master.user\"\nto = \"coupling.hand\"", "from = \"master.user\"\nto = \"canceller.hand\"");
-        let cut: String = without.split("[[connections]]").filter(|part| !part.contains("canceller.hand")).collect::<Vec<_>>().join("[[connections]]");
+        let cut: String =
+            without.split("[[connections]]").filter(|part| !part.contains("canceller.hand")).collect::<Vec<_>>().join("[[connections]]");
         Graph::from_text(&cut, &path, &Overrides::default(), &Files::Disk).map_err(|e| e.to_string())
     });
     let hand = hand.unwrap_err();

@@ -1,5 +1,6 @@
 //! `backdrive compare`: the same session through each law between master and slave, and through the canceller.
 
+mod compared;
 mod loaded;
 mod page;
 mod text;
@@ -7,27 +8,10 @@ mod text;
 use crate::failure::{Failure, code};
 use crate::{cli, interrupt, output, progress};
 use backdrive_stability::compare::Cell;
+use compared::Compared;
 use loaded::Loaded;
 use serde_json::json;
 use std::sync::atomic::Ordering;
-
-/// What was compared, for text, page and JSON.
-struct Compared<'a> {
-    /// The file.
-    session: String,
-    /// What the hand does there.
-    title: &'a str,
-    /// mu and lambda at which the numbers are told.
-    gains: [f64; 2],
-    /// Highest mu*lambda up to which edges were looked for.
-    highest: f64,
-    /// The cells that were done, condition by condition.
-    cells: Vec<Cell>,
-    /// How many were asked for.
-    asked: usize,
-    /// What a reader has to know.
-    notes: &'a [String],
-}
 
 /// Compares.
 pub fn compare(options: &cli::Compare) -> Result<u8, Failure> {

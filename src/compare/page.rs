@@ -1,6 +1,6 @@
 //! The page of a comparison: one picture, one table.
 
-use super::Compared;
+use super::compared::Compared;
 use super::text::{COLUMNS, row};
 use crate::page_parts::ending;
 use backdrive_report::{Cell as Shown, Colour, Figure, Page, Plot, Series, Table, Tone, number};
@@ -108,24 +108,24 @@ fn picture(compared: &Compared) -> Option<Figure> {
         return None;
     }
     let laws = laws(compared);
-    let plot = |plot: Plot, of: Of, named: bool| {
+    let plot = |plot: Plot, of: Of| {
         laws.iter().enumerate().fold(plot, |plot, (index, law)| {
             let points = over_delay.iter().filter(|c| c.rival == *law).filter_map(|c| Some((1e3 * c.condition.delay_s, of(c)?)));
             let (x, y): (Vec<f64>, Vec<f64>) = points.unzip();
-            let name = if named { *law } else { "" };
-            let colour = Colour::Nth(index);
-            plot.series(Series::line(name, &x, &y).colour(colour)).series(Series::points("", &x, &y).colour(colour))
+            // A line through one point is none.
+            let series = if x.len() > 1 { Series::line(law, &x, &y) } else { Series::points(law, &x, &y) };
+            plot.series(series.colour(Colour::Nth(index)))
         })
     };
     let edge: Of = |c| c.critical_gain.or((c.stable_up_to > 0.0).then_some(c.stable_up_to));
     let first = Plot::new("Edge").x_axis("delay each way", "ms").y_axis("edge μλ", "").y_log().height(230.0);
-    let share = Plot::new("").y_axis("shown stiffness", "%").include_y(0.0).horizontal(100.0, "", Tone::Good).height(180.0);
-    let drag = Plot::new("").y_axis("drag", "N s/m").include_y(0.0).height(180.0);
-    let off = Plot::new("").y_axis("off in free motion", "m").include_y(0.0).height(180.0);
+    let share = Plot::new("Shown stiffness").y_axis("of the wall's", "%").include_y(0.0).horizontal(100.0, "", Tone::Good).height(180.0);
+    let drag = Plot::new("Drag in free motion").y_axis("drag", "N s/m").include_y(0.0).height(180.0);
+    let off = Plot::new("Slave beside master in free motion").y_axis("off", "m").include_y(0.0).height(180.0);
     Some(Figure::stacked([
-        plot(first, edge, true),
-        plot(share, |c| c.measures.stiffness_share.map(|s| 100.0 * s), false),
-        plot(drag, |c| c.measures.drag, false),
-        plot(off, |c| c.measures.tracking_free, false),
+        plot(first, edge),
+        plot(share, |c| c.measures.stiffness_share.map(|s| 100.0 * s)),
+        plot(drag, |c| c.measures.drag),
+        plot(off, |c| c.measures.tracking_free),
     ]))
 }

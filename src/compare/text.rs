@@ -1,6 +1,6 @@
 //! The comparison as text, and the words and numbers that the page has too.
 
-use super::Compared;
+use super::compared::Compared;
 use backdrive_report::{number, si};
 use backdrive_stability::compare::Cell;
 use backdrive_stability::outcome::Outcome;

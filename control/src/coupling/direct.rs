@@ -3,7 +3,7 @@
 //! Packets: forward the position that the slave shall have; back the force of the environment on the slave as effort. It is passive
 //! with no delay at all, and only where the slave is where it shall be.
 
-use super::{Far, Near, Own, Packet};
+use super::side::{Far, Near, Own, Packet};
 
 /// The side at the master: it plays the newest contact force.
 #[derive(Debug, Default)]

@@ -15,7 +15,7 @@
 //! acceleration (as velocity) and the force of the environment.
 
 use super::proxy::Proxy;
-use super::{Far, Near, Own, Packet};
+use super::side::{Far, Near, Own, Packet};
 
 /// Settings; all of the slave's units but the master's inertia.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -22,7 +22,7 @@
 //! Packets: forward position as position, energy in as effort; back the force of the environment as velocity, energy in as
 //! effort, and the slave's position.
 
-use super::{Conditions, Far, Near, Own, Packet};
+use super::side::{Conditions, Far, Near, Own, Packet};
 
 /// Settings.
 #[derive(Debug, Clone, Copy, PartialEq)]

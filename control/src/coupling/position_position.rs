@@ -9,7 +9,7 @@
 //! Packets: position and velocity of the own device, both ways.
 
 use super::proxy::Proxy;
-use super::{Conditions, Far, Near, Own, Packet};
+use super::side::{Conditions, Far, Near, Own, Packet};
 
 /// Settings; all of the slave's units.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -7,17 +7,18 @@
 //!
 //! The coupling sits at the slave, where the environment answers at once; its point moves so that coupling and contact force are
 //! equal. What a delay of the link adds, K times the round trip at low frequency, is injected as damping at the master. That
-//! damper is sampled too, so it does not stand for the device's own b at high frequency.
+//! damper is sampled too, so it does not stand for the device's own b at high frequency, and too much of it shakes the device: by
+//! default the coupling is as soft as the round trip asks for.
 //!
 //! Packets: forward position and velocity; back the force of the coupling as effort, and the slave's position.
 
-use super::{Conditions, Far, Near, Own, Packet};
+use super::side::{Conditions, Far, Near, Own, Packet};
 
 /// Settings; all of the slave's units.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Settings {
-    /// Stiffness K of the coupling, N/m or N m/rad.
-    pub stiffness: f64,
+    /// Stiffness K of the coupling, N/m or N m/rad; where `None` 2000, or less where the damping to inject would be above 80.
+    pub stiffness: Option<f64>,
     /// Its damping B, N s/m or N m s/rad.
     pub damping: f64,
     /// Damping at the master, N s/m or N m s/rad; K (T/2 + round trip) where `None`.
@@ -26,18 +27,29 @@ pub struct Settings {
 
 impl Settings {
     /// For a hand-held device in translation.
-    pub const DEFAULT: Settings = Settings { stiffness: 2000.0, damping: 30.0, injection: None };
+    pub const DEFAULT: Settings = Settings { stiffness: None, damping: 30.0, injection: None };
 
-    /// Damping b that a device needs for the coupling to be passive on it at a period, K T/2 + |B|, N s/m or N m s/rad.
-    pub fn least_device_damping(&self, period_s: f64) -> f64 {
-        0.5 * self.stiffness * period_s + self.damping.abs()
+    /// The stiffness in force, N/m or N m/rad.
+    pub fn stiffness_for(&self, conditions: &Conditions) -> f64 {
+        self.stiffness.unwrap_or_else(|| STIFFEST.min(MOST_INJECTION / conditions.answer_s()))
+    }
+
+    /// Damping b that a device needs for the coupling to be passive on it without a delay, K T/2 + |B|, N s/m or N m s/rad.
+    pub fn least_device_damping(&self, conditions: &Conditions) -> f64 {
+        0.5 * self.stiffness_for(conditions) * conditions.period_s + self.damping.abs()
     }
 
     /// The injected damping in force.
     pub fn injection_for(&self, conditions: &Conditions) -> f64 {
-        self.injection.unwrap_or(self.stiffness * (0.5 * conditions.period_s + conditions.round_trip_s))
+        self.injection.unwrap_or_else(|| self.stiffness_for(conditions) * conditions.answer_s())
     }
 }
+
+/// Stiffness by default where the round trip allows it, N/m.
+const STIFFEST: f64 = 2000.0;
+
+/// Most damping that is injected by default, N s/m: a hand-held master does not shake with it.
+const MOST_INJECTION: f64 = 80.0;
 
 /// The side at the master.
 #[derive(Debug)]
@@ -71,8 +83,8 @@ pub struct FarSide {
 
 impl FarSide {
     /// With its point where the master is when it is first heard of.
-    pub fn new(settings: &Settings) -> FarSide {
-        FarSide { stiffness: settings.stiffness, damping: settings.damping, point: None, master: None }
+    pub fn new(settings: &Settings, conditions: &Conditions) -> FarSide {
+        FarSide { stiffness: settings.stiffness_for(conditions), damping: settings.damping, point: None, master: None }
     }
 }
 

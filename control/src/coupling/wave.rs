@@ -9,8 +9,8 @@
 //! ([`super::wave_line`]), what is lost on the way does not make the positions drift apart; where the two began counts as the same.
 
 use super::proxy::Proxy;
+use super::side::{Far, Near, Own, Packet};
 use super::wave_line::{Receiver, Sender};
-use super::{Far, Near, Own, Packet};
 
 /// Settings; all of the slave's units.
 #[derive(Debug, Clone, Copy, PartialEq)]

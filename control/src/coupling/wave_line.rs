@@ -5,7 +5,7 @@
 //! loss (Niemeyer & Slotine, "Towards force-reflecting teleoperation over the internet", ICRA 1998). With a constant delay and no
 //! loss it is the line of Anderson & Spong 1989: what comes out is what went in, one delay later.
 
-use super::Packet;
+use super::side::Packet;
 
 /// The sending end.
 #[derive(Debug, Clone, Default)]

@@ -53,7 +53,7 @@ fn settings(law: Law, keys: &mut Table) -> Result<Law, FileError> {
             compensation: compensation(keys, d.compensation)?,
         }),
         Law::VirtualCoupling(d) => Law::VirtualCoupling(virtual_coupling::Settings {
-            stiffness: keys.number_or("stiffness", Range::Positive, d.stiffness)?,
+            stiffness: keys.number("stiffness", Range::Positive)?,
             damping: keys.number_or("damping", Range::Positive, d.damping)?,
             injection: keys.number("injection", Range::NonNegative)?,
         }),
