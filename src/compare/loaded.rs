@@ -31,7 +31,7 @@ impl Loaded {
                 None => Ok(Graph::load(path, &changes)?),
             }
         };
-        let intents = bag.as_ref().map(|reader| intents(reader)).transpose()?;
+        let intents = bag.as_ref().map(intents).transpose()?;
         let mut notes = Vec::new();
         let mut rivals = Vec::new();
         let all = Rival::all();
