@@ -4,6 +4,7 @@
 mod bag;
 mod bridge;
 mod changes;
+mod compare;
 mod diagnose;
 mod doctor;
 mod fit;
@@ -25,6 +26,7 @@ mod why;
 
 pub use bag::Bag;
 pub use bridge::Bridge;
+pub use compare::Compare;
 pub use diagnose::Diagnose;
 pub use doctor::Doctor;
 pub use fit::Fit;
@@ -79,6 +81,9 @@ pub enum Command {
     /// Ask a bag why its loop shakes, and what would stop it: causes with their evidence, and remedies that were tried on the loop run again.
     #[command(after_help = why::HELP)]
     Why(Why),
+    /// Run the same hand through each law between master and slave, and through the canceller: edge, transparency, tracking, effort.
+    #[command(after_help = compare::HELP)]
+    Compare(Compare),
     /// Write a model and a set for recordings of your own: asks what is driven and what is measured, and checks what it wrote.
     #[command(after_help = init::HELP)]
     Init(Init),

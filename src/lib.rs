@@ -7,6 +7,7 @@ mod bag;
 mod bridge;
 mod cli;
 mod columns;
+mod compare;
 pub mod diagnose;
 mod diagnose_page;
 mod diagnose_text;
@@ -60,6 +61,7 @@ pub fn main() -> ExitCode {
         Command::Replay(options) => replay::replay(&options),
         Command::Stability(options) => stability::stability(&options),
         Command::Why(options) => why::why(&options),
+        Command::Compare(options) => compare::compare(&options),
         Command::Init(options) => init::init(&options),
         Command::Diagnose(options) => diagnose::diagnose(&options),
         Command::Fit(options) => fit::fit(&options),

@@ -4,6 +4,7 @@ pub mod butterworth;
 pub mod canceller;
 pub mod controller;
 pub mod core;
+pub mod coupling;
 pub mod cycle;
 pub mod device;
 pub mod dynamometer;

@@ -8,24 +8,24 @@ use backdrive_msgs::{Gains, MAX_AXES, Sample, flag};
 
 /// A gain that ramps to what is wanted in a straight line.
 #[derive(Debug, Clone)]
-struct Ramp {
-    now: f64,
+pub(crate) struct Ramp {
+    pub(crate) now: f64,
     target: f64,
     change_per_step: f64,
 }
 
 impl Ramp {
-    fn new(value: f64) -> Ramp {
+    pub(crate) fn new(value: f64) -> Ramp {
         Ramp { now: value, target: value, change_per_step: 0.0 }
     }
 
-    fn aim(&mut self, target: f64, ramp_s: f64, period_s: f64) {
+    pub(crate) fn aim(&mut self, target: f64, ramp_s: f64, period_s: f64) {
         self.target = target;
         let steps = (ramp_s / period_s).round().max(1.0);
         self.change_per_step = (target - self.now).abs() / steps;
     }
 
-    fn step(&mut self) -> f64 {
+    pub(crate) fn step(&mut self) -> f64 {
         let left = self.target - self.now;
         self.now = if left.abs() <= self.change_per_step { self.target } else { self.now + self.change_per_step.copysign(left) };
         self.now
@@ -63,7 +63,7 @@ pub struct GainPlan {
 }
 
 impl GainPlan {
-    fn due(&self, done: &mut usize, tick: &Tick) -> Option<GainChange> {
+    pub(crate) fn due(&self, done: &mut usize, tick: &Tick) -> Option<GainChange> {
         let change = self.changes.get(*done).filter(|c| tick.time_s >= c.at_s).copied();
         *done += usize::from(change.is_some());
         change

@@ -51,7 +51,7 @@ impl Plan {
             command: n.command.clone(),
             restart: n.restart,
             records: n.kind == NodeKind::Recorder,
-            has_gains: n.kind == NodeKind::Scaling,
+            has_gains: n.kind.closes_loop(),
         });
         Plan {
             title: graph.title.clone(),

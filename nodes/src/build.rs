@@ -1,10 +1,12 @@
 //! From a graph to what each process does.
 
+use crate::graph::coupling;
 use crate::graph::{DeviceFiles, Direction, Graph, Node, NodeKind, ObserverFiles, Settings};
 use crate::stage::{Clock, InputPort, NodePlan, OutputPort, PACE_PORT, Stage};
 use backdrive_control::canceller::Canceller;
 use backdrive_control::controller::Controller;
 use backdrive_control::core::{Core, Events, Port, Tick};
+use backdrive_control::coupling::node::{FarNode, NearNode};
 use backdrive_control::cycle::CycleNode;
 use backdrive_control::device::{Device, DeviceError, DeviceOptions, DeviceRole};
 use backdrive_control::dynamometer::{Dynamometer, DynamometerNode};
@@ -104,8 +106,10 @@ pub fn topics(graph: &Graph) -> Vec<GraphTopic> {
             let topic = Topic { name: format!("/{}/{part}", node.name), kind };
             topics.push(GraphTopic { topic, publisher: node.name.clone(), axes: Vec::new(), woken: 0, listeners: recorded });
         };
-        if node.kind == NodeKind::Scaling {
+        if node.kind.closes_loop() {
             side("gains", Kind::Gains);
+        }
+        if node.kind == NodeKind::Scaling {
             side("margin", Kind::Margin);
         }
         side("events", Kind::Event);
@@ -216,7 +220,7 @@ pub fn plan_with(graph: &Graph, name: &str, cores: Vec<Box<dyn Core>>) -> Result
         events: side("events", Kind::Event),
         status: side("status", Kind::Status),
         gains_in: None,
-        gains_out: (node.kind == NodeKind::Scaling).then(|| side("gains", Kind::Gains)),
+        gains_out: node.kind.closes_loop().then(|| side("gains", Kind::Gains)),
         margin_out: (node.kind == NodeKind::Scaling).then(|| side("margin", Kind::Margin)),
     })
 }
@@ -246,6 +250,13 @@ fn cores(graph: &Graph, node: &Node) -> Result<Vec<Box<dyn Core>>, DeviceError> 
             vec![
                 Box::new(Forward::new(graph.gains.clone(), period_s)),
                 Box::new(Backward::new(graph.gains.clone(), dither.clone(), guard, period_s)),
+            ]
+        }
+        Settings::Coupling { law, velocity_hz } => {
+            let conditions = coupling::conditions(graph);
+            vec![
+                Box::new(NearNode::new(node.axes, law, graph.gains.clone(), &conditions, *velocity_hz, stale)),
+                Box::new(FarNode::new(node.axes, law, &conditions, stale)),
             ]
         }
         Settings::Slave(files) => vec![Box::new(Slave::new(needed(simulated(files, DeviceRole::Slave)?)?, stale, period_s))],

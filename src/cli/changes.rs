@@ -1,6 +1,6 @@
 //! Changes to a graph, which several verbs take.
 
-use super::values::{not_negative, positive, rate};
+use super::values::{law, not_negative, positive, rate};
 use backdrive_nodes::graph::Overrides;
 use clap::{Args, ValueEnum};
 use std::path::PathBuf;
@@ -101,6 +101,10 @@ pub struct Changes {
     #[command(flatten)]
     #[allow(missing_docs)]
     pub parts: SwappedParts,
+    /// Law between master and slave: the one of the graph's coupling, or of a coupling that takes the place of its scaling; see
+    /// docs/couplings.md.
+    #[arg(long, value_name = "LAW", value_parser = law())]
+    pub coupling: Option<String>,
     /// Position scale from master to slave.
     #[arg(long, value_parser = not_negative, allow_negative_numbers = true)]
     pub mu: Option<f64>,
@@ -143,6 +147,7 @@ impl Changes {
         Overrides {
             mu: self.mu,
             lambda: self.lambda,
+            coupling: self.coupling.clone(),
             dither: self.dither.clone(),
             guard: self.guard.then_some(true),
             bag: self.bag.clone(),

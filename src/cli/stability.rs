@@ -1,7 +1,7 @@
 //! Options of `backdrive stability`.
 
 use super::changes::SwappedParts;
-use super::values::positive;
+use super::values::{law, positive};
 use clap::Args;
 use std::path::PathBuf;
 
@@ -41,6 +41,9 @@ pub struct Stability {
     /// Which topic is which, for a bag that we did not record; see docs/roles-example.toml.
     #[arg(long, value_name = "FILE")]
     pub roles: Option<PathBuf>,
+    /// Law between master and slave that is asked about, in the place of the bag's scaling or of its coupling's law; see docs/couplings.md.
+    #[arg(long, value_name = "LAW", value_parser = law())]
+    pub coupling: Option<String>,
     /// Write the report as one HTML file.
     #[arg(long, value_name = "FILE")]
     pub html: Option<PathBuf>,

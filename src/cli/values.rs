@@ -1,6 +1,9 @@
 //! Values of options: numbers within their bounds.
 
+use backdrive_control::coupling::Law;
 use backdrive_nodes::graph::MAX_RATE_HZ;
+use backdrive_stability::compare::Rival;
+use clap::builder::PossibleValuesParser;
 
 /// s, how long a search may take on the clock where nothing else is said: the library's own.
 pub fn patience() -> f64 {
@@ -20,6 +23,16 @@ pub fn not_negative(text: &str) -> Result<f64, String> {
 /// A number above 0.
 pub fn positive(text: &str) -> Result<f64, String> {
     number(text).and_then(|x| if x > 0.0 { Ok(x) } else { Err("must be above 0".to_string()) })
+}
+
+/// A law of a coupling.
+pub fn law() -> PossibleValuesParser {
+    PossibleValuesParser::new(Law::ALL.map(|(name, _)| name))
+}
+
+/// What is compared: a law of a coupling, or the canceller.
+pub fn rival() -> PossibleValuesParser {
+    PossibleValuesParser::new(Rival::all().into_iter().map(Rival::word))
 }
 
 /// Steps per second.

@@ -28,7 +28,7 @@ pub(super) struct Loaded {
 impl Loaded {
     pub(super) fn read(options: &cli::Stability) -> Result<Loaded, Failure> {
         let path = &options.recording;
-        let changes = options.parts.overrides();
+        let changes = Overrides { coupling: options.coupling.clone(), ..options.parts.overrides() };
         if let Some(roles) = &options.roles {
             if changes != Overrides::default() {
                 return Err(Failure::input(format!(
@@ -77,6 +77,7 @@ impl Loaded {
             master: parts.master.is_some() || parts.grip.is_some(),
             canceller: parts.canceller.is_some() || parts.canceller_grip.is_some() || parts.high_pass.is_some(),
             slave: parts.slave.is_some() || parts.environment.is_some(),
+            coupling: options.coupling.is_some(),
         };
         if let Some(asked) = &self.asked {
             swapped.canceller &= asked.node_of(NodeKind::Canceller).is_some();

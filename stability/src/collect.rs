@@ -62,7 +62,7 @@ pub struct Collector {
 /// Whether a graph has a loop whose stability can be asked about.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Closes {
-    /// No master, no scaling or no slave: there is none.
+    /// No master, nothing that closes the loop, or no slave: there is none.
     Never,
     /// The slave meets nothing that the graph knows of.
     OnlyIfTouched,
@@ -72,8 +72,8 @@ enum Closes {
 
 impl Closes {
     fn of(graph: &Graph) -> Closes {
-        let [master, scaling, slave] = [NodeKind::Master, NodeKind::Scaling, NodeKind::Slave].map(|kind| graph.node_of(kind));
-        match (master, scaling, slave.map(|n| (&n.settings, n.command.is_some()))) {
+        let [master, slave] = [NodeKind::Master, NodeKind::Slave].map(|kind| graph.node_of(kind));
+        match (master, graph.loop_node(), slave.map(|n| (&n.settings, n.command.is_some()))) {
             (Some(_), Some(_), Some((Settings::Slave(files), false))) if files.fragment.is_none() => Closes::OnlyIfTouched,
             (Some(_), Some(_), Some(_)) => Closes::Yes,
             _ => Closes::Never,
@@ -85,12 +85,13 @@ impl Collector {
     /// Ready for the messages of a graph; `name` is for messages about what was collected.
     pub fn of(graph: &Graph, name: &str) -> Collector {
         let node = |kind: NodeKind| graph.nodes.iter().position(|n| n.kind == kind);
+        let closes = graph.loop_node().map_or(NodeKind::Scaling, |n| n.kind);
         let ports = [
             (NodeKind::Operator, "intent", Signal::Intent),
             (NodeKind::Master, "measured", Signal::Master),
             (NodeKind::Canceller, "induced", Signal::Induced),
             (NodeKind::Scaling, "dither", Signal::Dither),
-            (NodeKind::Scaling, "command", Signal::Command),
+            (closes, "command", Signal::Command),
             (NodeKind::Slave, "measured", Signal::Slave),
         ];
         let spoken = |signal: Signal, node: usize| match (&graph.nodes[node].settings, signal) {
@@ -121,7 +122,7 @@ impl Collector {
         let axes: Vec<AxisSignals> = axes.collect();
         Collector {
             topics: topics.collect(),
-            gains_topic: node(NodeKind::Scaling).map(|n| format!("/{}/gains", graph.nodes[n].name)),
+            gains_topic: node(closes).map(|n| format!("/{}/gains", graph.nodes[n].name)),
             axes: vec![Columns::default(); axes.len()],
             blank: Session {
                 name: name.to_string(),

@@ -118,7 +118,9 @@ impl Session {
         let no_node = |role: SignalRole, kind: NodeKind| missing(role, format!("the graph has no {} node", kind.name()));
 
         let master = node(NodeKind::Master).ok_or_else(|| no_node(SignalRole::Master, NodeKind::Master))?;
-        let scaling = node(NodeKind::Scaling).ok_or_else(|| no_node(SignalRole::Command, NodeKind::Scaling))?;
+        // Scaling, or a coupling in its place.
+        let scaling =
+            graph.nodes.iter().position(|n| n.kind.closes_loop()).ok_or_else(|| no_node(SignalRole::Command, NodeKind::Scaling))?;
         let slave = node(NodeKind::Slave).ok_or_else(|| no_node(SignalRole::Contact, NodeKind::Slave))?;
         let axes = graph.nodes[master].axes.min(graph.nodes[slave].axes);
         let mut notes = Vec::new();

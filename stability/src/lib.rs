@@ -4,6 +4,7 @@
 #![cfg_attr(not(test), warn(clippy::print_stdout, clippy::print_stderr))]
 
 pub mod collect;
+pub mod compare;
 pub mod energy;
 pub mod frequency;
 pub mod from_bag;

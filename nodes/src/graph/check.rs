@@ -28,6 +28,17 @@ pub(super) fn check(graph: &Graph, top: &Table) -> Result<(), FileError> {
         if node.restart && graph.timing.clock == crate::stage::Clock::Lockstep {
             return Err(of_node(node, "restart needs clock = \"realtime\": in lockstep the others cannot go on without it".into()));
         }
+        if let Settings::Coupling { law, .. } = &node.settings
+            && law.needs_hand()
+            && !graph.connections.iter().any(|c| graph.nodes[c.to.0].name == node.name && c.to.1 == "hand")
+        {
+            let message = format!(
+                "the law {} needs the force of the hand: connect the user of the master (in simulation) or the estimate of an \
+                 observer to its input \"hand\"",
+                law.name()
+            );
+            return Err(of_node(node, message));
+        }
         if let Settings::Scaling { guard: true, .. } = node.settings
             && !graph.connections.iter().any(|c| graph.nodes[c.to.0].name == node.name && c.to.1 == "measured")
         {

@@ -91,6 +91,7 @@ fn describe(node: &Node) -> String {
             }
         }
         Settings::Controller { law, .. } => format!("{}: {}", kind.name(), law.law.name()),
+        Settings::Coupling { law, .. } => format!("{}: {}", kind.name(), law.name()),
         Settings::Operator(_)
         | Settings::Scaling { .. }
         | Settings::Exciter(_)

@@ -90,6 +90,32 @@ const SCALING: &[StageKind] = &[
     },
 ];
 
+const COUPLING: &[StageKind] = &[
+    StageKind {
+        name: "near",
+        inputs: &[
+            input("motion", true, "the master's motion"),
+            input("from_far", true, "what the far side sends: connect to_near here, delay = 1"),
+            input("hand", false, "force of the hand on the master, for the law four_channel"),
+        ],
+        outputs: &[
+            command("force", "servo_jf", "lambda times the law's force; connect it to the master with delay = 1"),
+            state("to_far", "to_far_js", "what goes over the link to the slave's side"),
+        ],
+    },
+    StageKind {
+        name: "far",
+        inputs: &[
+            input("contact", true, "the slave's measured motion and the force of the environment on it, delay = 1"),
+            input("from_near", true, "what the near side sends: connect to_far here"),
+        ],
+        outputs: &[
+            command("command", "servo_jp", "where the slave shall be"),
+            state("to_near", "to_near_js", "what goes over the link to the master's side"),
+        ],
+    },
+];
+
 const SLAVE: &[StageKind] = &[StageKind {
     name: "plant",
     inputs: &[
@@ -219,6 +245,8 @@ kinds!(
     Canceller "canceller" CANCELLER,
     /// Position and force scaling.
     Scaling "scaling" SCALING,
+    /// A law between master and slave over a link, in the place of scaling.
+    Coupling "coupling" COUPLING,
     /// The remote device with its environment.
     Slave "slave" SLAVE,
     /// Drives a slave whose feedback is a force.
@@ -244,6 +272,11 @@ kinds!(
 );
 
 impl NodeKind {
+    /// Whether it closes the loop: it commands the slave, forces the master and has the gains.
+    pub fn closes_loop(self) -> bool {
+        matches!(self, NodeKind::Scaling | NodeKind::Coupling)
+    }
+
     /// A port by its name and direction, with the index of its stage.
     pub fn port(self, name: &str, direction: Direction) -> Option<(usize, &'static PortKind)> {
         self.stages().iter().enumerate().find_map(|(index, stage)| {

@@ -6,6 +6,7 @@
 pub mod bench;
 mod check;
 mod controller;
+pub mod coupling;
 mod draw;
 mod files;
 mod hosts;
@@ -13,6 +14,7 @@ mod kinds;
 mod overrides;
 mod parse;
 mod recorded;
+mod swap;
 mod types;
 
 pub use check::step_order;

@@ -2,6 +2,7 @@
 
 use super::files::Files;
 use super::recorded::Recorded;
+use super::swap::put_coupling;
 use super::{Graph, NodeKind};
 use backdrive_plant::tomlfile::FileError;
 use std::path::{Path, PathBuf};
@@ -28,6 +29,8 @@ pub struct Overrides {
     pub mu: Option<f64>,
     /// Force scale.
     pub lambda: Option<f64>,
+    /// Law of the coupling; where the graph has a scaling node, a coupling takes its place.
+    pub coupling: Option<String>,
     /// Dither on the force channel, such as `multisine:peak=0.1,from=1,to=500,period=2`.
     pub dither: Option<String>,
     /// Whether the guard watches.
@@ -72,6 +75,9 @@ impl Overrides {
         // A program that is named with its folder lies beside the graph; a bare name is looked for as a shell would.
         rename_programs(&mut doc, &|name| if name.contains('/') { full(name) } else { name.to_string() });
         self.write_top(&mut doc);
+        if let Some(law) = &self.coupling {
+            put_coupling(&mut doc, law, &name)?;
+        }
         self.write_nodes(&mut doc, &here, &name)?;
         Ok(doc.to_string())
     }

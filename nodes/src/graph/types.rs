@@ -3,6 +3,7 @@
 use super::kinds::NodeKind;
 use crate::graph::bench;
 use crate::stage::{Impairment, Timing};
+use backdrive_control::coupling::Law;
 use backdrive_control::cycle::Cycle;
 use backdrive_control::dynamometer::DynamometerModel;
 use backdrive_control::observer::{Quantity, Weights};
@@ -131,6 +132,13 @@ pub enum Settings {
         /// Whether the guard watches.
         guard: bool,
     },
+    /// The law between master and slave.
+    Coupling {
+        /// The law with its values.
+        law: Law,
+        /// Corner of the low-pass behind which velocities are told from positions, Hz.
+        velocity_hz: f64,
+    },
     /// The slave and what it touches.
     Slave(DeviceFiles),
     /// Law and gains of a slave's controller, and the model that it knows of the slave.
@@ -205,6 +213,11 @@ impl Graph {
     /// The first node of a kind.
     pub fn node_of(&self, kind: NodeKind) -> Option<&Node> {
         self.nodes.iter().find(|n| n.kind == kind)
+    }
+
+    /// The node that closes the loop: scaling, or a coupling in its place.
+    pub fn loop_node(&self) -> Option<&Node> {
+        self.nodes.iter().find(|n| n.kind.closes_loop())
     }
 
     /// The topic that an output port of a node speaks on.

@@ -141,13 +141,12 @@ fn to_ground(model: &Model, user: usize, notes: &mut Vec<String>) -> ToGround {
 
 /// Delay of the connections round the loop, impairments' fixed delays among them, s.
 pub fn loop_delay_s(graph: &Graph) -> f64 {
-    let through_canceller = graph
-        .connections
-        .iter()
-        .any(|c| graph.nodes[c.from.0].kind == NodeKind::Canceller && graph.nodes[c.to.0].kind == NodeKind::Scaling);
+    let through_canceller =
+        graph.connections.iter().any(|c| graph.nodes[c.from.0].kind == NodeKind::Canceller && graph.nodes[c.to.0].kind.closes_loop());
     let in_loop = |kind: NodeKind, port: &str| match (kind, port) {
         (NodeKind::Canceller, "measured") => through_canceller,
-        (NodeKind::Scaling, "motion" | "contact") | (NodeKind::Slave, "command" | "force") => true,
+        (NodeKind::Coupling, "from_near" | "from_far") => true,
+        (NodeKind::Scaling | NodeKind::Coupling, "motion" | "contact") | (NodeKind::Slave, "command" | "force") => true,
         (NodeKind::Controller, "command") | (NodeKind::Master, "force") => true,
         _ => false,
     };

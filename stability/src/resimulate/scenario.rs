@@ -46,7 +46,8 @@ impl Scenario {
     pub fn new(mut graph: Graph, intents: Option<Vec<Intent>>, steps: Option<u64>) -> Result<Scenario, ResimulateError> {
         let name = graph.path.display().to_string();
         for kind in [NodeKind::Master, NodeKind::Scaling, NodeKind::Slave] {
-            if graph.node_of(kind).is_none() {
+            let there = if kind.closes_loop() { graph.loop_node().is_some() } else { graph.node_of(kind).is_some() };
+            if !there {
                 return Err(ResimulateError::NoLoop { graph: name, kind: kind.name() });
             }
         }
@@ -58,7 +59,7 @@ impl Scenario {
                 Settings::Master(files) if files.model.is_none() => "--master",
                 Settings::Slave(files) if files.model.is_none() => "--slave",
                 Settings::Canceller(..) => "--canceller",
-                Settings::Scaling { .. } => continue,
+                Settings::Scaling { .. } | Settings::Coupling { .. } => continue,
                 Settings::Operator(_) if intents.is_none() => "--script",
                 _ => continue,
             };

@@ -12,6 +12,15 @@ use crate::model_check::PartCheck;
 use crate::outcome::Outcome;
 use crate::transparency::transparency;
 use crate::unjudged::Unjudged;
+use backdrive_nodes::graph::{Graph, Settings};
+
+/// The law of a graph's coupling.
+fn coupling_law(graph: &Graph) -> Option<&'static str> {
+    match graph.loop_node().map(|node| &node.settings) {
+        Some(Settings::Coupling { law, .. }) => Some(law.name()),
+        _ => None,
+    }
+}
 
 impl Answer {
     /// What is known before the methods are weighed.
@@ -27,6 +36,16 @@ impl Answer {
             frequency.cannot_tell = Some(CannotTell {
                 reason: "the recording itself runs away, so it holds no steady response".to_string(),
                 advice: Some("record at a lower gain, or with a smaller dither".to_string()),
+            });
+        }
+        // Last, for it is about the loop that is asked about, whatever the recording is worth.
+        if let Some(law) = [question.asked, question.recorded].into_iter().flatten().find_map(coupling_law) {
+            frequency.cannot_tell = Some(CannotTell {
+                reason: format!(
+                    "the loop goes through a coupling of the law {law}: the force on the master is not lambda times the contact force, so \
+                     the loop measured at one gain says nothing of another"
+                ),
+                advice: None,
             });
         }
         let frequency_answer = frequency.at(question.gain.product());

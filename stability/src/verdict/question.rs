@@ -40,11 +40,13 @@ pub struct Swapped {
     pub canceller: bool,
     /// The slave or what it touches.
     pub slave: bool,
+    /// What couples them.
+    pub coupling: bool,
 }
 
 impl Swapped {
     /// Whether there is any.
     pub(super) fn any(&self) -> bool {
-        self.master || self.canceller || self.slave
+        self.master || self.canceller || self.slave || self.coupling
     }
 }

@@ -52,7 +52,8 @@ pub(super) fn settle_axes(graph: &mut Graph) {
     let slave = graph.nodes.iter().find(|n| n.kind == NodeKind::Slave).map(|n| n.axis_names.clone());
     let Some(names) = master.or(slave) else { return };
     for node in &mut graph.nodes {
-        let follows = matches!(node.kind, NodeKind::Scaling | NodeKind::Operator | NodeKind::Exciter) || node.axes == 0;
+        let follows =
+            matches!(node.kind, NodeKind::Scaling | NodeKind::Coupling | NodeKind::Operator | NodeKind::Exciter) || node.axes == 0;
         if follows && node.kind != NodeKind::Recorder && node.axes <= names.len() {
             node.axis_names.clone_from(&names);
             node.axes = names.len();

@@ -2,6 +2,7 @@
 
 use super::device::{NodeReader, axis_names};
 use crate::graph::controller;
+use crate::graph::coupling;
 use crate::graph::hosts::read_host;
 use crate::graph::overrides::absolute;
 use crate::graph::{DeviceFiles, Direction, Node, NodeKind, ObserverFiles, Settings, bench};
@@ -64,6 +65,10 @@ impl NodeReader<'_> {
                 let guard = table.boolean("guard")?.unwrap_or(false);
                 let dither = self.excitations(table, "dither")?;
                 (Settings::Scaling { dither, guard }, Vec::new())
+            }
+            NodeKind::Coupling => {
+                let (law, velocity_hz) = coupling::read(table)?;
+                (Settings::Coupling { law, velocity_hz }, Vec::new())
             }
             NodeKind::Controller => self.controller(table)?,
             NodeKind::Exciter => self.exciter(table)?,

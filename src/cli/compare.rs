@@ -1,0 +1,93 @@
+//! Options of `backdrive compare`.
+
+use super::changes::SwappedParts;
+use super::values::{number, positive, rival};
+use clap::Args;
+use std::path::PathBuf;
+
+/// Examples and exit codes.
+pub const HELP: &str = "Examples:
+  backdrive compare launch/coupling.toml --html out/compare.html
+  backdrive compare contact.mcap --laws canceller,wave --delays 0,50 --jitter none --loss none --grips 1
+
+Each number of --loss and --grips is tried at the delay --at; --jitter at its own mean. The numbers of the table are told at the gain of the
+graph, or of --lambda; the edge is the loop gain mu*lambda at which the loop stops being stable.
+
+Exit codes: 0 compared, 2 usage, 3 a file is wrong, 5 the page cannot be written, 130 interrupted: what was done is shown.";
+
+/// `backdrive compare`
+#[derive(Debug, Args)]
+pub struct Compare {
+    /// A graph file with an operator, or the bag of a run, whose hand is then played.
+    pub session: PathBuf,
+    /// What is compared; `canceller` is the law direct behind a canceller, which knows the master where the graph's subtracts nothing.
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = rival())]
+    pub laws: Vec<String>,
+    /// Delays of the link, ms each way.
+    #[arg(long, value_name = "MS", value_delimiter = ',', value_parser = delay, default_values_t = [0.0, 20.0, 50.0, 100.0, 200.0])]
+    pub delays: Vec<f64>,
+    /// Delays that vary: mean and largest deviation, ms each way; `none` for none.
+    #[arg(long, value_name = "MEAN:DEVIATION", value_delimiter = ',', value_parser = jitter, default_value = "120:40")]
+    pub jitter: Vec<Jitter>,
+    /// Shares of the packets that are lost each way, 0 to 1; `none` for none.
+    #[arg(long, value_name = "SHARE", value_delimiter = ',', value_parser = loss, default_value = "0.05,0.3")]
+    pub loss: Vec<Loss>,
+    /// Factors on stiffness and damping of the grip beside the grip as it is.
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = positive, default_values_t = [0.7, 1.3])]
+    pub grips: Vec<f64>,
+    /// Delay at which loss and grips are tried, ms each way.
+    #[arg(long, value_name = "MS", value_parser = delay, default_value_t = 20.0)]
+    pub at: f64,
+    /// Force scale of the comparison; the session's own if not given.
+    #[arg(long, value_parser = positive, allow_negative_numbers = true)]
+    pub lambda: Option<f64>,
+    /// Write the report as one HTML file.
+    #[arg(long, value_name = "FILE")]
+    pub html: Option<PathBuf>,
+    /// Print the result as JSON.
+    #[arg(long)]
+    pub json: bool,
+    #[command(flatten)]
+    #[allow(missing_docs)]
+    pub parts: SwappedParts,
+}
+
+/// A delay that varies: mean and largest deviation, ms; `None` for the word none.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Jitter(pub Option<[f64; 2]>);
+
+/// A share of lost packets; `None` for the word none.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Loss(pub Option<f64>);
+
+/// Longest delay of a link, ms.
+const LONGEST_MS: f64 = 5000.0;
+
+fn delay(text: &str) -> Result<f64, String> {
+    number(text).and_then(|ms| match (0.0..=LONGEST_MS).contains(&ms) {
+        true => Ok(ms),
+        false => Err(format!("must be from 0 to {LONGEST_MS} ms")),
+    })
+}
+
+fn jitter(text: &str) -> Result<Jitter, String> {
+    if text == "none" {
+        return Ok(Jitter(None));
+    }
+    let (mean, deviation) = text.split_once(':').ok_or("must be MEAN:DEVIATION in ms, such as 120:40, or none")?;
+    let (mean, deviation) = (delay(mean)?, delay(deviation)?);
+    if deviation > mean {
+        return Err("the deviation must not be above the mean: no packet arrives before it was sent".to_string());
+    }
+    Ok(Jitter(Some([mean, deviation])))
+}
+
+fn loss(text: &str) -> Result<Loss, String> {
+    if text == "none" {
+        return Ok(Loss(None));
+    }
+    number(text).and_then(|share| match (0.0..1.0).contains(&share) {
+        true => Ok(Loss(Some(share))),
+        false => Err("must be a share from 0 to below 1, such as 0.05, or none".to_string()),
+    })
+}
