@@ -113,6 +113,7 @@ fn replay(found: &Answer, changes: &[Change], master: Option<&Path>) -> Option<S
         command += &match (change, master) {
             (Change::Gain { lambda, .. }, _) => format!(" --lambda {lambda:.4}"),
             (Change::HighPass { hz }, _) => format!(" --high-pass {hz}"),
+            (Change::Coupling { law }, _) => format!(" --coupling {law} --canceller none"),
             (Change::Canceller { model: None, .. }, _) => " --canceller none".to_string(),
             (Change::Canceller { model: Some(_), high_pass_hz, .. }, Some(file)) => {
                 format!(" --canceller {} --canceller-grip none --high-pass {high_pass_hz}", shell_word(&file.display().to_string()))

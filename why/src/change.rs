@@ -1,5 +1,6 @@
 //! Changes to a loop that would stop it, as things that can be done to any graph.
 
+use crate::coupled::couple;
 use crate::trial::Trial;
 use backdrive_nodes::graph::{Graph, NodeKind, Settings};
 use backdrive_plant::elements::Law;
@@ -70,6 +71,11 @@ pub enum Change {
         /// Hz.
         hz: f64,
     },
+    /// Another law between master and slave, without a canceller.
+    Coupling {
+        /// As `--coupling` takes it.
+        law: String,
+    },
     /// Motors without limits of force and rate.
     StrongerMotor,
     /// No limit at all, of motors or of travel: not to be had, but it shows what a limit hides.
@@ -112,6 +118,7 @@ impl Change {
                 }
                 trial.distortions.retain(|d| d.step == 0.0 && d.noise == 0.0);
             }
+            Change::Coupling { law } => couple(&mut trial.graph, law),
             Change::Damping { damping } => damped(&mut trial.graph, *damping),
             Change::Grip { factor } => firmer(&mut trial.graph, *factor),
             Change::Rate { hz } => {
@@ -170,6 +177,9 @@ impl std::fmt::Display for Change {
                 write!(f, "bring delays, jitter and loss down to {:.0} % of what the graph states", 100.0 * factor)
             }
             Change::SensorRepaired { node } => write!(f, "repair the sensor that {node} reads"),
+            Change::Coupling { law } => {
+                write!(f, "couple master and slave by {} in the place of scaling and canceller (--coupling {law})", law.replace('_', " "))
+            }
             Change::FinerSensors => write!(f, "read the position with a finer sensor"),
             Change::Damping { damping } => write!(f, "inject damping of {damping:.1} N s/m at the handle"),
             Change::Grip { factor } if *factor > 1.0 => write!(f, "hold the handle {factor:.1} times as firmly"),

@@ -10,6 +10,7 @@ pub mod cause;
 pub mod cause_kind;
 pub mod change;
 pub mod compared;
+mod coupled;
 pub mod device;
 pub mod difference;
 pub mod differences;

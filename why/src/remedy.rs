@@ -24,6 +24,9 @@ const BELOW: f64 = 0.8;
 /// Damping that is tried, N s/m, or as many thousandths of N m s/rad.
 const DAMPING: [f64; 5] = [2.0, 5.0, 10.0, 20.0, 50.0];
 
+/// Laws that are tried in the place of scaling.
+const COUPLINGS: [&str; 4] = ["wave", "passivity", "position_position", "virtual_coupling"];
+
 /// Corner of a high-pass that is tried, Hz.
 const HIGH_PASS_HZ: f64 = 1.0;
 
@@ -191,6 +194,9 @@ fn candidates(was: &Trial, gain: Gain, edge: Option<f64>, causes: &[Cause]) -> V
     }
     if graph.connections.iter().any(|c| c.impairment.is_some() || c.delay > 1) {
         all.extend([0.5, 0.25].map(|factor| (vec![Change::Delays { factor }], false)));
+    }
+    if graph.node_of(NodeKind::Scaling).is_some() {
+        all.extend(COUPLINGS.map(|law| (vec![Change::Coupling { law: law.to_string() }], false)));
     }
     all.push((vec![Change::Rate { hz: 2.0 * graph.timing.rate_hz }], false));
     all.extend(DAMPING.map(|damping| (vec![Change::Damping { damping: damping * unit_of_damping(was) }], false)));
