@@ -147,7 +147,7 @@ fn swapped_parts_are_answered_from_the_record_and_a_model() {
         let measured = model.axes[0].measured;
         model.outputs[measured].gain *= 0.5;
     });
-    let Settings::Canceller(canceller, corner) = &other.node_of(NodeKind::Canceller).unwrap().settings else { unreachable!() };
+    let Settings::Canceller(canceller, corner, _) = &other.node_of(NodeKind::Canceller).unwrap().settings else { unreachable!() };
     let parts = ExchangedParts { canceller: Some((canceller, *corner)), ..ExchangedParts::default() };
     let found = analyse(&record, &Options { parts, ..Options::default() }).unwrap();
     println!("half cancelled: {:?}, expected {:.4}", found.edge, 2.0 * bare);

@@ -11,6 +11,9 @@ pub enum DeviceError {
     /// The model has no `[[axes]]`.
     #[error("model \"{0}\" has no [[axes]]: a graph needs to know where it is held, pushed and read")]
     NoAxes(String),
+    /// A hand is to be estimated where none holds the model.
+    #[error("model \"{0}\": nothing holds it whose firmness could be estimated; give the canceller a grip, or leave hand = \"estimated\" out")]
+    NoHand(String),
     /// More axes than a sample carries.
     #[error("model \"{0}\" has {1} axes; at most 8 are possible")]
     TooManyAxes(String, usize),

@@ -11,6 +11,7 @@ pub mod engine;
 pub mod exciter;
 mod freshness;
 pub mod guard;
+pub mod hand;
 pub mod live_margin;
 pub mod margins;
 pub mod master;

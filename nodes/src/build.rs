@@ -11,6 +11,7 @@ use backdrive_control::dynamometer::{Dynamometer, DynamometerNode};
 use backdrive_control::engine::EngineNode;
 use backdrive_control::exciter::Exciter;
 use backdrive_control::guard::Guard;
+use backdrive_control::hand::HandBank;
 use backdrive_control::live_margin::Told;
 use backdrive_control::master::Master;
 use backdrive_control::observer::{DesignError, ObserverNode, Quantity, System, UnknownInput, design};
@@ -229,9 +230,13 @@ fn cores(graph: &Graph, node: &Node) -> Result<Vec<Box<dyn Core>>, DeviceError> 
         Settings::Master(files) => {
             vec![Box::new(Master::new(Box::new(needed(simulated(files, DeviceRole::Master)?)?), stale, period_s))]
         }
-        Settings::Canceller(files, high_pass_hz) => {
-            vec![Box::new(Canceller::new(simulated(files, DeviceRole::Master)?, *high_pass_hz, period_s))]
-        }
+        Settings::Canceller(files, high_pass_hz, hand) => vec![Box::new(match (hand, &files.model) {
+            (Some(hand), Some(model)) => {
+                let bank = HandBank::new(model, files.fragment.as_ref(), hand, period_s, &options(files, seed))?;
+                Canceller::scheduled(bank, *high_pass_hz, period_s)
+            }
+            _ => Canceller::new(simulated(files, DeviceRole::Master)?, *high_pass_hz, period_s),
+        })],
         Settings::Scaling { dither, guard } => {
             // What a dither shakes is no oscillation of the loop's own.
             let peak = dither.iter().flatten().fold(0.0_f64, |peak, d| peak.max(d.abs()));

@@ -3,9 +3,8 @@
 use super::hidden::Opened;
 use crate::failure::Failure;
 use backdrive_nodes::graph::{Graph, NodeKind, Overrides, Settings};
-use backdrive_plant::model::InputKind;
 use backdrive_stability::resimulate::edge::{Edge, Search, edge};
-use backdrive_stability::resimulate::{OwnCores, RunOptions, Scenario, grip};
+use backdrive_stability::resimulate::{OwnCores, RunOptions, Scenario};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -104,8 +103,6 @@ fn firmer(graph: &mut Graph, factor: f64) {
     for node in graph.nodes.iter_mut().filter(|n| n.kind == NodeKind::Master) {
         let Settings::Master(files) = &mut node.settings else { continue };
         let Some(model) = &mut files.model else { continue };
-        let hands: Vec<usize> = model.inputs.iter().filter(|i| i.kind == InputKind::Motion).map(|i| i.on).collect();
-        let of_hand = |between: &[Option<usize>; 2]| between.iter().flatten().any(|body| hands.contains(body));
-        model.elements.iter_mut().filter(|e| of_hand(&e.between)).for_each(|e| grip::scale_element(e, factor));
+        model.scale_own_hand(factor);
     }
 }

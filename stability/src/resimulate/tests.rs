@@ -55,7 +55,7 @@ fn find(scenario: &Scenario, search: &Search) -> Edge {
 fn assume_grip(scenario: &Scenario, factor: f64) -> Scenario {
     let mut scenario = scenario.clone();
     for node in &mut scenario.graph.nodes {
-        if let Settings::Canceller(files, _) = &mut node.settings {
+        if let Settings::Canceller(files, ..) = &mut node.settings {
             grip::scale(files.fragment.as_mut().unwrap(), factor);
         }
     }
@@ -224,7 +224,7 @@ fn beyond_the_dc_limit_it_runs_away_and_the_growth_is_told() {
     // 10 % too soft a spring only: the DC limit is all that is left.
     let mut scenario = linear(Some("plant/models/impulse-engine-linear.toml"));
     for node in &mut scenario.graph.nodes {
-        if let Settings::Canceller(files, _) = &mut node.settings {
+        if let Settings::Canceller(files, ..) = &mut node.settings {
             files.fragment.as_mut().unwrap().network.set_values_at("elements.spring.stiffness", &[400.0 / 1.1]).unwrap();
         }
     }

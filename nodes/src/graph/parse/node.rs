@@ -6,6 +6,7 @@ use crate::graph::hosts::read_host;
 use crate::graph::overrides::absolute;
 use crate::graph::{DeviceFiles, Direction, Node, NodeKind, ObserverFiles, Settings, bench};
 use backdrive_control::butterworth::MOST_ORDER;
+use backdrive_control::hand::HandSettings;
 use backdrive_control::observer::{Quantity, Weights};
 use backdrive_control::rig::RigSettings;
 use backdrive_control::speed_control::SpeedControl;
@@ -109,7 +110,14 @@ impl NodeReader<'_> {
         device.real_sensors = false;
         let high_pass_hz = table.number_or("high_pass_hz", Range::NonNegative, 0.0)?;
         let names = axis_names(&device);
-        Ok((Settings::Canceller(device, high_pass_hz), names))
+        let estimated = table.one_of("hand", &[("as_modelled", false), ("estimated", true)])?.unwrap_or(false);
+        let range = table.numbers("hand_range", Range::Positive)?;
+        let hand = match (estimated, range) {
+            (false, None) => None,
+            (false, Some(_)) => return Err(table.error_at("hand_range", "means nothing without hand = \"estimated\"")),
+            (true, range) => Some(hand_settings(table, range.as_deref())?),
+        };
+        Ok((Settings::Canceller(device, high_pass_hz, hand), names))
     }
 
     /// A slave's controller.
@@ -201,6 +209,17 @@ fn own_axes(table: &mut Table) -> Result<Vec<String>, FileError> {
 /// A test bench has one axis.
 fn one_shaft() -> Vec<String> {
     vec!["shaft".to_string()]
+}
+
+/// Between which factors on the grip of its file a hand is looked for.
+fn hand_settings(table: &Table, range: Option<&[f64]>) -> Result<HandSettings, FileError> {
+    match range {
+        None => Ok(HandSettings::default()),
+        Some([softest, firmest]) if softest < firmest => Ok(HandSettings { softest: *softest, firmest: *firmest }),
+        Some(_) => {
+            Err(table.error_at("hand_range", "expected two factors on the grip of the file, the softer first, such as [0.5, 2.0]"))
+        }
+    }
 }
 
 /// The displacement controller of a rig, and its sensors.
