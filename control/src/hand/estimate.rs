@@ -2,8 +2,13 @@
 
 use super::filter::Steep;
 
-/// Below this the hand moves on its own accord, Hz: what it wants is measured by nobody.
-const INTENT_HZ: f64 = 10.0;
+/// Corners of the high-passes through which positions are looked at, Hz. The hand moves on its own accord, which nobody measures, and the more the
+/// slower; a loop that runs away is slow as well.
+const BANDS_HZ: [f64; 2] = [8.0, 25.0];
+/// How the hand moves on its own accord, m/s^3 or rad/s^3: the jerk of a move of 4 mm in 0.15 s or of 10 cm in 0.5 s (Flash & Hogan 1985).
+const INTENT_JERK: f64 = 50.0;
+/// How long the misfit is remembered, s: longer than what tells the hands apart, so that an estimate grows uncertain where nothing moves.
+const MISFIT_S: f64 = 3.0;
 /// Error of a model that is right, as a share of the motion: errors of a model grow with what it predicts.
 const MODEL_ERROR: f64 = 0.03;
 /// What a position sensor leaves at least, m or rad.
@@ -46,37 +51,92 @@ struct Pair {
 struct Memory {
     keep: f64,
     samples: f64,
+    /// Misfit for which the errors' scale is forgotten more slowly.
+    misfit: f64,
+    misfit_keep: f64,
     pairs: Vec<Pair>,
+    /// What follows from the sums.
+    estimate: Estimate,
 }
 
 impl Memory {
     fn new(time_s: f64, period_s: f64, pairs: usize) -> Memory {
-        Memory { keep: (-period_s / time_s).exp(), samples: 0.0, pairs: vec![Pair::default(); pairs] }
-    }
-
-    fn hear(&mut self, errors: &[f64], weight: f64) {
-        self.samples = self.keep * self.samples + 1.0;
-        for (pair, two) in self.pairs.iter_mut().zip(errors.windows(2)) {
-            pair.first = self.keep * pair.first + weight * two[0] * two[0];
-            pair.both = self.keep * pair.both + weight * two[0] * two[1];
-            pair.second = self.keep * pair.second + weight * two[1] * two[1];
+        Memory {
+            keep: (-period_s / time_s).exp(),
+            samples: 0.0,
+            misfit: 1.0,
+            misfit_keep: (-period_s / MISFIT_S).exp(),
+            pairs: vec![Pair::default(); pairs],
+            estimate: Estimate { softness: 0.0, deviation: f64::INFINITY },
         }
     }
 
-    /// The softness whose error is least, the motion between neighbours being linear in it.
-    fn estimate(&self, softness: &[f64], alike: f64) -> Estimate {
-        let mut best = (f64::INFINITY, Estimate { softness: softness[0], deviation: f64::INFINITY });
+    fn forget(&mut self) {
+        self.samples = self.keep * self.samples + 1.0;
+        for pair in &mut self.pairs {
+            *pair = Pair { first: self.keep * pair.first, both: self.keep * pair.both, second: self.keep * pair.second };
+        }
+    }
+
+    fn hear(&mut self, errors: &[f64], weight: f64) {
+        for (pair, two) in self.pairs.iter_mut().zip(errors.windows(2)) {
+            pair.first += weight * two[0] * two[0];
+            pair.both += weight * two[0] * two[1];
+            pair.second += weight * two[1] * two[1];
+        }
+    }
+
+    /// Takes the softness whose error is least, the motion between neighbours being linear in it.
+    fn conclude(&mut self, softness: &[f64], alike: f64) {
+        let mut best = (f64::INFINITY, 0.0, 0.0);
         for (pair, hands) in self.pairs.iter().zip(softness.windows(2)) {
             let curvature = pair.first - 2.0 * pair.both + pair.second;
             let share = if curvature > 0.0 { ((pair.first - pair.both) / curvature).clamp(0.0, 1.0) } else { 0.0 };
             let error = pair.first - 2.0 * share * (pair.first - pair.both) + share * share * curvature;
             if error < best.0 {
-                let misfit = (error / self.samples.max(1.0)).max(1.0);
-                let deviation = (hands[1] - hands[0]) * (misfit * alike / curvature).sqrt();
-                best = (error, Estimate { softness: hands[0] + share * (hands[1] - hands[0]), deviation });
+                let width = hands[1] - hands[0];
+                best = (error, hands[0] + share * width, curvature / (width * width));
             }
         }
-        best.1
+        let (error, softness, curvature) = best;
+        let misfit = error / (BANDS_HZ.len() as f64 * self.samples.max(1.0));
+        self.misfit = (1.0 + self.misfit_keep * (self.misfit - 1.0)).max(misfit);
+        self.estimate = Estimate { softness, deviation: (self.misfit * alike / curvature).sqrt() };
+    }
+}
+
+/// One band of a position and of what the bank says of it.
+#[derive(Debug, Clone)]
+struct Band {
+    measured: Steep,
+    predicted: Vec<Steep>,
+    /// Variance of what is neither the force's doing nor the model's error, m^2.
+    noise: f64,
+    power: f64,
+    weight: f64,
+    errors: Vec<f64>,
+}
+
+impl Band {
+    fn new(corner_hz: f64, hands: usize, noise: f64, period_s: f64) -> Band {
+        let intent = INTENT_JERK / (2.0 * std::f64::consts::PI * corner_hz).powi(3);
+        Band {
+            measured: Steep::new(corner_hz, period_s),
+            predicted: vec![Steep::new(corner_hz, period_s); hands],
+            noise: noise * noise + intent * intent,
+            power: 0.0,
+            weight: 0.0,
+            errors: vec![0.0; hands],
+        }
+    }
+
+    fn step(&mut self, measured: f64, predicted: &impl Fn(usize) -> f64, power_keep: f64) {
+        let seen = self.measured.step(measured);
+        for (hand, (filter, error)) in self.predicted.iter_mut().zip(&mut self.errors).enumerate() {
+            *error = seen - filter.step(predicted(hand));
+        }
+        self.power = power_keep * self.power + (1.0 - power_keep) * seen * seen;
+        self.weight = 1.0 / (self.noise + MODEL_ERROR * MODEL_ERROR * self.power);
     }
 }
 
@@ -84,12 +144,8 @@ impl Memory {
 #[derive(Debug, Clone)]
 pub struct HandEstimator {
     softness: Vec<f64>,
-    measured: Steep,
-    predicted: Vec<Steep>,
-    errors: Vec<f64>,
-    power: f64,
+    bands: [Band; BANDS_HZ.len()],
     power_keep: f64,
-    noise: f64,
     alike: f64,
     short: Memory,
     long: Memory,
@@ -98,17 +154,12 @@ pub struct HandEstimator {
 impl HandEstimator {
     /// For hands of these softnesses, ascending. `noise` is the standard deviation of the position sensor, m or rad.
     pub fn new(softness: &[f64], noise: f64, period_s: f64) -> HandEstimator {
-        let pairs = softness.len().saturating_sub(1);
-        let memory = |time_s: f64| Memory::new(time_s, period_s, pairs);
-        let [short, long] = MEMORIES_S.map(memory);
+        let hands = softness.len();
+        let [short, long] = MEMORIES_S.map(|time_s| Memory::new(time_s, period_s, hands.saturating_sub(1)));
         HandEstimator {
             softness: softness.to_vec(),
-            measured: Steep::new(INTENT_HZ, period_s),
-            predicted: vec![Steep::new(INTENT_HZ, period_s); softness.len()],
-            errors: vec![0.0; softness.len()],
-            power: 0.0,
+            bands: BANDS_HZ.map(|corner_hz| Band::new(corner_hz, hands, noise.max(LEAST_NOISE), period_s)),
             power_keep: (-period_s / POWER_S).exp(),
-            noise: noise.max(LEAST_NOISE),
             alike: (ALIKE_S / period_s).max(1.0),
             short,
             long,
@@ -117,28 +168,27 @@ impl HandEstimator {
 
     /// Hears a sample: the measured position and the bank's, all at this step. Whether the hand was seen to have changed.
     pub fn step(&mut self, measured: f64, predicted: impl Fn(usize) -> f64) -> bool {
-        let seen = self.measured.step(measured);
-        let mut largest = 0.0_f64;
-        for (hand, (filter, error)) in self.predicted.iter_mut().zip(&mut self.errors).enumerate() {
-            let predicted = filter.step(predicted(hand));
-            largest = largest.max(predicted * predicted);
-            *error = seen - predicted;
+        for band in &mut self.bands {
+            band.step(measured, &predicted, self.power_keep);
         }
-        self.power = self.power_keep * self.power + (1.0 - self.power_keep) * seen * seen;
-        let weight = 1.0 / (self.noise * self.noise + MODEL_ERROR * MODEL_ERROR * self.power);
-        self.short.hear(&self.errors, weight);
-        self.long.hear(&self.errors, weight);
-        let (now, before) = (self.short.estimate(&self.softness, self.alike), self.long.estimate(&self.softness, self.alike));
+        for memory in [&mut self.short, &mut self.long] {
+            memory.forget();
+            self.bands.iter().for_each(|band| memory.hear(&band.errors, band.weight));
+            memory.conclude(&self.softness, self.alike);
+        }
+        let (now, before) = (self.short.estimate, self.long.estimate);
         let changed = (now.softness - before.softness).abs() > CHANGED * now.deviation.hypot(before.deviation);
         if changed {
             self.long.samples = self.short.samples;
+            self.long.misfit = self.short.misfit;
             self.long.pairs.copy_from_slice(&self.short.pairs);
+            self.long.estimate = now;
         }
         changed
     }
 
     /// What is known now.
     pub fn estimate(&self) -> Estimate {
-        self.long.estimate(&self.softness, self.alike)
+        self.long.estimate
     }
 }
