@@ -25,7 +25,15 @@ impl Canceller {
     /// high-pass of that corner: it lifts the limit that over-cancelling at DC sets, at the price of phase near the corner.
     pub fn new(model: Option<Device>, high_pass_hz: f64, period_s: f64) -> Canceller {
         let high_pass = (high_pass_hz > 0.0).then(|| HighPass::new(high_pass_hz, period_s));
-        Canceller { model, scheduled: None, high_pass, measured: Freshness::default(), force: [0.0; MAX_AXES], started: false, trusted: true }
+        Canceller {
+            model,
+            scheduled: None,
+            high_pass,
+            measured: Freshness::default(),
+            force: [0.0; MAX_AXES],
+            started: false,
+            trusted: true,
+        }
     }
 
     /// With a model for each of several hands, and the hand estimated while the loop runs ([`crate::hand`]). `high_pass_hz` as in [`Canceller::new`].

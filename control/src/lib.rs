@@ -2,6 +2,7 @@
 
 pub mod butterworth;
 pub mod canceller;
+pub mod changing_grip;
 pub mod controller;
 pub mod core;
 pub mod cycle;

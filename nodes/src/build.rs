@@ -3,6 +3,7 @@
 use crate::graph::{DeviceFiles, Direction, Graph, Node, NodeKind, ObserverFiles, Settings};
 use crate::stage::{Clock, InputPort, NodePlan, OutputPort, PACE_PORT, Stage};
 use backdrive_control::canceller::Canceller;
+use backdrive_control::changing_grip::ChangingGrip;
 use backdrive_control::controller::Controller;
 use backdrive_control::core::{Core, Events, Port, Tick};
 use backdrive_control::cycle::CycleNode;
@@ -14,6 +15,7 @@ use backdrive_control::guard::Guard;
 use backdrive_control::hand::HandBank;
 use backdrive_control::live_margin::Told;
 use backdrive_control::master::Master;
+use backdrive_control::mechanism::Mechanism;
 use backdrive_control::observer::{DesignError, ObserverNode, Quantity, System, UnknownInput, design};
 use backdrive_control::operator::Operator;
 use backdrive_control::rig::Rig;
@@ -228,7 +230,14 @@ fn cores(graph: &Graph, node: &Node) -> Result<Vec<Box<dyn Core>>, DeviceError> 
     Ok(match &node.settings {
         Settings::Operator(intents) => vec![Box::new(Operator::new(intents.clone()))],
         Settings::Master(files) => {
-            vec![Box::new(Master::new(Box::new(needed(simulated(files, DeviceRole::Master)?)?), stale, period_s))]
+            let device: Box<dyn Mechanism> = match &files.model {
+                Some(model) if !files.grip_changes.is_empty() => {
+                    let (grip, options) = (files.fragment.as_ref(), options(files, seed));
+                    Box::new(ChangingGrip::new(model, grip, &files.grip_changes, period_s, &options)?)
+                }
+                _ => Box::new(needed(simulated(files, DeviceRole::Master)?)?),
+            };
+            vec![Box::new(Master::new(device, stale, period_s))]
         }
         Settings::Canceller(files, high_pass_hz, hand) => vec![Box::new(match (hand, &files.model) {
             (Some(hand), Some(model)) => {

@@ -3,6 +3,7 @@
 use super::kinds::NodeKind;
 use crate::graph::bench;
 use crate::stage::{Impairment, Timing};
+use backdrive_control::changing_grip::GripChange;
 use backdrive_control::cycle::Cycle;
 use backdrive_control::dynamometer::DynamometerModel;
 use backdrive_control::hand::HandSettings;
@@ -114,6 +115,8 @@ pub struct DeviceFiles {
     pub substeps: Option<usize>,
     /// Whether sensors round and are noisy as the model file says.
     pub real_sensors: bool,
+    /// How a master's hand changes its grip, times ascending; empty where it does not.
+    pub grip_changes: Vec<GripChange>,
 }
 
 /// What a node's kind needs beyond its ports.
