@@ -38,7 +38,7 @@ impl Canceller {
 
     /// With a model for each of several hands, and the hand estimated while the loop runs ([`crate::hand`]). `high_pass_hz` as in [`Canceller::new`].
     pub fn scheduled(bank: HandBank, high_pass_hz: f64, period_s: f64) -> Canceller {
-        let scheduled = Some(Scheduled::new(bank, &[], period_s));
+        let scheduled = Some(Scheduled::new(bank, period_s));
         Canceller { scheduled, ..Canceller::new(None, high_pass_hz, period_s) }
     }
 }
@@ -67,7 +67,7 @@ impl Core for Canceller {
             }
         }
         if let Some(scheduled) = &mut self.scheduled {
-            let predicted = scheduled.step(&self.force, fresh.as_ref().map(|s| &s.position));
+            let predicted = scheduled.step(&self.force, fresh.as_ref().map(|s| &s.position), events);
             if self.trusted && !scheduled.is_finite() {
                 self.trusted = false;
                 events.push("canceller_off", tick.time_s, 2);

@@ -73,6 +73,14 @@ impl HandBank {
         self.devices.first().map_or(0, Device::axes)
     }
 
+    /// What the position sensor of an axis adds by its file, m or rad: standard deviation of its noise and of its steps.
+    pub fn sensor_noise(&self, axis: usize) -> f64 {
+        let Some(device) = self.devices.first().filter(|d| axis < d.axes()) else { return 0.0 };
+        let axis = device.axis(axis);
+        let output = device.model().outputs.get(axis.measured);
+        output.map_or(0.0, |o| axis.scale.abs() * (o.noise * o.noise + o.resolution * o.resolution / 12.0).sqrt())
+    }
+
     /// Starts all at rest, the force being what it is.
     pub fn start(&mut self, force: &[f64]) {
         self.devices.iter_mut().for_each(|device| device.start(force, &[]));

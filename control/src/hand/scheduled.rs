@@ -2,6 +2,7 @@
 
 use super::bank::HandBank;
 use super::estimate::{Estimate, HandEstimator};
+use crate::core::Events;
 use backdrive_msgs::MAX_AXES;
 
 /// So many standard deviations below the estimated softness is what is cancelled.
@@ -15,6 +16,11 @@ const FORCE_MEMORY_S: f64 = 5.0;
 /// Over which time a displacement that is left where no force acts is let go, s.
 const LET_GO_S: f64 = 0.2;
 
+/// A hand is told where its relative deviation is below this.
+const TELLS_AT: f64 = 0.1;
+/// And where it differs from the one told last by more than this, in the logarithm of the firmness.
+const TELLS_AFTER: f64 = 0.2;
+
 /// One axis.
 struct Axis {
     estimator: HandEstimator,
@@ -22,6 +28,8 @@ struct Axis {
     before: Vec<f64>,
     induced: f64,
     largest_force: f64,
+    /// The firmness that was told last.
+    told: f64,
 }
 
 /// A bank with the estimate of the hand of every axis.
@@ -34,14 +42,15 @@ pub struct Scheduled {
 }
 
 impl Scheduled {
-    /// Around a bank. `noise` is the deviation of every axis' position sensor, m or rad.
-    pub fn new(bank: HandBank, noise: &[f64], period_s: f64) -> Scheduled {
+    /// Around a bank.
+    pub fn new(bank: HandBank, period_s: f64) -> Scheduled {
         let hands = bank.softness().len();
         let axis = |axis: usize| Axis {
-            estimator: HandEstimator::new(bank.softness(), noise.get(axis).copied().unwrap_or(0.0), period_s),
+            estimator: HandEstimator::new(bank.softness(), bank.sensor_noise(axis), period_s),
             before: vec![0.0; hands],
             induced: 0.0,
             largest_force: 0.0,
+            told: f64::NAN,
         };
         let axes = (0..bank.axes().min(MAX_AXES)).map(axis).collect();
         let (force_keep, let_go) = ((-period_s / FORCE_MEMORY_S).exp(), 1.0 - (-period_s / LET_GO_S).exp());
@@ -58,8 +67,9 @@ impl Scheduled {
         self.bank.is_finite()
     }
 
-    /// The next step: the force that was held until now, and the position of each axis where it is measured. The induced motion, m or rad.
-    pub fn step(&mut self, force: &[f64; MAX_AXES], measured: Option<&[f64; MAX_AXES]>) -> [f64; MAX_AXES] {
+    /// The next step: the force that was held until now, and the position of each axis where it is measured. The induced motion, m or rad. A hand that is
+    /// surely another than the one told last is told in an event.
+    pub fn step(&mut self, force: &[f64; MAX_AXES], measured: Option<&[f64; MAX_AXES]>, events: &mut Events) -> [f64; MAX_AXES] {
         let known = self.bank.axes();
         if self.started {
             self.bank.step(&force[..known]);
@@ -73,6 +83,12 @@ impl Scheduled {
                 axis.estimator.step(measured[number], |hand| self.bank.position(hand, number));
             }
             let estimate = axis.estimator.estimate();
+            let (firmness, unsure) = (estimate.firmness(), estimate.deviation * estimate.firmness());
+            // Nothing was told where `told` is no number.
+            if unsure < TELLS_AT && !((firmness / axis.told).ln().abs() < TELLS_AFTER) {
+                axis.told = firmness;
+                events.push("hand_holds", firmness, 0);
+            }
             let softness = estimate.softness - SURE * estimate.deviation;
             axis.largest_force = (self.force_keep * axis.largest_force).max(force[number].abs());
             let (mut moved, mut stands) = (0.0, 0.0);
