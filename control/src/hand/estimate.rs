@@ -187,8 +187,12 @@ impl HandEstimator {
         changed
     }
 
-    /// What is known now.
+    /// What is known now. What the short memory says beyond its own uncertainty is uncertainty of the long one: a hand may be about to be another.
     pub fn estimate(&self) -> Estimate {
-        self.long.estimate
+        let (now, before) = (self.short.estimate, self.long.estimate);
+        let apart = (now.softness - before.softness).powi(2) - now.deviation.powi(2);
+        // Where the short memory knows nothing, `apart` is no number above 0.
+        let deviation = if apart > 0.0 { before.deviation.hypot(apart.sqrt()) } else { before.deviation };
+        Estimate { deviation, ..before }
     }
 }

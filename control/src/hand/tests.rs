@@ -84,7 +84,7 @@ fn a_change_is_seen_within_a_quarter_of_a_second_and_known_within_a_second() {
         let estimate = played.play(0.25, -4.0);
         // The force has gone up and down once and again since.
         let error = (estimate.softness * after - 1.0).abs();
-        assert!(error < 0.15 && error < 2.0 * estimate.deviation * after, "from {before} to {after}: {estimate:?}");
+        assert!(error < 0.3 && error < 2.0 * estimate.deviation * after, "from {before} to {after}: {estimate:?}");
         let later = played.play(0.75, -4.0);
         println!("from {before} to {after}: {:.3} after 0.25 s, {:.3} after 1 s", estimate.firmness(), later.firmness());
         assert!((later.softness * after - 1.0).abs() < 0.05, "from {before} to {after}: {later:?}");
