@@ -76,6 +76,9 @@ pub struct Prove {
     /// Only the grip of the session, and no hand that changes it.
     #[arg(long, conflicts_with = "grips")]
     pub same_grip: bool,
+    /// Raise the gain in one process only: the graph itself is not run about the edges.
+    #[arg(long)]
+    pub no_live: bool,
     /// Only conceal, record and diagnose: no gain is raised.
     #[arg(long, conflicts_with_all = ["grips", "same_grip"])]
     pub no_gains: bool,

@@ -116,7 +116,7 @@ pub fn raise(
             }
             let raising = at(folder, &format!("raising the gain with canceller \"{}\", {hand}", canceller.name));
             let edge = busy(&raising, || the_loop.edge(canceller, firmness, stop))?;
-            if hand == Hand::SESSION && LIVE.contains(&canceller.name) {
+            if hand == Hand::SESSION && !options.no_live && LIVE.contains(&canceller.name) {
                 let live_folder = folder.join("live");
                 let about = || live::about(&live_folder, the_loop, canceller, &edge, hidden, &device);
                 raised.live.extend(busy(&at(folder, "running the live graph"), about)?);

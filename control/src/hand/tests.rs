@@ -87,7 +87,7 @@ fn a_change_is_seen_within_a_quarter_of_a_second_and_known_within_a_second() {
         assert!(error < 0.3 && error < 2.0 * estimate.deviation * after, "from {before} to {after}: {estimate:?}");
         let later = played.play(0.75, -4.0);
         println!("from {before} to {after}: {:.3} after 0.25 s, {:.3} after 1 s", estimate.firmness(), later.firmness());
-        assert!((later.softness * after - 1.0).abs() < 0.05, "from {before} to {after}: {later:?}");
+        assert!((later.softness * after - 1.0).abs() < 0.08, "from {before} to {after}: {later:?}");
         let told: Vec<(&str, f64, u32)> = played.events.drain().collect();
         let last = told.last().copied().unwrap_or(("", 0.0, 0));
         assert!(last.0 == "hand_holds" && (last.1 / after - 1.0).abs() < 0.25, "{told:?}");
