@@ -34,7 +34,7 @@ pub fn recovery(the_loop: &Loop, canceller: &Canceller, gain: f64, cancel: &Atom
             .axes
             .iter()
             .map(|axis| Some(settled(axis.contact.get(of(at_s)..of(at_s + AFTER_S))?)? as f64 * signals.period_s))
-            .fold(Some(0.0_f64), |most, time| Some(most?.max(time?)))
+            .try_fold(0.0_f64, |most, time| Some(most.max(time?)))
     };
     Ok(median(changes.iter().filter_map(|change| settle(change.at_s)).collect()))
 }

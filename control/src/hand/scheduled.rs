@@ -28,8 +28,8 @@ struct Axis {
     before: Vec<f64>,
     induced: f64,
     largest_force: f64,
-    /// The firmness that was told last.
-    told: f64,
+    /// The firmness that was told last, if one was.
+    told: Option<f64>,
 }
 
 /// A bank with the estimate of the hand of every axis.
@@ -50,7 +50,7 @@ impl Scheduled {
             before: vec![0.0; hands],
             induced: 0.0,
             largest_force: 0.0,
-            told: f64::NAN,
+            told: None,
         };
         let axes = (0..bank.axes().min(MAX_AXES)).map(axis).collect();
         let (force_keep, let_go) = ((-period_s / FORCE_MEMORY_S).exp(), 1.0 - (-period_s / LET_GO_S).exp());
@@ -84,9 +84,9 @@ impl Scheduled {
             }
             let estimate = axis.estimator.estimate();
             let (firmness, unsure) = (estimate.firmness(), estimate.deviation * estimate.firmness());
-            // Nothing was told where `told` is no number.
-            if unsure < TELLS_AT && !((firmness / axis.told).ln().abs() < TELLS_AFTER) {
-                axis.told = firmness;
+            let is_another = axis.told.is_none_or(|told| (firmness / told).ln().abs() > TELLS_AFTER);
+            if unsure < TELLS_AT && is_another {
+                axis.told = Some(firmness);
                 events.push("hand_holds", firmness, 0);
             }
             let softness = estimate.softness - SURE * estimate.deviation;

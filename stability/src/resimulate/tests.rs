@@ -316,7 +316,8 @@ fn another_graph_s_operator_is_a_script() {
 /// The contact script with the exact model in the canceller, its hand as modelled or estimated, no limits.
 fn with_hand(path: &str, hand: &str, canceller: Option<&str>) -> Scenario {
     let (hand, limits) = (Some(hand.to_string()), Some("ignored".into()));
-    Scenario::new(graph(path, Overrides { hand, limits, canceller: canceller.map(Into::into), ..Overrides::default() }), None, None).unwrap()
+    Scenario::new(graph(path, Overrides { hand, limits, canceller: canceller.map(Into::into), ..Overrides::default() }), None, None)
+        .unwrap()
 }
 
 #[test]
