@@ -54,7 +54,7 @@ impl Played {
             let mut force = [0.0; MAX_AXES];
             force[0] = self.force;
             self.scheduled.step(&force, Some(&measured), &mut self.events);
-            self.force = if (time * 10.0) as usize % 2 == 0 { peak } else { 0.3 * peak };
+            self.force = if ((time * 10.0) as usize).is_multiple_of(2) { peak } else { 0.3 * peak };
         }
         self.scheduled.estimate(0).unwrap()
     }
