@@ -21,7 +21,7 @@ fn graph(substeps: usize) -> Graph {
     let ideal = Overrides { sensors: Some("ideal".into()), ..Overrides::default() };
     let mut graph = Graph::load(&path, &ideal).expect("the contact graph is part of the workspace");
     for node in &mut graph.nodes {
-        if let Settings::Master(files) | Settings::Canceller(files, _) | Settings::Slave(files) = &mut node.settings {
+        if let Settings::Master(files) | Settings::Canceller(files, ..) | Settings::Slave(files) = &mut node.settings {
             files.substeps = Some(substeps);
         }
     }

@@ -117,7 +117,7 @@ fn best_second_order(what: &str, start: &Graph, outcome: impl Fn(&Graph, f64) ->
     let with_numbers = |values: &[f64; 3]| {
         let mut graph = start.clone();
         if let Some(node) = graph.nodes.iter_mut().find(|n| n.kind == NodeKind::Canceller)
-            && let Settings::Canceller(files, _) = &mut node.settings
+            && let Settings::Canceller(files, ..) = &mut node.settings
             && let Some(model) = &mut files.model
         {
             for (path, value) in numbers.iter().zip(values) {

@@ -41,6 +41,7 @@ impl Loop {
             fragment: fragment.map(|text| Fragment::from_toml(text, "environment.toml").unwrap()),
             substeps: None,
             real_sensors: false,
+            grip_changes: Vec::new(),
         };
         for node in &mut graph.nodes {
             match &mut node.settings {

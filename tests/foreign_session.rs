@@ -177,7 +177,7 @@ fn energy_of_a_calm_and_of_a_humming_loop() {
     let none = |lambda: f64| {
         let mut graph = graph(false, lambda, 0.0);
         let canceller = graph.nodes.iter_mut().find(|n| n.kind == NodeKind::Canceller).unwrap();
-        if let Settings::Canceller(files, _) = &mut canceller.settings {
+        if let Settings::Canceller(files, ..) = &mut canceller.settings {
             files.model = None;
         }
         graph

@@ -155,7 +155,7 @@ fn quality(real: &Model, canceller: &Model) -> f64 {
         match &mut node.settings {
             Settings::Operator(intents) => *intents = vec![backdrive_control::operator::Intent::Rest],
             Settings::Master(files) => files.model = Some(real.clone()),
-            Settings::Canceller(files, _) => files.model = Some(canceller.clone()),
+            Settings::Canceller(files, ..) => files.model = Some(canceller.clone()),
             // With lambda = 0 the dither is all the force that is played.
             Settings::Scaling { dither, .. } => *dither = vec![forces.clone()],
             _ => {}

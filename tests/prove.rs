@@ -32,6 +32,7 @@ fn prove_with(place: &Place, others: &[(&str, &str)], more: &[&str]) -> system::
         ("--second-order", "plant/models/impulse-engine-second-order.toml"),
         ("--session", "launch/prove.toml"),
         ("--contact", "launch/contact.toml"),
+        ("--regrip", "launch/contact-regrip.toml"),
     ];
     let other = |option: &str| others.iter().find(|(name, _)| *name == option).map(|(_, path)| path.to_string());
     let files: Vec<(&str, String)> = inputs.iter().map(|(option, path)| (*option, other(option).unwrap_or_else(|| file(path)))).collect();

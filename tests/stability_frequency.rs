@@ -147,8 +147,8 @@ fn swapped_parts_are_answered_from_the_record_and_a_model() {
         let measured = model.axes[0].measured;
         model.outputs[measured].gain *= 0.5;
     });
-    let Settings::Canceller(canceller, corner) = &other.node_of(NodeKind::Canceller).unwrap().settings else { unreachable!() };
-    let parts = ExchangedParts { canceller: Some((canceller, *corner)), ..ExchangedParts::default() };
+    let Settings::Canceller(canceller, corner, _) = &other.node_of(NodeKind::Canceller).unwrap().settings else { unreachable!() };
+    let parts = ExchangedParts { canceller: Some((canceller, *corner, None)), ..ExchangedParts::default() };
     let found = analyse(&record, &Options { parts, ..Options::default() }).unwrap();
     println!("half cancelled: {:?}, expected {:.4}", found.edge, 2.0 * bare);
     assert!((found.edge.gain.unwrap() / (2.0 * bare) - 1.0).abs() < 0.02, "{:?}", found.edge);

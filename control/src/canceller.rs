@@ -3,6 +3,7 @@
 use crate::core::{Core, Events, Port, Tick};
 use crate::device::Device;
 use crate::freshness::Freshness;
+use crate::hand::{HandBank, Scheduled};
 use backdrive_msgs::{MAX_AXES, Sample};
 
 /// Input `measured` (position; effort = applied force); outputs `motion` (position without the predicted induced motion,
@@ -11,6 +12,7 @@ use backdrive_msgs::{MAX_AXES, Sample};
 /// Kuchenbecker & Niemeyer 2005, Fig. 3: the model is driven by the applied force alone, with the hand at rest.
 pub struct Canceller {
     model: Option<Device>,
+    scheduled: Option<Scheduled>,
     high_pass: Option<HighPass>,
     measured: Freshness,
     force: [f64; MAX_AXES],
@@ -23,7 +25,21 @@ impl Canceller {
     /// high-pass of that corner: it lifts the limit that over-cancelling at DC sets, at the price of phase near the corner.
     pub fn new(model: Option<Device>, high_pass_hz: f64, period_s: f64) -> Canceller {
         let high_pass = (high_pass_hz > 0.0).then(|| HighPass::new(high_pass_hz, period_s));
-        Canceller { model, high_pass, measured: Freshness::default(), force: [0.0; MAX_AXES], started: false, trusted: true }
+        Canceller {
+            model,
+            scheduled: None,
+            high_pass,
+            measured: Freshness::default(),
+            force: [0.0; MAX_AXES],
+            started: false,
+            trusted: true,
+        }
+    }
+
+    /// With a model for each of several hands, and the hand estimated while the loop runs ([`crate::hand`]). `high_pass_hz` as in [`Canceller::new`].
+    pub fn scheduled(bank: HandBank, high_pass_hz: f64, period_s: f64) -> Canceller {
+        let scheduled = Some(Scheduled::new(bank, period_s));
+        Canceller { scheduled, ..Canceller::new(None, high_pass_hz, period_s) }
     }
 }
 
@@ -48,6 +64,16 @@ impl Core for Canceller {
                 for axis in 0..axes {
                     induced[axis] = model.measured(axis);
                 }
+            }
+        }
+        if let Some(scheduled) = &mut self.scheduled {
+            let predicted = scheduled.step(&self.force, fresh.as_ref().map(|s| &s.position), events);
+            if self.trusted && !scheduled.is_finite() {
+                self.trusted = false;
+                events.push("canceller_off", tick.time_s, 2);
+            }
+            if self.trusted {
+                induced = predicted;
             }
         }
         if let Some(high_pass) = &mut self.high_pass {

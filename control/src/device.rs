@@ -2,6 +2,7 @@
 
 use crate::observer::DesignError;
 use backdrive_msgs::MAX_AXES;
+use backdrive_plant::elements::Role;
 use backdrive_plant::model::{Axis, Fragment, InputKind, Model};
 use backdrive_plant::stepper::{CompileError, Options, Plant, Segment};
 
@@ -11,6 +12,14 @@ pub enum DeviceError {
     /// The model has no `[[axes]]`.
     #[error("model \"{0}\" has no [[axes]]: a graph needs to know where it is held, pushed and read")]
     NoAxes(String),
+    /// A hand is to be estimated where none holds the model.
+    #[error(
+        "model \"{0}\": nothing holds it whose firmness could be estimated; give the canceller a grip, or leave hand = \"estimated\" out"
+    )]
+    NoHand(String),
+    /// A hand cannot change its grip where it is not one of springs and dampers.
+    #[error("model \"{0}\": grip_changes need a grip of springs and dampers that holds it; name one such as plant/grips/normal.toml")]
+    NoSpringyHand(String),
     /// More axes than a sample carries.
     #[error("model \"{0}\" has {1} axes; at most 8 are possible")]
     TooManyAxes(String, usize),
@@ -246,6 +255,27 @@ impl Device {
     /// Force that the attached grip or environment exerts on the user's body, N or N m, positive along +x.
     pub fn port_force(&self, axis: usize) -> f64 {
         self.axes[axis].port_forces.iter().map(|(element, sign)| -sign * self.plant.element_force(*element)).sum()
+    }
+
+    /// Energy of the springs of the attached grip as it was at the start, J, on an axis whose hand is `stretch` (m or rad) from the user's body.
+    pub(crate) fn spring_energy(&self, axis: usize, stretch: f64) -> f64 {
+        let stiffness = |element: usize| match self.model.elements[element].law.role() {
+            Role::Linear(linear) => linear.stiffness,
+            _ => 0.0,
+        };
+        0.5 * stretch * stretch * self.axes[axis].port_forces.iter().map(|(element, _)| stiffness(*element)).sum::<f64>()
+    }
+
+    /// Puts the hand of an axis elsewhere, without a motion from where it was.
+    pub(crate) fn move_hand(&mut self, axis: usize, position: f64) {
+        if let Some(input) = self.axes[axis].hand {
+            self.previous[input] = position;
+        }
+    }
+
+    /// See [`Plant::exchange_laws`].
+    pub(crate) fn exchange_laws(&mut self, other: &mut Plant) {
+        self.plant.exchange_laws(other);
     }
 
     /// Whether the state is finite.

@@ -2,6 +2,7 @@
 
 pub mod butterworth;
 pub mod canceller;
+pub mod changing_grip;
 pub mod controller;
 pub mod core;
 pub mod coupling;
@@ -12,6 +13,7 @@ pub mod engine;
 pub mod exciter;
 mod freshness;
 pub mod guard;
+pub mod hand;
 pub mod live_margin;
 pub mod margins;
 pub mod master;

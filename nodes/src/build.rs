@@ -4,6 +4,7 @@ use crate::graph::coupling;
 use crate::graph::{DeviceFiles, Direction, Graph, Node, NodeKind, ObserverFiles, Settings};
 use crate::stage::{Clock, InputPort, NodePlan, OutputPort, PACE_PORT, Stage};
 use backdrive_control::canceller::Canceller;
+use backdrive_control::changing_grip::ChangingGrip;
 use backdrive_control::controller::Controller;
 use backdrive_control::core::{Core, Events, Port, Tick};
 use backdrive_control::coupling::node::{FarNode, NearNode};
@@ -13,8 +14,10 @@ use backdrive_control::dynamometer::{Dynamometer, DynamometerNode};
 use backdrive_control::engine::EngineNode;
 use backdrive_control::exciter::Exciter;
 use backdrive_control::guard::Guard;
+use backdrive_control::hand::HandBank;
 use backdrive_control::live_margin::Told;
 use backdrive_control::master::Master;
+use backdrive_control::mechanism::Mechanism;
 use backdrive_control::observer::{DesignError, ObserverNode, Quantity, System, UnknownInput, design};
 use backdrive_control::operator::Operator;
 use backdrive_control::rig::Rig;
@@ -238,11 +241,22 @@ fn cores(graph: &Graph, node: &Node) -> Result<Vec<Box<dyn Core>>, DeviceError> 
     Ok(match &node.settings {
         Settings::Operator(intents) => vec![Box::new(Operator::new(intents.clone()))],
         Settings::Master(files) => {
-            vec![Box::new(Master::new(Box::new(needed(simulated(files, DeviceRole::Master)?)?), stale, period_s))]
+            let device: Box<dyn Mechanism> = match &files.model {
+                Some(model) if !files.grip_changes.is_empty() => {
+                    let (grip, options) = (files.fragment.as_ref(), options(files, seed));
+                    Box::new(ChangingGrip::new(model, grip, &files.grip_changes, period_s, &options)?)
+                }
+                _ => Box::new(needed(simulated(files, DeviceRole::Master)?)?),
+            };
+            vec![Box::new(Master::new(device, stale, period_s))]
         }
-        Settings::Canceller(files, high_pass_hz) => {
-            vec![Box::new(Canceller::new(simulated(files, DeviceRole::Master)?, *high_pass_hz, period_s))]
-        }
+        Settings::Canceller(files, high_pass_hz, hand) => vec![Box::new(match (hand, &files.model) {
+            (Some(hand), Some(model)) => {
+                let bank = HandBank::new(model, files.fragment.as_ref(), hand, period_s, &options(files, seed))?;
+                Canceller::scheduled(bank, *high_pass_hz, period_s)
+            }
+            _ => Canceller::new(simulated(files, DeviceRole::Master)?, *high_pass_hz, period_s),
+        })],
         Settings::Scaling { dither, guard } => {
             // What a dither shakes is no oscillation of the loop's own.
             let peak = dither.iter().flatten().fold(0.0_f64, |peak, d| peak.max(d.abs()));

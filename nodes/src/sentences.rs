@@ -18,6 +18,7 @@ const SENTENCES: &[(&str, &str, Option<&str>)] = &[
     ("guard_persistent", "an oscillation does not die: the guard lowers lambda to", Some("")),
     ("guard_runaway", "force and master run away together: the guard lowers lambda to", Some("")),
     ("guard_thin_margin", "the dither shows the edge near: the guard lowers lambda to", Some("")),
+    ("hand_holds", "the hand holds, over the grip of the canceller's file, times", Some("")),
     ("input_gone", "an input's publisher is silent and is no longer waited for", None),
     ("input_back", "an input that was silent is back", None),
     ("joined_late", "joined a graph that was already running, at step", Some("")),

@@ -3,6 +3,12 @@
 use crate::model::{Fragment, Hold, Input, InputKind, Model, Output, OutputKind, Place};
 
 impl Fragment {
+    /// The same fragment held `factor` times as firmly: every force of it scaled, of a spring its stiffness, of a damper its damping, of friction its
+    /// level. Masses stay.
+    pub fn scale(&mut self, factor: f64) {
+        self.network.elements.iter_mut().for_each(|element| element.law = element.law.scaled(factor));
+    }
+
     /// The fragment by itself, its port moved from outside: input `displacement` (m or rad, hold cubic), and output `force` (N or N m), what it
     /// takes to move the port. Both come before the fragment's own.
     pub fn driven(&self) -> Model {
@@ -59,6 +65,14 @@ impl Model {
             held.axes[number].holds_user = true;
         }
         (held, hands)
+    }
+
+    /// Scales every force between a hand that is part of the model (a body on a motion input) and what it holds; how many elements that were.
+    pub fn scale_own_hand(&mut self, factor: f64) -> usize {
+        let hands: Vec<usize> = self.inputs.iter().filter(|i| i.kind == InputKind::Motion).map(|i| i.on).collect();
+        let of_hand = |between: &[Place; 2]| between.iter().flatten().any(|body| hands.contains(body));
+        let held = self.elements.iter_mut().filter(|e| of_hand(&e.between));
+        held.map(|element| element.law = element.law.scaled(factor)).count()
     }
 
     /// Of each axis whose user is part of the model, the input that is its hand, if it has one: a motion that drives no axis, in the order of the axes.

@@ -4,7 +4,7 @@
 #![cfg_attr(not(test), warn(clippy::print_stdout, clippy::print_stderr))]
 
 use backdrive_sealed::draw::{DrawOptions, draw};
-use backdrive_sealed::master::{MasterOptions, SealedMaster};
+use backdrive_sealed::master::{MasterOptions, Regrip, SealedMaster};
 use backdrive_sealed::network::{Grip, Network};
 use backdrive_sealed::process::serve;
 use backdrive_sealed::seal::seal;
@@ -29,10 +29,12 @@ backdrive-sealed draw --model FILE [--grip FILE] --seed N --out FILE [--effects 
     --grip-differs  per cent, 0 to 50, by which the true grip differs from the nominal one at most (20)
     --rate          samples of the graph per second (5000)
 
-backdrive-sealed run --model FILE [--grip FILE] --truth FILE [--number N] [--firmness FACTOR] [--rate HZ]
+backdrive-sealed run --model FILE [--grip FILE] --truth FILE [--number N] [--firmness FACTOR]
+                     [--regrips T:FACTOR,...] [--rate HZ]
     Is the device that a truth describes, over standard input and output: documentation of the library, `process`.
     --number        which run it is: every one has sensor noise of its own (0)
     --firmness      how firm the hand grips in this run: factor on the true grip (1)
+    --regrips       how it changes that in the run: from T seconds on by FACTOR, 2:1.5,4:0.7
 ";
 
 /// What stands behind the verb: `--name value`, and names that stand alone.
@@ -72,6 +74,23 @@ impl Options {
         self.values.get(name).map(|text| text.parse().map_err(|_| wrong(text))).transpose()
     }
 
+    /// Pairs of a time and a factor.
+    fn regrips(&self) -> Result<Vec<Regrip>, Failure> {
+        let Some(text) = self.values.get("regrips") else { return Ok(Vec::new()) };
+        let wrong = || misused(format!("--regrips: \"{text}\" is no list of times, ascending, and factors above 0, such as 2:1.5,4:0.7"));
+        let number = |text: &str| text.trim().parse::<f64>().ok().filter(|x| x.is_finite());
+        let mut regrips: Vec<Regrip> = Vec::new();
+        for pair in text.split(',') {
+            let (at, scale) = pair.split_once(':').ok_or_else(wrong)?;
+            let (at_s, scale) = number(at).zip(number(scale)).filter(|(at, scale)| *at >= 0.0 && *scale > 0.0).ok_or_else(wrong)?;
+            if regrips.last().is_some_and(|last| last.at_s >= at_s) {
+                return Err(wrong());
+            }
+            regrips.push(Regrip { at_s, scale });
+        }
+        Ok(regrips)
+    }
+
     /// s, from one sample to the next.
     fn period(&self) -> Result<f64, Failure> {
         Ok(1.0 / self.number("rate")?.unwrap_or(5000.0))
@@ -100,7 +119,7 @@ fn main() -> ExitCode {
             Options::sort(arguments, &named, &["nonlinear"]).and_then(|options| draw_truth(&options))
         }
         Some("run") => {
-            let named = ["model", "grip", "truth", "number", "firmness", "rate"];
+            let named = ["model", "grip", "truth", "number", "firmness", "regrips", "rate"];
             Options::sort(arguments, &named, &[]).and_then(|options| run(&options))
         }
         Some("--help" | "-h" | "help") => put(USAGE),
@@ -159,6 +178,7 @@ fn run(options: &Options) -> Result<(), Failure> {
         period_s: options.period()?,
         run: options.number("number")?.unwrap_or(0),
         firmness: options.number("firmness")?.unwrap_or(1.0),
+        regrips: options.regrips()?,
         coarse: false,
     };
     let network = options.network()?;

@@ -4,6 +4,18 @@ use crate::network::{InputKind, Network};
 use crate::plant::{PlantError, SealedPlant, StepError};
 use crate::truth::Truth;
 
+/// A change of the grip in a run.
+///
+/// The hand tightens or loosens where it is: the handle stays, and the force of the hand's spring; from then on that follows with the new stiffness. So
+/// the point that the spring pulls to is taken along, and the spring's energy changes from `F^2 / 2k` to `F^2 / 2k'`, which the muscle gives or takes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Regrip {
+    /// s, when.
+    pub at_s: f64,
+    /// Factor on stiffness and damping of the hand of this run, from then on.
+    pub scale: f64,
+}
+
 /// How a run uses the device.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MasterOptions {
@@ -13,6 +25,8 @@ pub struct MasterOptions {
     pub run: u32,
     /// How firm the hand grips in this run: factor on stiffness and damping of the true grip.
     pub firmness: f64,
+    /// How it changes its grip in this run, times ascending.
+    pub regrips: Vec<Regrip>,
     /// Whether a look is enough, as [`SealedPlant::coarse`] gives it.
     pub coarse: bool,
 }
@@ -73,6 +87,13 @@ pub struct SealedMaster {
     axes: Vec<Bound>,
     inputs: Vec<f64>,
     ran_away: bool,
+    regrips: Vec<(u64, f64, SealedPlant)>,
+    regripped: usize,
+    step: u64,
+    scale: f64,
+    /// m, of every axis' hand: how far the point that its spring pulls to was taken along.
+    shift: Vec<f64>,
+    of_grip: Vec<usize>,
 }
 
 impl SealedMaster {
@@ -104,11 +125,23 @@ impl SealedMaster {
         let axes = axes.collect();
         let mut truth = truth.clone();
         truth.noise_seed ^= u64::from(options.run) << 32;
-        truth.hand.stiffness *= options.firmness;
-        truth.hand.damping *= options.firmness;
         let make = if options.coarse { SealedPlant::coarse } else { SealedPlant::new };
-        let plant = make(held, &truth, options.period_s)?;
-        Ok(SealedMaster { plant, axes, inputs: vec![0.0; held.inputs.len()], ran_away: false })
+        let gripped = |scale: f64| {
+            let mut truth = truth.clone();
+            truth.hand.stiffness *= options.firmness * scale;
+            truth.hand.damping *= options.firmness * scale;
+            make(held, &truth, options.period_s)
+        };
+        let regrip = |regrip: &Regrip| {
+            let at = (regrip.at_s / options.period_s).round().max(0.0) as u64;
+            Ok((at, regrip.scale, gripped(regrip.scale)?))
+        };
+        let regrips = options.regrips.iter().map(regrip).collect::<Result<Vec<_>, PlantError>>()?;
+        let plant = gripped(1.0)?;
+        let named = held.elements.iter().filter(|element| element.of_grip);
+        let of_grip = named.filter_map(|element| plant.element(&element.name)).collect();
+        let (inputs, shift) = (vec![0.0; held.inputs.len()], vec![0.0; held.axes.len()]);
+        Ok(SealedMaster { plant, axes, inputs, ran_away: false, regrips, regripped: 0, step: 0, scale: 1.0, shift, of_grip })
     }
 
     /// How many axes it has.
@@ -142,7 +175,27 @@ impl SealedMaster {
                 self.ran_away = true;
                 Ok(())
             }
-            other => other,
+            other => {
+                self.step += 1;
+                self.regrip();
+                other
+            }
+        }
+    }
+
+    /// What of the grip changes at this sample.
+    fn regrip(&mut self) {
+        while let Some((_, scale, other)) = self.regrips.get_mut(self.regripped).filter(|(at, ..)| *at <= self.step) {
+            for (axis, shift) in self.axes.iter().zip(&mut self.shift) {
+                let Some(input) = axis.hand else { continue };
+                let stretch = self.inputs[input] - self.plant.position(axis.user);
+                let taken_along = (self.scale / *scale - 1.0) * stretch;
+                *shift += taken_along;
+                self.plant.move_hand(input, self.inputs[input] + taken_along);
+            }
+            self.plant.exchange_laws(other, &self.of_grip);
+            self.scale = *scale;
+            self.regripped += 1;
         }
     }
 
@@ -151,7 +204,7 @@ impl SealedMaster {
         for (index, axis) in self.axes.iter().enumerate() {
             self.inputs[axis.feedback] = at(force, index);
             if let Some(input) = axis.hand {
-                self.inputs[input] = at(hand, index);
+                self.inputs[input] = at(hand, index) + self.shift[index];
             }
         }
     }

@@ -3,7 +3,7 @@
 mod common;
 
 use backdrive_sealed::draw::{DrawOptions, draw};
-use backdrive_sealed::master::{MasterOptions, Reading, SealedMaster};
+use backdrive_sealed::master::{MasterOptions, Reading, Regrip, SealedMaster};
 use backdrive_sealed::plant::SealedPlant;
 use backdrive_sealed::process::{RemoteError, RemoteMaster};
 use backdrive_sealed::seal::hash;
@@ -55,7 +55,8 @@ fn the_process_is_the_device() {
         let truth = Truth::from_json(&bytes).unwrap();
         assert_eq!(truth, draw(&held(model), 8, &DrawOptions { effects: 2, ..DrawOptions::default() }).unwrap());
 
-        let options = MasterOptions { period_s: 2e-4, run: 3, firmness: 1.1, coarse: false };
+        let regrips = vec![Regrip { at_s: 0.02, scale: 1.5 }, Regrip { at_s: 0.05, scale: 0.5 }];
+        let options = MasterOptions { period_s: 2e-4, run: 3, firmness: 1.1, regrips, coarse: false };
         let mut here = SealedMaster::new(&held(model), &truth, &options).unwrap();
         let mut is_started = false;
         let expected = play(axes, |force, hand| {
@@ -67,10 +68,20 @@ fn the_process_is_the_device() {
             is_started = true;
             (0..axes).map(|axis| here.reading(axis).unwrap()).collect()
         });
-        let mut there = RemoteMaster::start_process(device_process(&path, model, &["--number", "3", "--firmness", "1.1"])).unwrap();
+        let mut there = RemoteMaster::start_process(device_process(
+            &path,
+            model,
+            &["--number", "3", "--firmness", "1.1", "--regrips", "0.02:1.5,0.05:0.5"],
+        ))
+        .unwrap();
         assert_eq!(there.axes(), axes);
         assert_eq!(play(axes, |force, hand| there.step(force, hand).unwrap().to_vec()), expected);
-        let mut other = RemoteMaster::start_process(device_process(&path, model, &["--number", "4", "--firmness", "1.1"])).unwrap();
+        let mut other = RemoteMaster::start_process(device_process(
+            &path,
+            model,
+            &["--number", "4", "--firmness", "1.1", "--regrips", "0.02:1.5,0.05:0.5"],
+        ))
+        .unwrap();
         let again = play(axes, |force, hand| other.step(force, hand).unwrap().to_vec());
         assert!(again.iter().zip(&expected).any(|(a, b)| a.measured != b.measured), "its noise is another");
         assert!(again.iter().zip(&expected).all(|(a, b)| a.position == b.position), "and nothing else");
@@ -116,7 +127,9 @@ fn it_ends_when_what_it_is_told_is_no_number() {
 fn a_reading_is_what_the_plant_does() {
     let network = held("plant/models/two-axis.toml");
     let truth = Truth::nothing(&network);
-    let mut master = SealedMaster::new(&network, &truth, &MasterOptions { period_s: 2e-4, run: 0, firmness: 1.0, coarse: false }).unwrap();
+    let mut master =
+        SealedMaster::new(&network, &truth, &MasterOptions { period_s: 2e-4, run: 0, firmness: 1.0, regrips: Vec::new(), coarse: false })
+            .unwrap();
     let mut plant = SealedPlant::new(&network, &truth, 2e-4).unwrap();
     master.start(&[1e-3, -1e-3]).unwrap();
     let at = |name: &str| network.input(name).unwrap();
@@ -144,10 +157,32 @@ fn a_reading_is_what_the_plant_does() {
 
 #[test]
 fn what_is_no_master_is_refused() {
-    let options = MasterOptions { period_s: 2e-4, run: 0, firmness: 1.0, coarse: false };
+    let options = MasterOptions { period_s: 2e-4, run: 0, firmness: 1.0, regrips: Vec::new(), coarse: false };
     let refused = |network: &backdrive_sealed::network::Network| {
         SealedMaster::new(network, &Truth::nothing(network), &options).map(|_| ()).unwrap_err().to_string()
     };
     assert!(refused(&device(MASS)).contains("has no [[axes]]"));
     assert!(refused(&device(&file("plant/models/steering-compensator.toml"))).contains("must be a force input"));
+}
+
+#[test]
+fn a_hand_that_tightens_holds_where_it_is_and_gives_way_less_from_then_on() {
+    let network = held(MODEL);
+    let regrips = vec![Regrip { at_s: 1.5, scale: 2.0 }];
+    let options = MasterOptions { period_s: 2e-4, run: 0, firmness: 1.0, regrips, coarse: true };
+    let mut master = SealedMaster::new(&network, &Truth::nothing(&network), &options).unwrap();
+    master.start(&[1e-3]).unwrap();
+    let mut rest = |force: f64, seconds: f64| {
+        (0..(seconds / 2e-4) as usize).for_each(|_| master.step(&[force], &[1e-3]).unwrap());
+        let reading = master.reading(0).unwrap();
+        (reading.position, reading.force)
+    };
+    let before = rest(2.0, 1.4);
+    near(before.0, 1e-3 + 2.0 / 400.0, 1e-6);
+    let after = rest(2.0, 0.5);
+    // The handle stays, and so does the force of the hand.
+    near(after.0, before.0, 1e-6);
+    near(after.1, -2.0, 1e-4);
+    let more = rest(3.0, 1.5);
+    near(more.0 - after.0, 1.0 / 800.0, 1e-6);
 }

@@ -30,6 +30,9 @@ pub struct SwappedParts {
     /// Corner of a high-pass on the canceller's estimate; 0 for none.
     #[arg(long, value_name = "HZ", value_parser = not_negative, allow_negative_numbers = true)]
     pub high_pass: Option<f64>,
+    /// Whether the canceller takes the hand as its grip says, or estimates how firmly it holds while the loop runs: docs/canceller.md.
+    #[arg(long, value_enum)]
+    pub hand: Option<Hand>,
     /// Whether sensors round and are noisy as the model files say.
     #[arg(long, value_enum)]
     pub sensors: Option<Sensors>,
@@ -49,9 +52,29 @@ impl SwappedParts {
             canceller: self.canceller.clone(),
             canceller_grip: self.canceller_grip.clone(),
             high_pass_hz: self.high_pass,
+            hand: self.hand.map(|h| h.word().to_string()),
             sensors: self.sensors.map(|s| s.word().to_string()),
             limits: self.limits.map(|l| l.word().to_string()),
             ..Overrides::default()
+        }
+    }
+}
+
+/// See [`SwappedParts::hand`].
+#[derive(Debug, Clone, Copy, ValueEnum)]
+pub enum Hand {
+    /// As its grip says.
+    AsModelled,
+    /// Estimated.
+    Estimated,
+}
+
+impl Hand {
+    /// As a graph file says it.
+    fn word(self) -> &'static str {
+        match self {
+            Hand::AsModelled => "as_modelled",
+            Hand::Estimated => "estimated",
         }
     }
 }

@@ -49,7 +49,10 @@ pub struct Prove {
     /// The task in which the gain is raised.
     #[arg(long, value_name = "FILE", default_value = "launch/contact.toml")]
     pub contact: PathBuf,
-    /// Corner of the canceller's high-pass while the gain is raised, Hz.
+    /// The same task with a hand that changes its grip while it pushes.
+    #[arg(long, value_name = "FILE", default_value = "launch/contact-regrip.toml")]
+    pub regrip: PathBuf,
+    /// Corner of the high-pass of the cancellers that do not estimate the hand, while the gain is raised, Hz.
     #[arg(long, value_name = "HZ", default_value_t = 1.0)]
     pub high_pass: f64,
     /// How much a diagnosis searches, as a multiple of the default; two and a half times that where nobody measured the hand.
@@ -68,11 +71,14 @@ pub struct Prove {
     #[arg(long, value_name = "HZ", value_parser = positive, default_value_t = 5.0)]
     pub hand_bandwidth: f64,
     /// How firmly the hand grips in further runs at each gain: factors on the grip of the session.
-    #[arg(long, value_name = "FACTORS", value_delimiter = ',', value_parser = positive, default_values_t = [0.8, 0.9, 0.95, 1.05, 1.1, 1.2])]
+    #[arg(long, value_name = "FACTORS", value_delimiter = ',', value_parser = positive, default_values_t = [0.5, 0.7, 1.4, 2.0])]
     pub grips: Vec<f64>,
-    /// Only the grip of the session.
+    /// Only the grip of the session, and no hand that changes it.
     #[arg(long, conflicts_with = "grips")]
     pub same_grip: bool,
+    /// Raise the gain in one process only: the graph itself is not run about the edges.
+    #[arg(long)]
+    pub no_live: bool,
     /// Only conceal, record and diagnose: no gain is raised.
     #[arg(long, conflicts_with_all = ["grips", "same_grip"])]
     pub no_gains: bool,

@@ -67,7 +67,7 @@ impl Loaded {
 /// Whether a graph's canceller has a model.
 fn knows(graph: &Graph) -> bool {
     use backdrive_nodes::graph::Settings;
-    matches!(graph.node_of(NodeKind::Canceller).map(|n| &n.settings), Some(Settings::Canceller(files, _)) if files.model.is_some())
+    matches!(graph.node_of(NodeKind::Canceller).map(|n| &n.settings), Some(Settings::Canceller(files, ..)) if files.model.is_some())
 }
 
 /// The hand in a bag.

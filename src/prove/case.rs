@@ -1,10 +1,11 @@
 //! One proof: draw and seal, record, diagnose, raise the gain, and only then look at the truth.
 
 use super::chosen::{Chosen, Task, choose};
-use super::edges::{Canceller, Loop, Moved};
-use super::files::{absolute, ours, read, write};
-use super::hidden::{Hidden, Opened, program};
-use super::live::{self, LiveRun, hide};
+use super::edges::Canceller;
+use super::files::{absolute, at, ours, read, write};
+use super::hidden::{Hidden, program};
+use super::live::{LiveRun, hide};
+use super::raise::{ESTIMATED, Gain, Hand, Raised, raise};
 use super::score::{Finding, Handed, Mark, findings, is_nonlinear, mark, name_of};
 use super::session::hand_over;
 use crate::cli;
@@ -14,12 +15,10 @@ use crate::progress::busy;
 use backdrive_diagnosis::verdict::{MODEL_FILE, VERDICT_FILE, Verdict, Word};
 use backdrive_sealed::seal::hash;
 use backdrive_sealed::truth::Truth;
-use serde::Serialize;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
 use toml_edit::{Array, DocumentMut, Item, value};
 
 /// Factor on the time for a search where the hand is not shown: its curve makes every fit longer.
@@ -28,26 +27,15 @@ const LONGER: f64 = 2.5;
 /// Noise floors from which on an effect counts as one that shows.
 pub const SHOWS: f64 = 3.0;
 
-/// Cancellers that are compared at other grips than the session's.
-const AT_OTHER_GRIPS: [&str; 5] = ["none", "second order", "linear, refitted", "diagnosed", "chosen"];
+/// What a user has without a diagnosis: the honest measure of a canceller is its stable gain over the best of these.
+const OTHERS: [&str; 3] = ["none", "second order", "linear, refitted"];
 
-/// Cancellers whose edges the live graph confirms.
-const LIVE: [&str; 3] = ["none", "diagnosed", "chosen"];
-
-/// A stable gain that was measured.
-#[derive(Debug, Clone, Serialize)]
-pub struct Gain {
-    /// Which canceller.
-    pub canceller: &'static str,
-    /// Factor on the true grip of the session.
-    pub grip: f64,
-    /// Highest mu*lambda found stable; 0 where not even the lowest of the search was.
-    pub stable_to: f64,
-    /// What ends the stable range, or that nothing does.
-    pub because: String,
-    /// Whether nothing ended it.
-    pub whole_range: bool,
-}
+/// Kinds of physics, by the names of the hidden laws.
+pub const KINDS: [(&str, &[&str]); 3] = [
+    ("dry friction", &["coulomb", "asymmetric_coulomb", "stribeck", "friction_deficit", "load_friction", "warm_friction", "gear_loss"]),
+    ("hysteresis", &["hysteretic_spring", "bouc_wen", "dahl", "lugre", "maxwell_slip", "preisach_lugre", "bristle_field"]),
+    ("backlash", &["backlash", "rounded_gap"]),
+];
 
 /// What is drawn and how it is shown.
 pub struct Draw {
@@ -95,6 +83,8 @@ pub struct Case {
     pub refit_floors: Option<f64>,
     /// Stable mu*lambda by canceller and grip.
     pub gains: Vec<Gain>,
+    /// Time that the loop with the canceller that estimates the hand takes to settle after a change of the grip, at half its stable gain, s: the median.
+    pub recovery_s: Option<f64>,
     /// The live graph at gains about the edges without a canceller and with the diagnosed and the chosen one.
     pub live: Vec<LiveRun>,
     /// Share of the diagnosed estimate that was chosen where the grip is uncertain, 0 for no canceller; `None` where no gain was raised.
@@ -146,13 +136,8 @@ pub fn prove(options: &cli::Prove, folder: &Path, drawn: &Draw, stop: &AtomicBoo
     };
     // The verdict is written; now the truth is opened.
     let truth = open_truth(&hidden, &digest)?;
-    let (gains, live) = raise(options, folder, &hidden, &truth, &cancellers, stop)?;
-    Ok(case(folder, drawn, digest, &verdict, &truth, Raised { gains, live, share }))
-}
-
-/// What is being done, for the status line.
-fn at(folder: &Path, doing: &str) -> String {
-    format!("{}: {doing}", folder.display())
+    let raised = raise(options, folder, &hidden, &truth, &cancellers, stop)?;
+    Ok(case(folder, drawn, digest, &verdict, &truth, raised, share))
 }
 
 /// The hidden plant of a case, with a folder made for its truth.
@@ -203,7 +188,9 @@ fn cancellers(
     let is_explained = verdict.word != Word::Unexplained && left.is_some_and(|floors| floors < SHOWS);
     let choose = || choose(&diagnosed, &rivals, &scaled, &task, stop);
     let chosen = if is_explained { busy(&at(folder, "choosing how much to cancel"), choose)? } else { Chosen::nothing() };
-    cancellers.push(Canceller { name: "chosen", model: (chosen.share > 0.0).then_some(scaled), grip: None });
+    cancellers.push(Canceller::fixed("chosen", (chosen.share > 0.0).then_some(scaled), None));
+    let model = is_explained.then_some(diagnosed);
+    cancellers.push(Canceller { name: ESTIMATED, estimates_hand: model.is_some(), model, grip: None });
     Ok((cancellers, Some(chosen.share)))
 }
 
@@ -221,55 +208,15 @@ fn open_truth(hidden: &Hidden, digest: &str) -> Result<Truth, Failure> {
     Truth::from_json(&bytes).map_err(Failure::input)
 }
 
-/// What the gain was raised to.
-struct Raised {
-    gains: Vec<Gain>,
-    live: Vec<LiveRun>,
-    share: Option<f64>,
-}
-
-/// Raises the gain with every canceller and grip, the hidden plant being the master; runs the live graph about some of the edges.
-fn raise(
-    options: &cli::Prove,
-    folder: &Path,
-    hidden: &Hidden,
-    truth: &Truth,
-    cancellers: &[Canceller],
-    stop: &AtomicBool,
-) -> Result<(Vec<Gain>, Vec<LiveRun>), Failure> {
-    let device = Arc::new(Opened::new(hidden, truth).map_err(Failure::input)?);
-    let master = Moved::Hidden(&hidden.model, hidden.grip.as_deref(), device.clone());
-    let the_loop = Loop { graph: &options.contact, high_pass_hz: options.high_pass, master };
-    let further: &[f64] = if options.same_grip { &[] } else { &options.grips };
-    let (mut gains, mut live) = (Vec::new(), Vec::new());
-    for grip in [1.0].iter().chain(further) {
-        for canceller in cancellers.iter().filter(|c| *grip == 1.0 || AT_OTHER_GRIPS.contains(&c.name)) {
-            if stop.load(Ordering::SeqCst) {
-                break;
-            }
-            let raising = at(folder, &format!("raising the gain with canceller \"{}\" and {grip} of the grip", canceller.name));
-            let edge = busy(&raising, || the_loop.edge(canceller, *grip, stop))?;
-            if *grip == 1.0 && LIVE.contains(&canceller.name) {
-                let live_folder = folder.join("live");
-                let about = || live::about(&live_folder, &the_loop, canceller, &edge, hidden, &device);
-                live.extend(busy(&at(folder, "running the live graph"), about)?);
-            }
-            let whole_range = edge.critical_gain.is_none() && edge.limited_from.is_none() && edge.at_least > 0.0;
-            gains.push(Gain { canceller: canceller.name, grip: *grip, stable_to: edge.at_least, because: edge.reason, whole_range });
-        }
-    }
-    Ok((gains, live))
-}
-
 /// What was found beside what was concealed.
-fn case(folder: &Path, drawn: &Draw, sealed: String, verdict: &Verdict, truth: &Truth, raised: Raised) -> Case {
+fn case(folder: &Path, drawn: &Draw, sealed: String, verdict: &Verdict, truth: &Truth, raised: Raised, share: Option<f64>) -> Case {
     let (held, findings) = (&verdict.held_out, findings(verdict));
     let handed = Handed { hand_hidden: !drawn.shows_hand, refitted: drawn.refitted };
     Case {
         name: folder.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned()),
         shows_hand: drawn.shows_hand,
         refitted: drawn.refitted,
-        share: raised.share,
+        share,
         sealed,
         word: verdict.word,
         sentence: verdict.sentence.clone(),
@@ -281,30 +228,44 @@ fn case(folder: &Path, drawn: &Draw, sealed: String, verdict: &Verdict, truth: &
         findings,
         gains: raised.gains,
         live: raised.live,
+        recovery_s: raised.recovery_s,
     }
 }
 
 impl Case {
-    /// The stable gain with a canceller and a grip.
-    pub fn gain(&self, canceller: &str, grip: f64) -> Option<f64> {
-        self.gains.iter().find(|g| g.canceller == canceller && g.grip == grip).map(|g| g.stable_to)
+    /// The stable gain with a canceller and a hand.
+    pub fn gain(&self, canceller: &str, hand: Hand) -> Option<f64> {
+        self.gains.iter().find(|g| g.canceller == canceller && g.hand == hand).map(|g| g.stable_to)
     }
 
     /// The stable gain with a canceller over that with the better of the two linear ones.
-    pub fn ratio(&self, canceller: &str, grip: f64) -> Option<f64> {
-        let linear = self.gain("second order", grip)?.max(self.gain("linear, refitted", grip)?);
-        Some(self.gain(canceller, grip)? / linear).filter(|r| r.is_finite())
+    pub fn over_linear(&self, canceller: &str, hand: Hand) -> Option<f64> {
+        let linear = self.gain("second order", hand)?.max(self.gain("linear, refitted", hand)?);
+        Some(self.gain(canceller, hand)? / linear).filter(|r| r.is_finite())
     }
 
-    /// The grips at which gains were measured, the session's first.
-    pub fn grips(&self) -> Vec<f64> {
-        let mut grips = Vec::new();
+    /// The same over the best of what a user has without a diagnosis: no canceller, or one of the two linear ones.
+    pub fn over_others(&self, canceller: &str, hand: Hand) -> Option<f64> {
+        let best = OTHERS.iter().map(|other| self.gain(other, hand)).try_fold(0.0_f64, |best, gain| Some(best.max(gain?)))?;
+        Some(self.gain(canceller, hand)? / best).filter(|r| r.is_finite())
+    }
+
+    /// The hands with which gains were measured, the session's first.
+    pub fn hands(&self) -> Vec<Hand> {
+        let mut hands = Vec::new();
         for gain in &self.gains {
-            if !grips.contains(&gain.grip) {
-                grips.push(gain.grip);
+            if !hands.contains(&gain.hand) {
+                hands.push(gain.hand);
             }
         }
-        grips
+        hands
+    }
+
+    /// What kind of physics is concealed first: dry friction, hysteresis, backlash, something else; `None` where nothing is.
+    pub fn kind(&self) -> Option<&'static str> {
+        let name = self.concealed.first()?.split(' ').next()?;
+        let kind = KINDS.iter().find(|(_, names)| names.contains(&name));
+        Some(kind.map_or("other physics", |(kind, _)| kind))
     }
 
     /// Whether the recordings show what is concealed: the nominal model, with whatever numbers fit best, stays [`SHOWS`] noise floors and more away
@@ -323,7 +284,7 @@ impl Case {
         let list = |names: &[String]| if names.is_empty() { "nothing".to_string() } else { names.join(", ") };
         let found: Vec<String> = self.findings.iter().map(|f| format!("{} {}", f.physics, f.place.join("-"))).collect();
         let percent = |x: Option<f64>| x.map_or("-".to_string(), |x| format!("{:.2} %", 100.0 * x));
-        let here = self.gains.iter().filter(|g| g.grip == 1.0);
+        let here = self.gains.iter().filter(|g| g.hand == Hand::SESSION);
         let gains: Vec<String> =
             here.map(|g| format!("{} {}{:.2}", g.canceller, if g.whole_range { "above " } else { "" }, g.stable_to)).collect();
         let [given, refitted, diagnosed] = self.held_out.map(percent);
@@ -336,6 +297,12 @@ impl Case {
         );
         if !gains.is_empty() {
             text += &format!("\n  stable to   {}", gains.join(", "));
+            let worth = |hand: &Hand| Some(format!("{hand} {:.2}", self.over_others(ESTIMATED, *hand)?));
+            let worths: Vec<String> = self.hands().iter().filter_map(worth).collect();
+            text += &format!("\n  {ESTIMATED}, over the best of none, second order and linear refitted: {}", worths.join(", "));
+            if let Some(time) = self.recovery_s {
+                text += &format!("; settles {time:.2} s after a change of the grip");
+            }
         }
         if !self.live.is_empty() {
             let agree = self.live.iter().filter(|run| run.agrees()).count();
@@ -349,7 +316,10 @@ impl Case {
         json!({
             "case": self.name, "sealed": self.sealed, "shows_hand": self.shows_hand, "nominal_refitted": self.refitted, "verdict": self.word, "sentence": self.sentence,
             "findings": self.findings, "concealed": self.concealed, "marks": self.marks, "nonlinear": self.nonlinear,
-            "held_out": self.held_out, "refit_floors": self.refit_floors, "stable_gain": self.gains, "live": self.live, "share": self.share, "ratio": self.ratio("diagnosed", 1.0),
+            "held_out": self.held_out, "refit_floors": self.refit_floors, "stable_gain": self.gains, "live": self.live, "share": self.share,
+            "over_others": self.hands().iter().map(|hand| json!({ "hand": hand, "diagnosed": self.over_others("diagnosed", *hand),
+                "chosen": self.over_others("chosen", *hand), "hand_estimated": self.over_others(ESTIMATED, *hand) })).collect::<Vec<_>>(),
+            "recovery_s": self.recovery_s, "ratio": self.over_linear("diagnosed", Hand::SESSION),
         })
     }
 }
@@ -406,10 +376,10 @@ fn all_cancellers(options: &cli::Prove, folder: &Path, nominal: &Nominal, sessio
     ours(folder, "fit-second-order", &[&"fit", &options.second_order, &still, &"--out", &second])?;
     let refitted = folder.join("refitted.toml");
     refit(folder, "fit-nominal", session, &refitted)?;
-    let holds = |name, model: PathBuf| Canceller { name, model: Some(model), grip: None };
+    let holds = |name, model: PathBuf| Canceller::fixed(name, Some(model), None);
     Ok(vec![
-        Canceller { name: "none", model: None, grip: None },
-        Canceller { name: "nominal", model: Some(nominal.model.clone()), grip: nominal.grip.clone() },
+        Canceller::fixed("none", None, None),
+        Canceller::fixed("nominal", Some(nominal.model.clone()), nominal.grip.clone()),
         holds("second order", second),
         holds("linear, refitted", refitted),
         holds("diagnosed", found.join(MODEL_FILE)),

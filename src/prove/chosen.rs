@@ -52,11 +52,11 @@ pub fn choose(model: &Path, rivals: &[PathBuf], path: &Path, task: &Task, stop: 
         }
         Ok(worst)
     };
-    let mut best = Chosen { share: 0.0, worst: worst(&Canceller { name: "none", model: None, grip: None }, 0.0)? };
+    let mut best = Chosen { share: 0.0, worst: worst(&Canceller::fixed("none", None, None), 0.0)? };
     for share in SHARES {
         write_scaled(&text, model, path, share)?;
         let enough = if best.share > 0.0 { BETTER * best.worst } else { best.worst };
-        let worst = worst(&Canceller { name: "chosen", model: Some(path.to_path_buf()), grip: None }, enough)?;
+        let worst = worst(&Canceller::fixed("chosen", Some(path.to_path_buf()), None), enough)?;
         if worst > enough {
             best = Chosen { share, worst };
         }

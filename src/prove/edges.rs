@@ -3,9 +3,8 @@
 use super::hidden::Opened;
 use crate::failure::Failure;
 use backdrive_nodes::graph::{Graph, NodeKind, Overrides, Settings};
-use backdrive_plant::model::InputKind;
 use backdrive_stability::resimulate::edge::{Edge, Search, edge};
-use backdrive_stability::resimulate::{OwnCores, RunOptions, Scenario, grip};
+use backdrive_stability::resimulate::{OwnCores, RunOptions, Scenario};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -24,6 +23,15 @@ pub struct Canceller {
     pub model: Option<PathBuf>,
     /// The grip that it assumes; `None` where its model holds the hand.
     pub grip: Option<PathBuf>,
+    /// Whether it estimates the hand while the loop runs.
+    pub estimates_hand: bool,
+}
+
+impl Canceller {
+    /// One that takes the hand as the file says.
+    pub fn fixed(name: &'static str, model: Option<PathBuf>, grip: Option<PathBuf>) -> Canceller {
+        Canceller { name, model, grip, estimates_hand: false }
+    }
 }
 
 /// What the loop moves.
@@ -57,7 +65,9 @@ impl Loop<'_> {
             grip: Some(grip.map_or_else(none, Path::to_path_buf)),
             canceller: Some(canceller.model.clone().unwrap_or_else(none)),
             canceller_grip: Some(canceller.grip.clone().unwrap_or_else(none)),
-            high_pass_hz: Some(self.high_pass_hz),
+            // Who estimates the hand has a rule of its own for what cannot be known at rest.
+            high_pass_hz: Some(if canceller.estimates_hand { 0.0 } else { self.high_pass_hz }),
+            hand: canceller.estimates_hand.then(|| "estimated".to_string()),
             limits: Some("ignored".to_string()),
             ..Overrides::default()
         }
@@ -65,6 +75,14 @@ impl Loop<'_> {
 
     /// The edge with a canceller, the hand gripping `firmness` times as firmly as when it was recorded.
     pub fn edge(&self, canceller: &Canceller, firmness: f64, cancel: &AtomicBool) -> Result<Edge, Failure> {
+        let scenario = self.scenario(canceller, firmness)?;
+        let options = RunOptions { grip_scale: firmness, ..RunOptions::default() };
+        let around = firmness == 1.0 && matches!(self.master, Moved::Hidden(..)) && scenario.duration_s() < LONG_S;
+        edge(&scenario, &Search { around, ..SEARCH }, &options, &|_, _| {}, cancel).map_err(Failure::input)
+    }
+
+    /// The loop with a canceller, ready to be run.
+    pub fn scenario(&self, canceller: &Canceller, firmness: f64) -> Result<Scenario, Failure> {
         let changes = self.changes(canceller);
         let mut graph = Graph::load(self.graph, &changes)?;
         let device = match &self.master {
@@ -77,18 +95,17 @@ impl Loop<'_> {
                 Some(device.clone())
             }
         };
-        let mut scenario = Scenario::new(graph, None, None).map_err(Failure::input)?;
-        if let Some(device) = device {
-            let own: OwnCores = Arc::new(move |graph, node, firmness| {
-                (node.kind == NodeKind::Master).then(|| device.core(graph, node, number_at(graph.gains.mu * graph.gains.lambda), firmness))
-            });
-            scenario = scenario.with_own_cores(own);
-        }
-        let options = RunOptions { grip_scale: firmness, ..RunOptions::default() };
-        let around = firmness == 1.0 && matches!(self.master, Moved::Hidden(..));
-        edge(&scenario, &Search { around, ..SEARCH }, &options, &|_, _| {}, cancel).map_err(Failure::input)
+        let scenario = Scenario::new(graph, None, None).map_err(Failure::input)?;
+        let Some(device) = device else { return Ok(scenario) };
+        let own: OwnCores = Arc::new(move |graph, node, firmness| {
+            (node.kind == NodeKind::Master).then(|| device.core(graph, node, number_at(graph.gains.mu * graph.gains.lambda), firmness))
+        });
+        Ok(scenario.with_own_cores(own))
     }
 }
+
+/// Of runs as long as this the edge is not looked at again from both sides, s.
+const LONG_S: f64 = 8.0;
 
 /// Numbers of runs of the hidden plant from this on are of runs at a gain.
 const AT_GAINS: u32 = 10_000;
@@ -104,8 +121,6 @@ fn firmer(graph: &mut Graph, factor: f64) {
     for node in graph.nodes.iter_mut().filter(|n| n.kind == NodeKind::Master) {
         let Settings::Master(files) = &mut node.settings else { continue };
         let Some(model) = &mut files.model else { continue };
-        let hands: Vec<usize> = model.inputs.iter().filter(|i| i.kind == InputKind::Motion).map(|i| i.on).collect();
-        let of_hand = |between: &[Option<usize>; 2]| between.iter().flatten().any(|body| hands.contains(body));
-        model.elements.iter_mut().filter(|e| of_hand(&e.between)).for_each(|e| grip::scale_element(e, factor));
+        model.scale_own_hand(factor);
     }
 }

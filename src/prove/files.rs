@@ -39,3 +39,8 @@ pub(super) fn read(path: &Path) -> Result<String, Failure> {
 pub(super) fn write(path: &Path, text: &str) -> Result<(), Failure> {
     output::file(path, text)
 }
+
+/// What is being done with a case, for the status line.
+pub(super) fn at(folder: &Path, doing: &str) -> String {
+    format!("{}: {doing}", folder.display())
+}

@@ -5,7 +5,7 @@ use backdrive_control::master::Master;
 use backdrive_control::mechanism::Mechanism;
 use backdrive_nodes::graph::{Graph, Node, NodeKind, Settings};
 use backdrive_plant::model::Axis;
-use backdrive_sealed::master::{MasterOptions, Reading, SealedMaster};
+use backdrive_sealed::master::{MasterOptions, Reading, Regrip, SealedMaster};
 use backdrive_sealed::network::{Grip, Network};
 use backdrive_sealed::process::RemoteMaster;
 use backdrive_sealed::truth::Truth;
@@ -100,7 +100,12 @@ impl Opened {
 
     /// The core of a master that is this device, in a run with sensor noise of its own.
     pub fn core(&self, graph: &Graph, node: &Node, run: u32, firmness: f64) -> Result<Vec<Box<dyn Core>>, String> {
-        let options = MasterOptions { period_s: self.period_s, run, firmness, coarse: true };
+        let changes = match &node.settings {
+            Settings::Master(files) => &files.grip_changes[..],
+            _ => &[],
+        };
+        let regrips = changes.iter().map(|change| Regrip { at_s: change.at_s, scale: change.scale }).collect();
+        let options = MasterOptions { period_s: self.period_s, run, firmness, regrips, coarse: true };
         let mut plant = SealedMaster::new(&self.held, &self.truth, &options).map_err(|e| e.to_string())?;
         let axes = plant.axes();
         let mut started = false;

@@ -7,9 +7,13 @@ mod files;
 pub mod hidden;
 mod live;
 mod page;
+mod raise;
+mod recovery;
 mod score;
 mod session;
+mod statistics;
 mod summary;
+mod worth;
 
 use crate::cli;
 use crate::failure::{Failure, code};
@@ -84,6 +88,7 @@ fn given_files_are_there(options: &cli::Prove) -> Result<(), Failure> {
         ("second-order", &options.second_order),
         ("session", &options.session),
         ("contact", &options.contact),
+        ("regrip", &options.regrip),
     ];
     for (option, path) in given {
         std::fs::File::open(path).map_err(|e| {

@@ -1,14 +1,16 @@
 //! The report of a proof: what was concealed beside what was found, and what that is worth.
 
 use super::case::{Case, SHOWS};
-use super::summary::{Summary, Worth};
+use super::raise::{ESTIMATED, Hand};
+use super::summary::Summary;
+use super::worth::{DIAGNOSED, Group};
 use crate::cli;
 use backdrive_diagnosis::hypothesis::Place;
 use backdrive_diagnosis::words;
 use backdrive_report::{Cell, Figure, Page, Plot, Series, Table, Tone, number, percent};
 
 /// The cancellers in tables, in this order.
-const CANCELLERS: [&str; 6] = ["none", "nominal", "second order", "linear, refitted", "diagnosed", "chosen"];
+const CANCELLERS: [&str; 7] = ["none", "nominal", "second order", "linear, refitted", "diagnosed", "chosen", ESTIMATED];
 
 /// The report over cases.
 pub fn page(options: &cli::Prove, cases: &[Case]) -> Page {
@@ -30,7 +32,7 @@ pub fn page(options: &cli::Prove, cases: &[Case]) -> Page {
             ),
         );
         if !options.no_gains {
-            page.figure(ratios(cases), "Stable μλ with the diagnosed and with the chosen canceller, over that with the better of the two linear ones; above 1 is better. Cases in their order.");
+            page.figure(ratios(cases), "Stable μλ with the diagnosed, the chosen and the hand-estimating canceller, over the best of no canceller and the two linear ones; above 1 is better. Cases in their order, grip of the session.");
         }
         page.section("What was found");
         page.table(table(cases));
@@ -39,11 +41,15 @@ pub fn page(options: &cli::Prove, cases: &[Case]) -> Page {
         if !options.no_gains {
             page.section("What it is worth");
         }
-        for (name, worths) in [("Nonlinear effects", &summary.nonlinear), ("Linear effects", &summary.linear)] {
-            if !worths.is_empty() {
-                page.text(&format!("{name}: median of the stable gain over that of the better linear canceller, and in how many cases it is below that without one."));
-                page.table(worth(worths));
-            }
+        for group in &summary.worth {
+            page.text(&format!(
+                "{}, {} cases: median of the stable gain over the best of what a user has without a diagnosis (no canceller, second order, linear refitted), in how many cases it is below that \
+                 without a canceller, and, as it was told before, over the better of the two linear ones alone, which flatters: they are often far below none.{}",
+                group.kind,
+                group.cases,
+                group.recovery_s.map_or_else(String::new, |s| format!(" After a change of the grip the loop with the hand estimated settles in {s:.2} s (median)."))
+            ));
+            page.table(worth(group));
         }
     }
     for case in cases {
@@ -63,12 +69,14 @@ pub fn page(options: &cli::Prove, cases: &[Case]) -> Page {
          to 50 in steps that end at 3 %, the canceller behind a high-pass of {} Hz; \"linear, refitted\" is the nominal model with its numbers fitted to \
          the session, \"second order\" one mass on a spring and a damper fitted to the recordings in which the hand holds still, \"chosen\" the diagnosed \
          model with that share of its estimate whose worst stable gain over grips 20 % softer to 20 % firmer is best when the diagnosed model itself, or \
-         one of its rivals that explain the recordings nearly as well, is the master, and no canceller where the verdict leaves something unexplained, or {} noise floors and more of what was held out. Edges are searched with the loop in one process; at the edges without \
-         canceller, with the diagnosed and with the chosen one the graph itself is run, its processes over shared memory.",
+         one of its rivals that explain the recordings nearly as well, is the master, and no canceller where the verdict leaves something unexplained, or {} noise floors and more of what was held out; \"hand estimated\" the diagnosed model behind no high-pass, the firmness of the hand estimated while the loop runs \
+         (docs/canceller.md), and none where the chosen one would be none for what is unexplained. The changing hand is that of {}. Edges are searched with the loop in one process; at the edges without \
+         canceller, with the diagnosed, the chosen and the hand-estimating one the graph itself is run, its processes over shared memory.",
         options.seed,
         options.contact.display(),
         options.high_pass,
-        SHOWS
+        SHOWS,
+        options.regrip.display()
     ));
     page.text(
         "What another number of the nominal model does as well, or a constant force on a handle whose hand nobody measured, no recording can tell: there naming \
@@ -80,12 +88,16 @@ pub fn page(options: &cli::Prove, cases: &[Case]) -> Page {
 }
 
 /// The terms of the page.
-const TERMS: [(&str, &str); 5] = [
+const TERMS: [(&str, &str); 6] = [
     ("μλ", "the loop's gain: the position scale μ from master to slave times the force scale λ from slave to master"),
     ("stable to", "the highest gain found at which what oscillates in contact dies out"),
     ("canceller", "takes the master's own motion under the reflected force out of the command, by the model named"),
     ("noise floor", "standard deviation of the sensor noise: an error of 1 cannot be improved on"),
-    ("linear", "the better of the two cancellers with a linear model"),
+    (
+        "best of others",
+        "the best of no canceller and the two with a linear model, fitted to the session: what a user has without a diagnosis",
+    ),
+    ("over linear", "over the better of the two cancellers with a linear model alone"),
 ];
 
 fn concealed(case: &Case) -> String {
@@ -118,10 +130,10 @@ fn one(page: &mut Page, case: &Case) {
     if !case.gains.is_empty() {
         page.figure(gains(case), "Highest stable μλ against how firmly the hand grips, 1 being its grip in the session.");
     }
-    let mut because = Table::new(["canceller", "grip", "stable to", "because"]);
+    let mut because = Table::new(["canceller", "hand", "stable to", "because"]);
     for gain in &case.gains {
         let stable = if gain.whole_range { format!("above {}", number(gain.stable_to)) } else { number(gain.stable_to) };
-        because.push([gain.canceller.to_string(), number(gain.grip), stable, gain.because.clone()]);
+        because.push([gain.canceller.to_string(), gain.hand.to_string(), stable, gain.because.clone()]);
     }
     let [given, refitted, diagnosed] = case.held_out.map(|x| x.map_or("-".to_string(), percent));
     page.text(&format!(
@@ -136,7 +148,10 @@ fn one(page: &mut Page, case: &Case) {
     let nominal = if case.refitted { " The nominal model's numbers were refitted to a session before." } else { "" };
     page.text(&format!("{hand}{nominal}{share} Seal: {}.", case.sealed));
     if !case.gains.is_empty() {
-        page.table(by_grip(case));
+        page.table(by_hand(case));
+        if let Some(time) = case.recovery_s {
+            page.text(&format!("After a change of the grip, at half the stable gain of the changing hand, the loop with the hand estimated settles in {time:.2} s (median); the hand's own move is 0.15 s of it."));
+        }
         page.details("What ends each stable range", |inside| {
             inside.table(because);
         });
@@ -154,13 +169,21 @@ fn one(page: &mut Page, case: &Case) {
     page.link("The diagnosis itself: its page", &format!("{}/diagnosis/report.html", case.name));
 }
 
-/// A row for each canceller, a column for each grip.
-fn by_grip(case: &Case) -> Table {
-    let mut grips = case.grips();
+/// The grips in ascending order.
+fn grips(case: &Case) -> Vec<f64> {
+    let grip = |hand: &Hand| if let Hand::Grip(factor) = hand { Some(*factor) } else { None };
+    let mut grips: Vec<f64> = case.hands().iter().filter_map(grip).collect();
     grips.sort_by(f64::total_cmp);
-    let mut table = Table::new(["canceller".to_string()].into_iter().chain(grips.iter().map(|g| format!("grip × {}", number(*g)))));
+    grips
+}
+
+/// A row for each canceller, a column for each hand.
+fn by_hand(case: &Case) -> Table {
+    let mut hands: Vec<Hand> = grips(case).into_iter().map(Hand::Grip).collect();
+    hands.extend(case.hands().contains(&Hand::Changing).then_some(Hand::Changing));
+    let mut table = Table::new(["canceller".to_string()].into_iter().chain(hands.iter().map(Hand::to_string)));
     for canceller in CANCELLERS {
-        let cells = grips.iter().map(|g| case.gain(canceller, *g).map_or("–".to_string(), number));
+        let cells = hands.iter().map(|hand| case.gain(canceller, *hand).map_or("–".to_string(), number));
         table.push([canceller.to_string()].into_iter().chain(cells));
     }
     table.caption("Stable up to this μλ.")
@@ -168,21 +191,20 @@ fn by_grip(case: &Case) -> Table {
 
 /// Stable gain over grip, a line for each canceller; bars where there is one grip only.
 fn gains(case: &Case) -> Figure {
-    let mut grips = case.grips();
-    grips.sort_by(f64::total_cmp);
+    let grips = grips(case);
     let lowest = 0.05;
     let mut plot = Plot::new("Stable gain").y_axis("μλ", "").y_log();
     if grips.len() > 1 {
         plot = plot.x_axis("grip, over that of the session", "");
         for canceller in CANCELLERS {
-            let known: Vec<(f64, f64)> = grips.iter().filter_map(|g| Some((*g, case.gain(canceller, *g)?.max(lowest)))).collect();
-            let (x, y): (Vec<f64>, Vec<f64>) = known.into_iter().unzip();
+            let at = |grip: &f64| Some((*grip, case.gain(canceller, Hand::Grip(*grip))?.max(lowest)));
+            let (x, y): (Vec<f64>, Vec<f64>) = grips.iter().filter_map(at).unzip();
             plot = if x.len() > 1 { plot.line(canceller, &x, &y) } else { plot.points(canceller, &x, &y) };
         }
     } else {
         plot = plot.x_axis("canceller", "").x_names(CANCELLERS);
         for (index, canceller) in CANCELLERS.iter().enumerate() {
-            let stable = case.gain(canceller, 1.0).unwrap_or(lowest).max(lowest);
+            let stable = case.gain(canceller, Hand::SESSION).unwrap_or(lowest).max(lowest);
             plot = plot.series(Series::bars(canceller, &[index as f64 + 1.0], &[stable]));
         }
     }
@@ -190,10 +212,10 @@ fn gains(case: &Case) -> Figure {
 }
 
 fn ratios(cases: &[Case]) -> Figure {
-    let mut plot =
-        Plot::new("Stable gain over that of the better linear canceller").x_axis("case", "").y_axis("ratio", "").y_log().include_y(1.0);
-    for canceller in ["diagnosed", "chosen"] {
-        let known = cases.iter().enumerate().filter_map(|(i, c)| Some((i as f64 + 1.0, c.ratio(canceller, 1.0)?)));
+    let title = "Stable gain over the best of none, second order and linear refitted";
+    let mut plot = Plot::new(title).x_axis("case", "").y_axis("ratio", "").y_log().include_y(1.0);
+    for canceller in DIAGNOSED {
+        let known = cases.iter().enumerate().filter_map(|(i, c)| Some((i as f64 + 1.0, c.over_others(canceller, Hand::SESSION)?)));
         let (x, y): (Vec<f64>, Vec<f64>) = known.filter(|(_, r)| *r > 0.0).unzip();
         plot = plot.points(canceller, &x, &y);
     }
@@ -220,7 +242,7 @@ fn table(cases: &[Case]) -> Table {
             floors.into(),
             error(2).into(),
         ];
-        row.extend(CANCELLERS.iter().map(|c| Cell::from(case.gain(c, 1.0).map_or("-".to_string(), number))));
+        row.extend(CANCELLERS.iter().map(|c| Cell::from(case.gain(c, Hand::SESSION).map_or("-".to_string(), number))));
         table.push(row);
     }
     table
@@ -235,13 +257,14 @@ fn confusion(summary: &Summary) -> Table {
     table
 }
 
-fn worth(worths: &[Worth]) -> Table {
-    let headers = ["grip", "diagnosed / linear", "chosen / linear", "diagnosed below none", "chosen below none"];
-    let mut table = Table::new(headers);
-    for worth in worths {
-        let of = |x: Option<f64>| x.map_or("-".to_string(), number);
-        let (diagnosed, chosen) = (of(worth.diagnosed), of(worth.chosen));
-        table.push([number(worth.grip), diagnosed, chosen, worth.diagnosed_below_none.to_string(), worth.chosen_below_none.to_string()]);
+fn worth(group: &Group) -> Table {
+    let columns = ["over the best of others", "below none", "over linear"];
+    let headers = DIAGNOSED.iter().flat_map(|c| columns.map(|column| format!("{c}: {column}")));
+    let mut table = Table::new(["hand".to_string()].into_iter().chain(headers));
+    let of = |x: Option<f64>| x.map_or("-".to_string(), number);
+    for worth in &group.worths {
+        let cells = worth.cancellers.iter().flat_map(|c| [of(c.over_others), c.below_none.to_string(), of(c.over_linear)]);
+        table.push([worth.hand.to_string()].into_iter().chain(cells));
     }
     table
 }

@@ -1,24 +1,11 @@
 //! Over all cases: shares of what was found, what was taken for what, and what the found models are worth.
 
-use super::case::{Case, SHOWS};
+use super::case::{Case, KINDS, SHOWS};
 use super::score::Mark;
+use super::statistics::Share;
+use super::worth::Group;
 use serde::Serialize;
 use std::collections::BTreeMap;
-
-/// A share as counts.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-pub struct Share {
-    /// How many are.
-    pub are: usize,
-    /// Of how many.
-    pub of: usize,
-}
-
-impl std::fmt::Display for Share {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "{} of {}", self.are, self.of)
-    }
-}
 
 /// How many effects were found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -45,21 +32,6 @@ impl std::fmt::Display for Found {
     }
 }
 
-/// What a canceller is worth at one grip, over several cases.
-#[derive(Debug, Clone, Serialize)]
-pub struct Worth {
-    /// Factor on the grip of the session.
-    pub grip: f64,
-    /// Median of the diagnosed canceller's stable gain over that of the better linear one.
-    pub diagnosed: Option<f64>,
-    /// The same of the chosen canceller.
-    pub chosen: Option<f64>,
-    /// In how many cases the diagnosed canceller is below no canceller.
-    pub diagnosed_below_none: Share,
-    /// In how many cases the chosen one is.
-    pub chosen_below_none: Share,
-}
-
 /// All cases in a few numbers.
 #[derive(Debug, Clone, Serialize)]
 pub struct Summary {
@@ -74,10 +46,8 @@ pub struct Summary {
     pub live: Share,
     /// What was concealed, what was said first, how often. `nothing` stands for no effect and no finding.
     pub confusion: Vec<(String, String, usize)>,
-    /// Cases that conceal something nonlinear: worth by grip.
-    pub nonlinear: Vec<Worth>,
-    /// The others.
-    pub linear: Vec<Worth>,
+    /// What cancellers are worth, by what is concealed: each kind of physics, then all that is nonlinear and all that is linear.
+    pub worth: Vec<Group>,
 }
 
 impl Summary {
@@ -86,6 +56,8 @@ impl Summary {
         let nulls: Vec<&Case> = cases.iter().filter(|c| c.marks.is_empty()).collect();
         let alarms = nulls.iter().filter(|c| !c.findings.is_empty()).count();
         let with = |nonlinear: bool| cases.iter().filter(|c| !c.marks.is_empty() && c.nonlinear == nonlinear).collect::<Vec<_>>();
+        let of_kind = |kind: &str| cases.iter().filter(|c| c.kind() == Some(kind)).collect::<Vec<_>>();
+        let of_kinds = KINDS.iter().map(|(kind, _)| (*kind, of_kind(kind)));
         Summary {
             all: Found::of(cases.iter()),
             showing: Found::of(cases.iter().filter(|c| c.shows())),
@@ -95,8 +67,10 @@ impl Summary {
                 Share { are: runs().filter(|run| run.agrees()).count(), of: runs().count() }
             },
             confusion: confusion(cases),
-            nonlinear: worths(&with(true)),
-            linear: worths(&with(false)),
+            worth: of_kinds
+                .chain([("nonlinear effects", with(true)), ("linear effects", with(false))])
+                .filter_map(|(kind, cases)| Group::of(kind, &cases))
+                .collect(),
         }
     }
 
@@ -107,19 +81,7 @@ impl Summary {
         if self.live.of > 0 {
             text += &format!("\nthe live graph agreed in {} runs", self.live);
         }
-        for (name, worths) in [("nonlinear", &self.nonlinear), ("linear", &self.linear)] {
-            for worth in worths {
-                let of = |x: Option<f64>| x.map_or("-".to_string(), |x| format!("{x:.1}"));
-                text += &format!(
-                    "\n{name} effects, grip x{:.2}: stable gain over the better linear canceller, median: diagnosed {}, chosen {}; below no canceller: diagnosed {}, chosen {}",
-                    worth.grip,
-                    of(worth.diagnosed),
-                    of(worth.chosen),
-                    worth.diagnosed_below_none,
-                    worth.chosen_below_none
-                );
-            }
-        }
+        self.worth.iter().for_each(|group| text += &group.text());
         text
     }
 }
@@ -137,33 +99,4 @@ fn confusion(cases: &[Case]) -> Vec<(String, String, usize)> {
         }
     }
     counts.into_iter().map(|((concealed, said), count)| (concealed, said, count)).collect()
-}
-
-fn worths(cases: &[&Case]) -> Vec<Worth> {
-    let grips = cases.first().map_or_else(Vec::new, |c| c.grips());
-    let one = |grip: f64| {
-        let below = |canceller: &str| {
-            let both = cases.iter().filter_map(|c| Some((c.gain(canceller, grip)?, c.gain("none", grip)?)));
-            // Both edges are known to 3 per cent only.
-            let (are, of) = both.fold((0, 0), |(are, of), (with, none)| (are + usize::from(with < 0.94 * none), of + 1));
-            Share { are, of }
-        };
-        Worth {
-            grip,
-            diagnosed: median(cases.iter().filter_map(|c| c.ratio("diagnosed", grip)).collect()),
-            chosen: median(cases.iter().filter_map(|c| c.ratio("chosen", grip)).collect()),
-            diagnosed_below_none: below("diagnosed"),
-            chosen_below_none: below("chosen"),
-        }
-    };
-    let mut all: Vec<Worth> = grips.into_iter().map(one).collect();
-    all.sort_by(|a, b| a.grip.total_cmp(&b.grip));
-    all
-}
-
-/// The middle one; of an even number the mean of the middle two.
-pub fn median(mut of: Vec<f64>) -> Option<f64> {
-    of.sort_by(f64::total_cmp);
-    let n = of.len();
-    (n > 0).then(|| 0.5 * (of[(n - 1) / 2] + of[n / 2]))
 }

@@ -75,7 +75,7 @@ impl Loaded {
         // The sensors and limits of a device belong to its model.
         let mut swapped = Swapped {
             master: parts.master.is_some() || parts.grip.is_some(),
-            canceller: parts.canceller.is_some() || parts.canceller_grip.is_some() || parts.high_pass.is_some(),
+            canceller: parts.canceller.is_some() || parts.canceller_grip.is_some() || parts.high_pass.is_some() || parts.hand.is_some(),
             slave: parts.slave.is_some() || parts.environment.is_some(),
             coupling: options.coupling.is_some(),
         };

@@ -95,7 +95,7 @@ impl Collector {
             (NodeKind::Slave, "measured", Signal::Slave),
         ];
         let spoken = |signal: Signal, node: usize| match (&graph.nodes[node].settings, signal) {
-            (Settings::Canceller(files, _), Signal::Induced) => files.model.is_some() || graph.nodes[node].command.is_some(),
+            (Settings::Canceller(files, ..), Signal::Induced) => files.model.is_some() || graph.nodes[node].command.is_some(),
             (Settings::Scaling { dither, .. }, Signal::Dither) => dither.iter().any(|d| !d.is_empty()),
             _ => true,
         };

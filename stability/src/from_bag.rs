@@ -141,7 +141,7 @@ impl Session {
             Some(operator) => hear(operator, "intent", SignalRole::Intent),
             None => notes.push(format!("the graph has no operator: {}", SignalRole::Intent.without())),
         }
-        let cancels = |n: usize| matches!(&graph.nodes[n].settings, Settings::Canceller(files, _) if files.model.is_some());
+        let cancels = |n: usize| matches!(&graph.nodes[n].settings, Settings::Canceller(files, ..) if files.model.is_some());
         if let Some(canceller) = node(NodeKind::Canceller).filter(|n| cancels(*n)) {
             hear(canceller, "induced", SignalRole::Induced);
         }

@@ -47,7 +47,7 @@ pub fn cancel_with(graph: &mut Graph, edit: impl Fn(&mut backdrive_plant::model:
     edit(files.model.as_mut().unwrap());
     files.real_sensors = false;
     let node = graph.nodes.iter_mut().find(|n| n.kind == NodeKind::Canceller).unwrap();
-    node.settings = Settings::Canceller(files, 0.0);
+    node.settings = Settings::Canceller(files, 0.0, None);
 }
 
 /// One value per step of what matters.

@@ -2,6 +2,7 @@
 
 use crate::coupled::couple;
 use crate::trial::Trial;
+use backdrive_control::hand::HandSettings;
 use backdrive_nodes::graph::{Graph, NodeKind, Settings};
 use backdrive_plant::elements::Law;
 use backdrive_plant::model::{Fragment, InputKind, Model};
@@ -31,6 +32,15 @@ pub enum Change {
         grip: Option<Box<Fragment>>,
         /// Corner of its high-pass, Hz; 0 for none.
         high_pass_hz: f64,
+    },
+    /// A canceller that estimates the hand while the loop runs, with the master's model and grip.
+    EstimatedHand {
+        /// The model.
+        #[serde(skip)]
+        model: Box<Model>,
+        /// The grip about which it looks.
+        #[serde(skip)]
+        grip: Box<Fragment>,
     },
     /// Corner of the canceller's high-pass.
     HighPass {
@@ -92,6 +102,14 @@ impl Change {
                 files.fragment = grip.as_deref().cloned();
                 *corner = *high_pass_hz;
             }),
+            Change::EstimatedHand { model, grip } => {
+                for node in &mut trial.graph.nodes {
+                    if let Settings::Canceller(files, corner, hand) = &mut node.settings {
+                        (files.model, files.fragment) = (Some((**model).clone()), Some((**grip).clone()));
+                        (*corner, *hand) = (0.0, Some(HandSettings::default()));
+                    }
+                }
+            }
             Change::HighPass { hz } => cancellers(&mut trial.graph, |_, corner| *corner = *hz),
             Change::WayRepaired { node, port } => {
                 let Some(index) = trial.graph.nodes.iter().position(|n| n.name == *node) else { return };
@@ -164,6 +182,9 @@ impl std::fmt::Display for Change {
             Change::Canceller { of, high_pass_hz, .. } if *high_pass_hz > 0.0 => {
                 write!(f, "let the canceller predict with {of}, above {high_pass_hz:.1} Hz only (high_pass_hz)")
             }
+            Change::EstimatedHand { .. } => {
+                write!(f, "let the canceller know the master's model and estimate the hand while it runs (hand = \"estimated\")")
+            }
             Change::Canceller { of, .. } => write!(f, "let the canceller predict with {of}"),
             Change::HighPass { hz } if *hz > 0.0 => {
                 write!(f, "put the canceller's estimate through a high-pass of {hz:.1} Hz (high_pass_hz)")
@@ -193,7 +214,7 @@ impl std::fmt::Display for Change {
 
 fn cancellers(graph: &mut Graph, mut change: impl FnMut(&mut backdrive_nodes::graph::DeviceFiles, &mut f64)) {
     for node in &mut graph.nodes {
-        if let Settings::Canceller(files, corner) = &mut node.settings {
+        if let Settings::Canceller(files, corner, _) = &mut node.settings {
             change(files, corner);
         }
     }
@@ -226,6 +247,6 @@ pub fn firmer(graph: &mut Graph, factor: f64) {
         let Some(model) = &mut files.model else { continue };
         let hands: Vec<usize> = model.inputs.iter().filter(|i| i.kind == InputKind::Motion).map(|i| i.on).collect();
         let of_hand = |between: &[Option<usize>; 2]| between.iter().flatten().any(|body| hands.contains(body));
-        model.elements.iter_mut().filter(|e| of_hand(&e.between)).for_each(|e| grip::scale_element(e, factor));
+        model.elements.iter_mut().filter(|e| of_hand(&e.between)).for_each(|e| e.law = e.law.scaled(factor));
     }
 }

@@ -24,7 +24,7 @@ pub fn couple(graph: &mut Graph, law: &str) {
     for node in &mut coupled.nodes {
         let now = graph.nodes.iter().find(|n| n.name == node.name);
         match (&mut node.settings, now.map(|n| &n.settings)) {
-            (Settings::Canceller(files, _), _) => files.model = None,
+            (Settings::Canceller(files, ..), _) => files.model = None,
             (settings @ (Settings::Master(_) | Settings::Slave(_) | Settings::Operator(_)), Some(now)) => *settings = now.clone(),
             _ => {}
         }

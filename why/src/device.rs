@@ -69,7 +69,8 @@ pub struct NumberFound {
 /// Diagnoses the master of a graph by its bag. `None` where the bag cannot say: the hand was not recorded, or there is no model.
 pub fn diagnose_master(graph: &Graph, recorded: &Recorded, patience: Duration, stop: &AtomicBool) -> Option<DeviceFound> {
     let master = graph.nodes.iter().position(|n| n.kind == NodeKind::Master)?;
-    let NodeSettings::Master(DeviceFiles { model: Some(model), fragment, substeps, real_sensors }) = &graph.nodes[master].settings else {
+    let NodeSettings::Master(DeviceFiles { model: Some(model), fragment, substeps, real_sensors, .. }) = &graph.nodes[master].settings
+    else {
         return None;
     };
     let (held, hands) = match fragment {
@@ -123,7 +124,13 @@ pub fn diagnose_master(graph: &Graph, recorded: &Recorded, patience: Duration, s
     let model = Model::from_toml(&text, "the master with its grip").ok()?;
     let record = Record::new(&recording, &model, Vec::new()).ok()?;
     let problem = Problem::new(text, "master.toml".into(), model, vec![record], Vec::new(), Initial::Rest).ok()?;
-    let files = |model: Model| DeviceFiles { model: Some(model), fragment: None, substeps: *substeps, real_sensors: *real_sensors };
+    let files = |model: Model| DeviceFiles {
+        model: Some(model),
+        fragment: None,
+        substeps: *substeps,
+        real_sensors: *real_sensors,
+        grip_changes: Vec::new(),
+    };
     // First with the numbers as the graph has them: one effect that explains everything beside them is the simplest answer. Then with other numbers.
     let fixed = Problem { stated: Vec::new(), ..problem.clone() };
     let mut best: Option<Explained> = None;

@@ -40,7 +40,7 @@ impl Number {
             Number::Springs | Number::Dampers => {
                 let elements = files.fragment.iter_mut().flat_map(|f| f.network.elements.iter_mut());
                 let wanted = |law: &Law| matches!((self, law), (Number::Springs, Law::Spring(_)) | (Number::Dampers, Law::Damper(_)));
-                elements.filter(|e| wanted(&e.law)).for_each(|e| grip::scale_element(e, factor));
+                elements.filter(|e| wanted(&e.law)).for_each(|e| e.law = e.law.scaled(factor));
             }
             Number::Masses => files.model.iter_mut().flat_map(|m| m.bodies.iter_mut()).for_each(|b| b.inertia *= factor),
             Number::HeldMass => {

@@ -166,7 +166,7 @@ fn candidates(was: &Trial, gain: Gain, edge: Option<f64>, causes: &[Cause]) -> V
         graph.node_of(NodeKind::Master).and_then(|n| if let Settings::Master(files) = &n.settings { Some(files.clone()) } else { None });
     let canceller = graph
         .node_of(NodeKind::Canceller)
-        .and_then(|n| if let Settings::Canceller(files, hz) = &n.settings { Some((files.clone(), *hz)) } else { None });
+        .and_then(|n| if let Settings::Canceller(files, hz, _) = &n.settings { Some((files.clone(), *hz)) } else { None });
     let knows = causes.first().is_some_and(|c| {
         use CauseKind::*;
         matches!(c.kind, DryFriction | Backlash | Hysteresis | Inertia | Compliance | OtherPhysics | Grip | OverCancelling)
@@ -178,6 +178,10 @@ fn candidates(was: &Trial, gain: Gain, edge: Option<f64>, causes: &[Cause]) -> V
             grip: fragment.clone().map(Box::new),
             high_pass_hz,
         };
+        if let Some(grip) = fragment {
+            let estimated = Change::EstimatedHand { model: Box::new(model.clone()), grip: Box::new(grip.clone()) };
+            all.push((vec![estimated], knows));
+        }
         for corner in [*hz, HIGH_PASS_HZ] {
             all.push((vec![told(corner)], knows));
             if !together.is_empty() {

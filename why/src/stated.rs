@@ -61,7 +61,7 @@ pub fn of_the_graph(stated: &Graph, was: &Trial, happening: &Happening) -> Vec<S
     let files = |graph: &Graph, kind: NodeKind| -> Option<(DeviceFiles, f64)> {
         match graph.node_of(kind).map(|n| &n.settings) {
             Some(Settings::Master(files)) => Some((files.clone(), 0.0)),
-            Some(Settings::Canceller(files, hz)) => Some((files.clone(), *hz)),
+            Some(Settings::Canceller(files, hz, _)) => Some((files.clone(), *hz)),
             _ => None,
         }
     };

@@ -80,7 +80,7 @@ fn describe(node: &Node) -> String {
     match &node.settings {
         Settings::Master(device)
         | Settings::Slave(device)
-        | Settings::Canceller(device, _)
+        | Settings::Canceller(device, ..)
         | Settings::Shaft(device)
         | Settings::Rig(device, ..)
         | Settings::Observer(ObserverFiles { device, .. }) => {

@@ -25,6 +25,8 @@ pub struct Overrides {
     pub canceller_grip: Option<PathBuf>,
     /// Corner of the canceller's high-pass, Hz.
     pub high_pass_hz: Option<f64>,
+    /// Whether the canceller takes the hand as its grip says (`as_modelled`) or estimates it (`estimated`).
+    pub hand: Option<String>,
     /// Position scale.
     pub mu: Option<f64>,
     /// Force scale.
@@ -112,7 +114,7 @@ impl Overrides {
             let keep = path.as_os_str() == "none";
             value(if keep { "none".to_string() } else { absolute(here, path).display().to_string() })
         };
-        let wanted: [(&str, NodeKind, &str, Option<Item>); 15] = [
+        let wanted: [(&str, NodeKind, &str, Option<Item>); 16] = [
             ("--master", NodeKind::Master, "model", self.master.as_ref().map(file)),
             ("--grip", NodeKind::Master, "grip", self.grip.as_ref().map(file)),
             ("--slave", NodeKind::Slave, "model", self.slave.as_ref().map(file)),
@@ -120,6 +122,7 @@ impl Overrides {
             ("--canceller", NodeKind::Canceller, "model", self.canceller.as_ref().map(file)),
             ("--canceller-grip", NodeKind::Canceller, "grip", self.canceller_grip.as_ref().map(file)),
             ("--high-pass", NodeKind::Canceller, "high_pass_hz", self.high_pass_hz.map(value)),
+            ("--hand", NodeKind::Canceller, "hand", self.hand.as_deref().map(value)),
             ("--dither", NodeKind::Scaling, "dither", self.dither.as_deref().map(value)),
             ("--guard", NodeKind::Scaling, "guard", self.guard.map(value)),
             ("--bag", NodeKind::Recorder, "bag", self.bag.as_ref().map(file)),

@@ -3,9 +3,11 @@
 use super::kinds::NodeKind;
 use crate::graph::bench;
 use crate::stage::{Impairment, Timing};
+use backdrive_control::changing_grip::GripChange;
 use backdrive_control::coupling::Law;
 use backdrive_control::cycle::Cycle;
 use backdrive_control::dynamometer::DynamometerModel;
+use backdrive_control::hand::HandSettings;
 use backdrive_control::observer::{Quantity, Weights};
 use backdrive_control::operator::Intent;
 use backdrive_control::rig::RigSettings;
@@ -114,6 +116,8 @@ pub struct DeviceFiles {
     pub substeps: Option<usize>,
     /// Whether sensors round and are noisy as the model file says.
     pub real_sensors: bool,
+    /// How a master's hand changes its grip, times ascending; empty where it does not.
+    pub grip_changes: Vec<GripChange>,
 }
 
 /// What a node's kind needs beyond its ports.
@@ -123,8 +127,9 @@ pub enum Settings {
     Operator(Vec<Intent>),
     /// The master plant and its grip.
     Master(DeviceFiles),
-    /// The model that predicts induced motion, and the corner of its high-pass, Hz (0: none).
-    Canceller(DeviceFiles, f64),
+    /// The model that predicts induced motion, the corner of its high-pass, Hz (0: none), and how the hand is estimated; `None` where the grip is taken
+    /// as the file says.
+    Canceller(DeviceFiles, f64, Option<HandSettings>),
     /// Dither per axis as samples, N or N m, and whether the guard watches.
     Scaling {
         /// One value per step; empty without a dither.

@@ -36,6 +36,7 @@ mod simulate;
 mod slots;
 mod spline;
 mod state;
+mod swap;
 mod tangents;
 
 pub use ahead::ahead;

@@ -14,6 +14,7 @@ mod error;
 mod joint;
 mod kick;
 mod loading;
+mod regrip;
 mod sense;
 mod sensor;
 mod state;

@@ -47,7 +47,7 @@ impl Rival {
             _ => None,
         });
         let canceller = graph.nodes.iter_mut().find_map(|n| match &mut n.settings {
-            Settings::Canceller(files, _) => Some(files),
+            Settings::Canceller(files, ..) => Some(files),
             _ => None,
         });
         match (self, canceller) {

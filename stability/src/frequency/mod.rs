@@ -66,7 +66,7 @@ pub fn analyse(session: &Session, options: &Options) -> Result<Frequency, Freque
         cannot_tell: None,
         advice,
     };
-    let induced = options.parts.canceller.map(|(files, corner)| swap::induced(&session, files, corner)).transpose()?;
+    let induced = options.parts.canceller.map(|(files, corner, hand)| swap::induced(&session, files, corner, hand)).transpose()?;
     let signals = signals(&session, induced.as_deref());
     let prepared = Prepared { session, signals, rows };
     if has_dither {
@@ -81,7 +81,7 @@ pub fn analyse(session: &Session, options: &Options) -> Result<Frequency, Freque
 fn provenance(parts: &ExchangedParts) -> Provenance {
     let of = |there: bool| if there { "from model" } else { "measured" };
     let canceller = match parts.canceller {
-        Some((files, _)) if files.model.is_none() => "none",
+        Some((files, ..)) if files.model.is_none() => "none",
         canceller => of(canceller.is_some()),
     };
     Provenance { master: of(parts.master.is_some()), canceller, slave: of(parts.slave.is_some()) }

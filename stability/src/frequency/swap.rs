@@ -4,6 +4,7 @@ use crate::session::Session;
 use backdrive_control::canceller::Canceller;
 use backdrive_control::core::{Core, Events, Port, Tick};
 use backdrive_control::device::{Device, DeviceError, DeviceOptions, DeviceRole};
+use backdrive_control::hand::{HandBank, HandSettings};
 use backdrive_msgs::{MAX_AXES, Sample};
 use backdrive_nodes::graph::DeviceFiles;
 use backdrive_plant::linear::{LinearError, LinearModel, Operating};
@@ -14,8 +15,9 @@ use std::f64::consts::TAU;
 /// Parts to put in the place of those that recorded the session.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct ExchangedParts<'a> {
-    /// Another canceller: its model with grip (no model: nothing is cancelled), and the corner of its high-pass, Hz (0: none).
-    pub canceller: Option<(&'a DeviceFiles, f64)>,
+    /// Another canceller: its model with grip (no model: nothing is cancelled), the corner of its high-pass, Hz (0: none), and how it
+    /// estimates the hand (`None`: it does not).
+    pub canceller: Option<(&'a DeviceFiles, f64, Option<&'a HandSettings>)>,
     /// Another master with its grip: G_f comes from its model, linear at a small amplitude.
     pub master: Option<&'a DeviceFiles>,
     /// Another slave with its environment: H_se comes from its model, linear about where the slave was.
@@ -61,20 +63,27 @@ pub enum PartError {
 }
 
 /// Induced motion that a canceller predicts from the forces of a session: one column per axis, m or rad.
-pub(super) fn induced(session: &Session, files: &DeviceFiles, high_pass_hz: f64) -> Result<Vec<Vec<f64>>, PartError> {
+pub(super) fn induced(
+    session: &Session,
+    files: &DeviceFiles,
+    high_pass_hz: f64,
+    hand: Option<&HandSettings>,
+) -> Result<Vec<Vec<f64>>, PartError> {
     let (n, axes) = (session.len(), session.axes.len());
-    let device = match &files.model {
-        None => None,
-        Some(model) => {
-            if model.axes.len() != axes {
-                return Err(PartError::Axes { part: "canceller", model: model.axes.len(), session: axes });
-            }
-            let options = DeviceOptions { substeps: files.substeps, noise_seed: None, quantise: false };
-            let device = Device::new(model, files.fragment.as_ref(), DeviceRole::Master, session.period_s, &options);
-            Some(device.map_err(PartError::Canceller)?)
+    let options = DeviceOptions { substeps: files.substeps, noise_seed: None, quantise: false };
+    if let Some(model) = files.model.as_ref().filter(|model| model.axes.len() != axes) {
+        return Err(PartError::Axes { part: "canceller", model: model.axes.len(), session: axes });
+    }
+    let mut core = match (&files.model, hand) {
+        (Some(model), Some(hand)) => {
+            let bank = HandBank::new(model, files.fragment.as_ref(), hand, session.period_s, &options);
+            Canceller::scheduled(bank.map_err(PartError::Canceller)?, high_pass_hz, session.period_s)
+        }
+        (model, _) => {
+            let held = |model| Device::new(model, files.fragment.as_ref(), DeviceRole::Master, session.period_s, &options);
+            Canceller::new(model.as_ref().map(held).transpose().map_err(PartError::Canceller)?, high_pass_hz, session.period_s)
         }
     };
-    let mut core = Canceller::new(device, high_pass_hz, session.period_s);
     let mut columns = vec![vec![f64::NAN; n]; axes];
     let mut events = Events::default();
     for row in 0..n {

@@ -1,7 +1,7 @@
 //! The master's grip, and one that is firmer or softer.
 
 use backdrive_nodes::graph::{Graph, NodeKind, Settings};
-use backdrive_plant::model::{Element, Fragment};
+use backdrive_plant::model::Fragment;
 
 /// The master's grip; `None` where nothing holds it, and where its model holds the user's hand itself.
 pub fn grip(graph: &Graph) -> Option<&Fragment> {
@@ -16,12 +16,7 @@ pub fn grip(graph: &Graph) -> Option<&Fragment> {
 
 /// Scales every force of a fragment: of a spring its stiffness, of a damper its damping, of friction its level. Masses stay.
 pub fn scale(fragment: &mut Fragment, factor: f64) {
-    fragment.network.elements.iter_mut().for_each(|element| scale_element(element, factor));
-}
-
-/// The same for one element.
-pub fn scale_element(element: &mut Element, factor: f64) {
-    element.law = element.law.scaled(factor);
+    fragment.scale(factor);
 }
 
 #[cfg(test)]

@@ -67,12 +67,13 @@ pub fn over_cancelling(
         OverCancelling { environment_stiffness: environment_stiffness.clone(), balances: Vec::new(), at_asked: Vec::new(), warning: None };
     let graph = scenario.graph();
     let settings = |kind: NodeKind| graph.node_of(kind).map(|n| &n.settings);
-    let (Some(Settings::Master(master)), Some(Settings::Canceller(canceller, high_pass_hz))) =
+    let (Some(Settings::Master(master)), Some(Settings::Canceller(canceller, high_pass_hz, hand))) =
         (settings(NodeKind::Master), settings(NodeKind::Canceller))
     else {
         return Ok(none);
     };
-    if canceller.model.is_none() || *high_pass_hz > 0.0 {
+    // A canceller that estimates the hand does not assume a grip.
+    if canceller.model.is_none() || *high_pass_hz > 0.0 || hand.is_some() {
         return Ok(none);
     }
     let mut every: Vec<f64> = scales.to_vec();
@@ -237,7 +238,7 @@ pub fn against_none(
     done: &(dyn Fn(usize, usize) + Sync),
     cancel: &AtomicBool,
 ) -> Result<Option<AgainstNone>, ResimulateError> {
-    let cancels = |settings: &Settings| matches!(settings, Settings::Canceller(files, _) if files.model.is_some());
+    let cancels = |settings: &Settings| matches!(settings, Settings::Canceller(files, ..) if files.model.is_some());
     if !scenario.graph().nodes.iter().any(|n| cancels(&n.settings)) {
         return Ok(None);
     }

@@ -119,7 +119,7 @@ impl Scenario {
     pub fn without_canceller(&self) -> Scenario {
         let mut scenario = self.clone();
         for node in &mut scenario.graph.nodes {
-            if let Settings::Canceller(files, _) = &mut node.settings {
+            if let Settings::Canceller(files, ..) = &mut node.settings {
                 files.model = None;
             }
         }

@@ -55,7 +55,7 @@ fn find(scenario: &Scenario, search: &Search) -> Edge {
 fn assume_grip(scenario: &Scenario, factor: f64) -> Scenario {
     let mut scenario = scenario.clone();
     for node in &mut scenario.graph.nodes {
-        if let Settings::Canceller(files, _) = &mut node.settings {
+        if let Settings::Canceller(files, ..) = &mut node.settings {
             grip::scale(files.fragment.as_mut().unwrap(), factor);
         }
     }
@@ -224,7 +224,7 @@ fn beyond_the_dc_limit_it_runs_away_and_the_growth_is_told() {
     // 10 % too soft a spring only: the DC limit is all that is left.
     let mut scenario = linear(Some("plant/models/impulse-engine-linear.toml"));
     for node in &mut scenario.graph.nodes {
-        if let Settings::Canceller(files, _) = &mut node.settings {
+        if let Settings::Canceller(files, ..) = &mut node.settings {
             files.fragment.as_mut().unwrap().network.set_values_at("elements.spring.stiffness", &[400.0 / 1.1]).unwrap();
         }
     }
@@ -311,4 +311,33 @@ fn another_graph_s_operator_is_a_script() {
     let intent = run.signals.unwrap().axes[0].intent.clone().unwrap();
     assert!(intent.contains(&0.007));
     assert!(Script::from_graph(&file("launch/identify.toml")).is_err());
+}
+
+/// The contact script with the exact model in the canceller, its hand as modelled or estimated, no limits.
+fn with_hand(path: &str, hand: &str, canceller: Option<&str>) -> Scenario {
+    let (hand, limits) = (Some(hand.to_string()), Some("ignored".into()));
+    Scenario::new(graph(path, Overrides { hand, limits, canceller: canceller.map(Into::into), ..Overrides::default() }), None, None)
+        .unwrap()
+}
+
+#[test]
+fn with_the_hand_estimated_five_times_the_gain_without_a_canceller_is_stable_whoever_holds() {
+    let outcome = |scenario: &Scenario, grip_scale: f64, gain: f64| {
+        let options = RunOptions { grip_scale, ..RunOptions::default() };
+        scenario.run(scenario.gain(gain), &options, &NEVER).unwrap().outcome
+    };
+    for (path, grips) in [("launch/contact.toml", &[0.5, 1.1, 2.0][..]), ("launch/contact-regrip.toml", &[1.0])] {
+        let [none, fixed, estimated] =
+            [("as_modelled", Some("none")), ("as_modelled", None), ("estimated", None)].map(|(hand, model)| with_hand(path, hand, model));
+        for grip in grips {
+            // No canceller bears 2.72 at most, with the softest hand.
+            assert!(outcome(&none, *grip, 2.9) != Outcome::Stable, "{path}, {grip}");
+            assert!(outcome(&fixed, *grip, 2.9) != Outcome::Stable, "{path}, {grip}");
+            // Never below no canceller, and far above it.
+            for gain in [0.1, 0.5, 1.5, 2.7, 5.0, 14.0] {
+                let done = outcome(&estimated, *grip, gain);
+                assert_eq!(done, Outcome::Stable, "{path}, grip {grip}, gain {gain}");
+            }
+        }
+    }
 }

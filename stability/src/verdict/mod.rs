@@ -98,7 +98,7 @@ fn exchanged(graph: &Graph, swapped: Swapped) -> ExchangedParts<'_> {
     };
     ExchangedParts {
         canceller: match files(NodeKind::Canceller) {
-            Some(Settings::Canceller(files, corner)) if swapped.canceller => Some((files, *corner)),
+            Some(Settings::Canceller(files, corner, hand)) if swapped.canceller => Some((files, *corner, hand.as_ref())),
             _ => None,
         },
         master: device(NodeKind::Master).filter(|_| swapped.master),

@@ -40,7 +40,7 @@ impl NodeReader<'_> {
             model
         });
         let real_sensors = table.one_of("sensors", &[("as_modelled", true), ("ideal", false)])?.unwrap_or(true);
-        Ok(DeviceFiles { model, fragment, substeps, real_sensors })
+        Ok(DeviceFiles { model, fragment, substeps, real_sensors, grip_changes: Vec::new() })
     }
 
     /// The text of the file that a key names, and its path.

@@ -7,6 +7,8 @@ use crate::graph::hosts::read_host;
 use crate::graph::overrides::absolute;
 use crate::graph::{DeviceFiles, Direction, Node, NodeKind, ObserverFiles, Settings, bench};
 use backdrive_control::butterworth::MOST_ORDER;
+use backdrive_control::changing_grip::GripChange;
+use backdrive_control::hand::HandSettings;
 use backdrive_control::observer::{Quantity, Weights};
 use backdrive_control::rig::RigSettings;
 use backdrive_control::speed_control::SpeedControl;
@@ -46,7 +48,7 @@ impl NodeReader<'_> {
         Ok(match kind {
             NodeKind::Master | NodeKind::Slave if own && !table.contains("model") => {
                 let names = own_axes(table)?;
-                let device = DeviceFiles { model: None, fragment: None, substeps: None, real_sensors: true };
+                let device = DeviceFiles { model: None, fragment: None, substeps: None, real_sensors: true, grip_changes: Vec::new() };
                 (if kind == NodeKind::Master { Settings::Master(device) } else { Settings::Slave(device) }, names)
             }
             NodeKind::Operator => {
@@ -55,7 +57,8 @@ impl NodeReader<'_> {
                 (Settings::Operator(intents), names)
             }
             NodeKind::Master => {
-                let device = self.device(table, Some("grip"), false)?;
+                let mut device = self.device(table, Some("grip"), false)?;
+                device.grip_changes = grip_changes(table)?;
                 let names = axis_names(&device);
                 (Settings::Master(device), names)
             }
@@ -114,7 +117,14 @@ impl NodeReader<'_> {
         device.real_sensors = false;
         let high_pass_hz = table.number_or("high_pass_hz", Range::NonNegative, 0.0)?;
         let names = axis_names(&device);
-        Ok((Settings::Canceller(device, high_pass_hz), names))
+        let estimated = table.one_of("hand", &[("as_modelled", false), ("estimated", true)])?.unwrap_or(false);
+        let range = table.numbers("hand_range", Range::Positive)?;
+        let hand = match (estimated, range) {
+            (false, None) => None,
+            (false, Some(_)) => return Err(table.error_at("hand_range", "means nothing without hand = \"estimated\"")),
+            (true, range) => Some(hand_settings(table, range.as_deref())?),
+        };
+        Ok((Settings::Canceller(device, high_pass_hz, hand), names))
     }
 
     /// A slave's controller.
@@ -206,6 +216,29 @@ fn own_axes(table: &mut Table) -> Result<Vec<String>, FileError> {
 /// A test bench has one axis.
 fn one_shaft() -> Vec<String> {
     vec!["shaft".to_string()]
+}
+
+/// `grip_changes = [{ t, scale }, ..]`: from when on a hand grips by which factor on the grip of the file.
+fn grip_changes(table: &mut Table) -> Result<Vec<GripChange>, FileError> {
+    let mut changes: Vec<GripChange> = Vec::new();
+    for mut change in table.tables("grip_changes")? {
+        let (at_s, scale) = (change.need_number("t", Range::NonNegative)?, change.need_number("scale", Range::Positive)?);
+        if changes.last().is_some_and(|last| at_s <= last.at_s) {
+            return Err(change.error_at("t", "times must increase"));
+        }
+        change.finish()?;
+        changes.push(GripChange { at_s, scale });
+    }
+    Ok(changes)
+}
+
+/// Between which factors on the grip of its file a hand is looked for.
+fn hand_settings(table: &Table, range: Option<&[f64]>) -> Result<HandSettings, FileError> {
+    match range {
+        None => Ok(HandSettings::default()),
+        Some([softest, firmest]) if softest < firmest => Ok(HandSettings { softest: *softest, firmest: *firmest }),
+        Some(_) => Err(table.error_at("hand_range", "expected two factors on the grip of the file, the softer first, such as [0.5, 2.0]")),
+    }
 }
 
 /// The displacement controller of a rig, and its sensors.

@@ -1,0 +1,122 @@
+//! The induced motion that the hand at work leaves, with no more than is sure of it.
+
+use super::bank::HandBank;
+use super::estimate::{Estimate, HandEstimator};
+use crate::core::Events;
+use backdrive_msgs::MAX_AXES;
+
+/// So many standard deviations below the estimated softness is what is cancelled.
+const SURE: f64 = 2.0;
+/// A force below this share of the largest of late is none.
+const NO_FORCE: f64 = 0.02;
+/// A force below this is none, N or N m.
+const LEAST_FORCE: f64 = 1e-3;
+/// How fast the largest force is forgotten, s.
+const FORCE_MEMORY_S: f64 = 5.0;
+/// Over which time a displacement that is left where no force acts is let go, s.
+const LET_GO_S: f64 = 0.2;
+
+/// A hand is told where its relative deviation is below this.
+const TELLS_AT: f64 = 0.1;
+/// And where it differs from the one told last by more than this, in the logarithm of the firmness.
+const TELLS_AFTER: f64 = 0.2;
+
+/// One axis.
+struct Axis {
+    estimator: HandEstimator,
+    /// What the bank said at the step before.
+    before: Vec<f64>,
+    induced: f64,
+    largest_force: f64,
+    /// The firmness that was told last, if one was.
+    told: Option<f64>,
+}
+
+/// A bank with the estimate of the hand of every axis.
+pub struct Scheduled {
+    bank: HandBank,
+    axes: Vec<Axis>,
+    started: bool,
+    force_keep: f64,
+    let_go: f64,
+}
+
+impl Scheduled {
+    /// Around a bank.
+    pub fn new(bank: HandBank, period_s: f64) -> Scheduled {
+        let hands = bank.softness().len();
+        let axis = |axis: usize| Axis {
+            estimator: HandEstimator::new(bank.softness(), bank.sensor_noise(axis), period_s),
+            before: vec![0.0; hands],
+            induced: 0.0,
+            largest_force: 0.0,
+            told: None,
+        };
+        let axes = (0..bank.axes().min(MAX_AXES)).map(axis).collect();
+        let (force_keep, let_go) = ((-period_s / FORCE_MEMORY_S).exp(), 1.0 - (-period_s / LET_GO_S).exp());
+        Scheduled { bank, axes, started: false, force_keep, let_go }
+    }
+
+    /// What is known of the hand of an axis.
+    pub fn estimate(&self, axis: usize) -> Option<Estimate> {
+        self.axes.get(axis).map(|a| a.estimator.estimate())
+    }
+
+    /// Whether the models go on.
+    pub fn is_finite(&self) -> bool {
+        self.bank.is_finite()
+    }
+
+    /// The next step: the force that was held until now, and the position of each axis where it is measured. The induced motion, m or rad. A hand that is
+    /// surely another than the one told last is told in an event.
+    pub fn step(&mut self, force: &[f64; MAX_AXES], measured: Option<&[f64; MAX_AXES]>, events: &mut Events) -> [f64; MAX_AXES] {
+        let known = self.bank.axes();
+        if self.started {
+            self.bank.step(&force[..known]);
+        } else {
+            self.bank.start(&force[..known]);
+            self.started = true;
+        }
+        let mut induced = [0.0; MAX_AXES];
+        for (number, axis) in self.axes.iter_mut().enumerate() {
+            if let Some(measured) = measured {
+                axis.estimator.step(measured[number], |hand| self.bank.position(hand, number));
+            }
+            let estimate = axis.estimator.estimate();
+            let (firmness, unsure) = (estimate.firmness(), estimate.deviation * estimate.firmness());
+            let is_another = axis.told.is_none_or(|told| (firmness / told).ln().abs() > TELLS_AFTER);
+            if unsure < TELLS_AT && is_another {
+                axis.told = Some(firmness);
+                events.push("hand_holds", firmness, 0);
+            }
+            let softness = estimate.softness - SURE * estimate.deviation;
+            axis.largest_force = (self.force_keep * axis.largest_force).max(force[number].abs());
+            let (mut moved, mut stands) = (0.0, 0.0);
+            for (hand, weight) in between(self.bank.softness(), softness) {
+                let position = self.bank.position(hand, number);
+                moved += weight * (position - axis.before[hand]);
+                stands += weight * position;
+            }
+            for (hand, before) in axis.before.iter_mut().enumerate() {
+                *before = self.bank.position(hand, number);
+            }
+            axis.induced += moved;
+            if force[number].abs() < LEAST_FORCE.max(NO_FORCE * axis.largest_force) {
+                axis.induced += self.let_go * (stands - axis.induced);
+            }
+            induced[number] = axis.induced;
+        }
+        induced
+    }
+}
+
+/// The two neighbours of a softness in an ascending list, with their shares; the firmest alone below.
+fn between(softness: &[f64], wanted: f64) -> [(usize, f64); 2] {
+    let last = softness.len().saturating_sub(1);
+    let upper = softness.partition_point(|s| *s < wanted).min(last);
+    if upper == 0 || wanted.is_nan() {
+        return [(0, 1.0), (0, 0.0)];
+    }
+    let share = ((wanted - softness[upper - 1]) / (softness[upper] - softness[upper - 1])).clamp(0.0, 1.0);
+    [(upper - 1, 1.0 - share), (upper, share)]
+}

@@ -1,0 +1,150 @@
+use super::*;
+use crate::changing_grip::{ChangingGrip, GripChange};
+use crate::core::Events;
+use crate::device::DeviceOptions;
+use crate::mechanism::Mechanism;
+use backdrive_msgs::MAX_AXES;
+use backdrive_plant::model::{Fragment, Model};
+use std::path::Path;
+
+const PERIOD: f64 = 1.0 / 5000.0;
+
+fn read(file: &str) -> String {
+    std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("../plant").join(file)).unwrap()
+}
+
+fn master(name: &str) -> Model {
+    Model::from_toml(&read(&format!("models/{name}.toml")), name).unwrap()
+}
+
+fn grip(firmness: f64) -> Fragment {
+    let mut grip = Fragment::from_toml(&read("grips/normal.toml"), "normal.toml").unwrap();
+    grip.scale(firmness);
+    grip
+}
+
+fn bank(model: &Model) -> HandBank {
+    HandBank::new(model, Some(&grip(1.0)), &HandSettings::default(), PERIOD, &DeviceOptions::default()).unwrap()
+}
+
+/// A master held by hands one after another, pushed by the force of a contact that comes and goes, its hand moving as well; what a canceller sees of it.
+struct Played {
+    scheduled: Scheduled,
+    device: ChangingGrip,
+    step: usize,
+    force: f64,
+    events: Events,
+}
+
+impl Played {
+    fn new(model: &Model, firmness: f64, changes: &[GripChange]) -> Played {
+        let mut device = ChangingGrip::new(model, Some(&grip(firmness)), changes, PERIOD, &DeviceOptions::default()).unwrap();
+        device.start(&[0.0], &[0.0]);
+        Played { scheduled: Scheduled::new(bank(model), PERIOD), device, step: 0, force: 0.0, events: Events::default() }
+    }
+
+    /// Goes on with this peak of a force that is a step every 0.1 s; the hand moves by 2 mm at 1 Hz.
+    fn play(&mut self, seconds: f64, peak: f64) -> Estimate {
+        for _ in 0..(seconds / PERIOD) as usize {
+            self.step += 1;
+            let time = self.step as f64 * PERIOD;
+            self.device.step(&[self.force], &[2e-3 * (std::f64::consts::TAU * time).sin()]);
+            let mut measured = [0.0; MAX_AXES];
+            measured[0] = self.device.measured(0);
+            let mut force = [0.0; MAX_AXES];
+            force[0] = self.force;
+            self.scheduled.step(&force, Some(&measured), &mut self.events);
+            self.force = if ((time * 10.0) as usize).is_multiple_of(2) { peak } else { 0.3 * peak };
+        }
+        self.scheduled.estimate(0).unwrap()
+    }
+}
+
+#[test]
+fn a_constant_hand_is_found_within_its_uncertainty() {
+    for name in ["impulse-engine-linear", "impulse-engine"] {
+        for firmness in [0.5, 0.8, 1.0, 1.3, 2.0] {
+            let estimate = Played::new(&master(name), firmness, &[]).play(1.0, -4.0);
+            let error = estimate.softness * firmness - 1.0;
+            println!("{name}, {firmness}: {:.4} +- {:.4}", estimate.firmness(), estimate.deviation / estimate.softness.powi(2));
+            assert!(error.abs() < 0.03, "{name}, {firmness}: {estimate:?}");
+            assert!((estimate.softness - 1.0 / firmness).abs() < 2.0 * estimate.deviation, "{name}, {firmness}: {estimate:?}");
+            assert!(estimate.deviation * firmness < 0.1, "{name}, {firmness}: {estimate:?}");
+        }
+    }
+}
+
+#[test]
+fn a_change_is_seen_within_a_quarter_of_a_second_and_known_within_a_second() {
+    for (before, after) in [(0.5, 2.0), (2.0, 0.5), (1.0, 1.5)] {
+        let model = master("impulse-engine");
+        let change = [GripChange { at_s: 1.0, scale: after / before }];
+        let mut played = Played::new(&model, before, &change);
+        played.play(1.0, -4.0);
+        let estimate = played.play(0.25, -4.0);
+        // The force has gone up and down once and again since.
+        let error = (estimate.softness * after - 1.0).abs();
+        assert!(error < 0.3 && error < 2.0 * estimate.deviation * after, "from {before} to {after}: {estimate:?}");
+        let later = played.play(0.75, -4.0);
+        println!("from {before} to {after}: {:.3} after 0.25 s, {:.3} after 1 s", estimate.firmness(), later.firmness());
+        assert!((later.softness * after - 1.0).abs() < 0.08, "from {before} to {after}: {later:?}");
+        let told: Vec<(&str, f64, u32)> = played.events.drain().collect();
+        let last = told.last().copied().unwrap_or(("", 0.0, 0));
+        assert!(last.0 == "hand_holds" && (last.1 / after - 1.0).abs() < 0.25, "{told:?}");
+    }
+}
+
+#[test]
+fn without_a_force_nothing_is_known_and_what_was_known_fades() {
+    let mut played = Played::new(&master("impulse-engine"), 1.0, &[]);
+    assert_eq!(played.play(0.5, 0.0).deviation, f64::INFINITY);
+    let known = played.play(1.0, -4.0);
+    let later = played.play(1.0, 0.0);
+    let much_later = played.play(2.0, 0.0);
+    assert!(
+        later.deviation > 2.0 * known.deviation && much_later.deviation > 2.0 * later.deviation,
+        "{known:?}, {later:?}, {much_later:?}"
+    );
+}
+
+#[test]
+fn no_more_is_predicted_than_the_firmest_hand_leaves_until_something_is_known() {
+    let model = master("impulse-engine-linear");
+    let (bank, firmest) = (bank(&model), HandSettings::default().firmest);
+    assert!(bank.softness()[0] <= 1.0 / firmest);
+    assert!(bank.softness().windows(2).all(|w| w[0] < w[1]));
+    let mut scheduled = Scheduled::new(bank, PERIOD);
+    let mut force = [0.0; MAX_AXES];
+    scheduled.step(&force, None, &mut Events::default());
+    force[0] = 2.0;
+    let mut induced = 0.0;
+    for _ in 0..5000 {
+        induced = scheduled.step(&force, None, &mut Events::default())[0];
+    }
+    // At rest the handle gives way by F/k, and the linkage and the cable by their own.
+    let give = 2.0 / 3950.0 + 2.0 / 39500.0;
+    assert!(induced > 0.0 && induced < 2.0 / (400.0 * firmest) + 2.0 * give, "{induced}");
+}
+
+#[test]
+fn what_nothing_holds_has_no_hand_to_estimate() {
+    let options = DeviceOptions::default();
+    let made = HandBank::new(&master("impulse-engine"), None, &HandSettings::default(), PERIOD, &options);
+    assert!(matches!(made, Err(crate::device::DeviceError::NoHand(_))));
+}
+
+#[test]
+fn a_hand_that_is_part_of_the_model_is_a_hand() {
+    let (held, _) = master("impulse-engine").held_by(&grip(1.0));
+    let attached = bank(&master("impulse-engine"));
+    let own = HandBank::new(&held, None, &HandSettings::default(), PERIOD, &DeviceOptions::default()).unwrap();
+    let (mut own, mut attached) = (own, attached);
+    for bank in [&mut own, &mut attached] {
+        bank.start(&[0.0]);
+        (0..500).for_each(|_| bank.step(&[-1.0]));
+    }
+    for hand in 0..own.softness().len() {
+        assert_eq!(own.position(hand, 0), attached.position(hand, 0));
+        assert!(hand == 0 || own.position(hand, 0) < own.position(hand - 1, 0), "a softer hand gives way more");
+    }
+}

@@ -1,0 +1,51 @@
+//! The stable gain on the contact script for hands that grip otherwise than the canceller's file says: nothing cancelled, the exact model with the grip
+//! of the file, and the canceller that estimates the hand.
+//!
+//!     cargo run --release -p backdrive-stability --example hand_edges [GRAPH [GRIP...]]
+
+use backdrive_nodes::graph::{Graph, NodeKind, Overrides, Settings};
+use backdrive_stability::resimulate::edge::{Search, edge};
+use backdrive_stability::resimulate::{RunOptions, Scenario};
+use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
+
+const GRIPS: [f64; 6] = [0.5, 0.8, 1.0, 1.1, 1.5, 2.0];
+
+/// As `backdrive prove` searches.
+const SEARCH: Search =
+    Search { lowest: 0.05, floor: 0.05, highest: 50.0, tolerance: 0.03, per_decade: 8, whole_grid: false, around: false };
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let mut arguments = std::env::args().skip(1);
+    let file = arguments.next().map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../launch/contact.toml"), PathBuf::from);
+    let mut grips: Vec<f64> = arguments.map(|a| a.parse()).collect::<Result<_, _>>()?;
+    if grips.is_empty() {
+        grips = GRIPS.to_vec();
+    }
+    println!("{:<12} {:>10} {:>10} {:>10}", "grip", "none", "fixed", "estimated");
+    for grip in grips {
+        let mut row = Vec::new();
+        for canceller in ["none", "fixed", "estimated"] {
+            let changes = Overrides {
+                canceller: (canceller == "none").then(|| "none".into()),
+                limits: Some("ignored".into()),
+                sensors: std::env::var("IDEAL").ok().map(|_| "ideal".into()),
+                ..Overrides::default()
+            };
+            let mut graph = Graph::load(&file, &changes)?;
+            for node in graph.nodes.iter_mut().filter(|n| n.kind == NodeKind::Canceller) {
+                if let Settings::Canceller(.., hand) = &mut node.settings {
+                    *hand = (canceller == "estimated").then(Default::default);
+                }
+            }
+            let scenario = Scenario::new(graph, None, None)?;
+            let options = RunOptions { grip_scale: grip, ..RunOptions::default() };
+            let found = edge(&scenario, &SEARCH, &options, &|_, _| {}, &AtomicBool::new(false))?;
+            row.push((found.at_least, found.reason));
+        }
+        print!("{grip:<12}");
+        row.iter().for_each(|(gain, _)| print!(" {gain:>10.3}"));
+        println!("   {}", row[2].1);
+    }
+    Ok(())
+}
