@@ -56,6 +56,7 @@ fn session(graph: &Graph, lambda: f64, dither: &str) -> Session {
         mu: vec![1.0; n],
         lambda: vec![lambda; n],
         notes: Vec::new(),
+        sensors: Vec::new(),
         cut_short: None,
         bridged_s: backdrive_stability::unjudged::BRIDGED_S,
     }

@@ -4,6 +4,7 @@
 #![cfg_attr(not(test), warn(clippy::print_stdout, clippy::print_stderr))]
 
 pub mod collect;
+pub mod coupling;
 pub mod energy;
 pub mod frequency;
 pub mod from_bag;
@@ -16,6 +17,7 @@ mod phases;
 pub mod resimulate;
 pub mod roles;
 mod rosbag;
+pub mod sensors;
 pub mod session;
 pub mod spectra;
 pub mod transparency;

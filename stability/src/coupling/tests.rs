@@ -1,0 +1,1 @@
+//! Laws that are known, in sessions that are simulated.
