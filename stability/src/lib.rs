@@ -11,6 +11,7 @@ pub mod from_bag;
 mod grid;
 mod master_run;
 mod model_check;
+pub mod moving;
 pub mod oscillation;
 pub mod outcome;
 mod phases;

@@ -15,6 +15,10 @@ const SURELY_WORSE: f64 = 2.0;
 /// A term is worth a word only where it takes away at least this share of what is left: what a recording does not tell of filters and rounding is of
 /// that size.
 const WORTH: f64 = 0.05;
+/// What leaves less of the variance is exact: the rest is rounding of the computation.
+const EXACT: f64 = 1e-14;
+/// A term that adds less than this share of the force is none.
+const VISIBLE: f64 = 1e-3;
 /// Gauss-Newton steps of a first fit, of a whole one, and of one that starts at it and misses a quarter of the time.
 const ROUGH_STEPS: usize = 3;
 /// See [`ROUGH_STEPS`].
@@ -67,9 +71,10 @@ pub(super) fn choose(side: &Side) -> Option<SideLaw> {
     let mut tried: Vec<Tried> = roughly.into_par_iter().filter_map(|fit| attempt(side, &ready, fit)).collect();
     tried.sort_by(|a, b| a.total.total_cmp(&b.total));
     let best = tried.iter().find(|t| t.stands_out)?;
+    let variance = spread(&ready.force).powi(2).max(f64::MIN_POSITIVE);
+    let worse = |law: &Tried, best: &Tried| worse(law, best, EXACT * variance);
     let as_good = |t: &&Tried| t.stands_out && !worse(t, best);
     let chosen = tried.iter().filter(as_good).min_by(|a, b| a.fit.terms.len().cmp(&b.fit.terms.len()).then(a.total.total_cmp(&b.total)))?;
-    let variance = spread(&ready.force).powi(2).max(f64::MIN_POSITIVE);
     // The same law with a term more that nobody would miss is no rival.
     let same = |t: &Tried| {
         chosen.fit.terms.iter().all(|term| t.fit.terms.contains(term)) && (t.fit.terms == chosen.fit.terms || !worse(chosen, t))
@@ -106,12 +111,16 @@ fn attempt(side: &Side, ready: &Ready, rough: Fit) -> Option<Tried> {
         }
     }
     let total = unseen.iter().sum::<f64>() / BLOCKS as f64;
-    let stands_out = ready.contributions(&fit).iter().all(|c| *c > ready.rounding(&fit));
+    let least = ready.rounding(&fit).max(VISIBLE * spread(&ready.force));
+    let stands_out = ready.contributions(&fit).iter().all(|c| *c > least);
     total.is_finite().then_some(Tried { fit, unseen, total, stands_out })
 }
 
 /// Whether a law predicts worse than another: by block, in pairs, surely and by what is worth a word; or by far in all.
-fn worse(law: &Tried, best: &Tried) -> bool {
+fn worse(law: &Tried, best: &Tried, exact: f64) -> bool {
+    if law.total <= exact {
+        return false;
+    }
     if law.total > SURELY_WORSE * best.total {
         return true;
     }

@@ -1,6 +1,6 @@
 //! The signals of one side made ready for its fits: without holes, in the band in which they are known, cut into blocks of time.
 
-use super::filter::BothWays;
+use super::filter::{BothWays, FilteredRate};
 use super::law::Term;
 use super::types::{NoCoupling, Signals};
 use crate::spectra::welch;
@@ -83,7 +83,7 @@ impl Side {
             let (from, to) = (row.saturating_sub(memory), (row + memory + 1).min(usable.len()));
             usable.get_mut(from..to).unwrap_or_default().fill(false);
         }
-        let every = ((0.25 / (band_hz * period_s)).floor() as usize).max(1);
+        let every = ((0.25 / (band_hz * period_s)).floor() as usize).min(force.len() / (100 * BLOCKS)).max(1);
         // The filter of speeds remembers how it began.
         let begins = memory.max((0.05 / period_s) as usize);
         let inner = begins..force.len().saturating_sub(begins);
@@ -154,7 +154,10 @@ fn clamp(force: &[f64]) -> Option<f64> {
 fn band(force: &[f64], own: &[f64], other: &[f64], forces: [Option<&[f64]>; 2], period_s: f64) -> f64 {
     let half = 0.5 / period_s;
     let error: Vec<f64> = other.iter().zip(own).map(|(r, x)| r - x).collect();
-    let mut columns: Vec<&[f64]> = vec![force, &error, own];
+    // A law of a speed is not told from a position that wanders, for that leaks over every line.
+    let rate = |x: &[f64]| FilteredRate::of(x, 2.0 * period_s, period_s);
+    let (error_rate, own_rate) = (rate(&error), rate(own));
+    let mut columns: Vec<&[f64]> = vec![force, &error, own, &error_rate, &own_rate];
     columns.extend(forces.into_iter().flatten());
     let segment = ((0.5 / period_s) as usize).min(force.len() / 8).max(16);
     let whole = 0..force.len();

@@ -11,6 +11,11 @@ impl Coupling {
 }
 
 impl SideLaw {
+    /// Whether it pushes away from the other side, which no coupling does: then a sign in the recording is turned round.
+    pub fn pushes_apart(&self) -> bool {
+        self.gains.iter().any(|g| g.term == Term::Position && g.estimate.ci95[1] < 0.0)
+    }
+
     /// The law as a formula with its intervals; `names` are the own and the other's position, the own and the other's measured force.
     fn line(&self, force: &str, names: [&str; 4]) -> String {
         let [own, other, own_force, other_force] = names;
@@ -41,7 +46,7 @@ impl SideLaw {
         if let Some(limit) = self.limit {
             more.push(format!("clamped at {limit:.4}"));
         }
-        more.push(format!("{:.3} % unexplained in unseen time up to {:.0} Hz", 100.0 * self.unexplained, self.band_hz));
+        more.push(format!("leaves {:.1e} of its variance in unseen time up to {:.0} Hz", self.unexplained, self.band_hz));
         let law = if terms.is_empty() { "nothing".to_owned() } else { terms.join(" + ") };
         format!("{force} = {law}; {}", more.join(", "))
     }
