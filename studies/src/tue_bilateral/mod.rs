@@ -1,16 +1,21 @@
-//! Two levers of a real force-reflecting teleoperator, of which nothing is stated but an inertia: what they have besides, which gauge is dead, and how
-//! late the hand's torque is recorded.
+//! Two levers of a real force-reflecting teleoperator, of which nothing is stated but an inertia: what they have besides, which gauge is dead, how
+//! late the hand's torque is recorded, which law couples them, whether they were stable with it, and the sessions run again with what was found.
+
+mod again;
+mod sessions;
 
 use crate::filter::LowPass;
-use crate::run::{Ask, LIKELY, diagnose, diagnosed_model, findings, instead, parameter, percent, remarks, said, total};
+use crate::run::{Ask, LIKELY, diagnose, diagnosed_model, findings, instead, parameter, percent, remarks, said, solved, total};
 use crate::table::Report;
 use crate::{Context, Study, StudyError, csv_columns};
+use again::{Levers, again};
 use backdrive_diagnosis::verdict::Verdict;
-use nalgebra::{DMatrix, DVector};
+use backdrive_plant::model::Model;
+use sessions::judge;
 
 pub(crate) const STUDY: Study = Study {
     name: "tue_bilateral",
-    about: "both levers of a teleoperator from a stated inertia alone: friction, a dead gauge, a torque that is recorded late",
+    about: "a teleoperator from a stated inertia alone: friction, a dead gauge, the law that couples its levers, its sessions run again",
     needs: ("tue_bilateral", &FILES),
     run,
 };
@@ -38,7 +43,7 @@ const FILES: [&str; 17] = [
 /// What of their names is the same in all.
 const SAME: &str = "m2_";
 /// Their columns.
-const COLUMNS: [&str; 9] = [
+const COLUMNS: [&str; 10] = [
     "master_position [rad]",
     "slave_position [rad]",
     "minus_hand_torque [N m]",
@@ -48,6 +53,7 @@ const COLUMNS: [&str; 9] = [
     "master_gauge_b [V]",
     "slave_gauge_a [V]",
     "slave_gauge_b [V]",
+    "environment_torque [N m]",
 ];
 /// Sample rate, Hz; corner of the zero-phase filter on positions and torques, Hz; every so manieth sample is kept, and so many are left out at either end.
 const RATE: f64 = 2000.0;
@@ -80,6 +86,28 @@ struct Known {
     lags: Vec<f64>,
     /// Dry friction, N m, and viscous friction, N m s/rad, of the slave in free motion.
     friction: Vec<[f64; 2]>,
+    /// The records at their own rate.
+    records: Vec<Record>,
+}
+
+/// A record at its own rate, positions and torques through the same filter.
+#[derive(Debug, Clone)]
+struct Record {
+    /// Such as `b_spring`.
+    name: String,
+    /// s
+    period_s: f64,
+    /// rad
+    master: Vec<f64>,
+    /// rad
+    slave: Vec<f64>,
+    /// Torque of the hand on the master by its gauge, N m.
+    hand: Vec<f64>,
+    /// Torque of the environment on the slave, N m.
+    contact: Vec<f64>,
+    /// Torques of the motors, N m.
+    master_motor: Vec<f64>,
+    slave_motor: Vec<f64>,
 }
 
 fn run(context: &Context) -> Result<Report, StudyError> {
@@ -103,11 +131,24 @@ fn run(context: &Context) -> Result<Report, StudyError> {
     report.figure("lag of the recorded torque", lag);
     report.line("recorded hand torque behind its gauge", format!("{:.2} ms, first order", 1e3 * lag), "unpublished", SOURCE, None);
     gauges(&mut report, context)?;
-    slave(&mut report, context, &known)?;
+    let judged = judge(&mut report, context)?;
+    let mut halves = slave(&mut report, context, &known)?;
     if !context.quick {
-        master(&mut report, context, &known, "master", "the recorded torque")?;
-        master(&mut report, context, &known, "gauge", "the gauge itself")?;
+        halves.extend(master(&mut report, context, &known, "master", "the recorded torque")?);
+        let (by_gauge, gain) = gauge(&mut report, context, &known)?;
+        halves.extend(by_gauge);
+        let levers = Levers { master: lever(context, "gauge")?, slave: lever(context, "slave")? };
+        again(&mut report, &known.records, &judged, &levers, gain)?;
     }
+    let halved = halves.iter().filter(|h| **h).count();
+    report.figure("halved", halved as f64 / halves.len().max(1) as f64);
+    report.line(
+        "unseen records whose torque residual is at least halved, of all levers and ways",
+        format!("{halved} of {}", halves.len()),
+        "80 %",
+        "wanted, against inertia alone, refitted",
+        Some(halved * 10 >= halves.len() * 8),
+    );
     Ok(report)
 }
 
@@ -130,7 +171,7 @@ fn gauges(report: &mut Report, context: &Context) -> Result<(), StudyError> {
 }
 
 /// The slave in free motion.
-fn slave(report: &mut Report, context: &Context, known: &Known) -> Result<(), StudyError> {
+fn slave(report: &mut Report, context: &Context, known: &Known) -> Result<Vec<bool>, StudyError> {
     let effort = if context.quick { 0.85 } else { 3.0 };
     let ask = Ask { name: "slave", set: "set-slave.toml", model: "slave.toml", without: &[], effects: 3, effort };
     let found = diagnose(context, &ask)?;
@@ -148,11 +189,30 @@ fn slave(report: &mut Report, context: &Context, known: &Known) -> Result<(), St
     let damping = parameter(&found.verdict, "damper", "damping").map(|p| p.0);
     report.figure("slave damping", damping.unwrap_or(f64::NAN));
     report.line("slave, viscous friction", shown(damping, 1e3, "mN m s/rad"), format!("{:.1} mN m s/rad", 1e3 * viscous), SOURCE, None);
-    Ok(())
+    Ok(halved(&found.verdict))
+}
+
+/// The master by the torque of its gauge, and the gain by which the gauge is off.
+fn gauge(report: &mut Report, context: &Context, known: &Known) -> Result<(Vec<bool>, f64), StudyError> {
+    let halved = master(report, context, known, "gauge", "the gauge itself")?;
+    let ask = Ask { name: "gauge", set: "set-gauge.toml", model: "master.toml", without: &[], effects: 4, effort: 1.5 };
+    let model = diagnosed_model(context, &ask)?;
+    Ok((halved, model.outputs.first().map_or(1.0, |o| o.gain)))
+}
+
+/// A diagnosed lever.
+fn lever(context: &Context, name: &str) -> Result<Model, StudyError> {
+    diagnosed_model(context, &Ask { name, set: "", model: "", without: &[], effects: 0, effort: 0.0 })
+}
+
+/// Of each unseen record, whether the diagnosed model leaves at most half of what the inertia alone, refitted, leaves.
+fn halved(verdict: &Verdict) -> Vec<bool> {
+    let errors = verdict.held_out.per_record.iter();
+    errors.filter_map(|r| Some(r.nrmse_after? <= 0.5 * r.nrmse_refit?)).collect()
 }
 
 /// The master in a hand, its torque as recorded or from the gauge.
-fn master(report: &mut Report, context: &Context, known: &Known, name: &str, from: &str) -> Result<(), StudyError> {
+fn master(report: &mut Report, context: &Context, known: &Known, name: &str, from: &str) -> Result<Vec<bool>, StudyError> {
     let set = format!("set-{name}.toml");
     let ask = Ask { name, set: &set, model: "master.toml", without: &[], effects: 4, effort: 1.5 };
     let found = diagnose(context, &ask)?;
@@ -172,7 +232,7 @@ fn master(report: &mut Report, context: &Context, known: &Known, name: &str, fro
         ("that of the motor's command, unpublished".to_string(), None)
     };
     report.line(&format!("{name}, hand torque from {from}: lag"), shown(lag, 1e3, "ms"), published, "the same records", met);
-    Ok(())
+    Ok(halved(&found.verdict))
 }
 
 /// The lines that every diagnosis has.
@@ -228,7 +288,7 @@ fn prepare(context: &Context, file: &str, known: &mut Known) -> Result<(), Study
     let smooth = |c: &[f64]| filter.both_ways(c);
     let thin = |c: &[f64]| c[ENDS..c.len().saturating_sub(ENDS)].iter().step_by(KEPT).copied().collect::<Vec<f64>>();
     let negative = |c: &[f64]| c.iter().map(|x| -x).collect::<Vec<f64>>();
-    let [master, slave, hand, master_motor, slave_motor, a, b, slave_a, slave_b] = [0, 1, 2, 3, 4, 5, 6, 7, 8].map(|i| &columns[i]);
+    let [master, slave, hand, master_motor, slave_motor, a, b, slave_a, slave_b, met] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9].map(|i| &columns[i]);
 
     let (lag, [gain, offset]) = follows(b, hand)?;
     known.lags.push(lag);
@@ -237,6 +297,16 @@ fn prepare(context: &Context, file: &str, known: &mut Known) -> Result<(), Study
     known.coupling[group].push(solved(&[&difference, &vec![1.0; difference.len()]], master_motor)?[0]);
 
     let gauge: Vec<f64> = b.iter().map(|v| gain * v + offset).collect();
+    known.records.push(Record {
+        name: name.trim_end_matches(".csv").to_string(),
+        period_s: 1.0 / RATE,
+        master: smooth(master),
+        slave: smooth(slave),
+        hand: smooth(&gauge),
+        contact: negative(&smooth(met)),
+        master_motor: negative(&smooth(master_motor)),
+        slave_motor: smooth(slave_motor),
+    });
     let own = [smooth(master), negative(&smooth(master_motor)), smooth(hand), smooth(&gauge), a.clone(), b.clone()].map(|c| thin(&c));
     let t: Vec<f64> = (0..own[0].len()).map(|i| (i * KEPT) as f64 / RATE).collect();
     let names = ["t", "position", "motor_torque", "hand_torque", "gauge_torque", "gauge_a", "gauge_b"];
@@ -267,14 +337,6 @@ fn follows(from: &[f64], signal: &[f64]) -> Result<(f64, [f64; 2]), StudyError> 
     let numbers = solved(&[&signal[..n], &from[1..], &vec![1.0; n]], &signal[1..])?;
     let kept = numbers[0];
     Ok((-1.0 / (RATE * kept.ln()), [numbers[1] / (1.0 - kept), numbers[2] / (1.0 - kept)]))
-}
-
-/// Least squares: what the columns have to be multiplied with to give the right side.
-fn solved(columns: &[&[f64]], right: &[f64]) -> Result<Vec<f64>, StudyError> {
-    let matrix = DMatrix::from_fn(right.len(), columns.len(), |i, j| columns[j][i]);
-    let numbers =
-        matrix.svd(true, true).solve(&DVector::from_column_slice(right), 1e-12).map_err(|e| StudyError::Diagnosis(e.to_string()))?;
-    Ok(numbers.iter().copied().collect())
 }
 
 #[cfg(test)]
