@@ -16,17 +16,17 @@ const SURELY_WORSE: f64 = 2.0;
 /// that size.
 const WORTH: f64 = 0.05;
 /// What leaves less of the variance is exact: the rest is rounding of the computation.
-const EXACT: f64 = 1e-14;
+const EXACT: f64 = 1e-10;
 /// A term that adds less than this share of the force is none.
 const VISIBLE: f64 = 1e-3;
 /// Gauss-Newton steps of a first fit, of a whole one, and of one that starts at it and misses a quarter of the time.
-const ROUGH_STEPS: usize = 3;
+const ROUGH_STEPS: usize = 5;
 /// See [`ROUGH_STEPS`].
 const FULL_STEPS: usize = 12;
 /// See [`ROUGH_STEPS`].
 const FOLD_STEPS: usize = 2;
 /// A first fit that leaves so many times more than the best is surely worse in unseen time too; the best few of these are told as rivals.
-const HOPELESS: f64 = 4.0;
+const HOPELESS: f64 = 8.0;
 /// See [`HOPELESS`].
 const HOPELESS_TOLD: usize = 3;
 /// Rivals that are told.
@@ -65,15 +65,16 @@ pub(super) fn choose(side: &Side) -> Option<SideLaw> {
     let possible: Vec<Vec<Term>> = laws().into_iter().filter(|terms| terms.iter().all(|t| side.has(*t))).collect();
     let mut roughly: Vec<Fit> = possible.par_iter().filter_map(|terms| ready.fit(terms, &side.blocks, ROUGH_STEPS)).collect();
     roughly.sort_by(|a, b| a.loss.total_cmp(&b.loss));
-    let least = roughly.first()?.loss;
+    let variance = spread(&ready.force).powi(2).max(f64::MIN_POSITIVE);
+    let least = roughly.first()?.loss.max(EXACT * variance);
     let near = roughly.iter().filter(|f| f.loss <= HOPELESS * least).count();
     roughly.truncate(near + HOPELESS_TOLD);
     let mut tried: Vec<Tried> = roughly.into_par_iter().filter_map(|fit| attempt(side, &ready, fit)).collect();
     tried.sort_by(|a, b| a.total.total_cmp(&b.total));
-    let best = tried.iter().find(|t| t.stands_out)?;
-    let variance = spread(&ready.force).powi(2).max(f64::MIN_POSITIVE);
+    // Where every law has a term that nobody would miss, the best of them all.
+    let best = tried.iter().find(|t| t.stands_out).or(tried.first())?;
     let worse = |law: &Tried, best: &Tried| worse(law, best, EXACT * variance);
-    let as_good = |t: &&Tried| t.stands_out && !worse(t, best);
+    let as_good = |t: &&Tried| (t.stands_out || std::ptr::eq(*t, best)) && !worse(t, best);
     let chosen = tried.iter().filter(as_good).min_by(|a, b| a.fit.terms.len().cmp(&b.fit.terms.len()).then(a.total.total_cmp(&b.total)))?;
     // The same law with a term more that nobody would miss is no rival.
     let same = |t: &Tried| {

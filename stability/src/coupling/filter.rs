@@ -55,14 +55,14 @@ impl FilteredRate {
 
 /// A Butterworth low-pass of second order run forward and backward, so that nothing is delayed; half of the amplitude passes at its corner.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct BothWays {
+pub(crate) struct BothWays {
     b: f64,
     a: [f64; 2],
 }
 
 impl BothWays {
     /// With its corner, Hz; `None` where that lies so near half the sample rate that nothing would be left out.
-    pub(super) fn new(corner_hz: f64, period_s: f64) -> Option<BothWays> {
+    pub(crate) fn new(corner_hz: f64, period_s: f64) -> Option<BothWays> {
         if corner_hz * period_s > 0.4 {
             return None;
         }
@@ -72,7 +72,7 @@ impl BothWays {
     }
 
     /// The signal filtered.
-    pub(super) fn of(self, signal: &[f64]) -> Vec<f64> {
+    pub(crate) fn of(self, signal: &[f64]) -> Vec<f64> {
         let mut once: Vec<f64> = self.run(signal.iter().copied());
         once.reverse();
         let mut twice = self.run(once.iter().copied());

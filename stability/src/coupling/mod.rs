@@ -21,6 +21,8 @@ mod tests;
 pub use law::{Law, Running, Seen, Term};
 pub use types::{Coupling, Estimate, Gain, Kind, NoCoupling, Rival, SideLaw, Signals};
 
+pub(crate) use filter::BothWays;
+
 use choose::choose;
 use prepared::Side;
 

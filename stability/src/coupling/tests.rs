@@ -180,3 +180,76 @@ fn intervals_hold_the_truth_about_as_often_as_they_say() {
     // 95 % of about 20: fewer than 15 would come by chance once in ten thousand times.
     assert!(inside * 20 >= all * 15, "{inside} of {all}");
 }
+
+/// As a reader of recordings hands it over.
+fn recorded(signals: &Recorded) -> crate::session::Session {
+    let n = signals.master.len();
+    let axis = crate::session::AxisSignals {
+        name: "lever".into(),
+        master: signals.master.clone(),
+        force: signals.master_force.clone(),
+        command: signals.master.clone(),
+        contact: signals.contact.clone(),
+        slave: Some(signals.slave.clone()),
+        slave_force: Some(signals.slave_force.clone()),
+        hand: Some(signals.hand.clone()),
+        clamped: vec![false; n],
+        resolution: STEP,
+        ..Default::default()
+    };
+    crate::session::Session {
+        name: "two levers".into(),
+        period_s: PERIOD,
+        axes: vec![axis],
+        mu: vec![1.0; n],
+        lambda: vec![f64::NAN; n],
+        notes: Vec::new(),
+        sensors: Vec::new(),
+        cut_short: None,
+        bridged_s: crate::unjudged::BRIDGED_S,
+    }
+}
+
+fn answered(session: &crate::session::Session) -> crate::verdict::Answer {
+    let question = crate::verdict::Question {
+        session,
+        recorded: None,
+        asked: None,
+        swapped: Default::default(),
+        intents: None,
+        script: None,
+        gain: crate::resimulate::Gain { mu: 1.0, lambda: 1.0 },
+        grips: Vec::new(),
+        search: Default::default(),
+    };
+    crate::verdict::answer(&question, &|_, _, _| (), &std::sync::atomic::AtomicBool::new(false)).unwrap()
+}
+
+#[test]
+fn a_damped_pair_is_stable_a_late_one_is_not_and_a_torn_record_says_nothing() {
+    use crate::verdict::Word;
+    let good = law(&POSITION, 1.2e-3, 0.5e-3);
+    let mut session = recorded(&super::tests::session(&good, &good, 6, 6.0));
+    let found = answered(&session);
+    assert_eq!(found.verdict, Word::Stable, "{}", found.reason);
+    let json = found.json();
+    assert_eq!(json["coupling"][0]["coupling"]["kind"], "position_error");
+    assert_eq!(json["coupling"][0]["coupling"]["master"]["gains"][0]["term"], "position");
+    assert!(json["coupling"][0]["coupling"]["slave"]["delay_s"]["ci95"][1].as_f64().unwrap() < 6e-4, "{json}");
+    // A tenth of the time is missing.
+    session.axes[0].slave.as_mut().unwrap()[4000..5200].fill(f64::NAN);
+    assert_eq!(answered(&session).verdict, Word::CannotTell);
+    // The same gains 12 ms late swing up until the clamp holds them.
+    let late = Law { limit: Some(0.4), ..law(&POSITION, 1.2e-3, 12e-3) };
+    let found = answered(&recorded(&super::tests::session(&late, &late, 6, 6.0)));
+    assert!(matches!(found.verdict, Word::LimitCycle | Word::Unstable), "{:?}: {}", found.verdict, found.reason);
+}
+
+#[test]
+fn a_sign_that_is_turned_round_is_told() {
+    let good = law(&POSITION, 1.2e-3, 0.5e-3);
+    let mut turned = session(&good, &good, 7, 4.0);
+    turned.slave_force.iter_mut().for_each(|f| *f = -*f);
+    let found = answered(&recorded(&turned));
+    assert!(found.warnings.iter().any(|w| w.to_string().contains("tau_s pushes the two sides apart")), "{:?}", found.warnings);
+}

@@ -15,6 +15,7 @@
 
 mod line;
 
+use crate::coupling::BothWays;
 use crate::outcome::{LEAST_AMPLITUDE, LOWEST_HZ, NOISE, Outcome};
 use crate::session::AxisSignals;
 use crate::unjudged::Unjudged;
@@ -143,10 +144,11 @@ fn decimated(signal: &[f64], every: usize) -> Vec<f64> {
     kept.windows(2).filter_map(|w| Some(w.get(1)? - w.first()?)).collect()
 }
 
-/// A low-pass by a windowed sinc (Blackman), its corner as a share of the sample rate; as long as four of its periods to either side.
+/// A low-pass by a windowed sinc (Blackman), its corner as a share of the sample rate; twelve of its periods long to either side, so that it is flat
+/// up to four fifths of its corner.
 fn low_pass(signal: &[f64], corner: f64) -> Vec<f64> {
     use std::f64::consts::PI;
-    let half = (4.0 / corner).ceil() as i64;
+    let half = (12.0 / corner).ceil() as i64;
     let tap = |i: i64| {
         let x = i as f64;
         let sinc = if i == 0 { 2.0 * corner } else { (2.0 * PI * corner * x).sin() / (PI * x) };
@@ -162,9 +164,8 @@ fn low_pass(signal: &[f64], corner: f64) -> Vec<f64> {
 
 /// Amplitude of a sine with the power that the signal has in a band.
 fn amplitude_in(signal: &[f64], band: &Band, period_s: f64) -> f64 {
-    let upper = if band.every > 1 { low_pass(signal, band.to_hz * period_s) } else { signal.to_vec() };
-    let lower = low_pass(signal, band.from_hz * period_s);
-    let power = upper.iter().zip(&lower).map(|(a, b)| (a - b).powi(2)).sum::<f64>() / signal.len().max(1) as f64;
+    let below = |hz: f64| BothWays::new(hz, period_s).map_or_else(|| signal.to_vec(), |f| f.of(signal));
+    let power = below(band.to_hz).iter().zip(below(band.from_hz)).map(|(a, b)| (a - b).powi(2)).sum::<f64>() / signal.len().max(1) as f64;
     (2.0 * power).sqrt()
 }
 

@@ -59,3 +59,59 @@ fn values_of<'a>(table: &'a Recording, column: &str) -> Option<&'a [f64]> {
         table.signals.iter().find(|(name, _)| of(name)).map(|(_, values)| values.as_slice())
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::session::Session;
+
+    const ROLES: &str = "time = \"time\"\n[signals]\nx_m = \"xm\"\nx_s = { column = \"xs [mm]\", scale = 2.0 }\nF_f = \"fm\"\ntau_s = \"fs\"\n\
+                         F_s = \"contact\"\n[sensors]\nsecond = { column = \"gauge\", of = \"F_s\" }\n";
+
+    fn table(dir: &Path) -> std::path::PathBuf {
+        let mut text = "time [ms],xm,xs [mm],fm,fs,contact,gauge,unused,words\n".to_string();
+        for row in 0..4000 {
+            let t = f64::from(row) * 1e-3;
+            let x = 0.05 * (5.0 * t).sin();
+            text += &format!("{},{x},{},{},{},{},9.99,3,on\n", 1e3 * t, 500.0 * x, -x, x, -0.1 * (3.0 * t).sin());
+        }
+        let path = dir.join("session.csv");
+        std::fs::write(&path, text).unwrap();
+        path
+    }
+
+    #[test]
+    fn a_table_becomes_a_session_in_si_units_and_its_dead_columns_are_told() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = table(dir.path());
+        let roles = Roles::from_toml(ROLES, "roles.toml").unwrap();
+        let session = Session::from_roles(&path, &roles).unwrap();
+        let axis = &session.axes[0];
+        assert!((session.period_s - 1e-3).abs() < 1e-12 && session.len() == 4000);
+        assert!((axis.slave.as_ref().unwrap()[1000] - axis.master[1000]).abs() < 1e-9, "millimetres, and a scale of 2");
+        assert_eq!(axis.command, axis.master);
+        let told: Vec<&str> = session.sensors.iter().map(|s| s.signal.as_str()).collect();
+        assert_eq!(told, ["second (gauge)"], "a column of words keeps the others from being read: {told:?}");
+        // Without it every column is looked at.
+        let text = std::fs::read_to_string(&path).unwrap().replace(",words", "").replace(",on\n", "\n");
+        std::fs::write(&path, text).unwrap();
+        let session = Session::from_roles(&path, &roles).unwrap();
+        let told: Vec<&str> = session.sensors.iter().map(|s| s.signal.as_str()).collect();
+        assert_eq!(told, ["second (gauge)", "unused"]);
+    }
+
+    #[test]
+    fn what_does_not_go_with_a_table_is_told_at_its_line() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = table(dir.path());
+        let says = |from: &str, to: &str, what: &[&str]| {
+            let error =
+                Session::from_roles(&path, &Roles::from_toml(&ROLES.replace(from, to), "roles.toml").unwrap()).unwrap_err().to_string();
+            assert!(what.iter().all(|w| error.contains(w)), "{error}");
+        };
+        says("\"fm\"", "\"fn\"", &["roles.toml:5", "F_f", "unknown column", "contact"]);
+        says("\"fm\"", "\"/motor.effort[0]\"", &["roles.toml:5", "/motor.effort[0] is a topic", "name a column"]);
+        says("\"time\"", "\"clock\"", &["session.csv", "clock"]);
+        says("\"fm\"", "\"words\"", &["session.csv:2", "words", "on"]);
+    }
+}
