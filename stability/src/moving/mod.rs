@@ -55,8 +55,8 @@ const STEP: f64 = 4.0;
 /// Fewest samples of a band.
 const LEAST_SAMPLES: usize = 200;
 
-/// What the pair did, and its slowest mode where one was seen.
-pub(crate) fn judge_moving(axis: &AxisSignals, mu: f64, period_s: f64) -> (Outcome, Option<Decay>) {
+/// What a pair did whose slave is at `mu` times the master, from rows `period_s` apart, and the mode that is least sure to die where one was seen.
+pub fn judge(axis: &AxisSignals, mu: f64, period_s: f64) -> (Outcome, Option<Decay>) {
     let no = |why: Unjudged| (Outcome::NotJudged { why }, None);
     let Some(slave) = &axis.slave else { return no(Unjudged::Empty) };
     let master = without_holes(&axis.master);
@@ -169,24 +169,34 @@ fn amplitude_in(signal: &[f64], band: &Band, period_s: f64) -> f64 {
     (2.0 * power).sqrt()
 }
 
-/// The slowest mode in a band, with its interval.
+/// The mode of a band that is least sure to die, with its interval.
 fn slowest(samples: &[f64], band: &Band, period_s: f64) -> Option<Decay> {
     let rate = 1.0 / (band.every as f64 * period_s);
     let order = order_of(samples)?;
     let rows = samples.len() - order;
-    let mode = |left_out: std::ops::Range<usize>| {
-        let found = modes(&autoregression(samples, order, &left_out)?, rate);
-        found.into_iter().filter(|m| (band.from_hz..band.to_hz).contains(&m.0)).min_by(|a, b| a.1.total_cmp(&b.1))
-    };
-    let (frequency_hz, per_s) = mode(0..0)?;
-    // A mode that is not there in a piece does not die slowly there.
-    let pieces: Vec<f64> = (0..PIECES).filter_map(|p| mode(p * rows / PIECES..(p + 1) * rows / PIECES).map(|m| m.1)).collect();
+    let without = |left_out: std::ops::Range<usize>| Some(modes(&autoregression(samples, order, &left_out)?, rate));
+    let all = without(0..0)?;
+    let pieces: Vec<Vec<(f64, f64)>> = (0..PIECES).filter_map(|p| without(p * rows / PIECES..(p + 1) * rows / PIECES)).collect();
+    let oscillates = |m: &&(f64, f64)| (band.from_hz..band.to_hz).contains(&m.0);
+    let found = all.iter().filter(oscillates).map(|mode| {
+        // The same mode in each piece is the one next to it.
+        let away = |m: &(f64, f64)| (std::f64::consts::TAU * (m.0 - mode.0)).hypot(m.1 - mode.1);
+        let same = pieces.iter().filter_map(|p| p.iter().min_by(|a, b| away(a).total_cmp(&away(b)))).map(|m| m.1);
+        let half = half_width(&same.collect::<Vec<f64>>());
+        Decay { frequency_hz: mode.0, per_s: mode.1, ci95: [mode.1 - half, mode.1 + half], amplitude: 0.0, of_error: false }
+    });
+    found.min_by(|a, b| a.ci95[0].total_cmp(&b.ci95[0]))
+}
+
+/// Half of the 95 % interval of a number by what it is without each piece (jackknife).
+fn half_width(pieces: &[f64]) -> f64 {
     let n = pieces.len() as f64;
-    let mean = pieces.iter().sum::<f64>() / n.max(1.0);
-    let deviation = ((n - 1.0) / n.max(1.0) * pieces.iter().map(|d| (d - mean).powi(2)).sum::<f64>()).max(0.0).sqrt();
-    let t = StudentsT::new(0.0, 1.0, (n - 1.0).max(1.0)).map_or(2.1, |t| t.inverse_cdf(0.975));
-    let half = if n >= 2.0 { t * deviation } else { f64::INFINITY };
-    Some(Decay { frequency_hz, per_s, ci95: [per_s - half, per_s + half], amplitude: 0.0, of_error: false })
+    if pieces.len() < 2 {
+        return f64::INFINITY;
+    }
+    let mean = pieces.iter().sum::<f64>() / n;
+    let deviation = ((n - 1.0) / n * pieces.iter().map(|d| (d - mean).powi(2)).sum::<f64>()).sqrt();
+    StudentsT::new(0.0, 1.0, n - 1.0).map_or(f64::INFINITY, |t| t.inverse_cdf(0.975) * deviation)
 }
 
 /// The order that Schwarz's criterion takes.
@@ -226,7 +236,7 @@ fn autoregression(samples: &[f64], order: usize, left_out: &std::ops::Range<usiz
     Some(solved.iter().copied().collect())
 }
 
-/// Frequency, Hz, and decay, 1/s, of each mode that oscillates.
+/// Frequency, Hz, and decay, 1/s, of each mode; of those that do not oscillate the frequency is 0 or half the rate.
 fn modes(coefficients: &[f64], rate: f64) -> Vec<(f64, f64)> {
     let n = coefficients.len();
     let companion = DMatrix::from_fn(n, n, |i, j| match i {
@@ -234,8 +244,11 @@ fn modes(coefficients: &[f64], rate: f64) -> Vec<(f64, f64)> {
         _ => f64::from(u8::from(i == j + 1)),
     });
     let poles = companion.complex_eigenvalues();
-    let oscillates = poles.iter().filter(|p| p.im > 0.0 && p.norm() > 0.0);
-    oscillates.map(|p| (p.im.atan2(p.re) * rate / std::f64::consts::TAU, -p.norm().ln() * rate)).collect()
+    poles
+        .iter()
+        .filter(|p| p.im >= 0.0 && p.norm() > 0.0)
+        .map(|p| (p.im.atan2(p.re) * rate / std::f64::consts::TAU, -p.norm().ln() * rate))
+        .collect()
 }
 
 /// A signal whose holes keep the value before them.
@@ -280,7 +293,7 @@ mod tests {
     #[test]
     fn the_decay_of_a_known_mode_is_found_while_the_hand_moves() {
         for (hz, decay) in [(16.0, 25.0), (28.0, 40.0), (45.0, 15.0)] {
-            let (outcome, found) = judge_moving(&pair(hz, decay, 5.0, |_| 0.0), 1.0, PERIOD);
+            let (outcome, found) = judge(&pair(hz, decay, 5.0, |_| 0.0), 1.0, PERIOD);
             let found = found.unwrap();
             assert_eq!(outcome, Outcome::Stable, "{found:?}");
             assert!(found.ci95[0] > DIES, "{found:?}");
@@ -293,12 +306,12 @@ mod tests {
     fn a_limit_cycle_and_a_growing_oscillation_are_told_in_any_band() {
         for hz in [14.0, 40.0, 110.0, 330.0] {
             let line = move |t: f64| 1e-3 * (std::f64::consts::TAU * hz * t).sin();
-            let (outcome, found) = judge_moving(&pair(20.0, 40.0, 5.0, line), 1.0, PERIOD);
+            let (outcome, found) = judge(&pair(20.0, 40.0, 5.0, line), 1.0, PERIOD);
             let Outcome::LimitCycle { frequency_hz, .. } = outcome else { panic!("{hz}: {outcome:?} {found:?}") };
             assert!((frequency_hz - hz).abs() < 0.05 * hz, "{frequency_hz}");
         }
         let grows = |t: f64| 1e-6 * (2.0 * t).exp() * (std::f64::consts::TAU * 30.0 * t).sin();
-        let (outcome, found) = judge_moving(&pair(20.0, 40.0, 5.0, grows), 1.0, PERIOD);
+        let (outcome, found) = judge(&pair(20.0, 40.0, 5.0, grows), 1.0, PERIOD);
         assert!(outcome.is_unstable(), "{outcome:?} {found:?}");
     }
 
@@ -306,7 +319,7 @@ mod tests {
     fn what_nothing_shakes_is_not_judged() {
         let n = 10_000;
         let still = AxisSignals { master: vec![0.1; n], slave: Some(vec![0.1; n]), resolution: 2e-5, ..AxisSignals::default() };
-        assert_eq!(judge_moving(&still, 1.0, PERIOD).0, Outcome::NotJudged { why: Unjudged::NotShaken });
-        assert_eq!(judge_moving(&AxisSignals::default(), 1.0, PERIOD).0, Outcome::NotJudged { why: Unjudged::Empty });
+        assert_eq!(judge(&still, 1.0, PERIOD).0, Outcome::NotJudged { why: Unjudged::NotShaken });
+        assert_eq!(judge(&AxisSignals::default(), 1.0, PERIOD).0, Outcome::NotJudged { why: Unjudged::Empty });
     }
 }

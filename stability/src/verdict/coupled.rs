@@ -7,7 +7,7 @@ use super::warning::Warning;
 use super::word::{Method, Word};
 use crate::coupling::{Signals, identify};
 use crate::energy::energy;
-use crate::moving::judge_moving;
+use crate::moving::judge;
 use crate::outcome::Outcome;
 use crate::session::{AxisSignals, Session};
 use crate::transparency::transparency;
@@ -79,7 +79,7 @@ fn axis(session: &Session, index: usize) -> Option<CoupledAxis> {
     let signals = Signals::of(session, index)?;
     let axis = session.axes.get(index)?;
     let found = identify(&signals);
-    let (outcome, slowest_mode) = judge_moving(axis, signals.mu, session.period_s);
+    let (outcome, slowest_mode) = judge(axis, signals.mu, session.period_s);
     let share =
         |force: &[f64], limit: f64| force.iter().filter(|f| f.abs() >= limit * (1.0 - 1e-6)).count() as f64 / force.len().max(1) as f64;
     let sides = found.as_ref().ok().map(|c| [(signals.master_force, c.master.limit), (signals.slave_force, c.slave.limit)]);

@@ -3,11 +3,11 @@
 //! Three ways, from the one that gives least to the one that gives most. A hand that is only a torque has to be integrated twice, so that what the
 //! friction is off by drifts away wherever no spring holds the levers; a hand is no torque, but a spring and a damper that are moved.
 
+use super::environment::Environment;
+use super::record::{ENDS, Record, mean};
 use super::sessions::{Judged, laws_without};
-use super::{Record, mean};
 use crate::StudyError;
 use crate::filter::derivative;
-use crate::run::solved;
 use crate::table::Report;
 use backdrive_plant::model::{Hold, Input, InputKind, Model, Output, OutputKind};
 use backdrive_plant::stepper::{Options, Plant, Segment, simulate};
@@ -18,10 +18,6 @@ use backdrive_stability::coupling::{Law, Running, Seen};
 const GRIP: [f64; 2] = [400.0 * ARM * ARM, 23.0 * ARM * ARM];
 /// m
 const ARM: f64 = 0.075;
-/// Rows that are left out at either end, for the filter of the recordings.
-const ENDS: usize = 100;
-/// A force below this share of the largest is no contact.
-const TOUCHES: f64 = 0.1;
 /// Share of the variance that is wanted.
 const WANTED: f64 = 0.9;
 
@@ -29,59 +25,6 @@ const WANTED: f64 = 0.9;
 pub(super) struct Levers {
     pub(super) master: Model,
     pub(super) slave: Model,
-}
-
-/// What the slave meets: a spring and a damper that push one way only.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct Environment {
-    /// N m/rad
-    stiffness: f64,
-    /// N m s/rad
-    damping: f64,
-    /// Torque at position 0 if the spring reached so far, N m: where it stands.
-    level: f64,
-    /// The sign of its torque.
-    sign: f64,
-}
-
-impl Environment {
-    fn torque(&self, x: f64, v: f64) -> f64 {
-        self.sign * (self.sign * (self.level - self.stiffness * x - self.damping * v)).max(0.0)
-    }
-
-    /// From the records of one kind by least squares where the slave touches something; each record has its own place.
-    fn fit(records: &[&Record]) -> Option<Environment> {
-        let (mut x, mut v, mut force, mut of) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
-        for (index, record) in records.iter().enumerate() {
-            let speed = derivative(&record.slave, record.period_s);
-            for row in touching(record) {
-                x.push(*record.slave.get(row)?);
-                v.push(*speed.get(row)?);
-                force.push(*record.contact.get(row)?);
-                of.push(index);
-            }
-        }
-        let here: Vec<Vec<f64>> = (0..records.len()).map(|i| of.iter().map(|o| f64::from(u8::from(*o == i))).collect()).collect();
-        let mut columns: Vec<&[f64]> = vec![&x, &v];
-        columns.extend(here.iter().map(Vec::as_slice));
-        let found = solved(&columns, &force).ok()?;
-        Some(Environment { stiffness: -*found.first()?, damping: -*found.get(1)?, level: *found.get(2)?, sign: mean(&force).signum() })
-    }
-
-    /// The same where it stands in another record.
-    fn placed(self, record: &Record) -> Environment {
-        let speed = derivative(&record.slave, record.period_s);
-        let level = |row: usize| Some(record.contact.get(row)? + self.stiffness * record.slave.get(row)? + self.damping * speed.get(row)?);
-        let all: Vec<f64> = touching(record).into_iter().filter_map(level).collect();
-        Environment { level: mean(&all), ..self }
-    }
-}
-
-fn touching(record: &Record) -> Vec<usize> {
-    let largest = record.contact.iter().fold(0.0_f64, |m, f| m.max(f.abs()));
-    (ENDS..record.contact.len().saturating_sub(ENDS))
-        .filter(|row| record.contact.get(*row).is_some_and(|f| f.abs() > TOUCHES * largest))
-        .collect()
 }
 
 /// A lever that is pushed, from one that is moved: its inertia and its elements, nothing of its sensors.
@@ -191,12 +134,15 @@ pub(super) fn again(report: &mut Report, records: &[Record], judged: &[Judged], 
         };
         let hand: Vec<f64> = record.hand.iter().map(|f| f / hand_gain).collect();
         let master_zero = zero(&needed(&levers.master, &record.master, record.period_s)?, &sum(&record.master_motor, &hand, 1.0));
-        let slave_zero = zero(&needed(&levers.slave, &record.slave, record.period_s)?, &sum(&record.slave_motor, &record.contact, 1.0));
+        let slave_needed = needed(&levers.slave, &record.slave, record.period_s)?;
+        let slave_zero = zero(&slave_needed, &sum(&record.slave_motor, &record.contact, 1.0));
         let hand: Vec<f64> = hand.iter().map(|f| f + master_zero).collect();
         let contact: Vec<f64> = record.contact.iter().map(|f| f + slave_zero).collect();
         let kind = environments.iter().find(|(kind, _)| record.name.contains(kind));
-        let environment = kind.and_then(|(_, e)| *e).map(|e| e.placed(record));
-        let rest = vec![slave_zero; record.contact.len()];
+        let environment = kind.and_then(|(_, e)| *e).and_then(|e| e.placed(record));
+        let meets = environment.map(|e| e.along(record));
+        let rest_zero = meets.map_or(slave_zero, |meets| zero(&slave_needed, &sum(&record.slave_motor, &meets, 1.0)));
+        let rest = vec![rest_zero; record.contact.len()];
         // Where nothing is met the recorded torque is what there is: the gauge's noise.
         let outside = || if environment.is_some() { rest.clone() } else { contact.clone() };
         let inner = |x: &[f64]| x.get(ENDS..x.len().saturating_sub(ENDS)).unwrap_or_default().to_vec();
@@ -289,7 +235,7 @@ mod tests {
         };
         let n = 6000;
         let t = |row: usize| row as f64 * 5e-4;
-        let spring = Environment { stiffness: 3.0, damping: 0.01, level: 0.05, sign: -1.0 };
+        let spring = Environment { stiffness: 3.0, damping: 0.01, place: -0.02 };
         let blank = Record {
             name: "b_spring".to_string(),
             period_s: 5e-4,
@@ -314,30 +260,5 @@ mod tests {
         // What was needed to move the master as it moved is what moved it: the hand and the motor, in the mean of a whole period.
         let pushes = needed(&levers.master, &recorded.master, 5e-4).unwrap();
         assert!(pushes.iter().all(|f| f.is_finite()) && pushes.len() == n);
-    }
-
-    #[test]
-    fn an_environment_is_found_from_its_torque() {
-        let truth = Environment { stiffness: 3.5, damping: 0.02, level: -0.03, sign: -1.0 };
-        let n = 4000;
-        let slave: Vec<f64> = (0..n).map(|row| 0.05 * (6.0 * row as f64 * 5e-4).sin()).collect();
-        let speed = derivative(&slave, 5e-4);
-        let contact = slave.iter().zip(&speed).map(|(x, v)| truth.torque(*x, *v)).collect();
-        let record = Record {
-            name: "a_spring".to_string(),
-            period_s: 5e-4,
-            master: slave.clone(),
-            slave,
-            hand: vec![0.0; n],
-            contact,
-            master_motor: vec![0.0; n],
-            slave_motor: vec![0.0; n],
-        };
-        let found = Environment::fit(&[&record]).unwrap();
-        assert!(
-            (found.stiffness - 3.5).abs() < 1e-6 && (found.damping - 0.02).abs() < 1e-6 && (found.level + 0.03).abs() < 1e-6,
-            "{found:?}"
-        );
-        assert!((found.placed(&record).level - found.level).abs() < 1e-9);
     }
 }

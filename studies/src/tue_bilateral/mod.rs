@@ -2,6 +2,8 @@
 //! late the hand's torque is recorded, which law couples them, whether they were stable with it, and the sessions run again with what was found.
 
 mod again;
+mod environment;
+mod record;
 mod sessions;
 
 use crate::filter::LowPass;
@@ -11,6 +13,7 @@ use crate::{Context, Study, StudyError, csv_columns};
 use again::{Levers, again};
 use backdrive_diagnosis::verdict::Verdict;
 use backdrive_plant::model::Model;
+use record::{ENDS, FILES, Record, SAME, mean};
 use sessions::judge;
 
 pub(crate) const STUDY: Study = Study {
@@ -20,28 +23,6 @@ pub(crate) const STUDY: Study = Study {
     run,
 };
 
-/// The recordings: the second master, gains of the coupling a, b and c, and what the slave met.
-const FILES: [&str; 17] = [
-    "m2_a_free_motion.csv",
-    "m2_a_spring.csv",
-    "m2_a_foam.csv",
-    "m2_a_foam2.csv",
-    "m2_a_foam3.csv",
-    "m2_a_rigid.csv",
-    "m2_b_free_motion.csv",
-    "m2_b_spring.csv",
-    "m2_b_foam.csv",
-    "m2_b_foam2.csv",
-    "m2_b_foam3.csv",
-    "m2_b_rigid.csv",
-    "m2_c_free_motion.csv",
-    "m2_c_spring.csv",
-    "m2_c_foam.csv",
-    "m2_c_foam2.csv",
-    "m2_c_rigid.csv",
-];
-/// What of their names is the same in all.
-const SAME: &str = "m2_";
 /// Their columns.
 const COLUMNS: [&str; 10] = [
     "master_position [rad]",
@@ -61,8 +42,6 @@ const RATE: f64 = 2000.0;
 const CORNER: f64 = 100.0;
 /// See [`RATE`].
 const KEPT: usize = 5;
-/// See [`RATE`].
-const ENDS: usize = 100;
 /// Laws of dry friction, and the parameter that is its size.
 const DRY: [(&str, &str); 8] = [
     ("coulomb", "force"),
@@ -88,26 +67,6 @@ struct Known {
     friction: Vec<[f64; 2]>,
     /// The records at their own rate.
     records: Vec<Record>,
-}
-
-/// A record at its own rate, positions and torques through the same filter.
-#[derive(Debug, Clone)]
-struct Record {
-    /// Such as `b_spring`.
-    name: String,
-    /// s
-    period_s: f64,
-    /// rad
-    master: Vec<f64>,
-    /// rad
-    slave: Vec<f64>,
-    /// Torque of the hand on the master by its gauge, N m.
-    hand: Vec<f64>,
-    /// Torque of the environment on the slave, N m.
-    contact: Vec<f64>,
-    /// Torques of the motors, N m.
-    master_motor: Vec<f64>,
-    slave_motor: Vec<f64>,
 }
 
 fn run(context: &Context) -> Result<Report, StudyError> {
@@ -274,10 +233,6 @@ fn friction(verdict: &Verdict) -> Option<f64> {
 
 fn shown(value: Option<f64>, scale: f64, unit: &str) -> String {
     value.map_or("not named".to_string(), |v| format!("{:.2} {unit}", scale * v))
-}
-
-fn mean(values: &[f64]) -> f64 {
-    values.iter().sum::<f64>() / values.len() as f64
 }
 
 /// Writes both levers of a record: position and torques through the same filter, the gauges in volts as they are.

@@ -1,6 +1,6 @@
 //! Each record as a session: whether the pair was stable at its own gains, which of its sensors say nothing, and which law couples its motors.
 
-use super::{FILES, SAME, mean};
+use super::record::{FILES, SAME, mean};
 use crate::table::Report;
 use crate::{Context, StudyError};
 use backdrive_stability::coupling::{Coupling, Estimate, Kind, Law, Term};
