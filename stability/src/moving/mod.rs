@@ -2,8 +2,8 @@
 //!
 //! A pair of motors that act on each other's positions is a closed loop all the time, and its hand need never hold still. What the hand does is slow
 //! and unknown; what the loop makes of it above that is a sum of its modes. They are told by an autoregressive model of the motion (output-only modal
-//! analysis; Neumaier and Schneider 2001), of the order that Schwarz's criterion takes, and the slowest decay has its interval by leaving out a
-//! twentieth of the recording at a time (jackknife). The same is done in bands, one above the other, of the coupling error and of the master.
+//! analysis; Neumaier and Schneider 2001), of the order that Schwarz's criterion takes, and each decay has the interval that the model's coefficients
+//! leave it (their covariance a sandwich over twenty blocks of time, carried on to the pole by its derivatives). The same is done in bands, one above the other, of the coupling error and of the master.
 //!
 //! | fact | threshold |
 //! |---|---|
@@ -20,7 +20,7 @@ use crate::outcome::{LEAST_AMPLITUDE, LOWEST_HZ, NOISE, Outcome};
 use crate::session::AxisSignals;
 use crate::unjudged::Unjudged;
 use line::line;
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{Complex, DMatrix, DVector};
 use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
@@ -43,8 +43,8 @@ pub struct Decay {
 const DIES: f64 = 1.6;
 /// Envelope growing faster than this grows, 1/s, as in `outcome`.
 const GROWS: f64 = 0.2;
-/// Pieces of the jackknife.
-const PIECES: usize = 20;
+/// Blocks of time that count as independent.
+const BLOCKS: usize = 20;
 /// Highest order of a model.
 const MOST_ORDER: usize = 12;
 /// A band reaches from where the one below ends to this share of its sample rate; the decimation filter is flat up to there.
@@ -65,7 +65,7 @@ pub fn judge(axis: &AxisSignals, mu: f64, period_s: f64) -> (Outcome, Option<Dec
         return no(Unjudged::Empty);
     }
     let floor = LEAST_AMPLITUDE.max(4.0 * axis.resolution) + NOISE * axis.noise;
-    let mut modes: Vec<Decay> = Vec::new();
+    let mut seen: Vec<Decay> = Vec::new();
     let mut shaken = false;
     let lines = [&error, &master].into_iter().filter_map(|signal| line(signal, period_s, LOWEST_HZ, floor));
     let line = lines.max_by(|a, b| a.amplitude.total_cmp(&b.amplitude));
@@ -80,8 +80,8 @@ pub fn judge(axis: &AxisSignals, mu: f64, period_s: f64) -> (Outcome, Option<Dec
                 continue;
             }
             shaken = true;
-            let found = slowest(&samples, &band, period_s);
-            modes.extend(found.map(|m| Decay { amplitude, of_error, ..m }));
+            let found = modes(&samples, &band, period_s).unwrap_or_default();
+            seen.extend(found.into_iter().map(|m| Decay { amplitude, of_error, ..m }));
         }
     }
     if let Some(line) = line {
@@ -94,16 +94,19 @@ pub fn judge(axis: &AxisSignals, mu: f64, period_s: f64) -> (Outcome, Option<Dec
     if !shaken {
         return no(Unjudged::NotShaken);
     }
-    // Modes that are surely slow come first, then the least sure ones.
-    let Some(worst) = modes.into_iter().min_by(|a, b| a.ci95[0].total_cmp(&b.ci95[0])) else {
+    // What surely grows comes first, then what surely does not die, then what is least sure to.
+    let grows = |m: &Decay| m.ci95[1] < -GROWS;
+    let goes_on = |m: &Decay| m.per_s < DIES && m.ci95[1] < 2.0 * DIES;
+    let rank = |m: &Decay| (!grows(m), !goes_on(m));
+    let Some(worst) = seen.into_iter().min_by(|a, b| rank(a).cmp(&rank(b)).then(a.ci95[0].total_cmp(&b.ci95[0]))) else {
         // Nothing oscillates at all: what there is dies without a turn.
         return (Outcome::Stable, None);
     };
     let outcome = if worst.ci95[0] >= DIES {
         Outcome::Stable
-    } else if worst.ci95[1] < -GROWS {
+    } else if grows(&worst) {
         Outcome::Unstable { growth_per_s: -worst.per_s }
-    } else if worst.per_s < DIES && worst.ci95[1] < 2.0 * DIES {
+    } else if goes_on(&worst) {
         Outcome::LimitCycle { amplitude_m: worst.amplitude, frequency_hz: worst.frequency_hz }
     } else {
         Outcome::NotJudged { why: Unjudged::NoDecay }
@@ -169,41 +172,55 @@ fn amplitude_in(signal: &[f64], band: &Band, period_s: f64) -> f64 {
     (2.0 * power).sqrt()
 }
 
-/// The mode of a band that is least sure to die, with its interval.
-fn slowest(samples: &[f64], band: &Band, period_s: f64) -> Option<Decay> {
+/// The modes of a band that oscillate, with their intervals.
+fn modes(samples: &[f64], band: &Band, period_s: f64) -> Option<Vec<Decay>> {
     let rate = 1.0 / (band.every as f64 * period_s);
     let order = order_of(samples)?;
-    let rows = samples.len() - order;
-    let without = |left_out: std::ops::Range<usize>| Some(modes(&autoregression(samples, order, &left_out)?, rate));
-    let all = without(0..0)?;
-    let pieces: Vec<Vec<(f64, f64)>> = (0..PIECES).filter_map(|p| without(p * rows / PIECES..(p + 1) * rows / PIECES)).collect();
-    let oscillates = |m: &&(f64, f64)| (band.from_hz..band.to_hz).contains(&m.0);
-    let found = all.iter().filter(oscillates).map(|mode| {
-        // The same mode in each piece is the one next to it.
-        let away = |m: &(f64, f64)| (std::f64::consts::TAU * (m.0 - mode.0)).hypot(m.1 - mode.1);
-        let same = pieces.iter().filter_map(|p| p.iter().min_by(|a, b| away(a).total_cmp(&away(b)))).map(|m| m.1);
-        let half = half_width(&same.collect::<Vec<f64>>());
-        Decay { frequency_hz: mode.0, per_s: mode.1, ci95: [mode.1 - half, mode.1 + half], amplitude: 0.0, of_error: false }
+    let coefficients = autoregression(samples, order)?;
+    let covariance = covariance(samples, &coefficients)?;
+    let t = StudentsT::new(0.0, 1.0, (BLOCKS - 1) as f64).map_or(2.1, |t| t.inverse_cdf(0.975));
+    let found = poles(&coefficients).into_iter().filter_map(|pole| {
+        let (frequency_hz, per_s) = (pole.im.atan2(pole.re) * rate / std::f64::consts::TAU, -pole.norm().ln() * rate);
+        let slopes = DVector::from_iterator(order, slopes(&coefficients, pole).into_iter().map(|s| -(s / pole).re * rate));
+        let half = t * (slopes.transpose() * &covariance * &slopes).get(0).copied()?.max(0.0).sqrt();
+        let inside = pole.im > 0.0 && (band.from_hz..band.to_hz).contains(&frequency_hz) && half.is_finite();
+        inside.then_some(Decay { frequency_hz, per_s, ci95: [per_s - half, per_s + half], amplitude: 0.0, of_error: false })
     });
-    found.min_by(|a, b| a.ci95[0].total_cmp(&b.ci95[0]))
+    Some(found.collect())
 }
 
-/// Half of the 95 % interval of a number by what it is without each piece (jackknife).
-fn half_width(pieces: &[f64]) -> f64 {
-    let n = pieces.len() as f64;
-    if pieces.len() < 2 {
-        return f64::INFINITY;
+/// How a pole moves with each coefficient.
+fn slopes(coefficients: &[f64], pole: Complex<f64>) -> Vec<Complex<f64>> {
+    let n = coefficients.len() as i32;
+    let past = |i: usize| n - 1 - i as i32;
+    let inner: Complex<f64> = coefficients.iter().enumerate().map(|(i, c)| pole.powi(past(i) - 1) * (c * f64::from(past(i)))).sum();
+    let slope = pole.powi(n - 1) * f64::from(n) - inner;
+    (0..coefficients.len()).map(|i| pole.powi(past(i)) / slope).collect()
+}
+
+/// Covariance of the coefficients: the sandwich over blocks of time, for what drives the pair is not of one size all the time.
+fn covariance(samples: &[f64], coefficients: &[f64]) -> Option<DMatrix<f64>> {
+    let order = coefficients.len();
+    let rows = samples.len().checked_sub(order)?;
+    let mut normal = DMatrix::zeros(order, order);
+    let mut scores = vec![DVector::zeros(order); BLOCKS];
+    for (row, window) in samples.windows(order + 1).enumerate() {
+        let (past, next) = window.split_at(order);
+        let past = DVector::from_iterator(order, past.iter().rev().copied());
+        let error = next.first()? - past.iter().zip(coefficients).map(|(x, c)| x * c).sum::<f64>();
+        normal += &past * past.transpose();
+        *scores.get_mut(row * BLOCKS / rows)? += past * error;
     }
-    let mean = pieces.iter().sum::<f64>() / n;
-    let deviation = ((n - 1.0) / n * pieces.iter().map(|d| (d - mean).powi(2)).sum::<f64>()).sqrt();
-    StudentsT::new(0.0, 1.0, n - 1.0).map_or(f64::INFINITY, |t| t.inverse_cdf(0.975) * deviation)
+    let inverse = normal.pseudo_inverse(0.0).ok()?;
+    let middle = scores.iter().map(|s| s * s.transpose()).sum::<DMatrix<f64>>() * (BLOCKS as f64 / (BLOCKS as f64 - 1.0));
+    Some(&inverse * middle * &inverse)
 }
 
 /// The order that Schwarz's criterion takes.
 fn order_of(samples: &[f64]) -> Option<usize> {
     let n = (samples.len().checked_sub(MOST_ORDER)?) as f64;
     let criterion = |order: usize| {
-        let coefficients = autoregression(samples, order, &(0..0))?;
+        let coefficients = autoregression(samples, order)?;
         // Over the same rows for every order.
         let errors = (MOST_ORDER..samples.len()).map(|row| {
             let predicted: f64 = coefficients.iter().enumerate().map(|(i, c)| c * samples.get(row - 1 - i).copied().unwrap_or(0.0)).sum();
@@ -216,39 +233,28 @@ fn order_of(samples: &[f64]) -> Option<usize> {
     all.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(order, _)| order)
 }
 
-/// Coefficients by which the last samples predict the next one, by least squares over all rows but some.
-fn autoregression(samples: &[f64], order: usize, left_out: &std::ops::Range<usize>) -> Option<Vec<f64>> {
+/// Coefficients by which the last samples predict the next one, by least squares.
+fn autoregression(samples: &[f64], order: usize) -> Option<Vec<f64>> {
     let mut normal = DMatrix::zeros(order, order);
     let mut right = DVector::zeros(order);
-    for (_, window) in samples.windows(order + 1).enumerate().filter(|(row, _)| !left_out.contains(row)) {
+    for window in samples.windows(order + 1) {
         let (past, next) = window.split_at(order);
-        let next = next.first().copied()?;
-        for i in 0..order {
-            let a = past.get(order - 1 - i).copied()?;
-            right[i] += a * next;
-            for j in 0..=i {
-                normal[(i, j)] += a * past.get(order - 1 - j).copied()?;
-            }
-        }
+        let past = DVector::from_iterator(order, past.iter().rev().copied());
+        right += &past * next.first().copied()?;
+        normal += &past * past.transpose();
     }
-    normal.fill_upper_triangle_with_lower_triangle();
     let solved = normal.svd(true, true).solve(&right, 1e-14).ok()?;
     Some(solved.iter().copied().collect())
 }
 
-/// Frequency, Hz, and decay, 1/s, of each mode; of those that do not oscillate the frequency is 0 or half the rate.
-fn modes(coefficients: &[f64], rate: f64) -> Vec<(f64, f64)> {
+/// The poles of a model, one of each pair.
+fn poles(coefficients: &[f64]) -> Vec<Complex<f64>> {
     let n = coefficients.len();
     let companion = DMatrix::from_fn(n, n, |i, j| match i {
         0 => coefficients.get(j).copied().unwrap_or(0.0),
         _ => f64::from(u8::from(i == j + 1)),
     });
-    let poles = companion.complex_eigenvalues();
-    poles
-        .iter()
-        .filter(|p| p.im >= 0.0 && p.norm() > 0.0)
-        .map(|p| (p.im.atan2(p.re) * rate / std::f64::consts::TAU, -p.norm().ln() * rate))
-        .collect()
+    companion.complex_eigenvalues().iter().copied().filter(|p| p.im >= 0.0 && p.norm() > 0.0).collect()
 }
 
 /// A signal whose holes keep the value before them.
