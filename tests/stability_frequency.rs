@@ -42,6 +42,8 @@ fn session(graph: &Graph, lambda: f64, dither: &str) -> Session {
         induced: some(signals.induced),
         command: signals.command,
         contact: signals.contact,
+        slave_force: None,
+        hand: None,
         slave: None,
         clamped: signals.clamped,
         stale: Vec::new(),
