@@ -42,6 +42,8 @@ fn session(graph: &Graph, lambda: f64, dither: &str) -> Session {
         induced: some(signals.induced),
         command: signals.command,
         contact: signals.contact,
+        slave_force: None,
+        hand: None,
         slave: None,
         clamped: signals.clamped,
         stale: Vec::new(),
@@ -56,6 +58,7 @@ fn session(graph: &Graph, lambda: f64, dither: &str) -> Session {
         mu: vec![1.0; n],
         lambda: vec![lambda; n],
         notes: Vec::new(),
+        sensors: Vec::new(),
         cut_short: None,
         bridged_s: backdrive_stability::unjudged::BRIDGED_S,
     }

@@ -12,13 +12,14 @@ pub const HELP: &str = "Examples:
   backdrive stability push-and-hold.mcap --sweep 0.1:50:200 --html out/stability.html
   backdrive stability push-and-hold.mcap --gain 1 --canceller plant/models/impulse-engine.toml --canceller-grip plant/grips/normal.toml
   backdrive stability session/ --roles roles.toml --gain 1
+  backdrive stability two-levers.csv --roles roles.toml
 
 Exit codes: 0 stable, 1 not, 2 usage, 3 the bag or a file is wrong, 5 the report cannot be written, 7 it cannot be told, 130 interrupted.";
 
 /// `backdrive stability`
 #[derive(Debug, Args)]
 pub struct Stability {
-    /// The bag of a run; with --roles any MCAP file, or a rosbag2 folder.
+    /// The bag of a run; with --roles any MCAP file, a rosbag2 folder, or a table (CSV).
     pub recording: PathBuf,
     /// The gain product mu*lambda asked about, reached by lambda; without it the bag's own.
     #[arg(long, value_name = "X", value_parser = positive, allow_negative_numbers = true, conflicts_with_all = ["mu", "lambda"])]
@@ -38,7 +39,7 @@ pub struct Stability {
     /// A graph file whose operator's hand is played, in place of the hand in the bag.
     #[arg(long, value_name = "GRAPH")]
     pub script: Option<PathBuf>,
-    /// Which topic is which, for a bag that we did not record; see docs/roles-example.toml.
+    /// Which topic or column is which, for a recording that we did not make; see docs/roles-example.toml.
     #[arg(long, value_name = "FILE")]
     pub roles: Option<PathBuf>,
     /// Law between master and slave that is asked about, in the place of the bag's scaling or of its coupling's law; see docs/couplings.md.

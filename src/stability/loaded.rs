@@ -12,7 +12,7 @@ use backdrive_stability::resimulate::recover::{recorded_intents, recover_intent}
 use backdrive_stability::resimulate::script::Script;
 use backdrive_stability::roles::Roles;
 use backdrive_stability::session::Session;
-use backdrive_stability::verdict::{Question, Swapped};
+use backdrive_stability::verdict::{Question, Swapped, is_coupled};
 
 /// Gain products that can be asked about. Beyond them the rounding of forces and positions decides, not the loop.
 const SENSIBLE: [f64; 2] = [1e-6, 1e6];
@@ -81,6 +81,12 @@ impl Loaded {
         };
         if let Some(asked) = &self.asked {
             swapped.canceller &= asked.node_of(NodeKind::Canceller).is_some();
+        }
+        if is_coupled(&self.session) && (options.gain.is_some() || options.mu.is_some() || options.lambda.is_some()) {
+            return Err(Failure::input(format!(
+                "{}: two motors that are coupled have no mu*lambda, and are judged at the gains of the recording; leave --gain, --mu and --lambda out",
+                options.recording.display()
+            )));
         }
         let own = self.own_gain();
         let gain = match (options.gain, options.mu, options.lambda) {

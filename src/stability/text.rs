@@ -24,11 +24,13 @@ impl Lines {
 pub(super) fn text(found: &Answer) -> String {
     let mut lines = Lines::default();
     let gain = found.gain;
-    lines.put(
-        "verdict",
-        format!("{} at mu*lambda = {:.4} (mu {}, lambda {:.4})", found.verdict.text().to_uppercase(), gain.product(), gain.mu, gain.lambda),
-    );
+    let at = match found.coupled.is_empty() {
+        true => format!("at mu*lambda = {:.4} (mu {}, lambda {:.4})", gain.product(), gain.mu, gain.lambda),
+        false => "at the gains of the recording".to_string(),
+    };
+    lines.put("verdict", format!("{} {at}", found.verdict.text().to_uppercase()));
     lines.put("why", found.reason.clone());
+    coupled(found, &mut lines);
     edge(found, &mut lines);
     margins(found, &mut lines);
     if let Some(f) = &found.frequency_answer {
@@ -46,6 +48,23 @@ pub(super) fn text(found: &Answer) -> String {
         lines.put("record", advice.clone());
     }
     lines.0.trim_end().to_string()
+}
+
+/// Which laws couple the motors.
+fn coupled(found: &Answer, lines: &mut Lines) {
+    let several = found.coupled.len() > 1;
+    for axis in &found.coupled {
+        let name = if several { format!("{}: ", axis.axis) } else { String::new() };
+        match (&axis.coupling, &axis.why_not) {
+            (Some(coupling), _) => {
+                lines.put("coupling", format!("{name}{}", coupling.kind.text()));
+                let [master, slave] = coupling.lines();
+                lines.put("master", master);
+                lines.put("slave", slave);
+            }
+            (None, why) => lines.put("coupling", format!("{name}not known: {}", why.as_deref().unwrap_or_default())),
+        }
+    }
 }
 
 /// Where the loop stops being stable.
@@ -116,6 +135,10 @@ fn margins(found: &Answer, lines: &mut Lines) {
 
 /// What the loop did when it was run again.
 fn run_again(found: &Answer, lines: &mut Lines) {
+    if !found.coupled.is_empty() {
+        lines.put("energy", found.recorded_energy.reason.clone());
+        return;
+    }
     match (&found.resimulated, &found.no_resimulation) {
         (Some(again), _) => {
             lines.put("re-run", format!("{}; {}", again.outcome, again.edge.reason));

@@ -1,5 +1,6 @@
 //! The report of `backdrive stability`: pictures first, the numbers beside them.
 
+mod coupled;
 mod energy;
 mod gains;
 mod measured;
@@ -20,7 +21,11 @@ use words::{capital, energy_verdict, file_name, interval, spelled, tone, verdict
 
 /// The report of an answer; `session` is what was recorded, `curve` the sweep, which may be empty.
 pub fn page(found: &Answer, session: &Session, curve: &[&Point]) -> Page {
-    let mut page = Page::new(&format!("Stability of {} at μλ = {}", file_name(&found.bag), number(found.gain.product())));
+    let is_pair = !found.coupled.is_empty();
+    let mut page = Page::new(&match is_pair {
+        true => coupled::title(file_name(&found.bag)),
+        false => format!("Stability of {} at μλ = {}", file_name(&found.bag), number(found.gain.product())),
+    });
     page.lead(tone(found.verdict), &lead(found));
     page.text(&capital(&found.reason));
     page.todo("What to do now", &to_do(found));
@@ -30,13 +35,18 @@ pub fn page(found: &Answer, session: &Session, curve: &[&Point]) -> Page {
     for warning in &found.warnings {
         page.note(&capital(&warning.to_string()));
     }
-    page.table(methods(found));
-
-    page.section("Loop, measured");
-    measured(&mut page, found);
-    page.section("Gain");
-    gains(&mut page, found, curve);
-    page.section(&format!("Response at μλ = {}", number(found.gain.product())));
+    if is_pair {
+        page.section("Coupling");
+        coupled::coupled(&mut page, found);
+        page.section("Response, as recorded");
+    } else {
+        page.table(methods(found));
+        page.section("Loop, measured");
+        measured(&mut page, found);
+        page.section("Gain");
+        gains(&mut page, found, curve);
+        page.section(&format!("Response at μλ = {}", number(found.gain.product())));
+    }
     response(&mut page, found, session);
     page.section("Energy");
     match &found.resimulated {
@@ -151,6 +161,16 @@ const TERMS: [(&str, &str); 10] = [
 /// The verdict in a sentence.
 fn lead(found: &Answer) -> String {
     let gain = number(found.gain.product());
+    if !found.coupled.is_empty() {
+        let said = match found.verdict {
+            Word::Stable => "Stable",
+            Word::LimitCycle => "Not stable: it oscillates in a limit cycle",
+            Word::Unstable => "Unstable",
+            Word::Limited => "Limited: a clamp decides, not the loop",
+            Word::CannotTell => "It cannot be told whether the pair is stable",
+        };
+        return format!("{said}, at the gains of the recording.");
+    }
     let verdict = match found.verdict {
         Word::Stable => format!("Stable at μλ = {gain}"),
         Word::LimitCycle => format!("Not stable at μλ = {gain}: it oscillates in a limit cycle"),

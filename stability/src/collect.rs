@@ -131,6 +131,7 @@ impl Collector {
                 mu: Vec::new(),
                 lambda: Vec::new(),
                 notes: Vec::new(),
+                sensors: Vec::new(),
                 cut_short: None,
                 bridged_s: graph.stale_after_s,
             },

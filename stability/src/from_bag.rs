@@ -60,6 +60,10 @@ pub(crate) enum SignalRole {
     Dither,
     Intent,
     Induced,
+    SlaveForce,
+    Hand,
+    /// Another sensor, which no answer needs.
+    Sensor,
 }
 
 impl SignalRole {
@@ -74,6 +78,9 @@ impl SignalRole {
             SignalRole::Dither => "the dither",
             SignalRole::Intent => "x_u, the operator's intent",
             SignalRole::Induced => "the canceller's predicted induced motion",
+            SignalRole::SlaveForce => "tau_s, the force of the slave's motor",
+            SignalRole::Hand => "F_h, the force of the hand on the master",
+            SignalRole::Sensor => "another sensor",
         }
     }
 
@@ -88,6 +95,9 @@ impl SignalRole {
             SignalRole::Dither => "the master's answer to a force can be told against a recorded operator only",
             SignalRole::Intent => "the loop cannot be run again with this hand, and rest is told by the signals alone",
             SignalRole::Induced => "what was cancelled is not known from the record",
+            SignalRole::SlaveForce => "the law that couples the two motors cannot be told",
+            SignalRole::Sensor => "its faults are not known",
+            SignalRole::Hand => "a coupling that carries the hand's force to the slave cannot be told",
         }
     }
 }
@@ -206,7 +216,17 @@ impl Session {
         let (mu, lambda) = gain_rows(graph, first, rows, &mut gains, &mut notes);
         let name = path.display().to_string();
         let cut_short = cut_short(reader, graph.timing.steps.unwrap_or(0) as usize, rows);
-        Ok(Session { name, period_s: graph.period_s(), axes: signals, mu, lambda, notes, cut_short, bridged_s: graph.stale_after_s })
+        Ok(Session {
+            name,
+            period_s: graph.period_s(),
+            axes: signals,
+            mu,
+            lambda,
+            notes,
+            sensors: Vec::new(),
+            cut_short,
+            bridged_s: graph.stale_after_s,
+        })
     }
 }
 
@@ -278,6 +298,8 @@ fn lay(topic: &Heard, axis: usize, first: u64, signals: &mut AxisSignals) {
         SignalRole::Dither | SignalRole::Intent | SignalRole::Induced => {}
         // Of the scaling's force only the flags count, and the slave's motion comes with its contact force.
         SignalRole::Force | SignalRole::Slave => {}
+        // Of motors no bag of ours tells; a slave's servo is in its model.
+        SignalRole::SlaveForce | SignalRole::Hand | SignalRole::Sensor => {}
     }
     for (step, flags, _) in &topic.rows {
         let row = step.checked_sub(first).map(|r| r as usize);

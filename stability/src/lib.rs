@@ -5,18 +5,21 @@
 
 pub mod collect;
 pub mod compare;
+pub mod coupling;
 pub mod energy;
 pub mod frequency;
 pub mod from_bag;
 mod grid;
 mod master_run;
 mod model_check;
+pub mod moving;
 pub mod oscillation;
 pub mod outcome;
 mod phases;
 pub mod resimulate;
 pub mod roles;
 mod rosbag;
+pub mod sensors;
 pub mod session;
 pub mod spectra;
 pub mod transparency;

@@ -153,7 +153,7 @@ impl std::fmt::Display for Outcome {
 /// An oscillation whose last quarter is larger than its first by this factor grows.
 const GROWS: f64 = 1.5;
 /// Slower than this is the hand moving, not the loop oscillating, Hz.
-const LOWEST_HZ: f64 = 8.0;
+pub(crate) const LOWEST_HZ: f64 = 8.0;
 /// The first part of a hold is the transient of getting there, s.
 const TRANSIENT_S: f64 = 0.15;
 /// Of the spectra that tell a dither's share, s.
@@ -161,10 +161,10 @@ const SEGMENT_S: f64 = 0.5;
 /// A hold must last this long beyond its transient to be judged, s.
 const LEAST_HOLD_S: f64 = 0.3;
 /// An oscillation below this is not felt and not counted, m or rad.
-const LEAST_AMPLITUDE: f64 = 2e-6;
+pub(crate) const LEAST_AMPLITUDE: f64 = 2e-6;
 
 /// Half the span of thousands of samples of noise stays below this, standard deviations.
-const NOISE: f64 = 5.0;
+pub(crate) const NOISE: f64 = 5.0;
 
 /// A master that moves less than this while the hand holds still is at rest, m or rad.
 const WANDER: f64 = 20e-6;

@@ -1,5 +1,6 @@
 //! The signals of a recorded loop, one value per step: what every answer is drawn from.
 
+use crate::sensors::SensorFault;
 use crate::unjudged::Unjudged;
 
 /// A recorded force-reflecting session.
@@ -20,6 +21,8 @@ pub struct Session {
     pub lambda: Vec<f64>,
     /// What a reader of the answers has to know: lost samples, resampled topics, gains estimated from data. One sentence each.
     pub notes: Vec<String>,
+    /// Signals of the recording that say nothing, or not always, whether a role names them or not.
+    pub sensors: Vec<SensorFault>,
     /// Whether its end is missing: then nothing in it proves that a loop is stable.
     pub cut_short: Option<Unjudged>,
     /// Longest gap that the loop bridges by holding its last force, s.
@@ -47,6 +50,10 @@ pub struct AxisSignals {
     pub contact: Vec<f64>,
     /// x_s, where the slave is, m or rad; `None` where nobody recorded it.
     pub slave: Option<Vec<f64>>,
+    /// tau_s, force of the slave's motor, N or N m; `None` where nobody recorded it.
+    pub slave_force: Option<Vec<f64>>,
+    /// F_h, force of the hand on the master, N or N m; `None` where nobody recorded it.
+    pub hand: Option<Vec<f64>>,
     /// Whether a clamp or rate limit acted, or an input was stale.
     pub clamped: Vec<bool>,
     /// Whether an input of the master or the slave was stale, so that the loop was open; empty where it never was or nobody says.

@@ -358,6 +358,7 @@ mod tests {
             mu,
             lambda,
             notes: Vec::new(),
+            sensors: Vec::new(),
             cut_short: None,
             bridged_s: crate::unjudged::BRIDGED_S,
         }

@@ -12,6 +12,10 @@ pub enum Unjudged {
     NoContact,
     /// The slave touched something, but never while the hand held still for 0.45 s.
     NoHold,
+    /// Nothing stirs the coupled pair above the frequencies of a hand, so nothing shows that a disturbance dies.
+    NotShaken,
+    /// How fast an oscillation of the coupled pair dies is not known well enough to say that it does.
+    NoDecay,
     /// Samples of the loop are missing or stale: in one gap longer than the loop bridges, or over more than 1 % of the steps.
     Gaps {
         /// Steps without a fresh sample of every signal of the loop.
@@ -47,6 +51,8 @@ impl Unjudged {
                  does), or make the run longer."
             }
             Unjudged::NoHold => "Let the hand hold still in contact for at least half a second, better a second or two.",
+            Unjudged::NotShaken => "Move faster, turn round sharply and touch something, so that the pair is stirred above 8 Hz.",
+            Unjudged::NoDecay => "Record longer, with more sharp contacts: ten seconds or more.",
             Unjudged::Gaps { .. } => {
                 "Record again with every node running and nothing lost; `backdrive doctor` tells what of this machine delays messages."
             }
@@ -63,7 +69,7 @@ impl Unjudged {
     /// Whether something is missing that there should be: then what is left may look stable and prove nothing. Without contact or a hold
     /// nothing is missing, but nothing was shown either.
     pub fn is_loss(&self) -> bool {
-        !matches!(self, Unjudged::NoContact | Unjudged::NoHold)
+        !matches!(self, Unjudged::NoContact | Unjudged::NoHold | Unjudged::NotShaken | Unjudged::NoDecay)
     }
 }
 
@@ -73,6 +79,10 @@ impl std::fmt::Display for Unjudged {
             Unjudged::Empty => write!(f, "there is no sample of the master and of what the slave touches together"),
             Unjudged::NoContact => write!(f, "the slave never touched anything, so the loop was never closed"),
             Unjudged::NoHold => write!(f, "the slave touched something, but never while the hand held still for 0.45 s"),
+            Unjudged::NotShaken => write!(f, "nothing stirs the pair above 8 Hz, so nothing shows that an oscillation dies"),
+            Unjudged::NoDecay => {
+                write!(f, "how fast the slowest oscillation of the pair dies is not known well enough to say that it does")
+            }
             Unjudged::Gaps { steps, of } => {
                 write!(f, "{steps} of {of} steps have no fresh sample of every signal of the loop, so it was open or is not known there")
             }

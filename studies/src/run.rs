@@ -12,6 +12,7 @@ use backdrive_diagnosis::search::Settings;
 use backdrive_diagnosis::structure::Structure;
 use backdrive_diagnosis::verdict::{Estimate, Finding, MODEL_FILE, Parameter, Verdict};
 use backdrive_plant::model::Model;
+use nalgebra::{DMatrix, DVector};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 use toml_edit::{Array, DocumentMut, Item};
@@ -191,6 +192,17 @@ pub fn errors_of(problem: &Problem, records: &[Record]) -> Result<Vec<(String, f
         .ok_or_else(|| StudyError::Diagnosis("the diagnosed model cannot be simulated".to_string()))?;
     let all = qualities(problem, records, &predicted, &problem.noise_sd, false);
     Ok(all.into_iter().map(|q| (recordings::file_name(&q.record).to_string(), q.nrmse)).collect())
+}
+
+/// Least squares: what the columns have to be multiplied with to give the right side.
+///
+/// # Errors
+/// When the decomposition does not converge.
+pub fn solved(columns: &[&[f64]], right: &[f64]) -> Result<Vec<f64>, StudyError> {
+    let matrix = DMatrix::from_fn(right.len(), columns.len(), |i, j| columns[j][i]);
+    let numbers =
+        matrix.svd(true, true).solve(&DVector::from_column_slice(right), 1e-12).map_err(|e| StudyError::Diagnosis(e.to_string()))?;
+    Ok(numbers.iter().copied().collect())
 }
 
 /// An error of a verdict in percent; NaN where there is none.

@@ -188,6 +188,18 @@ fn the_teleoperator_s_dead_gauge_is_told_and_its_levers_rub() {
         "{}",
         report.figure_named("lag of the recorded torque")
     );
+    assert_eq!(report.figure_named("judged stable"), 1.0);
+    assert_eq!(report.figure_named("position error"), 1.0);
+    assert!(report.word_named("faulty sensors").starts_with("master_gauge_a in"), "{}", report.word_named("faulty sensors"));
+    for (gain, stiffness) in [("a", 8.0), ("b", 15.0), ("c", 25.0)] {
+        let found = report.figure_named(&format!("gain {gain}"));
+        assert!((found / stiffness - 1.0).abs() < 1e-3, "{gain}: {found}");
+    }
+    if long() {
+        assert!(report.figure_named("followed enough: master, hand a grip") > 0.9);
+        assert!(report.figure_named("followed enough: slave behind the master") > 0.99);
+    }
+    assert!(report.figure_named("halved") >= 0.8, "{}", report.figure_named("halved"));
     for lever in if long() { vec!["slave", "master", "gauge"] } else { vec!["slave"] } {
         let friction = report.figure_named(&format!("{lever} friction"));
         assert!((0.015..0.05).contains(&friction), "{lever}: {friction} in {}", report.word_named(lever));

@@ -28,6 +28,7 @@ fn session() -> Session {
     axis.command = slave.clone();
     (axis.slave, axis.intent) = (Some(slave), Some(intent));
     Session {
+        sensors: Vec::new(),
         name: "by hand".into(),
         period_s,
         axes: vec![axis],
@@ -75,7 +76,7 @@ fn a_canceller_that_subtracts_nothing_gets_to_know_the_master() {
         Graph::load(&root.join(file), &changes).unwrap()
     };
     let knows = |graph: &Graph| match &graph.node_of(NodeKind::Canceller).unwrap().settings {
-        Settings::Canceller(files, _) => files.model.as_ref().map(|m| m.name.clone()),
+        Settings::Canceller(files, ..) => files.model.as_ref().map(|m| m.name.clone()),
         _ => None,
     };
     let mut with = graph("launch/coupling.toml");

@@ -175,6 +175,7 @@ impl Setup {
             mu: vec![1.0; n],
             lambda,
             notes: Vec::new(),
+            sensors: Vec::new(),
             cut_short: None,
             bridged_s: crate::unjudged::BRIDGED_S,
         }
@@ -481,6 +482,7 @@ fn coupled_axes_have_the_edge_of_their_closed_loop() {
         mu: vec![1.0; n],
         lambda: vec![lambda; n],
         notes: Vec::new(),
+        sensors: Vec::new(),
         cut_short: None,
         bridged_s: crate::unjudged::BRIDGED_S,
     };

@@ -42,7 +42,7 @@ pub(super) fn on_one_clock(wanted: &[(SignalRole, &Located)], series: &[Series],
 }
 
 pub(super) fn note_resampled(located: &Located, signal: &Ordered, laid: &Resampled, grid: &Grid, notes: &mut Vec<String>) {
-    let name = format!("{}.{}", located.signal.topic, located.signal.field);
+    let name = located.place();
     if signal.disordered > 0 {
         notes.push(format!("{name}: {} messages were out of order or had the time of another", signal.disordered));
     }

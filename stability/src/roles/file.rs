@@ -1,4 +1,4 @@
-//! The roles file: which field of which topic is which signal.
+//! The roles file: which field of which topic, or which column of a table, is which signal.
 
 use crate::from_bag::{SessionError, SignalRole};
 use backdrive_bags::Signal;
@@ -18,6 +18,10 @@ pub struct Roles {
     pub lambda: Option<f64>,
     /// Rows per second, Hz; the rate of the most frequent signal where `None`.
     pub rate_hz: Option<f64>,
+    /// Column with the times of a table, s.
+    pub time: String,
+    /// Further sensors by name, to be looked at for faults.
+    pub(super) sensors: Vec<Sensor>,
     /// The roles file, for messages.
     pub(super) file: String,
 }
@@ -33,13 +37,35 @@ pub struct AxisRoles {
 /// A signal, and where the roles file names it.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Located {
+    /// Its topic and field are empty where the roles file can only mean a column.
     pub(super) signal: Signal,
+    /// The column that is meant in a table; `None` where the roles file can only mean a topic.
+    pub(super) column: Option<String>,
     line: usize,
     key: String,
 }
 
+impl Located {
+    /// For messages: the field of its topic, or its column.
+    pub(super) fn place(&self) -> String {
+        match (&self.column, self.signal.topic.is_empty()) {
+            (Some(column), _) => column.clone(),
+            (None, _) => format!("{}.{}", self.signal.topic, self.signal.field),
+        }
+    }
+}
+
+/// A sensor that no answer needs, and what it measures besides another.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Sensor {
+    pub(super) name: String,
+    pub(super) located: Located,
+    /// The signal that it measures too, such as the force of the hand.
+    pub(super) of: Option<SignalRole>,
+}
+
 /// Keys of `[signals]`, whether they must be there, and how they run between their samples.
-const KEYS: [(&str, SignalRole, bool, Hold); 7] = [
+const KEYS: [(&str, SignalRole, bool, Hold); 9] = [
     ("x_m", SignalRole::Master, true, Hold::Linear),
     ("F_f", SignalRole::Force, true, Hold::Zero),
     ("x_c", SignalRole::Command, true, Hold::Linear),
@@ -47,6 +73,8 @@ const KEYS: [(&str, SignalRole, bool, Hold); 7] = [
     ("x_s", SignalRole::Slave, false, Hold::Linear),
     ("dither", SignalRole::Dither, false, Hold::Zero),
     ("operator", SignalRole::Intent, false, Hold::Linear),
+    ("tau_s", SignalRole::SlaveForce, false, Hold::Zero),
+    ("F_h", SignalRole::Hand, false, Hold::Zero),
 ];
 
 impl Roles {
@@ -68,10 +96,12 @@ impl Roles {
         let mut signals = top.table("signals")?.ok_or_else(|| top.missing("signals"))?;
         let mut axes: Vec<AxisRoles> = Vec::new();
         let mut first_key = "";
+        // A slave with a motor of its own may follow the master itself, with nobody to command it a position.
+        let commanded = !(signals.contains("tau_s") && signals.contains("x_s"));
         for (key, role, required, hold) in KEYS {
             let found = read_signals(&mut signals, key, hold)?;
             if found.is_empty() {
-                if required {
+                if required && (role != SignalRole::Command || commanded) {
                     let what = format!("missing key \"{key}\": {}; without it {}", role.text(), role.without());
                     // A misspelt key is told as such.
                     let misspelt = signals.missing(key);
@@ -110,14 +140,21 @@ impl Roles {
             rate_hz = resample.number("rate_hz", Range::Positive)?;
             resample.finish()?;
         }
+        let time = top.string("time")?.unwrap_or_else(|| "t".to_owned());
+        let sensors = top.table("sensors")?.map_or(Ok(Vec::new()), read_sensors)?;
         let file = top.file_name().to_owned();
         top.finish()?;
-        Ok(Roles { axes, mu, lambda, rate_hz, file })
+        Ok(Roles { axes, mu, lambda, rate_hz, time, sensors, file })
     }
 
     pub(super) fn at(&self, located: &Located, message: String) -> SessionError {
         SessionError::Roles(FileError::at(&self.file, located.line, &located.key, message))
     }
+}
+
+/// The key of a role.
+pub(super) fn key_of(role: SignalRole) -> &'static str {
+    KEYS.iter().find(|(_, r, ..)| *r == role).map_or("sensor", |(key, ..)| key)
 }
 
 pub(super) fn is_required(role: SignalRole) -> bool {
@@ -137,20 +174,53 @@ fn read_signals(table: &mut Table, key: &'static str, hold: Hold) -> Result<Vec<
     let specs = table.string_or_strings(key)?.unwrap_or_default();
     let several = specs.len() > 1;
     let read = |(index, spec): (usize, &String)| {
-        // Names of topics have no dots.
-        let Some((topic, field)) = spec.split_once('.').filter(|(t, f)| !t.is_empty() && !f.is_empty()) else {
-            let message = format!("expected \"TOPIC.FIELD\", such as \"/joint_states.position[0]\", found \"{spec}\"");
-            return Err(table.error_at(key, message));
-        };
-        let key = if several { format!("signals.{key}[{index}]") } else { format!("signals.{key}") };
-        Ok(Located { signal: Signal { hold, ..Signal::new(&key, topic, field) }, line, key })
+        let place = if several { format!("signals.{key}[{index}]") } else { format!("signals.{key}") };
+        read_text(spec, &place, line, hold).map_err(|message| table.error_at(key, message))
     };
     specs.iter().enumerate().map(read).collect()
 }
 
+/// `TOPIC.FIELD`, or the column of a table: what begins with a slash can only be a topic, what has no dot only a column.
+fn read_text(spec: &str, key: &str, line: usize, hold: Hold) -> Result<Located, String> {
+    // Names of topics have no dots.
+    let split = spec.split_once('.').filter(|(t, f)| !t.is_empty() && !f.is_empty());
+    let is_topic = spec.starts_with('/');
+    if spec.is_empty() || (is_topic && split.is_none()) {
+        return Err(format!("expected \"TOPIC.FIELD\", such as \"/joint_states.position[0]\", or the column of a table, found \"{spec}\""));
+    }
+    let (topic, field) = split.unwrap_or(("", ""));
+    let signal = Signal { hold, ..Signal::new(key, topic, field) };
+    Ok(Located { signal, column: (!is_topic).then(|| spec.to_owned()), line, key: key.to_owned() })
+}
+
+/// `NAME = "COLUMN"` or a table, which may say of what it is another sensor.
+fn read_sensors(mut table: Table) -> Result<Vec<Sensor>, FileError> {
+    let mut sensors = Vec::new();
+    for name in table.keys() {
+        let line = table.line_of(&name);
+        let sensor = if table.is_string(&name) {
+            let spec = table.need_string(&name)?;
+            let located = read_text(&spec, &format!("sensors.{name}"), line, Hold::Linear).map_err(|m| table.error_at(&name, m))?;
+            Sensor { name, located, of: None }
+        } else {
+            let Some(mut inner) = table.table(&name)? else { continue };
+            let roles = KEYS.map(|(key, role, ..)| (key, role));
+            let of = inner.one_of("of", &roles)?;
+            Sensor { located: read_table(inner, &name, Hold::Linear)?, name, of }
+        };
+        sensors.push(sensor);
+    }
+    table.finish()?;
+    Ok(sensors)
+}
+
 fn read_table(mut table: Table, key: &str, hold: Hold) -> Result<Located, FileError> {
     let line = table.line();
-    let (topic, field) = (table.need_string("topic")?, table.need_string("field")?);
+    let column = table.string("column")?;
+    let (topic, field) = match column {
+        Some(_) => (String::new(), String::new()),
+        None => (table.need_string("topic")?, table.need_string("field")?),
+    };
     let scale = table.number_or("scale", Range::Any, 1.0)?;
     if scale == 0.0 {
         return Err(table.error_at("scale", "must not be 0: the signal would be gone"));
@@ -160,7 +230,7 @@ fn read_table(mut table: Table, key: &str, hold: Hold) -> Result<Located, FileEr
     let key = if table.path().is_empty() { format!("signals.{key}") } else { table.path().to_owned() };
     let signal = Signal { name: key.clone(), topic, field, scale, offset, hold };
     table.finish()?;
-    Ok(Located { signal, line, key })
+    Ok(Located { signal, column, line, key })
 }
 
 #[cfg(test)]
@@ -196,5 +266,21 @@ mod tests {
         says(&GOOD.replace("mu = 2.0", "mu = -2.0"), &["mu", "above 0"]);
         says(&GOOD.replace("\"x\", \"y\"", "\"x\""), &["r.toml:1", "axes"]);
         says(&format!("{GOOD}[resample]\nrate = 5\n"), &["resample", "rate"]);
+        says(&format!("{TABLE}gauge = {{ column = \"g\", of = \"F_x\" }}\n"), &["sensors.gauge.of", "F_x"]);
+        says(&TABLE.replace("tau_s = \"ts\"\n", ""), &["x_c", "commanded"]);
+    }
+
+    const TABLE: &str = "time = \"time_s\"\n[signals]\nx_m = \"xm.raw\"\nx_s = \"xs\"\nF_f = { column = \"tm\", scale = -1.0 }\n\
+        tau_s = \"ts\"\nF_s = \"fe\"\nF_h = \"fh\"\n[sensors]\nb = { column = \"gb\", of = \"F_h\" }\na = \"ga\"\n";
+
+    #[test]
+    fn columns_of_a_table_stand_where_topics_do_and_a_driven_slave_needs_no_command() {
+        let roles = Roles::from_toml(TABLE, "r.toml").unwrap();
+        let found = |role: SignalRole| roles.axes[0].signals.iter().find(|(r, _)| *r == role).map(|(_, l)| l.column.clone().unwrap());
+        assert_eq!(found(SignalRole::Master).as_deref(), Some("xm.raw"));
+        assert_eq!((found(SignalRole::Force).as_deref(), found(SignalRole::Command)), (Some("tm"), None));
+        assert_eq!(roles.time, "time_s");
+        let sensors: Vec<(&str, Option<SignalRole>)> = roles.sensors.iter().map(|s| (s.name.as_str(), s.of)).collect();
+        assert!(sensors.contains(&("b", Some(SignalRole::Hand))) && sensors.contains(&("a", None)), "{sensors:?}");
     }
 }

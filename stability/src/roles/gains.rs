@@ -53,7 +53,15 @@ fn touching(axis: &AxisSignals, period_s: f64) -> (Vec<usize>, Vec<usize>) {
 }
 
 /// Fills mu and lambda: as the roles file says, else by least squares over the axis that explains most.
+///
+/// Two motors that are coupled have their own law, which is told by itself: of theirs only a position scale is known, or taken to be 1.
 pub(super) fn settle_gains(session: &mut Session, roles: &Roles) {
+    if session.axes.iter().any(|a| a.slave_force.is_some() && a.slave.is_some()) {
+        let rows = session.len();
+        session.mu = vec![roles.mu.unwrap_or(1.0); rows];
+        session.lambda = vec![roles.lambda.unwrap_or(f64::NAN); rows];
+        return;
+    }
     // A transport of 50 ms either way is the longest that is looked for.
     let most_lag = ((0.05 / session.period_s) as usize).min(200);
     let best = |fits: Vec<Option<Fit>>| fits.into_iter().flatten().max_by(|a, b| a.explained.total_cmp(&b.explained));
@@ -94,7 +102,7 @@ pub(super) fn settle_gains(session: &mut Session, roles: &Roles) {
 pub(super) fn check_signs(session: &mut Session) {
     let most_lag = ((0.05 / session.period_s) as usize).min(200);
     let mut warnings = Vec::new();
-    for axis in &session.axes {
+    for axis in session.axes.iter().filter(|a| a.slave_force.is_none() || a.slave.is_none()) {
         let (contact, _) = touching(axis, session.period_s);
         if contact.is_empty() {
             warnings.push(format!("axis {}: nothing was touched", axis.name));

@@ -20,6 +20,10 @@ struct Plan {
 /// Reads every wanted signal in one pass over each file.
 pub(super) fn gather(path: &Path, roles: &Roles, wanted: &[(SignalRole, &Located)]) -> Result<(Vec<Series>, bool), SessionError> {
     let mut closed = true;
+    if let Some((_, located)) = wanted.iter().find(|(_, l)| l.signal.topic.is_empty()) {
+        let what = format!("{} is the column of a table, but {} is none: name \"TOPIC.FIELD\"", located.place(), path.display());
+        return Err(roles.at(located, what));
+    }
     let mut series: Vec<Series> = wanted.iter().map(|_| Series { stamped: true, ..Series::default() }).collect();
     let mut available: Vec<String> = Vec::new();
     let mut seen = vec![false; wanted.len()];

@@ -1,4 +1,4 @@
-//! Other people's bags: a roles file says which field of which topic is which signal.
+//! Other people's recordings: a roles file says which field of which topic, or which column of a table, is which signal.
 //!
 //! ```toml
 //! axes = ["x"]                         # names; optional
@@ -18,13 +18,18 @@
 //! rate_hz = 1000
 //! ```
 //!
+//! Of a table (CSV) the columns are named in the place of topics: `x_m = "master_position"`, or `{ column = "...", scale = -1.0 }`. Where the
+//! slave has a motor of its own (`tau_s`, with `x_s`) the law that couples the two motors is told, and `x_c` may be left out.
+//!
 //! `docs/roles-example.toml` has every key with its meaning. Any ROS 2 type can be read whose ros2msg schema is in the bag. Positions
 //! are interpolated linearly between their samples; forces hold the last one, as a servo does (`hold` in a table changes either).
 
 mod clock;
+mod faulty;
 mod file;
 mod gains;
 mod gather;
+mod table;
 
 pub use file::{AxisRoles, Roles};
 
@@ -33,13 +38,14 @@ use crate::grid::{Grid, Ordered, step_of};
 use crate::session::{AxisSignals, Session};
 use crate::unjudged::{BRIDGED_S, Unjudged};
 use clock::{ends_apart, note_resampled, on_one_clock};
+use faulty::faulty;
 use file::{Located, is_required};
 use gains::{check_signs, settle_gains};
 use gather::gather;
 use std::path::Path;
 
 impl Session {
-    /// Reads somebody else's recording: one `.mcap`, or a rosbag2 folder.
+    /// Reads somebody else's recording: one `.mcap`, a rosbag2 folder, or a table (`.csv`).
     ///
     /// The signals are put on one grid of rows over the time that x_m, F_f, x_c and F_s have in common. What was done to them, and what
     /// looks wrong with signs, clocks or gains, is in the notes.
@@ -50,15 +56,24 @@ impl Session {
     pub fn from_roles(path: &Path, roles: &Roles) -> Result<Session, SessionError> {
         let wrong = |what: String| SessionError::Rows { path: path.to_owned(), what };
         let wanted: Vec<(SignalRole, &Located)> = roles.axes.iter().flat_map(|a| a.signals.iter().map(|(r, l)| (*r, l))).collect();
-        let (series, closed) = gather(path, roles, &wanted)?;
+        let extra: Vec<(SignalRole, &Located)> = roles.sensors.iter().map(|s| (SignalRole::Sensor, &s.located)).collect();
+        let everything = [wanted.clone(), extra].concat();
+        let (mut series, closed, others) = if table::is_table(path) {
+            let (series, columns) = table::gather(path, roles, &everything)?;
+            (series, true, columns)
+        } else {
+            let (series, closed) = gather(path, roles, &everything)?;
+            (series, closed, Vec::new())
+        };
+        let sensors = faulty(roles, &everything, &series, &others);
+        series.truncate(wanted.len());
         let mut notes = Vec::new();
         let ordered = on_one_clock(&wanted, &series, &mut notes);
 
         let needed: Vec<&Ordered> = wanted.iter().zip(&ordered).filter(|((role, _), _)| is_required(*role)).map(|(_, o)| o).collect();
         for ((role, located), o) in wanted.iter().zip(&ordered) {
             if is_required(*role) && o.times.is_empty() {
-                let (topic, field) = (&located.signal.topic, &located.signal.field);
-                return Err(roles.at(located, format!("{topic}.{field} was never measured; without it {}", role.without())));
+                return Err(roles.at(located, format!("{} was never measured; without it {}", located.place(), role.without())));
             }
         }
         let grid = Grid::over(&needed, roles.rate_hz).map_err(wrong)?;
@@ -68,9 +83,9 @@ impl Session {
 
         let mut axes = Vec::new();
         let mut next = 0;
-        for roles in &roles.axes {
-            let mut axis = AxisSignals { name: roles.name.clone(), clamped: vec![false; grid.rows], ..AxisSignals::default() };
-            for (role, located) in &roles.signals {
+        for told in &roles.axes {
+            let mut axis = AxisSignals { name: told.name.clone(), clamped: vec![false; grid.rows], ..AxisSignals::default() };
+            for (role, located) in &told.signals {
                 let Some(signal) = ordered.get(next) else { break };
                 next += 1;
                 let laid = signal.on(&grid, located.signal.hold);
@@ -83,6 +98,12 @@ impl Session {
             if axis.resolution > 0.0 {
                 notes.push(format!("axis {}: x_m comes in steps of {:.3e}", axis.name, axis.resolution));
             }
+            if axis.command.is_empty() {
+                // The slave follows the master itself.
+                let mu = roles.mu.unwrap_or(1.0);
+                axis.command = axis.master.iter().map(|x| mu * x).collect();
+                notes.push(format!("axis {}: nobody commands the slave a position; x_c is taken to be {mu} x_m", axis.name));
+            }
             axes.push(axis);
         }
         let mut session = Session {
@@ -92,6 +113,7 @@ impl Session {
             mu: Vec::new(),
             lambda: Vec::new(),
             notes,
+            sensors,
             cut_short,
             bridged_s: BRIDGED_S,
         };
@@ -115,5 +137,8 @@ fn put(axis: &mut AxisSignals, role: SignalRole, values: Vec<f64>) {
         SignalRole::Dither => axis.dither = Some(values),
         SignalRole::Intent => axis.intent = Some(values),
         SignalRole::Induced => axis.induced = Some(values),
+        SignalRole::SlaveForce => axis.slave_force = Some(values),
+        SignalRole::Hand => axis.hand = Some(values),
+        SignalRole::Sensor => {}
     }
 }

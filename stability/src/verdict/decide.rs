@@ -77,6 +77,8 @@ impl Answer {
             held_back: None,
             witnesses: Vec::new(),
             decided_by: None,
+            coupled: Vec::new(),
+            sensors: session.sensors.clone(),
         }
     }
 

@@ -9,8 +9,11 @@
 //! The method that leads gives the reason; the headline (verdict, edge, frequency) is then the least favourable of all that counts: see
 //! `headline.rs`. A recording that is cut short, has holes in it or never touched anything gives no green answer, whatever a method says.
 //!
+//! Where both motors' forces were recorded, the recording is judged by what the pair did at its own gains, and their law is told: `coupled.rs`.
+//!
 //! Energy never leads: passivity is enough for stability, and not needed for it.
 
+mod coupled;
 mod decide;
 mod disagreements;
 mod headline;
@@ -24,9 +27,10 @@ mod warning;
 mod witness;
 mod word;
 
+pub use coupled::is_coupled;
 pub use question::{Question, Swapped};
 pub use recorded::{recorded_outcome, recorded_traces};
-pub use types::{Answer, AnswerError, Apart, Disagreement, LoopCheck, Resimulated};
+pub use types::{Answer, AnswerError, Apart, CoupledAxis, Disagreement, LoopCheck, Resimulated};
 pub use warning::Warning;
 pub use witness::Witness;
 pub use word::{Method, Word};
@@ -53,6 +57,10 @@ pub type Progress<'a> = &'a (dyn Fn(&str, usize, usize) + Sync);
 /// A session without rows, a part that cannot be exchanged or run, or `cancel` was set.
 pub fn answer(question: &Question, progress: Progress, cancel: &AtomicBool) -> Result<Answer, AnswerError> {
     let Question { session, recorded, asked, swapped, .. } = question;
+    if coupled::is_coupled(session) {
+        progress("coupling", 0, 1);
+        return Ok(Answer::of_coupled(question));
+    }
     progress("frequency response", 0, 1);
     let parts = asked.map(|graph| exchanged(graph, *swapped)).unwrap_or_default();
     let frequency = frequency::analyse(session, &frequency::Options { parts, ..Default::default() })?;

@@ -60,6 +60,8 @@ impl Answer {
             "witnesses": self.witnesses,
             "energy": { "recorded": self.recorded_energy_numbers() },
             "transparency": self.transparency_numbers(),
+            "coupling": self.coupled,
+            "sensors": self.sensors,
         })
     }
 

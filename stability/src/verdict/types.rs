@@ -3,14 +3,17 @@
 use super::warning::Warning;
 use super::witness::Witness;
 use super::word::{Method, Word};
+use crate::coupling::Coupling;
 use crate::energy::EnergyAnswer;
 use crate::frequency::{Frequency, FrequencyAnswer, FrequencyError};
 use crate::model_check::PartCheck;
+use crate::moving::Decay;
 use crate::outcome::Outcome;
 use crate::resimulate::edge::Edge;
 use crate::resimulate::grips::GripEdge;
 use crate::resimulate::over_cancelling::OverCancelling;
 use crate::resimulate::{Gain, ResimulateError};
+use crate::sensors::SensorFault;
 use crate::session::Session;
 use crate::transparency::Transparency;
 use crate::unjudged::Unjudged;
@@ -124,6 +127,27 @@ pub struct Answer {
     pub witnesses: Vec<Witness>,
     /// Whose edge and frequency the headline has.
     pub decided_by: Option<String>,
+    /// What couples the motors of each axis whose motors were both recorded; empty where none was.
+    pub coupled: Vec<CoupledAxis>,
+    /// Signals that say nothing, or not always.
+    pub sensors: Vec<SensorFault>,
+}
+
+/// An axis with the force of a motor at either side.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct CoupledAxis {
+    /// Name of the axis.
+    pub axis: String,
+    /// The law of either motor; `None` where it cannot be told.
+    pub coupling: Option<Coupling>,
+    /// Why it cannot.
+    pub why_not: Option<String>,
+    /// The mode of the pair that dies most slowly; `None` where none oscillates, or none can be seen.
+    pub slowest_mode: Option<Decay>,
+    /// What the pair did.
+    pub outcome: Outcome,
+    /// Largest force of the environment on the slave, N or N m.
+    pub largest_contact: f64,
 }
 
 /// Why there is no answer at all.

@@ -8,11 +8,18 @@ use crate::outcome::Outcome;
 use crate::session::Session;
 use std::collections::HashSet;
 
+/// What there is to say of how the recording was read, and of its sensors.
+pub(super) fn of_what_was_read(session: &Session) -> Vec<Warning> {
+    let sensors = session.sensors.iter().cloned().map(Warning::Sensor);
+    session.notes.iter().cloned().map(Warning::Recording).chain(sensors).collect()
+}
+
 /// What the recording and its frequency response have to say, each once.
 pub(super) fn of_the_recording(session: &Session, frequency: &Frequency) -> Vec<Warning> {
     // That the edge depends on the amplitude is told with the numbers, by `Answer::warn`.
     let notes = frequency.notes.iter().filter(|n| **n != Note::AmplitudeDependent).cloned().map(Warning::Frequency);
-    let mut warnings: Vec<Warning> = session.notes.iter().cloned().map(Warning::Recording).chain(notes).collect();
+    let mut warnings = of_what_was_read(session);
+    warnings.extend(notes);
     let mut told = HashSet::new();
     warnings.retain(|w| told.insert(w.to_string()));
     warnings.extend(frequency.relative.then_some(Warning::GainsAreRelative));

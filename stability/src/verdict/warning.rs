@@ -2,6 +2,7 @@
 
 use crate::frequency::Note;
 use crate::outcome::Outcome;
+use crate::sensors::SensorFault;
 use serde::{Serialize, Serializer};
 use std::fmt;
 
@@ -10,6 +11,8 @@ use std::fmt;
 pub enum Warning {
     /// Of how the recording was read.
     Recording(String),
+    /// Of a signal that says nothing, or not always.
+    Sensor(SensorFault),
     /// Of the measured frequency response.
     Frequency(Note),
     /// Nobody recorded the gains, and the signals do not tell them.
@@ -53,6 +56,7 @@ impl fmt::Display for Warning {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Warning::Recording(text) | Warning::OverCancelling(text) => f.write_str(text),
+            Warning::Sensor(fault) => fault.fmt(f),
             Warning::Frequency(note) => note.fmt(f),
             Warning::GainsAreRelative => {
                 f.write_str("the gains of the recording are not known: every gain is in multiples of the recorded one")

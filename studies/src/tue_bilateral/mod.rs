@@ -1,44 +1,30 @@
-//! Two levers of a real force-reflecting teleoperator, of which nothing is stated but an inertia: what they have besides, which gauge is dead, and how
-//! late the hand's torque is recorded.
+//! Two levers of a real force-reflecting teleoperator, of which nothing is stated but an inertia: what they have besides, which gauge is dead, how
+//! late the hand's torque is recorded, which law couples them, whether they were stable with it, and the sessions run again with what was found.
+
+mod again;
+mod environment;
+mod record;
+mod sessions;
 
 use crate::filter::LowPass;
-use crate::run::{Ask, LIKELY, diagnose, diagnosed_model, findings, instead, parameter, percent, remarks, said, total};
+use crate::run::{Ask, LIKELY, diagnose, diagnosed_model, findings, instead, parameter, percent, remarks, said, solved, total};
 use crate::table::Report;
 use crate::{Context, Study, StudyError, csv_columns};
+use again::{Levers, again};
 use backdrive_diagnosis::verdict::Verdict;
-use nalgebra::{DMatrix, DVector};
+use backdrive_plant::model::Model;
+use record::{ENDS, FILES, Record, SAME, mean};
+use sessions::judge;
 
 pub(crate) const STUDY: Study = Study {
     name: "tue_bilateral",
-    about: "both levers of a teleoperator from a stated inertia alone: friction, a dead gauge, a torque that is recorded late",
+    about: "a teleoperator from a stated inertia alone: friction, a dead gauge, the law that couples its levers, its sessions run again",
     needs: ("tue_bilateral", &FILES),
     run,
 };
 
-/// The recordings: the second master, gains of the coupling a, b and c, and what the slave met.
-const FILES: [&str; 17] = [
-    "m2_a_free_motion.csv",
-    "m2_a_spring.csv",
-    "m2_a_foam.csv",
-    "m2_a_foam2.csv",
-    "m2_a_foam3.csv",
-    "m2_a_rigid.csv",
-    "m2_b_free_motion.csv",
-    "m2_b_spring.csv",
-    "m2_b_foam.csv",
-    "m2_b_foam2.csv",
-    "m2_b_foam3.csv",
-    "m2_b_rigid.csv",
-    "m2_c_free_motion.csv",
-    "m2_c_spring.csv",
-    "m2_c_foam.csv",
-    "m2_c_foam2.csv",
-    "m2_c_rigid.csv",
-];
-/// What of their names is the same in all.
-const SAME: &str = "m2_";
 /// Their columns.
-const COLUMNS: [&str; 9] = [
+const COLUMNS: [&str; 10] = [
     "master_position [rad]",
     "slave_position [rad]",
     "minus_hand_torque [N m]",
@@ -48,6 +34,7 @@ const COLUMNS: [&str; 9] = [
     "master_gauge_b [V]",
     "slave_gauge_a [V]",
     "slave_gauge_b [V]",
+    "environment_torque [N m]",
 ];
 /// Sample rate, Hz; corner of the zero-phase filter on positions and torques, Hz; every so manieth sample is kept, and so many are left out at either end.
 const RATE: f64 = 2000.0;
@@ -55,8 +42,6 @@ const RATE: f64 = 2000.0;
 const CORNER: f64 = 100.0;
 /// See [`RATE`].
 const KEPT: usize = 5;
-/// See [`RATE`].
-const ENDS: usize = 100;
 /// Laws of dry friction, and the parameter that is its size.
 const DRY: [(&str, &str); 8] = [
     ("coulomb", "force"),
@@ -80,6 +65,8 @@ struct Known {
     lags: Vec<f64>,
     /// Dry friction, N m, and viscous friction, N m s/rad, of the slave in free motion.
     friction: Vec<[f64; 2]>,
+    /// The records at their own rate.
+    records: Vec<Record>,
 }
 
 fn run(context: &Context) -> Result<Report, StudyError> {
@@ -103,11 +90,24 @@ fn run(context: &Context) -> Result<Report, StudyError> {
     report.figure("lag of the recorded torque", lag);
     report.line("recorded hand torque behind its gauge", format!("{:.2} ms, first order", 1e3 * lag), "unpublished", SOURCE, None);
     gauges(&mut report, context)?;
-    slave(&mut report, context, &known)?;
+    let judged = judge(&mut report, context)?;
+    let mut halves = slave(&mut report, context, &known)?;
     if !context.quick {
-        master(&mut report, context, &known, "master", "the recorded torque")?;
-        master(&mut report, context, &known, "gauge", "the gauge itself")?;
+        halves.extend(master(&mut report, context, &known, "master", "the recorded torque")?);
+        let (by_gauge, gain) = gauge(&mut report, context, &known)?;
+        halves.extend(by_gauge);
+        let levers = Levers { master: lever(context, "gauge")?, slave: lever(context, "slave")? };
+        again(&mut report, &known.records, &judged, &levers, gain)?;
     }
+    let halved = halves.iter().filter(|h| **h).count();
+    report.figure("halved", halved as f64 / halves.len().max(1) as f64);
+    report.line(
+        "unseen records whose torque residual is at least halved, of all levers and ways",
+        format!("{halved} of {}", halves.len()),
+        "80 %",
+        "wanted, against inertia alone, refitted",
+        Some(halved * 10 >= halves.len() * 8),
+    );
     Ok(report)
 }
 
@@ -130,7 +130,7 @@ fn gauges(report: &mut Report, context: &Context) -> Result<(), StudyError> {
 }
 
 /// The slave in free motion.
-fn slave(report: &mut Report, context: &Context, known: &Known) -> Result<(), StudyError> {
+fn slave(report: &mut Report, context: &Context, known: &Known) -> Result<Vec<bool>, StudyError> {
     let effort = if context.quick { 0.85 } else { 3.0 };
     let ask = Ask { name: "slave", set: "set-slave.toml", model: "slave.toml", without: &[], effects: 3, effort };
     let found = diagnose(context, &ask)?;
@@ -148,11 +148,30 @@ fn slave(report: &mut Report, context: &Context, known: &Known) -> Result<(), St
     let damping = parameter(&found.verdict, "damper", "damping").map(|p| p.0);
     report.figure("slave damping", damping.unwrap_or(f64::NAN));
     report.line("slave, viscous friction", shown(damping, 1e3, "mN m s/rad"), format!("{:.1} mN m s/rad", 1e3 * viscous), SOURCE, None);
-    Ok(())
+    Ok(halved(&found.verdict))
+}
+
+/// The master by the torque of its gauge, and the gain by which the gauge is off.
+fn gauge(report: &mut Report, context: &Context, known: &Known) -> Result<(Vec<bool>, f64), StudyError> {
+    let halved = master(report, context, known, "gauge", "the gauge itself")?;
+    let ask = Ask { name: "gauge", set: "set-gauge.toml", model: "master.toml", without: &[], effects: 4, effort: 1.5 };
+    let model = diagnosed_model(context, &ask)?;
+    Ok((halved, model.outputs.first().map_or(1.0, |o| o.gain)))
+}
+
+/// A diagnosed lever.
+fn lever(context: &Context, name: &str) -> Result<Model, StudyError> {
+    diagnosed_model(context, &Ask { name, set: "", model: "", without: &[], effects: 0, effort: 0.0 })
+}
+
+/// Of each unseen record, whether the diagnosed model leaves at most half of what the inertia alone, refitted, leaves.
+fn halved(verdict: &Verdict) -> Vec<bool> {
+    let errors = verdict.held_out.per_record.iter();
+    errors.filter_map(|r| Some(r.nrmse_after? <= 0.5 * r.nrmse_refit?)).collect()
 }
 
 /// The master in a hand, its torque as recorded or from the gauge.
-fn master(report: &mut Report, context: &Context, known: &Known, name: &str, from: &str) -> Result<(), StudyError> {
+fn master(report: &mut Report, context: &Context, known: &Known, name: &str, from: &str) -> Result<Vec<bool>, StudyError> {
     let set = format!("set-{name}.toml");
     let ask = Ask { name, set: &set, model: "master.toml", without: &[], effects: 4, effort: 1.5 };
     let found = diagnose(context, &ask)?;
@@ -172,7 +191,7 @@ fn master(report: &mut Report, context: &Context, known: &Known, name: &str, fro
         ("that of the motor's command, unpublished".to_string(), None)
     };
     report.line(&format!("{name}, hand torque from {from}: lag"), shown(lag, 1e3, "ms"), published, "the same records", met);
-    Ok(())
+    Ok(halved(&found.verdict))
 }
 
 /// The lines that every diagnosis has.
@@ -216,10 +235,6 @@ fn shown(value: Option<f64>, scale: f64, unit: &str) -> String {
     value.map_or("not named".to_string(), |v| format!("{:.2} {unit}", scale * v))
 }
 
-fn mean(values: &[f64]) -> f64 {
-    values.iter().sum::<f64>() / values.len() as f64
-}
-
 /// Writes both levers of a record: position and torques through the same filter, the gauges in volts as they are.
 fn prepare(context: &Context, file: &str, known: &mut Known) -> Result<(), StudyError> {
     let columns = csv_columns::read_at_least(&context.data.join(file), &COLUMNS, 4000)?;
@@ -228,7 +243,7 @@ fn prepare(context: &Context, file: &str, known: &mut Known) -> Result<(), Study
     let smooth = |c: &[f64]| filter.both_ways(c);
     let thin = |c: &[f64]| c[ENDS..c.len().saturating_sub(ENDS)].iter().step_by(KEPT).copied().collect::<Vec<f64>>();
     let negative = |c: &[f64]| c.iter().map(|x| -x).collect::<Vec<f64>>();
-    let [master, slave, hand, master_motor, slave_motor, a, b, slave_a, slave_b] = [0, 1, 2, 3, 4, 5, 6, 7, 8].map(|i| &columns[i]);
+    let [master, slave, hand, master_motor, slave_motor, a, b, slave_a, slave_b, met] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9].map(|i| &columns[i]);
 
     let (lag, [gain, offset]) = follows(b, hand)?;
     known.lags.push(lag);
@@ -237,6 +252,16 @@ fn prepare(context: &Context, file: &str, known: &mut Known) -> Result<(), Study
     known.coupling[group].push(solved(&[&difference, &vec![1.0; difference.len()]], master_motor)?[0]);
 
     let gauge: Vec<f64> = b.iter().map(|v| gain * v + offset).collect();
+    known.records.push(Record {
+        name: name.trim_end_matches(".csv").to_string(),
+        period_s: 1.0 / RATE,
+        master: smooth(master),
+        slave: smooth(slave),
+        hand: smooth(&gauge),
+        contact: negative(&smooth(met)),
+        master_motor: negative(&smooth(master_motor)),
+        slave_motor: smooth(slave_motor),
+    });
     let own = [smooth(master), negative(&smooth(master_motor)), smooth(hand), smooth(&gauge), a.clone(), b.clone()].map(|c| thin(&c));
     let t: Vec<f64> = (0..own[0].len()).map(|i| (i * KEPT) as f64 / RATE).collect();
     let names = ["t", "position", "motor_torque", "hand_torque", "gauge_torque", "gauge_a", "gauge_b"];
@@ -267,14 +292,6 @@ fn follows(from: &[f64], signal: &[f64]) -> Result<(f64, [f64; 2]), StudyError> 
     let numbers = solved(&[&signal[..n], &from[1..], &vec![1.0; n]], &signal[1..])?;
     let kept = numbers[0];
     Ok((-1.0 / (RATE * kept.ln()), [numbers[1] / (1.0 - kept), numbers[2] / (1.0 - kept)]))
-}
-
-/// Least squares: what the columns have to be multiplied with to give the right side.
-fn solved(columns: &[&[f64]], right: &[f64]) -> Result<Vec<f64>, StudyError> {
-    let matrix = DMatrix::from_fn(right.len(), columns.len(), |i, j| columns[j][i]);
-    let numbers =
-        matrix.svd(true, true).solve(&DVector::from_column_slice(right), 1e-12).map_err(|e| StudyError::Diagnosis(e.to_string()))?;
-    Ok(numbers.iter().copied().collect())
 }
 
 #[cfg(test)]
