@@ -9,7 +9,10 @@ use crate::happening::Happening;
 use crate::remedy::Remedy;
 use backdrive_stability::frequency;
 use backdrive_stability::resimulate::Gain;
+use backdrive_stability::resimulate::edge::Search;
 use backdrive_stability::session::{AxisSignals, Session};
+use backdrive_stability::verdict::{Question, Swapped, answer, is_coupled};
+use std::sync::atomic::AtomicBool;
 
 /// A lower gain is so far below the edge that was measured.
 const BELOW: f64 = 0.8;
@@ -20,10 +23,13 @@ const LEAST_LATE: usize = 3;
 /// Answers of a session that was read by a roles file: what happens, how late and how large each way is, and where the measured loop has its edge.
 /// No loop is run again, for no model of it is known.
 pub fn why_of_signals(session: &Session, gain: Gain) -> Answer {
-    let happening = Happening::of(session, session.len());
+    let happening = happening_of(session, gain);
     let (measured, mut notes) = measured(session, gain);
     let edge = measured.edge;
     let mut causes: Vec<(Cause, f64)> = session.axes.iter().flat_map(|axis| of_axis(axis, session, gain, &happening)).collect();
+    // What a dead sensor would have told is not in the loop; whether the loop needed it nobody says.
+    let dead = session.sensors.iter().map(|fault| (cause(CauseKind::DeadSensor, fault.signal.clone(), fault.to_string(), false), DEAD));
+    causes.extend(dead);
     let differs = causes.iter().map(|(c, _)| c.evidence.clone()).collect();
     if let Some(edge) = edge.filter(|e| *e < gain.product()) {
         let evidence = format!("by the measured frequency response the loop is stable up to mu*lambda = {edge:.3} only");
@@ -59,6 +65,31 @@ pub fn why_of_signals(session: &Session, gain: Gain) -> Answer {
         not_again: measured.why_not,
         events: Vec::new(),
         notes: session.notes.iter().cloned().chain(notes).collect(),
+    }
+}
+
+/// A dead sensor that may be no part of the loop weighs so much.
+const DEAD: f64 = 0.3;
+
+/// What happens; of a pair of coupled motors as it is judged while the hand moves.
+fn happening_of(session: &Session, gain: Gain) -> Happening {
+    let judged = is_coupled(session).then(|| {
+        let question = Question {
+            session,
+            recorded: None,
+            asked: None,
+            swapped: Swapped::default(),
+            intents: None,
+            script: None,
+            gain,
+            grips: Vec::new(),
+            search: Search::default(),
+        };
+        answer(&question, &|_, _, _| {}, &AtomicBool::new(false)).ok()?.recorded_outcome
+    });
+    match judged.flatten() {
+        Some(outcome) => Happening::of_outcome(outcome, &[]),
+        None => Happening::of(session, session.len()),
     }
 }
 
