@@ -59,7 +59,7 @@ const WHOLE: &str = "plant/models/impulse-engine.toml";
 const NORMAL: &str = "plant/grips/normal.toml";
 /// The clock does not decide where several loops are asked about at once.
 const PATIENCE: Duration = Duration::from_secs(120);
-const NEVER: AtomicBool = AtomicBool::new(false);
+static NEVER: AtomicBool = AtomicBool::new(false);
 
 /// A hidden loop.
 struct Case {
@@ -108,7 +108,8 @@ fn drawn(kind: &'static str, seed: u64, index: u64, attempt: u64) -> Option<Case
     let rate = [5000.0, 5000.0, 2500.0][index as usize % 3];
     let physics = matches!(kind, "friction" | "backlash" | "hysteresis");
     let wall = if index % 4 == 3 { "plant/environments/soft-tissue.toml" } else { "plant/environments/stiff-wall.toml" };
-    let cancels = physics || matches!(kind, "grip" | "inertia" | "canceller" | "over-cancelling") || (index % 2 == 0 && kind != "gain");
+    let cancels =
+        physics || matches!(kind, "grip" | "inertia" | "canceller" | "over-cancelling") || (index.is_multiple_of(2) && kind != "gain");
     let (master, model) = match kind {
         "canceller" => (WHOLE, LINEAR),
         _ if physics => (LINEAR, LINEAR),
