@@ -5,8 +5,9 @@ use crate::as_it_was::as_it_was;
 use crate::cause::{Asked, Cause, causes, reproduces};
 use crate::cause_kind::CauseKind;
 use crate::change::Change;
+use crate::compared::SMALL;
 use crate::difference::Difference;
-use crate::differences::{Differences, differences};
+use crate::differences::{Differences, Look, differences};
 use crate::happening::Happening;
 use crate::named::named;
 use crate::recorded::{Recorded, Told};
@@ -102,7 +103,7 @@ pub fn why(question: &Question, hear: &(dyn Fn(&str) + Sync), cancel: &AtomicBoo
     let Question { session, graph, gain, .. } = question;
     let recorded = &bounded(question);
     let happening = Happening::of(session, recorded.rows);
-    let Differences { found, notes } = differences(graph, recorded, hear, question.patience, cancel)?;
+    let Differences { found, notes } = differences(graph, recorded, &Look { small: SMALL, patience: question.patience }, hear, cancel)?;
     let mut answer = Answer {
         bag: session.name.clone(),
         gain: gain.product(),
@@ -126,6 +127,10 @@ pub fn why(question: &Question, hear: &(dyn Fn(&str) + Sync), cancel: &AtomicBoo
         Ok(()) => {}
         Err(ResimulateError::Cancelled) => return Err(ResimulateError::Cancelled.into()),
         Err(e) => answer.not_again = Some(e.to_string()),
+    }
+    // What shakes and does not when it is run again has a difference that is small beside its signal.
+    if answer.happening.is_trouble() && !answer.reproduced && answer.not_again.is_none() {
+        closer(question, recorded, &mut answer, hear, cancel)?;
     }
     of_events(&mut answer, recorded);
     Ok(answer)
@@ -151,6 +156,35 @@ fn bounded(question: &Question) -> Recorded {
 
 /// A master that is so many times as far away as the hand ever wanted has run away.
 const BEYOND_THE_HAND: f64 = 10.0;
+
+/// Looks again, for differences that are ten times as small; they are kept where the loop then does what was recorded.
+fn closer(
+    question: &Question,
+    recorded: &Recorded,
+    answer: &mut Answer,
+    hear: &(dyn Fn(&str) + Sync),
+    cancel: &AtomicBool,
+) -> Result<(), WhyError> {
+    let look = Look { small: 0.1 * SMALL, patience: question.patience };
+    let Differences { found, .. } = differences(question.graph, recorded, &look, hear, cancel)?;
+    if found.len() <= answer.differences.len() {
+        return Ok(());
+    }
+    let mut other = Answer {
+        differs: found.iter().map(|d| named(d, question.graph).2).collect(),
+        master: found.iter().find_map(|d| d.device.as_ref()?.files.as_ref()).and_then(|files| held(files)),
+        differences: found,
+        causes: Vec::new(),
+        remedies: Vec::new(),
+        ..answer.clone()
+    };
+    match again(question, &mut other, hear, cancel) {
+        Ok(()) if other.reproduced => *answer = other,
+        Err(ResimulateError::Cancelled) => return Err(ResimulateError::Cancelled.into()),
+        Ok(()) | Err(_) => {}
+    }
+    Ok(())
+}
 
 /// Runs the loop again: as it was, without each suspect, with each remedy.
 fn again(question: &Question, answer: &mut Answer, hear: &(dyn Fn(&str) + Sync), cancel: &AtomicBool) -> Result<(), ResimulateError> {

@@ -65,8 +65,10 @@ pub struct Compared {
 }
 
 /// What is known of the signal's sensor.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sensor {
+    /// A difference below this share of the signal counts as none.
+    pub small: f64,
     /// Step of the sensor, in the signal's unit.
     pub resolution: f64,
     /// Standard deviation of its noise, in the signal's unit.
@@ -75,7 +77,13 @@ pub struct Sensor {
     pub exact: bool,
 }
 
-/// A difference below this share of the signal is none that could shake a loop.
+impl Default for Sensor {
+    fn default() -> Sensor {
+        Sensor { small: SMALL, resolution: 0.0, noise: 0.0, exact: false }
+    }
+}
+
+/// A difference below this share of the signal seldom shakes a loop.
 pub const SMALL: f64 = 0.02;
 
 /// A simple thing explains a difference where it leaves no more of it than this.
@@ -110,7 +118,7 @@ pub fn compare(recorded: &[f64], predicted: &[f64], sensor: &Sensor, period_s: f
     let share = error / scale;
     let said = |as_if: AsIf, left: f64| Some(Compared { error, share, as_if, left });
     let missing = missing_share(recorded, predicted);
-    if (share <= SMALL || error <= 3.0 * floor) && missing < SMALL {
+    if (share <= sensor.small || error <= 3.0 * floor) && missing < SMALL {
         // Steps are small beside the signal, and its differences are not.
         let steps = if error > 3.0 * floor { stepped(recorded, predicted, &both, sensor) } else { None };
         return match steps {
@@ -134,7 +142,7 @@ pub fn compare(recorded: &[f64], predicted: &[f64], sensor: &Sensor, period_s: f
         return said(AsIf::Stepped { step }, 0.0);
     }
     let (gain, late, left) = changed(recorded, predicted, scale, period_s);
-    let good = (SMALL.max(3.0 * floor / scale)).max(EXPLAINS * share).min(share);
+    let good = (SMALL.max(3.0 * floor / scale)).max(EXPLAINS * share).min(0.5 * share);
     if left <= good && (late > 0 || (gain - 1.0).abs() > SMALL) {
         return said(AsIf::Changed { gain, late }, left);
     }
@@ -209,7 +217,7 @@ fn rails(recorded: &[f64], predicted: &[f64], both: &[usize], scale: f64, floor:
     let (low, high) = (if is_low { low } else { f64::NEG_INFINITY }, if is_high { high } else { f64::INFINITY });
     let left = rms(both.iter().map(|r| recorded[*r] - predicted[*r].clamp(low, high))) / scale;
     let before = rms(both.iter().map(|r| recorded[*r] - predicted[*r])) / scale;
-    (left <= SMALL.max(EXPLAINS * before)).then_some((low, high, left))
+    (left <= SMALL.max(EXPLAINS * before).min(0.5 * before)).then_some((low, high, left))
 }
 
 /// Whether the recorded values lie on a grid that is coarser than the sensor's, and the difference is what rounding to it makes.

@@ -25,12 +25,23 @@ const TOLD: &[(NodeKind, &str, Quantity, &str, bool)] = &[
     (NodeKind::Canceller, "motion", Quantity::Position, "measured", true),
     (NodeKind::Scaling, "command", Quantity::Position, "motion", true),
     (NodeKind::Scaling, "force", Quantity::Effort, "contact", true),
+    (NodeKind::Coupling, "command", Quantity::Position, "from_near", false),
+    (NodeKind::Coupling, "force", Quantity::Effort, "from_far", false),
     (NodeKind::Slave, "measured", Quantity::Effort, "command", false),
     (NodeKind::Slave, "measured", Quantity::Position, "command", false),
     (NodeKind::Master, "measured", Quantity::Effort, "force", true),
     // Whether its force is late shows in the force itself.
     (NodeKind::Master, "measured", Quantity::Position, "", false),
 ];
+
+/// How closely it is looked.
+#[derive(Debug, Clone, Copy)]
+pub struct Look {
+    /// A difference below this share of a signal counts as none.
+    pub small: f64,
+    /// How long a search for physics of the master may take on the clock.
+    pub patience: Duration,
+}
 
 /// Compares every node of a graph with its bag; `hear` is told which.
 ///
@@ -39,8 +50,8 @@ const TOLD: &[(NodeKind, &str, Quantity, &str, bool)] = &[
 pub fn differences(
     graph: &Graph,
     recorded: &Recorded,
+    look: &Look,
     hear: &dyn Fn(&str),
-    patience: Duration,
     stop: &AtomicBool,
 ) -> Result<Differences, AloneError> {
     let mut all = Differences::default();
@@ -54,7 +65,7 @@ pub fn differences(
             continue;
         }
         hear(&format!("{} by itself", node.name));
-        of_node(graph, index, recorded, &told, &mut all)?;
+        of_node(graph, index, (recorded, look.small), &told, &mut all)?;
     }
     let is_master = |d: &Difference| d.kind == NodeKind::Master && d.quantity == Quantity::Position && may_be_the_device(&d.compared);
     if let Some(place) = all.found.iter().position(is_master) {
@@ -69,7 +80,7 @@ pub fn differences(
             wrong_number(&as_it_is, &node, axis, recorded, compared.share).filter(|(_, left)| !simple || *left < 0.5 * compared.left);
         let device = number.map(|(found, _)| found).or_else(|| {
             (!simple).then(|| hear("the master, physics by physics"))?;
-            diagnose_master(&as_it_is, recorded, patience, stop)
+            diagnose_master(&as_it_is, recorded, look.patience, stop)
         });
         for d in all.found.iter_mut().filter(|d| is_master(d)) {
             d.device.clone_from(&device);
@@ -97,7 +108,13 @@ type Port = (NodeKind, &'static str, Quantity, &'static str, bool);
 
 /// Compares the outputs of one node. Where a way to it turns out to be late the node is looked at again with it so, so that one delay is not
 /// taken for several things.
-fn of_node(graph: &Graph, index: usize, recorded: &Recorded, told: &[&Port], all: &mut Differences) -> Result<(), AloneError> {
+fn of_node(
+    graph: &Graph,
+    index: usize,
+    (recorded, small): (&Recorded, f64),
+    told: &[&Port],
+    all: &mut Differences,
+) -> Result<(), AloneError> {
     let node = &graph.nodes[index];
     let mut as_it_is = graph.clone();
     let mut ways: Vec<Difference> = Vec::new();
@@ -114,7 +131,7 @@ fn of_node(graph: &Graph, index: usize, recorded: &Recorded, told: &[&Port], all
                 continue;
             };
             for axis in 0..node.axes {
-                let sensor = Sensor { exact: *exact, ..sensor_of(&node.settings, *quantity, axis) };
+                let sensor = Sensor { exact: *exact, small, ..sensor_of(&node.settings, *quantity, axis) };
                 let predicted: Vec<f64> = predicted.samples.iter().map(|s| quantity.of(s, axis)).collect();
                 let Some(compared) = compare(track.column(*quantity, axis), &predicted, &sensor, graph.period_s()) else { continue };
                 if compared.as_if == AsIf::Same {
@@ -168,5 +185,5 @@ fn sensor_of(settings: &Settings, quantity: Quantity, axis: usize) -> Sensor {
     };
     let Some(axis) = model.axes.get(axis) else { return Sensor::default() };
     let Some(output) = model.outputs.get(axis.measured) else { return Sensor::default() };
-    Sensor { resolution: axis.scale.abs() * output.resolution, noise: axis.scale.abs() * output.noise, exact: false }
+    Sensor { resolution: axis.scale.abs() * output.resolution, noise: axis.scale.abs() * output.noise, ..Sensor::default() }
 }

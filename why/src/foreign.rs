@@ -126,7 +126,7 @@ fn of_axis(axis: &AxisSignals, session: &Session, gain: Gain, happening: &Happen
     let wanted: Vec<f64> = (0..axis.master.len()).map(|r| gain.mu * (axis.master[r] - induced(r))).collect();
     let reflected: Vec<f64> = (0..axis.force.len()).map(|r| axis.force[r] - dither(r)).collect();
     let felt: Vec<f64> = axis.contact.iter().map(|f| gain.lambda * f).collect();
-    let sensor = Sensor { resolution: axis.resolution, noise: axis.noise, exact: false };
+    let sensor = Sensor { resolution: axis.resolution, noise: axis.noise, ..Sensor::default() };
     let ways = [
         ("the command x_c", "mu times the master's position", &axis.command, &wanted, sensor),
         ("the force F_f on the master", "lambda times the contact force", &reflected, &felt, Sensor::default()),

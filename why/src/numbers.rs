@@ -87,7 +87,7 @@ pub fn wrong_number(graph: &Graph, node: &str, axis: usize, recorded: &Recorded,
         let predicted: Vec<f64> = put.samples.iter().map(|s| Quantity::Position.of(s, axis)).collect();
         compare(column, &predicted, &Sensor::default(), graph.period_s()).map_or(f64::INFINITY, |c| c.share)
     };
-    let enough = (EXPLAINS * share).max(0.5 * crate::compared::SMALL);
+    let enough = (EXPLAINS * share).max(0.5 * crate::compared::SMALL).min(0.5 * share);
     let numbers: &[Number] =
         if files.fragment.is_some() { &[Number::Grip, Number::Masses, Number::HeldMass] } else { &[Number::Masses, Number::HeldMass] };
     for number in numbers {
