@@ -93,6 +93,10 @@ const EXPLAINS: f64 = 0.1;
 const MOST_LATE: usize = 4000;
 const MOST_LATE_S: f64 = 0.5;
 
+/// Delays that are tried row by row: the best places of a coarse look, and all up to this one.
+const PLACES: usize = 6;
+const NEAR: usize = 60;
+
 /// Rows that are compared at each delay.
 const LOOKED_AT: usize = 20_000;
 
@@ -266,9 +270,13 @@ fn changed(recorded: &[f64], predicted: &[f64], scale: f64, period_s: f64) -> (f
         (gain, left, (dd / count).sqrt() / scale)
     };
     let coarse = (most / 400).max(1);
-    let nearest = |best: &dyn Fn(usize) -> f64| {
-        let first = (0..=most).step_by(coarse).min_by(|a, b| best(*a).total_cmp(&best(*b))).unwrap_or(0);
-        (first.saturating_sub(coarse)..=(first + coarse).min(most)).min_by(|a, b| best(*a).total_cmp(&best(*b))).unwrap_or(0)
+    // What repeats itself fits nearly as well a period later: the best of several places is looked for, and near 0 at every row.
+    let nearest = |value: &dyn Fn(usize) -> f64| {
+        let mut places: Vec<(f64, usize)> = (0..=most).step_by(coarse).map(|late| (value(late), late)).collect();
+        places.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let about = places.iter().take(PLACES).flat_map(|(_, at)| at.saturating_sub(coarse)..=(at + coarse).min(most));
+        let all = about.chain(0..=NEAR.min(most));
+        all.map(|late| (value(late), late)).min_by(|a, b| a.0.total_cmp(&b.0)).map_or(0, |(_, late)| late)
     };
     let alone = fit(0, 1);
     let late = nearest(&|l| fit(l, stride).2);
@@ -353,6 +361,11 @@ mod tests {
         assert!((gain - 1.4).abs() < 1e-9);
         let delayed = |rows: usize| (0..x.len()).map(|i| if i < rows { x[0] } else { x[i - rows] }).collect::<Vec<_>>();
         assert_eq!(told(&delayed(60), false), AsIf::Changed { gain: 1.0, late: 60 });
+        // A vibration that goes on fits nearly as well a period later.
+        let shaking: Vec<f64> = (0..10_000).map(|i| (0.1 * f64::from(i)).sin() * (1.0 + 0.05 * (0.003 * f64::from(i)).sin())).collect();
+        let late: Vec<f64> = (0..shaking.len()).map(|i| shaking[i.saturating_sub(8)]).collect();
+        let found = compare(&late, &shaking, &Sensor::default(), PERIOD_S).unwrap();
+        assert_eq!(found.as_if, AsIf::Changed { gain: 1.0, late: 8 });
         let both: Vec<f64> = delayed(33).iter().map(|x| 2.0 * x).collect();
         let AsIf::Changed { gain, late: 33 } = told(&both, false) else { panic!() };
         assert!((gain - 2.0).abs() < 1e-9);

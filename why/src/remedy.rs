@@ -131,9 +131,11 @@ pub fn remedies(
 /// of the hand is the last thing.
 fn rank(remedy: &Remedy) -> f64 {
     let hand = remedy.changes.iter().any(|c| matches!(c, Change::Grip { .. }));
+    // An estimated hand holds where the model is exact; on hidden masters it was not always better than no canceller (docs/canceller.md).
+    let estimates = remedy.changes.iter().any(|c| matches!(c, Change::EstimatedHand { .. }));
     let more = f64::from(u8::try_from(remedy.changes.len()).unwrap_or(u8::MAX));
     8.0 * f64::from(u8::from(remedy.stops))
-        + remedy.kept() * if remedy.robust { 1.0 } else { FRAGILE }
+        + remedy.kept() * if remedy.robust && !estimates { 1.0 } else { FRAGILE }
         + 0.5 * f64::from(u8::from(remedy.repairs_cause))
         - 0.01 * more
         - if hand { 2.0 } else { 0.0 }
