@@ -2,6 +2,7 @@
 
 use backdrive_why::answer::Answer;
 use backdrive_why::cause::Cause;
+use backdrive_why::happening::Happening;
 use backdrive_why::remedy::Remedy;
 use std::fmt::Write;
 
@@ -46,7 +47,14 @@ pub fn text(answer: &Answer) -> String {
         line("remedy", "none of what was tried stops it");
     }
     if let Some(again) = &answer.again {
-        let agrees = if answer.reproduced { "as recorded" } else { "which is NOT what was recorded: something is not known" };
+        let judged = !matches!(answer.happening, Happening::NotJudged { .. });
+        let agrees = if !judged {
+            "and of the recording that is not known"
+        } else if answer.reproduced {
+            "as recorded"
+        } else {
+            "which is NOT what was recorded: something is not known"
+        };
         line("run again", &format!("{again}, {agrees}"));
     }
     if let Some(why) = &answer.not_again {

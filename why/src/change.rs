@@ -5,7 +5,7 @@ use crate::trial::Trial;
 use backdrive_control::hand::HandSettings;
 use backdrive_nodes::graph::{Graph, NodeKind, Settings};
 use backdrive_plant::elements::Law;
-use backdrive_plant::model::{Fragment, InputKind, Model};
+use backdrive_plant::model::{Fragment, Model};
 use backdrive_stability::resimulate::grip;
 use serde::Serialize;
 
@@ -245,8 +245,6 @@ pub fn firmer(graph: &mut Graph, factor: f64) {
             continue;
         }
         let Some(model) = &mut files.model else { continue };
-        let hands: Vec<usize> = model.inputs.iter().filter(|i| i.kind == InputKind::Motion).map(|i| i.on).collect();
-        let of_hand = |between: &[Option<usize>; 2]| between.iter().flatten().any(|body| hands.contains(body));
-        model.elements.iter_mut().filter(|e| of_hand(&e.between)).for_each(|e| e.law = e.law.scaled(factor));
+        model.scale_own_hand(factor);
     }
 }
