@@ -1,12 +1,20 @@
-//! The induced motion that the hand at work leaves, with no more than is sure of it.
+//! The induced motion that the hand at work leaves, less what is not sure of it.
 
 use super::bank::HandBank;
 use super::estimate::{Estimate, HandEstimator};
 use crate::core::Events;
 use backdrive_msgs::MAX_AXES;
 
-/// So many standard deviations below the estimated softness is what is cancelled.
-const SURE: f64 = 2.0;
+/// An estimate with a relative deviation above this is a guess.
+const GUESS_AT: f64 = 0.2;
+/// By so many times of what a guess exceeds that a hand is taken to be firmer than it is estimated to be.
+const GUESS_COSTS: f64 = 3.0;
+/// Share of the predicted motion that is cancelled where it is fast: what is cancelled whole may be too much.
+const FAST_SHARE: f64 = 0.97;
+/// And where it is slow: what cannot be known at rest is left to the hand, which without a canceller is stable there.
+const SLOW_SHARE: f64 = 0.5;
+/// Between slow and fast, Hz.
+const CORNER_HZ: f64 = 1.0;
 /// A force below this share of the largest of late is none.
 const NO_FORCE: f64 = 0.02;
 /// A force below this is none, N or N m.
@@ -26,10 +34,28 @@ struct Axis {
     estimator: HandEstimator,
     /// What the bank said at the step before.
     before: Vec<f64>,
+    /// Least relative deviation of the estimate since the hand was last seen to have changed.
+    surest: f64,
+    /// Motion that the force did, of the hands that were estimated meanwhile.
     induced: f64,
+    /// Its slow part.
+    slow: f64,
     largest_force: f64,
     /// The firmness that was told last, if one was.
     told: Option<f64>,
+}
+
+impl Axis {
+    /// Softness of the hand whose motion is cancelled: that of the file until anything is known.
+    fn cancelled(&mut self, estimate: &Estimate, changed: bool) -> f64 {
+        let unsure = estimate.deviation * estimate.firmness();
+        self.surest = if changed { unsure } else { self.surest.min(unsure) };
+        if !self.surest.is_finite() {
+            return 1.0;
+        }
+        // Where too little moved to tell the hand, a firm one is cancelled: too much is fatal, too little is as without a canceller.
+        estimate.softness * (1.0 - GUESS_COSTS * (self.surest - GUESS_AT).max(0.0))
+    }
 }
 
 /// A bank with the estimate of the hand of every axis.
@@ -39,6 +65,7 @@ pub struct Scheduled {
     started: bool,
     force_keep: f64,
     let_go: f64,
+    slow_gain: f64,
 }
 
 impl Scheduled {
@@ -48,13 +75,16 @@ impl Scheduled {
         let axis = |axis: usize| Axis {
             estimator: HandEstimator::new(bank.softness(), bank.sensor_noise(axis), period_s),
             before: vec![0.0; hands],
+            surest: f64::INFINITY,
             induced: 0.0,
+            slow: 0.0,
             largest_force: 0.0,
             told: None,
         };
         let axes = (0..bank.axes().min(MAX_AXES)).map(axis).collect();
         let (force_keep, let_go) = ((-period_s / FORCE_MEMORY_S).exp(), 1.0 - (-period_s / LET_GO_S).exp());
-        Scheduled { bank, axes, started: false, force_keep, let_go }
+        let slow_gain = 1.0 - (-2.0 * std::f64::consts::PI * CORNER_HZ * period_s).exp();
+        Scheduled { bank, axes, started: false, force_keep, let_go, slow_gain }
     }
 
     /// What is known of the hand of an axis.
@@ -79,9 +109,8 @@ impl Scheduled {
         }
         let mut induced = [0.0; MAX_AXES];
         for (number, axis) in self.axes.iter_mut().enumerate() {
-            if let Some(measured) = measured {
-                axis.estimator.step(measured[number], |hand| self.bank.position(hand, number));
-            }
+            let changed =
+                measured.is_some_and(|measured| axis.estimator.step(measured[number], |hand| self.bank.position(hand, number)));
             let estimate = axis.estimator.estimate();
             let (firmness, unsure) = (estimate.firmness(), estimate.deviation * estimate.firmness());
             let is_another = axis.told.is_none_or(|told| (firmness / told).ln().abs() > TELLS_AFTER);
@@ -89,7 +118,7 @@ impl Scheduled {
                 axis.told = Some(firmness);
                 events.push("hand_holds", firmness, 0);
             }
-            let softness = estimate.softness - SURE * estimate.deviation;
+            let softness = axis.cancelled(&estimate, changed);
             axis.largest_force = (self.force_keep * axis.largest_force).max(force[number].abs());
             let (mut moved, mut stands) = (0.0, 0.0);
             for (hand, weight) in between(self.bank.softness(), softness) {
@@ -104,13 +133,14 @@ impl Scheduled {
             if force[number].abs() < LEAST_FORCE.max(NO_FORCE * axis.largest_force) {
                 axis.induced += self.let_go * (stands - axis.induced);
             }
-            induced[number] = axis.induced;
+            axis.slow += self.slow_gain * (axis.induced - axis.slow);
+            induced[number] = FAST_SHARE * (axis.induced - axis.slow) + SLOW_SHARE * axis.slow;
         }
         induced
     }
 }
 
-/// The two neighbours of a softness in an ascending list, with their shares; the firmest alone below.
+/// The two neighbours of a softness in an ascending list, with their shares; the first alone below.
 fn between(softness: &[f64], wanted: f64) -> [(usize, f64); 2] {
     let last = softness.len().saturating_sub(1);
     let upper = softness.partition_point(|s| *s < wanted).min(last);
