@@ -1,5 +1,6 @@
 //! The page of `backdrive why`: what happens, why, and what would stop it, for a colleague who was not there.
 
+use super::text::{MASTER, master_is};
 use crate::page_parts::{ending, shell_word};
 use backdrive_report::{Figure, Page, Plot, Table, Tone, number, percent};
 use backdrive_stability::session::Session;
@@ -194,7 +195,15 @@ fn remedies(page: &mut Page, found: &Answer) {
         page.text(if found.happening.is_trouble() { "Nothing could be tried." } else { "Nothing needs to be stopped." });
         return;
     }
-    let mut table = Table::new(["remedy", "the loop then", "stops it", "with other grips and more gain", "force left", "motion left"]);
+    let mut table = Table::new([
+        "remedy",
+        "the loop then",
+        "stops it",
+        "with other grips and more gain",
+        "force left",
+        "motion left",
+        "backdrive run GRAPH ...",
+    ]);
     let yes = |is: bool| if is { "yes" } else { "no" }.to_string();
     for remedy in &found.remedies {
         table.push([
@@ -204,9 +213,13 @@ fn remedies(page: &mut Page, found: &Answer) {
             yes(remedy.robust),
             percent(remedy.force_kept),
             percent(remedy.motion_kept),
+            remedy.options.clone().unwrap_or_default(),
         ]);
     }
     page.table(table);
+    if found.remedies.iter().any(|r| r.options.as_ref().is_some_and(|o| o.contains(MASTER))) {
+        page.text(&format!("GRAPH is the graph file that was run, MASTER is {}.", master_is(found)));
+    }
 }
 
 fn capital(text: &str) -> String {

@@ -42,6 +42,12 @@ pub fn text(answer: &Answer) -> String {
     let stop: Vec<&Remedy> = answer.remedies.iter().filter(|r| r.stops).take(SHOWN).collect();
     for (number, remedy) in stop.iter().enumerate() {
         line(if number == 0 { "remedy" } else { "or" }, &of_remedy(remedy));
+        if let Some(options) = &remedy.options {
+            line("", &format!("backdrive run GRAPH {options}"));
+        }
+    }
+    if stop.iter().any(|r| r.options.as_ref().is_some_and(|o| o.contains(MASTER))) {
+        line("MASTER", master_is(answer));
     }
     if stop.is_empty() && !answer.remedies.is_empty() {
         line("remedy", "none of what was tried stops it");
@@ -65,6 +71,17 @@ pub fn text(answer: &Answer) -> String {
     }
     out.truncate(out.trim_end().len());
     out
+}
+
+/// What stands for a file in the options of a remedy.
+pub const MASTER: &str = "MASTER";
+
+/// Which file it is.
+pub fn master_is(answer: &Answer) -> &'static str {
+    match answer.master {
+        Some(_) => "the master as it was, which --out MASTER writes",
+        None => "the model file of the graph's master, with the grip that the graph gives the canceller",
+    }
 }
 
 fn of_cause(cause: &Cause) -> String {

@@ -132,6 +132,8 @@ pub fn why(question: &Question, hear: &(dyn Fn(&str) + Sync), cancel: &AtomicBoo
     if answer.happening.is_trouble() && !answer.reproduced && answer.not_again.is_none() {
         closer(question, recorded, &mut answer, hear, cancel)?;
     }
+    let held = answer.master.is_some();
+    answer.remedies.iter_mut().for_each(|remedy| remedy.say_how(held));
     of_events(&mut answer, recorded);
     Ok(answer)
 }

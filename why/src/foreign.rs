@@ -169,6 +169,7 @@ fn lower(gain: Gain, edge: f64) -> Remedy {
         force_kept: factor,
         motion_kept: 1.0,
         repairs_cause: false,
+        options: None,
         signals: None,
     }
 }

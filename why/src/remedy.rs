@@ -49,12 +49,20 @@ pub struct Remedy {
     pub motion_kept: f64,
     /// Whether it puts right what was found to be wrong.
     pub repairs_cause: bool,
+    /// What does it on the command line of `backdrive run`, where all of it can be done there.
+    pub options: Option<String>,
     /// What the loop did then; of the best remedy only.
     #[serde(skip)]
     pub signals: Option<Session>,
 }
 
 impl Remedy {
+    /// Says how it is done on the command line; `held`: whether the file that is called MASTER holds its hand.
+    pub(crate) fn say_how(&mut self, held: bool) {
+        let each: Option<Vec<String>> = self.changes.iter().map(|change| change.options(held)).collect();
+        self.options = each.filter(|e| !e.is_empty()).map(|e| e.join(" "));
+    }
+
     /// What is left of force and motion together, 0 to 1.
     pub fn kept(&self) -> f64 {
         self.force_kept * self.motion_kept
@@ -107,6 +115,7 @@ pub fn remedies(
             force_kept,
             motion_kept,
             repairs_cause: *repairs_cause,
+            options: None,
             signals: run.signals,
         }))
     };
@@ -131,11 +140,9 @@ pub fn remedies(
 /// of the hand is the last thing.
 fn rank(remedy: &Remedy) -> f64 {
     let hand = remedy.changes.iter().any(|c| matches!(c, Change::Grip { .. }));
-    // An estimated hand holds where the model is exact; on hidden masters it was not always better than no canceller (docs/canceller.md).
-    let estimates = remedy.changes.iter().any(|c| matches!(c, Change::EstimatedHand { .. }));
     let more = f64::from(u8::try_from(remedy.changes.len()).unwrap_or(u8::MAX));
     8.0 * f64::from(u8::from(remedy.stops))
-        + remedy.kept() * if remedy.robust && !estimates { 1.0 } else { FRAGILE }
+        + remedy.kept() * if remedy.robust { 1.0 } else { FRAGILE }
         + 0.5 * f64::from(u8::from(remedy.repairs_cause))
         - 0.01 * more
         - if hand { 2.0 } else { 0.0 }

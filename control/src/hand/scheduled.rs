@@ -30,7 +30,7 @@ const TELLS_AT: f64 = 0.1;
 const TELLS_AFTER: f64 = 0.2;
 
 /// One axis.
-struct Axis {
+pub(super) struct Axis {
     estimator: HandEstimator,
     /// What the bank said at the step before.
     before: Vec<f64>,
@@ -47,7 +47,7 @@ struct Axis {
 
 impl Axis {
     /// Softness of the hand whose motion is cancelled: that of the file until anything is known.
-    fn cancelled(&mut self, estimate: &Estimate, changed: bool) -> f64 {
+    pub(super) fn cancelled(&mut self, estimate: &Estimate, changed: bool) -> f64 {
         let unsure = estimate.deviation * estimate.firmness();
         self.surest = if changed { unsure } else { self.surest.min(unsure) };
         if !self.surest.is_finite() {
@@ -92,6 +92,11 @@ impl Scheduled {
         self.axes.get(axis).map(|a| a.estimator.estimate())
     }
 
+    #[cfg(test)]
+    pub(super) fn axis_mut(&mut self, axis: usize) -> Option<&mut Axis> {
+        self.axes.get_mut(axis)
+    }
+
     /// Whether the models go on.
     pub fn is_finite(&self) -> bool {
         self.bank.is_finite()
@@ -109,8 +114,7 @@ impl Scheduled {
         }
         let mut induced = [0.0; MAX_AXES];
         for (number, axis) in self.axes.iter_mut().enumerate() {
-            let changed =
-                measured.is_some_and(|measured| axis.estimator.step(measured[number], |hand| self.bank.position(hand, number)));
+            let changed = measured.is_some_and(|measured| axis.estimator.step(measured[number], |hand| self.bank.position(hand, number)));
             let estimate = axis.estimator.estimate();
             let (firmness, unsure) = (estimate.firmness(), estimate.deviation * estimate.firmness());
             let is_another = axis.told.is_none_or(|told| (firmness / told).ln().abs() > TELLS_AFTER);
