@@ -29,6 +29,9 @@ pub struct Difference {
     pub device: Option<DeviceFound>,
 }
 
+/// A loss above this share is told beside jitter.
+const TOLD_BESIDE_JITTER: f64 = 0.1;
+
 impl Difference {
     /// What the way to a port does besides what the graph says of it.
     pub fn impairment(&self, period_s: f64, seed: u64) -> Option<Impairment> {
@@ -37,8 +40,8 @@ impl Difference {
         match self.compared.as_if {
             AsIf::Changed { late, .. } => Some(Impairment { delay_s: s(late), jitter_s: 0.0, loss: 0.0, seed }),
             AsIf::Unsteady { late, jitter, missing } => {
-                // What jitter lets be overtaken is dropped too.
-                let loss = if jitter == 0 { missing } else { 0.0 };
+                // Beside jitter a small loss cannot be told from what is overtaken.
+                let loss = if jitter == 0 || missing > TOLD_BESIDE_JITTER { missing } else { 0.0 };
                 Some(Impairment { delay_s: s(late), jitter_s: s(jitter), loss, seed })
             }
             _ => None,
