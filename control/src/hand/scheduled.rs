@@ -6,9 +6,9 @@ use crate::core::Events;
 use backdrive_msgs::MAX_AXES;
 
 /// An estimate with a relative deviation above this is a guess.
-const GUESS_AT: f64 = 0.2;
+const GUESS_AT: f64 = 0.1;
 /// By so many times of what a guess exceeds that a hand is taken to be firmer than it is estimated to be.
-const GUESS_COSTS: f64 = 3.0;
+const GUESS_COSTS: f64 = 5.0;
 /// Share of the predicted motion that is cancelled where it is fast: what is cancelled whole may be too much.
 const FAST_SHARE: f64 = 0.97;
 /// And where it is slow: what cannot be known at rest is left to the hand, which without a canceller is stable there.
@@ -46,12 +46,12 @@ pub(super) struct Axis {
 }
 
 impl Axis {
-    /// Softness of the hand whose motion is cancelled: that of the file until anything is known.
+    /// Softness of the hand whose motion is cancelled, 0 for the firmest of the bank: that one until anything is known.
     pub(super) fn cancelled(&mut self, estimate: &Estimate, changed: bool) -> f64 {
         let unsure = estimate.deviation * estimate.firmness();
         self.surest = if changed { unsure } else { self.surest.min(unsure) };
         if !self.surest.is_finite() {
-            return 1.0;
+            return 0.0;
         }
         // Where too little moved to tell the hand, a firm one is cancelled: too much is fatal, too little is as without a canceller.
         estimate.softness * (1.0 - GUESS_COSTS * (self.surest - GUESS_AT).max(0.0))

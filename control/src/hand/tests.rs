@@ -108,12 +108,13 @@ fn without_a_force_nothing_is_known_and_what_was_known_fades() {
 }
 
 #[test]
-fn until_something_is_known_the_hand_of_the_file_is_cancelled_and_half_of_what_it_does_at_rest() {
+fn until_something_is_known_the_firmest_hand_is_cancelled_and_half_of_what_it_does_at_rest() {
     let model = master("impulse-engine-linear");
     let bank = bank(&model);
-    assert!(bank.softness()[0] <= 1.0 / HandSettings::default().firmest);
+    let firmest = 1.0 / bank.softness()[0];
+    assert!(firmest >= HandSettings::default().firmest);
     assert!(bank.softness().windows(2).all(|w| w[0] < w[1]));
-    let mut own = Device::new(&model, Some(&grip(1.0)), DeviceRole::Master, PERIOD, &DeviceOptions::default()).unwrap();
+    let mut own = Device::new(&model, Some(&grip(firmest)), DeviceRole::Master, PERIOD, &DeviceOptions::default()).unwrap();
     let mut scheduled = Scheduled::new(bank, PERIOD);
     let mut force = [0.0; MAX_AXES];
     scheduled.step(&force, None, &mut Events::default());
@@ -128,7 +129,7 @@ fn until_something_is_known_the_hand_of_the_file_is_cancelled_and_half_of_what_i
         assert!(step != 10 || (share - 0.97).abs() < 0.01, "{share}");
     }
     // At rest the handle gives way by F/k, and the linkage and the cable by their own.
-    let gives = 2.0 / 400.0 + 2.0 / 3950.0 + 2.0 / 39500.0;
+    let gives = 2.0 / (400.0 * firmest) + 2.0 / 3950.0 + 2.0 / 39500.0;
     assert!((induced / gives - 0.5).abs() < 0.005, "{induced} of {gives}");
 }
 
@@ -137,13 +138,13 @@ fn where_too_little_moved_a_firmer_hand_is_cancelled() {
     let mut axis = Played::new(&master("impulse-engine-linear"), 1.0, &[]).scheduled;
     let estimate = |deviation: f64| Estimate { softness: 1.5, deviation };
     let axis = axis.axis_mut(0).unwrap();
-    assert_eq!(axis.cancelled(&estimate(f64::INFINITY), false), 1.0);
-    let guess = axis.cancelled(&estimate(0.6), false);
-    assert!((guess - 1.5 * (1.0 - 3.0 * 0.2)).abs() < 1e-12, "{guess}");
+    assert_eq!(axis.cancelled(&estimate(f64::INFINITY), false), 0.0);
+    let guess = axis.cancelled(&estimate(0.3), false);
+    assert!((guess - 1.5 * (1.0 - 5.0 * 0.1)).abs() < 1e-12, "{guess}");
     assert_eq!(axis.cancelled(&estimate(0.15), false), 1.5);
     // It stays known while nothing moves, and not beyond a change.
-    assert_eq!(axis.cancelled(&estimate(0.6), false), 1.5);
-    assert!(axis.cancelled(&estimate(0.6), true) < 1.5);
+    assert_eq!(axis.cancelled(&estimate(0.3), false), 1.5);
+    assert!(axis.cancelled(&estimate(0.3), true) < 1.5);
 }
 
 #[test]
