@@ -18,6 +18,28 @@ pub const GRIPS: [f64; 3] = [0.8, 1.0, 1.2];
 /// A share must be better by this factor than a larger one.
 const BETTER: f64 = 1.05;
 
+/// How firmly the hand may hold a rival, about the grip of the session, where the canceller estimates it.
+const RIVAL_GRIPS: [f64; 3] = [0.5, 1.0, 2.0];
+/// Both edges are known to a few per cent only.
+const AS_GOOD: f64 = 0.94;
+
+/// Whether a canceller is as good as none whichever of the `rivals` the device is, and however firmly it is held. Where none is named, nothing speaks against it.
+///
+/// # Errors
+/// A run that cannot be done; `stop` was set.
+pub fn never_below_none(canceller: &Canceller, rivals: &[PathBuf], task: &Task, stop: &AtomicBool) -> Result<bool, Failure> {
+    for rival in rivals {
+        let the_loop = Loop { graph: task.graph, high_pass_hz: task.high_pass_hz, master: Moved::Model(rival) };
+        for grip in RIVAL_GRIPS {
+            let none = the_loop.edge(&Canceller::fixed("none", None, None), grip, stop)?.at_least;
+            if the_loop.edge(canceller, grip, stop)?.at_least < AS_GOOD * none {
+                return Ok(false);
+            }
+        }
+    }
+    Ok(true)
+}
+
 /// What was chosen.
 pub struct Chosen {
     /// Share of the estimate that is subtracted; 0 for no canceller.
