@@ -1,5 +1,6 @@
 //! A signal as it was recorded beside what it should have been: by how much they differ, and what simple thing would make one of the other.
 
+use crate::ways::{MOST_LATE, MOST_LATE_S, unsteady};
 use serde::Serialize;
 
 /// What simple thing makes the recorded signal of the predicted one.
@@ -88,10 +89,6 @@ pub const SMALL: f64 = 0.02;
 
 /// A simple thing explains a difference where it leaves no more of it than this.
 const EXPLAINS: f64 = 0.1;
-
-/// Longest delay that is looked for, rows at most and s.
-const MOST_LATE: usize = 4000;
-const MOST_LATE_S: f64 = 0.5;
 
 /// Delays that are tried row by row: the best places of a coarse look, and all up to this one.
 const PLACES: usize = 6;
@@ -296,92 +293,6 @@ fn changed(recorded: &[f64], predicted: &[f64], scale: f64, period_s: f64) -> (f
     }
 }
 
-/// Of a node that only passes values on: how late each new one was, and the share that was lost. `None` where most of them are no earlier value at all.
-/// Where nothing new comes the node holds what it had, lets it decay, or says nothing.
-fn unsteady(recorded: &[f64], predicted: &[f64], period_s: f64) -> Option<(usize, usize, f64)> {
-    let most = MOST_LATE.min((MOST_LATE_S / period_s) as usize);
-    let size = predicted.iter().filter(|x| x.is_finite()).fold(0.0_f64, |m, x| m.max(x.abs()));
-    let tiny = 1e-12 * size;
-    let moves = |row: usize| row > 0 && (predicted[row] - predicted[row - 1]).abs() > tiny;
-    let (mut lates, mut told, mut oldest, mut last) = (Vec::new(), 0_usize, 0_usize, None);
-    for row in 1..recorded.len() {
-        let value = recorded[row];
-        if !value.is_finite() || value == 0.0 || (value - recorded[row - 1]).abs() <= tiny {
-            continue;
-        }
-        let from = oldest.max(row.saturating_sub(most));
-        let place = (from..=row).rev().find(|j| (predicted[*j] - value).abs() <= tiny);
-        // A force whose input has been away for long decays.
-        let decays = last.is_some_and(|last| row > last + HELD_ROWS);
-        told += usize::from(place.is_some() || !decays);
-        if let Some(place) = place {
-            (oldest, last) = (place, Some(row));
-            // Where a signal stands still, which of its rows this is cannot be told.
-            if moves(place) {
-                lates.push(row - place);
-            }
-        }
-    }
-    if lates.len() < 64 || (lates.len() as f64) < 0.5 * told as f64 {
-        return None;
-    }
-    let came = lates.len() as f64;
-    lates.sort_unstable();
-    let at = |share: f64| lates[((lates.len() - 1) as f64 * share) as usize];
-    let (late, span) = (at(0.01), at(0.99) - at(0.01));
-    let sent = (1..predicted.len()).filter(|row| predicted[*row] != 0.0 && moves(*row)).count() as f64;
-    let mean = lates.iter().map(|l| l.saturating_sub(late) as f64).sum::<f64>() / came;
-    let (jitter, lost) = scatter((came / sent.max(came)).min(1.0), span, mean);
-    Some((late, jitter, lost))
-}
-
-/// Jitter, rows, and the share that is lost, of a way of which a share `comes` in time to be the newest, up to `span` rows late and `mean` on average: what
-/// is overtaken by a later sample is seen by nobody, so that those that are seen are less late than all.
-fn scatter(comes: f64, span: usize, mean: f64) -> (usize, f64) {
-    if span == 0 || span > MOST_SPAN {
-        return (span, 1.0 - comes);
-    }
-    let loss_of = |jitter: usize| {
-        let (mut low, mut high) = (0.0, 1.0);
-        for _ in 0..20 {
-            let middle = 0.5 * (low + high);
-            if in_time(jitter, middle).0 > comes { low = middle } else { high = middle }
-        }
-        low
-    };
-    let all = (span..=3 * span + 2).map(|jitter| {
-        let lost = loss_of(jitter);
-        ((in_time(jitter, lost).1 - mean).abs(), jitter, lost)
-    });
-    let mut all: Vec<(f64, usize, f64)> = all.collect();
-    let nearest = all.iter().map(|a| a.0).fold(f64::INFINITY, f64::min);
-    // More jitter and less loss look nearly the same: then it is jitter alone.
-    all.retain(|a| a.0 <= nearest + ALIKE * mean.max(1.0));
-    all.into_iter().min_by(|a, b| a.2.total_cmp(&b.2)).map_or((span, 1.0 - comes), |(_, jitter, lost)| (jitter, lost))
-}
-
-/// Two ways whose samples are so nearly as late on average are not told apart, as a share.
-const ALIKE: f64 = 0.05;
-/// A way that is later than this from sample to sample is taken as it is seen, rows.
-const MOST_SPAN: usize = 150;
-
-/// Rows after which a value that nothing renews may decay.
-const HELD_ROWS: usize = 20;
-
-/// Share of the samples that are the newest when they arrive, and by how many rows these are late on average, where each is up to `jitter` rows late, every
-/// number of rows as likely, and a share `lost` never comes.
-fn in_time(jitter: usize, lost: f64) -> (f64, f64) {
-    let all = (jitter + 1) as f64;
-    let (mut share, mut late) = (0.0, 0.0);
-    for rows in 0..=jitter {
-        // The sample that is sent j rows later overtakes where it is at most rows - j late: at the same row the later one counts.
-        let newest: f64 = (1..=rows).map(|j| 1.0 - (1.0 - lost) * (rows - j + 1) as f64 / all).product();
-        share += newest / all;
-        late += rows as f64 * newest / all;
-    }
-    ((1.0 - lost) * share, late / share)
-}
-
 /// Whether a sequence has no memory.
 fn is_white(values: &[f64]) -> bool {
     let power: f64 = values.iter().map(|x| x * x).sum();
@@ -495,7 +406,7 @@ mod tests {
                 .collect();
             let AsIf::Unsteady { late, jitter: found, missing } = told(&passed, true) else { panic!("{jitter} {loss}") };
             // More jitter and less loss look the same: what counts is how many come, and how late.
-            let ((comes, mean), (true_comes, true_mean)) = (in_time(found, missing), in_time(jitter, loss));
+            let ((comes, mean), (true_comes, true_mean)) = (crate::ways::in_time(found, missing), crate::ways::in_time(jitter, loss));
             assert!(late <= 1 && (comes - true_comes).abs() < 0.03 && (mean - true_mean).abs() < 0.4, "{jitter} {loss}: {found} {missing}");
             assert!(jitter > 0 || (found == 0 && (missing - loss).abs() < 0.03), "{jitter} {loss}: {found} {missing}");
         }

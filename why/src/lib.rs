@@ -23,3 +23,4 @@ pub mod recorded;
 pub mod remedy;
 mod stated;
 pub mod trial;
+mod ways;
