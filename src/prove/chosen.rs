@@ -20,8 +20,8 @@ const BETTER: f64 = 1.05;
 
 /// How firmly the hand may hold a rival, about the grip of the session, where the canceller estimates it.
 const RIVAL_GRIPS: [f64; 3] = [0.5, 1.0, 2.0];
-/// Both edges are known to a few per cent only.
-const AS_GOOD: f64 = 0.94;
+/// A stable gain above this share of the one without a canceller is not below it: both edges are known to 3 per cent only.
+pub const AS_GOOD: f64 = 0.94;
 
 /// Whether a canceller is as good as none whichever of the `rivals` the device is, and however firmly it is held. Where none is named, nothing speaks against it.
 ///

@@ -1,15 +1,13 @@
 //! What cancellers are worth over several cases: the stable gain beside that of what a user has without a diagnosis.
 
 use super::case::Case;
+use super::chosen::AS_GOOD;
 use super::raise::{ESTIMATED, Hand};
 use super::statistics::{Share, median};
 use serde::Serialize;
 
 /// The cancellers that a diagnosis makes possible, in this order everywhere.
 pub const DIAGNOSED: [&str; 3] = ["diagnosed", "chosen", ESTIMATED];
-
-/// Below this share of the stable gain without a canceller one counts as below it: both edges are known to 3 per cent only.
-const BELOW: f64 = 0.94;
 
 /// What a canceller is worth with one hand.
 #[derive(Debug, Clone, Serialize)]
@@ -91,7 +89,7 @@ impl Group {
 
 fn of_one(cases: &[&Case], canceller: &'static str, hand: Hand) -> OfOne {
     let both = cases.iter().filter_map(|c| Some((c.gain(canceller, hand)?, c.gain("none", hand)?)));
-    let (are, of) = both.fold((0, 0), |(are, of), (with, none)| (are + usize::from(with < BELOW * none), of + 1));
+    let (are, of) = both.fold((0, 0), |(are, of), (with, none)| (are + usize::from(with < AS_GOOD * none), of + 1));
     OfOne {
         canceller,
         over_others: median(cases.iter().filter_map(|c| c.over_others(canceller, hand)).collect()),

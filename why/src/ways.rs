@@ -76,6 +76,9 @@ const MOST_SPAN: usize = 150;
 /// Rows after which a value that nothing renews may decay.
 const HELD_ROWS: usize = 20;
 
+/// A share that counts as none.
+const NEVER: f64 = 1e-6;
+
 /// Share of the samples that are the newest when they arrive, and by how many rows these are late on average, where each is up to `jitter` rows late, every
 /// number of rows as likely, and a share `lost` never comes.
 pub(crate) fn in_time(jitter: usize, lost: f64) -> (f64, f64) {
@@ -84,6 +87,10 @@ pub(crate) fn in_time(jitter: usize, lost: f64) -> (f64, f64) {
     for rows in 0..=jitter {
         // The sample that is sent j rows later overtakes where it is at most rows - j late: at the same row the later one counts.
         let newest: f64 = (1..=rows).map(|j| 1.0 - (1.0 - lost) * (rows - j + 1) as f64 / all).product();
+        // The later one is, the surer it is overtaken.
+        if newest < NEVER {
+            break;
+        }
         share += newest / all;
         late += rows as f64 * newest / all;
     }
