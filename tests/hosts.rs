@@ -66,6 +66,13 @@ fn run_on(hosts: &Hosts, host: usize, folder: &Path, more: &[&str]) -> Running {
     spawn(command)
 }
 
+/// On a busy machine a part of the samples comes late: then the run is not judged, and says so. It is never judged unstable.
+fn assert_stable_or_too_late(host: &str, report: &Value, code: Option<i32>, told: &str) {
+    let judged = (code, report["outcome"].as_str(), report["outcome_detail"]["why"].as_str());
+    let expected = [(Some(0), Some("stable"), None), (Some(7), Some("cannot_tell"), Some("gaps"))];
+    assert!(expected.contains(&judged), "{host}: {judged:?} {report} {told}");
+}
+
 fn spawn(mut command: Command) -> Running {
     Running(command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap())
 }
@@ -130,9 +137,8 @@ fn the_contact_task_in_real_time_loses_nothing_on_a_clean_link() {
         let runs = [0, 1].map(|host| run_on(&hosts, host, folder.path(), &[&["--duration", seconds], &by_address(host)[..]].concat()));
         for (host, run) in runs.into_iter().enumerate() {
             let (report, code, told) = end(run, Duration::from_secs(180));
-            assert_eq!(code, Some(0), "{}: {told}", HOSTS[host]);
+            assert_stable_or_too_late(HOSTS[host], &report, code, &told);
             assert_eq!((report["lost"].as_u64(), report["complete"].as_bool()), (Some(0), Some(true)), "{}: {told}", HOSTS[host]);
-            assert_eq!(report["outcome"].as_str(), Some("stable"));
             assert!(report["peak_contact_force_n"].as_f64().unwrap() > 1.0);
             // Both bags hold every topic of both hosts, whole.
             let bag = bag(folder.path(), host);
@@ -502,13 +508,7 @@ fn a_host_over_shared_memory_joins_the_others_by_its_bridge() {
         assert_eq!((code, lost("out"), lost("in")), (Some(0), Some(0), Some(0)), "{crossed} {told}\n{}\n{}", desk.2, robot.2);
         // The wall was felt at the desk, and the slave of the robot was moved.
         for (host, (report, code, told)) in [desk, robot].into_iter().enumerate() {
-            // On a busy machine a part of the samples comes late over the bridge: then it is not judged, and says so.
-            let judged = (code, report["outcome"].as_str(), report["outcome_detail"]["why"].as_str());
-            assert!(
-                [(Some(0), Some("stable"), None), (Some(7), Some("cannot_tell"), Some("gaps"))].contains(&judged),
-                "{}: {judged:?} {report} {told}",
-                HOSTS[host]
-            );
+            assert_stable_or_too_late(HOSTS[host], &report, code, &told);
             assert_eq!(report["lost"].as_u64(), Some(0), "{}: {told}", HOSTS[host]);
             assert!(report["peak_contact_force_n"].as_f64().unwrap() > 1.0, "{}: {report}", HOSTS[host]);
         }
