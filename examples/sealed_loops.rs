@@ -394,8 +394,8 @@ impl Scores {
         self.boldly += usize::from(!named && first.is_some_and(|c| c.confidence >= 0.8 && c.kind != CauseKind::Unknown));
         let hand = hand_of(&case.truth.graph);
         let own = Gain { mu: case.truth.graph.gains.mu, lambda: case.truth.graph.gains.lambda };
-        // What can be done to the real loop: a hidden plant takes no damper.
-        let doable = |c: &Change| !matches!(c, Change::Damping { .. }) || case.truth.own.is_none();
+        // What can be done to the real loop: a hidden plant takes no damper, and its friction is not this program's.
+        let doable = |c: &Change| !matches!(c, Change::Damping { .. } | Change::FrictionCompensated { .. }) || case.truth.own.is_none();
         let remedy = answer.remedies.iter().find(|r| r.stops && r.changes.iter().all(doable));
         let stopped = remedy.is_some_and(|remedy| {
             let mut again = case.truth.clone();

@@ -4,7 +4,7 @@ use crate::core::{Core, Events, Port, Tick};
 use crate::device::Device;
 use crate::freshness::Freshness;
 use crate::hand::{HandBank, Scheduled};
-use backdrive_msgs::{MAX_AXES, Sample};
+use backdrive_msgs::{Gains, MAX_AXES, Sample};
 
 /// Input `measured` (position; effort = applied force); outputs `motion` (position without the predicted induced motion,
 /// x_m - x^_mf), `induced` (position x^_mf).
@@ -36,10 +36,12 @@ impl Canceller {
         }
     }
 
-    /// With a model for each of several hands, and the hand estimated while the loop runs ([`crate::hand`]). `high_pass_hz` as in [`Canceller::new`].
-    pub fn scheduled(bank: HandBank, high_pass_hz: f64, period_s: f64) -> Canceller {
-        let scheduled = Some(Scheduled::new(bank, period_s));
-        Canceller { scheduled, ..Canceller::new(None, high_pass_hz, period_s) }
+    /// With a model for each of several hands, and the hand estimated while the loop runs ([`crate::hand`]), at the gain product `gain` until another is
+    /// set. `edge_without` as in [`Scheduled::new`], `high_pass_hz` as in [`Canceller::new`].
+    pub fn scheduled(bank: HandBank, edge_without: Option<f64>, gain: f64, high_pass_hz: f64, period_s: f64) -> Canceller {
+        let mut scheduled = Scheduled::new(bank, edge_without, period_s);
+        scheduled.set_gain(gain);
+        Canceller { scheduled: Some(scheduled), ..Canceller::new(None, high_pass_hz, period_s) }
     }
 }
 
@@ -87,6 +89,12 @@ impl Core for Canceller {
                 estimate[0].position[axis] = induced[axis];
                 self.force[axis] = if measured.effort[axis].is_nan() { 0.0 } else { measured.effort[axis] };
             }
+        }
+    }
+
+    fn set_gains(&mut self, gains: &Gains) {
+        if let Some(scheduled) = &mut self.scheduled {
+            scheduled.set_gain(gains.mu * gains.lambda);
         }
     }
 }

@@ -34,7 +34,9 @@ fn a_canceller_takes_the_hand_as_modelled_unless_it_is_told_to_estimate_it() {
     assert_eq!(canceller(&graph(1, "hand = \"as_modelled\"").unwrap()), None);
     assert_eq!(canceller(&graph(1, "hand = \"estimated\"").unwrap()), Some(HandSettings::default()));
     let narrow = graph(1, "hand = \"estimated\"\nhand_range = [0.8, 1.25]").unwrap();
-    assert_eq!(canceller(&narrow), Some(HandSettings { softest: 0.8, firmest: 1.25 }));
+    assert_eq!(canceller(&narrow), Some(HandSettings { softest: 0.8, firmest: 1.25, edge_without: None }));
+    let known = graph(1, "hand = \"estimated\"\nedge_without = 2.06").unwrap();
+    assert_eq!(canceller(&known), Some(HandSettings { edge_without: Some(2.06), ..HandSettings::default() }));
     assert!(plan(&narrow, "canceller").is_ok());
 }
 
@@ -43,6 +45,8 @@ fn what_is_wrong_with_a_hand_is_told_with_file_line_and_key() {
     for (of, line, told) in [
         (1, "hand = \"guessed\"", "hand"),
         (1, "hand_range = [0.5, 2.0]", "hand = \"estimated\""),
+        (1, "edge_without = 2.06", "hand = \"estimated\""),
+        (1, "hand = \"estimated\"\nedge_without = 0.0", "edge_without"),
         (1, "hand = \"estimated\"\nhand_range = [2.0, 0.5]", "the softer first"),
         (1, "hand = \"estimated\"\nhand_range = [1.0]", "the softer first"),
         (1, "hand = \"estimated\"\nhand_range = [0.0, 1.0]", "hand_range"),

@@ -33,6 +33,10 @@ pub struct SwappedParts {
     /// Whether the canceller takes the hand as its grip says, or estimates how firmly it holds while the loop runs: docs/canceller.md.
     #[arg(long, value_enum)]
     pub hand: Option<Hand>,
+    /// Gain product from which on the loop shakes without a canceller, whichever hand holds (`backdrive stability` says it): a canceller that estimates the hand
+    /// then cancels no more than the gain needs.
+    #[arg(long, value_name = "MU_LAMBDA", value_parser = positive)]
+    pub edge_without: Option<f64>,
     /// Whether sensors round and are noisy as the model files say.
     #[arg(long, value_enum)]
     pub sensors: Option<Sensors>,
@@ -53,6 +57,7 @@ impl SwappedParts {
             canceller_grip: self.canceller_grip.clone(),
             high_pass_hz: self.high_pass,
             hand: self.hand.map(|h| h.word().to_string()),
+            edge_without: self.edge_without,
             sensors: self.sensors.map(|s| s.word().to_string()),
             limits: self.limits.map(|l| l.word().to_string()),
             ..Overrides::default()

@@ -1,6 +1,6 @@
 //! One proof: draw and seal, record, diagnose, raise the gain, and only then look at the truth.
 
-use super::chosen::{Chosen, Task, choose, never_below_none};
+use super::chosen::{Chosen, Task, choose, estimating};
 use super::edges::Canceller;
 use super::files::{absolute, at, ours, read, write};
 use super::hidden::{Hidden, program};
@@ -189,10 +189,10 @@ fn cancellers(
     let choose = || choose(&diagnosed, &rivals, &scaled, &task, stop);
     let chosen = if is_explained { busy(&at(folder, "choosing how much to cancel"), choose)? } else { Chosen::nothing() };
     cancellers.push(Canceller::fixed("chosen", (chosen.share > 0.0).then_some(scaled), None));
-    let estimated = Canceller { name: ESTIMATED, estimates_hand: true, model: Some(diagnosed), grip: None };
-    let is_safe = is_explained
-        && busy(&at(folder, "trying the estimated hand on the rivals"), || never_below_none(&estimated, &rivals, &task, stop))?;
-    cancellers.push(if is_safe { estimated } else { Canceller::fixed(ESTIMATED, None, None) });
+    let models: Vec<PathBuf> = std::iter::once(diagnosed).chain(rivals).collect();
+    let try_all = || estimating(ESTIMATED, &models, &task, stop);
+    let estimated = if is_explained { busy(&at(folder, "trying the estimated hand on every explanation"), try_all)? } else { None };
+    cancellers.push(estimated.unwrap_or_else(|| Canceller::fixed(ESTIMATED, None, None)));
     Ok((cancellers, Some(chosen.share)))
 }
 

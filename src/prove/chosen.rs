@@ -18,26 +18,31 @@ pub const GRIPS: [f64; 3] = [0.8, 1.0, 1.2];
 /// A share must be better by this factor than a larger one.
 const BETTER: f64 = 1.05;
 
-/// How firmly the hand may hold a rival, about the grip of the session, where the canceller estimates it.
-const RIVAL_GRIPS: [f64; 3] = [0.5, 1.0, 2.0];
+/// How firmly the hand may hold a model, about the grip of the session, where the canceller estimates it.
+const HELD: [f64; 3] = [0.5, 1.0, 2.0];
 /// A stable gain above this share of the one without a canceller is not below it: both edges are known to 3 per cent only.
 pub const AS_GOOD: f64 = 0.94;
 
-/// Whether a canceller is as good as none whichever of the `rivals` the device is, and however firmly it is held. Where none is named, nothing speaks against it.
+/// The canceller that estimates the hand, with what the loop bears without one, whichever of the `models` the device is and however firmly it is held. `None` where it
+/// would be below no canceller on one of them. The first model is the one that predicts.
 ///
 /// # Errors
 /// A run that cannot be done; `stop` was set.
-pub fn never_below_none(canceller: &Canceller, rivals: &[PathBuf], task: &Task, stop: &AtomicBool) -> Result<bool, Failure> {
-    for rival in rivals {
-        let the_loop = Loop { graph: task.graph, high_pass_hz: task.high_pass_hz, master: Moved::Model(rival) };
-        for grip in RIVAL_GRIPS {
-            let none = the_loop.edge(&Canceller::fixed("none", None, None), grip, stop)?.at_least;
-            if the_loop.edge(canceller, grip, stop)?.at_least < AS_GOOD * none {
-                return Ok(false);
-            }
+pub fn estimating(name: &'static str, models: &[PathBuf], task: &Task, stop: &AtomicBool) -> Result<Option<Canceller>, Failure> {
+    let held = || models.iter().flat_map(|model| HELD.map(|grip| (model, grip)));
+    let edge = |canceller: &Canceller, (model, grip): (&PathBuf, f64)| -> Result<f64, Failure> {
+        let the_loop = Loop { graph: task.graph, high_pass_hz: task.high_pass_hz, master: Moved::Model(model) };
+        Ok(the_loop.edge(canceller, grip, stop)?.at_least)
+    };
+    let without = held().map(|of| edge(&Canceller::fixed("none", None, None), of)).collect::<Result<Vec<f64>, Failure>>()?;
+    let edge_without = without.iter().copied().reduce(f64::min).filter(|edge| *edge > 0.0);
+    let canceller = Canceller { estimates_hand: true, edge_without, ..Canceller::fixed(name, models.first().cloned(), None) };
+    for (of, without) in held().zip(without) {
+        if edge(&canceller, of)? < AS_GOOD * without {
+            return Ok(None);
         }
     }
-    Ok(true)
+    Ok(Some(canceller))
 }
 
 /// What was chosen.

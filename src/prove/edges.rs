@@ -25,12 +25,14 @@ pub struct Canceller {
     pub grip: Option<PathBuf>,
     /// Whether it estimates the hand while the loop runs.
     pub estimates_hand: bool,
+    /// For one that does: the gain product from which on the models shake without a canceller.
+    pub edge_without: Option<f64>,
 }
 
 impl Canceller {
     /// One that takes the hand as the file says.
     pub fn fixed(name: &'static str, model: Option<PathBuf>, grip: Option<PathBuf>) -> Canceller {
-        Canceller { name, model, grip, estimates_hand: false }
+        Canceller { name, model, grip, estimates_hand: false, edge_without: None }
     }
 }
 
@@ -68,6 +70,7 @@ impl Loop<'_> {
             // Who estimates the hand has a rule of its own for what cannot be known at rest.
             high_pass_hz: Some(if canceller.estimates_hand { 0.0 } else { self.high_pass_hz }),
             hand: canceller.estimates_hand.then(|| "estimated".to_string()),
+            edge_without: canceller.edge_without,
             limits: Some("ignored".to_string()),
             ..Overrides::default()
         }

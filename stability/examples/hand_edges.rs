@@ -1,8 +1,9 @@
 //! The stable gain on the contact script for hands that grip otherwise than the canceller's file says: nothing cancelled, the exact model with the grip
-//! of the file, and the canceller that estimates the hand.
+//! of the file, and the canceller that estimates the hand, without and with the gain that the loop bears without a canceller (docs/canceller.md).
 //!
 //!     cargo run --release -p backdrive-stability --example hand_edges [GRAPH [GRIP...]]
 
+use backdrive_control::hand::HandSettings;
 use backdrive_nodes::graph::{Graph, NodeKind, Overrides, Settings};
 use backdrive_stability::resimulate::edge::{Search, edge};
 use backdrive_stability::resimulate::{RunOptions, Scenario};
@@ -22,30 +23,37 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     if grips.is_empty() {
         grips = GRIPS.to_vec();
     }
-    println!("{:<12} {:>10} {:>10} {:>10}", "grip", "none", "fixed", "estimated");
-    for grip in grips {
-        let mut row = Vec::new();
-        for canceller in ["none", "fixed", "estimated"] {
-            let changes = Overrides {
-                canceller: (canceller == "none").then(|| "none".into()),
-                limits: Some("ignored".into()),
-                sensors: std::env::var("IDEAL").ok().map(|_| "ideal".into()),
-                ..Overrides::default()
-            };
-            let mut graph = Graph::load(&file, &changes)?;
-            for node in graph.nodes.iter_mut().filter(|n| n.kind == NodeKind::Canceller) {
-                if let Settings::Canceller(.., hand) = &mut node.settings {
-                    *hand = (canceller == "estimated").then(Default::default);
-                }
-            }
-            let scenario = Scenario::new(graph, None, None)?;
-            let options = RunOptions { grip_scale: grip, ..RunOptions::default() };
-            let found = edge(&scenario, &SEARCH, &options, &|_, _| {}, &AtomicBool::new(false))?;
-            row.push((found.at_least, found.reason));
-        }
-        print!("{grip:<12}");
-        row.iter().for_each(|(gain, _)| print!(" {gain:>10.3}"));
-        println!("   {}", row[2].1);
+    let mut none = Vec::new();
+    for grip in grips.iter().chain(&[0.5, 2.0]) {
+        none.push(stable_to(&file, "none", None, *grip)?.0);
+    }
+    let without = none.iter().copied().reduce(f64::min);
+    println!("{:<12} {:>10} {:>10} {:>10} {:>18}", "grip", "none", "fixed", "estimated", "and edge_without");
+    for (grip, none) in grips.iter().zip(none) {
+        let fixed = stable_to(&file, "fixed", None, *grip)?.0;
+        let estimated = stable_to(&file, "estimated", None, *grip)?;
+        let known = stable_to(&file, "estimated", without, *grip)?;
+        println!("{grip:<12} {none:>10.3} {fixed:>10.3} {:>10.3} {:>18.3}   {}", estimated.0, known.0, known.1);
     }
     Ok(())
+}
+
+/// The stable gain with a canceller, and what is beyond it.
+fn stable_to(file: &Path, canceller: &str, edge_without: Option<f64>, grip: f64) -> Result<(f64, String), Box<dyn std::error::Error>> {
+    let changes = Overrides {
+        canceller: (canceller == "none").then(|| "none".into()),
+        limits: Some("ignored".into()),
+        sensors: std::env::var("IDEAL").ok().map(|_| "ideal".into()),
+        ..Overrides::default()
+    };
+    let mut graph = Graph::load(file, &changes)?;
+    for node in graph.nodes.iter_mut().filter(|n| n.kind == NodeKind::Canceller) {
+        if let Settings::Canceller(.., hand) = &mut node.settings {
+            *hand = (canceller == "estimated").then(|| HandSettings { edge_without, ..HandSettings::default() });
+        }
+    }
+    let scenario = Scenario::new(graph, None, None)?;
+    let options = RunOptions { grip_scale: grip, ..RunOptions::default() };
+    let found = edge(&scenario, &SEARCH, &options, &|_, _| {}, &AtomicBool::new(false))?;
+    Ok((found.at_least, found.reason))
 }

@@ -3,9 +3,11 @@
 use crate::coupled::couple;
 use crate::trial::Trial;
 use backdrive_control::hand::HandSettings;
+use backdrive_diagnosis::hypothesis::Family;
+use backdrive_diagnosis::physics::physics_named;
 use backdrive_nodes::graph::{Graph, NodeKind, Settings};
 use backdrive_plant::elements::Law;
-use backdrive_plant::model::{Fragment, Model};
+use backdrive_plant::model::{Element, Fragment, Model};
 use backdrive_stability::resimulate::grip;
 use serde::Serialize;
 
@@ -66,6 +68,11 @@ pub enum Change {
     },
     /// Sensors that neither round nor are noisy.
     FinerSensors,
+    /// Dry friction between the master's bodies and ground made up for by the motor, as far as it is known.
+    FrictionCompensated {
+        /// Share of the friction that is made up for, 0 to 1.
+        share: f64,
+    },
     /// Damping at the handle, played by the motor.
     Damping {
         /// N s/m or N m s/rad.
@@ -138,6 +145,11 @@ impl Change {
             }
             Change::Coupling { law } => couple(&mut trial.graph, law),
             Change::Damping { damping } => damped(&mut trial.graph, *damping),
+            Change::FrictionCompensated { share } => {
+                for element in masters(&mut trial.graph).flat_map(|m| &mut m.elements).filter(|e| is_friction_to_ground(e)) {
+                    element.law = element.law.scaled(1.0 - share);
+                }
+            }
             Change::Grip { factor } => firmer(&mut trial.graph, *factor),
             Change::Rate { hz } => {
                 let times = hz / trial.graph.timing.rate_hz;
@@ -179,6 +191,7 @@ impl Change {
             | Change::SensorRepaired { .. }
             | Change::FinerSensors
             | Change::Damping { .. }
+            | Change::FrictionCompensated { .. }
             | Change::Grip { .. }
             | Change::StrongerMotor
             | Change::NoLimits => None,
@@ -225,6 +238,9 @@ impl std::fmt::Display for Change {
                 write!(f, "couple master and slave by {} in the place of scaling and canceller (--coupling {law})", law.replace('_', " "))
             }
             Change::FinerSensors => write!(f, "read the position with a finer sensor"),
+            Change::FrictionCompensated { share } => {
+                write!(f, "let the master's motor make up for {:.0} % of its dry friction", 100.0 * share)
+            }
             Change::Damping { damping } => write!(f, "inject damping of {damping:.1} N s/m at the handle"),
             Change::Grip { factor } if *factor > 1.0 => write!(f, "hold the handle {factor:.1} times as firmly"),
             Change::Grip { factor } => write!(f, "hold the handle more softly, {factor:.1} times as firmly"),
@@ -243,14 +259,26 @@ fn cancellers(graph: &mut Graph, mut change: impl FnMut(&mut backdrive_nodes::gr
     }
 }
 
+/// Models of the masters.
+fn masters(graph: &mut Graph) -> impl Iterator<Item = &mut Model> {
+    graph.nodes.iter_mut().filter(|n| n.kind == NodeKind::Master).filter_map(|node| match &mut node.settings {
+        Settings::Master(files) => files.model.as_mut(),
+        _ => None,
+    })
+}
+
+/// Dry friction of a body against ground: what a motor can make up for.
+pub(crate) fn is_friction_to_ground(element: &Element) -> bool {
+    let is_friction = physics_named(element.law.kind().name).is_some_and(|physics| physics.family == Family::Friction);
+    is_friction && element.between.contains(&None)
+}
+
 /// A damper between each handle and ground.
 fn damped(graph: &mut Graph, damping: f64) {
-    for node in graph.nodes.iter_mut().filter(|n| n.kind == NodeKind::Master) {
-        let Settings::Master(files) = &mut node.settings else { continue };
-        let Some(model) = &mut files.model else { continue };
+    for model in masters(graph) {
         let users: Vec<usize> = model.axes.iter().map(|a| a.user).collect();
         for (number, user) in users.into_iter().enumerate() {
-            model.elements.push(backdrive_plant::model::Element {
+            model.elements.push(Element {
                 name: format!("injected_damping_{number}"),
                 between: [Some(user), None],
                 law: Law::Damper(backdrive_plant::elements::Damper { damping }),
@@ -269,5 +297,31 @@ pub fn firmer(graph: &mut Graph, factor: f64) {
         }
         let Some(model) = &mut files.model else { continue };
         model.scale_own_hand(factor);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use backdrive_nodes::graph::Overrides;
+    use std::path::Path;
+
+    #[test]
+    fn what_a_motor_makes_up_for_is_friction_against_ground_and_nothing_else() {
+        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../launch/contact.toml");
+        let mut trial = Trial::of(Graph::load(&file, &Overrides::default()).unwrap());
+        let law = |trial: &mut Trial| -> Vec<(bool, Vec<Vec<f64>>)> {
+            let model = masters(&mut trial.graph).next().unwrap();
+            model.elements.iter().map(|e| (is_friction_to_ground(e), e.law.values())).collect()
+        };
+        let before = law(&mut trial);
+        Change::FrictionCompensated { share: 0.8 }.apply(&mut trial);
+        let after = law(&mut trial);
+        assert!(before.iter().any(|(friction, _)| *friction) && before.iter().any(|(friction, _)| !friction));
+        for ((friction, was), (_, is)) in before.iter().zip(&after) {
+            // The force is the first number of a friction's law.
+            let left = if *friction { 0.2 } else { 1.0 };
+            assert!((is[0][0] - left * was[0][0]).abs() < 1e-12, "{was:?} {is:?}");
+        }
     }
 }

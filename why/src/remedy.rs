@@ -2,7 +2,7 @@
 
 use crate::cause::Cause;
 use crate::cause_kind::CauseKind;
-use crate::change::Change;
+use crate::change::{Change, is_friction_to_ground};
 use crate::trial::{Hand, Trial};
 use backdrive_nodes::graph::{DeviceFiles, NodeKind, Settings};
 use backdrive_stability::outcome::Outcome;
@@ -23,6 +23,9 @@ const BELOW: f64 = 0.8;
 
 /// Damping that is tried, N s/m, or as many thousandths of N m s/rad.
 const DAMPING: [f64; 5] = [2.0, 5.0, 10.0, 20.0, 50.0];
+
+/// Share of dry friction that a compensation makes up for: with more a friction that is less than it was taken for would be driven.
+const COMPENSATED: f64 = 0.8;
 
 /// Laws that are tried in the place of scaling.
 const COUPLINGS: [&str; 4] = ["wave", "passivity", "position_position", "virtual_coupling"];
@@ -213,6 +216,10 @@ fn candidates(was: &Trial, gain: Gain, edge: Option<f64>, causes: &[Cause]) -> V
     }
     all.push((vec![Change::Rate { hz: 2.0 * graph.timing.rate_hz }], false));
     all.extend(DAMPING.map(|damping| (vec![Change::Damping { damping: damping * unit_of_damping(was) }], false)));
+    let rubs = |files: &DeviceFiles| files.model.iter().flat_map(|m| &m.elements).any(is_friction_to_ground);
+    if master.as_ref().is_some_and(rubs) {
+        all.push((vec![Change::FrictionCompensated { share: COMPENSATED }], false));
+    }
     all.extend([1.5, 2.0, 0.6].map(|factor| (vec![Change::Grip { factor }], false)));
     if let Some(edge) = edge.filter(|e| *e < gain.product() / BELOW) {
         for share in [BELOW, 0.5, 0.25] {

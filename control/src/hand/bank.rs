@@ -15,12 +15,14 @@ pub struct HandSettings {
     pub softest: f64,
     /// The firmest; above `softest`.
     pub firmest: f64,
+    /// The gain product mu lambda from which on the loop shakes without a canceller, whichever of these hands holds; `None` where it is not known.
+    pub edge_without: Option<f64>,
 }
 
 impl Default for HandSettings {
     /// From half to twice the grip of the file.
     fn default() -> HandSettings {
-        HandSettings { softest: 0.5, firmest: 2.0 }
+        HandSettings { softest: 0.5, firmest: 2.0, edge_without: None }
     }
 }
 

@@ -9,10 +9,12 @@ use backdrive_msgs::MAX_AXES;
 const GUESS_AT: f64 = 0.1;
 /// By so many times of what a guess exceeds that a hand is taken to be firmer than it is estimated to be.
 const GUESS_COSTS: f64 = 5.0;
-/// Share of the predicted motion that is cancelled where it is fast: what is cancelled whole may be too much.
-const FAST_SHARE: f64 = 0.97;
-/// And where it is slow: what cannot be known at rest is left to the hand, which without a canceller is stable there.
-const SLOW_SHARE: f64 = 0.5;
+/// Most of the predicted motion that is cancelled where it is fast: what is cancelled whole may be too much.
+const MOST: f64 = 0.97;
+/// What is left over acts as no canceller at this share of the gain that the loop bears without one.
+const LEFT: f64 = 0.3;
+/// Where it is slow this much of the share is cancelled: what cannot be known at rest is left to the hand, which without a canceller is stable there.
+const SLOW: f64 = 0.5;
 /// Between slow and fast, Hz.
 const CORNER_HZ: f64 = 1.0;
 /// A force below this share of the largest of late is none.
@@ -66,11 +68,16 @@ pub struct Scheduled {
     force_keep: f64,
     let_go: f64,
     slow_gain: f64,
+    /// Share of the predicted motion that is cancelled where it is fast.
+    share: f64,
+    /// Gain product that the loop bears without a canceller, where it is known.
+    edge_without: Option<f64>,
 }
 
 impl Scheduled {
-    /// Around a bank.
-    pub fn new(bank: HandBank, period_s: f64) -> Scheduled {
+    /// Around a bank. `edge_without` is the gain product from which on the loop shakes without a canceller, in the softest and the firmest hand; where it is
+    /// not known as much is cancelled at any gain as a high one needs.
+    pub fn new(bank: HandBank, edge_without: Option<f64>, period_s: f64) -> Scheduled {
         let hands = bank.softness().len();
         let axis = |axis: usize| Axis {
             estimator: HandEstimator::new(bank.softness(), bank.sensor_noise(axis), period_s),
@@ -84,7 +91,20 @@ impl Scheduled {
         let axes = (0..bank.axes().min(MAX_AXES)).map(axis).collect();
         let (force_keep, let_go) = ((-period_s / FORCE_MEMORY_S).exp(), 1.0 - (-period_s / LET_GO_S).exp());
         let slow_gain = 1.0 - (-2.0 * std::f64::consts::PI * CORNER_HZ * period_s).exp();
-        Scheduled { bank, axes, started: false, force_keep, let_go, slow_gain }
+        Scheduled { bank, axes, started: false, force_keep, let_go, slow_gain, share: MOST, edge_without }
+    }
+
+    /// The gain product now in force, NaN where it is not known. No more is cancelled than it needs: what is left of the motion acts as the whole would at a
+    /// lower gain.
+    pub fn set_gain(&mut self, gain: f64) {
+        if let Some(edge) = self.edge_without.filter(|_| !gain.is_nan()) {
+            self.share = (1.0 - LEFT * edge / gain.max(f64::MIN_POSITIVE)).clamp(0.0, MOST);
+        }
+    }
+
+    /// Share of the predicted motion that is cancelled where it is fast.
+    pub fn share(&self) -> f64 {
+        self.share
     }
 
     /// What is known of the hand of an axis.
@@ -138,7 +158,7 @@ impl Scheduled {
                 axis.induced += self.let_go * (stands - axis.induced);
             }
             axis.slow += self.slow_gain * (axis.induced - axis.slow);
-            induced[number] = FAST_SHARE * (axis.induced - axis.slow) + SLOW_SHARE * axis.slow;
+            induced[number] = self.share * (axis.induced - axis.slow + SLOW * axis.slow);
         }
         induced
     }

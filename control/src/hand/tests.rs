@@ -40,7 +40,7 @@ impl Played {
     fn new(model: &Model, firmness: f64, changes: &[GripChange]) -> Played {
         let mut device = ChangingGrip::new(model, Some(&grip(firmness)), changes, PERIOD, &DeviceOptions::default()).unwrap();
         device.start(&[0.0], &[0.0]);
-        Played { scheduled: Scheduled::new(bank(model), PERIOD), device, step: 0, force: 0.0, events: Events::default() }
+        Played { scheduled: Scheduled::new(bank(model), None, PERIOD), device, step: 0, force: 0.0, events: Events::default() }
     }
 
     /// Goes on with this peak of a force that is a step every 0.1 s; the hand moves by 2 mm at 1 Hz.
@@ -115,7 +115,7 @@ fn until_something_is_known_the_firmest_hand_is_cancelled_and_half_of_what_it_do
     assert!(firmest >= HandSettings::default().firmest);
     assert!(bank.softness().windows(2).all(|w| w[0] < w[1]));
     let mut own = Device::new(&model, Some(&grip(firmest)), DeviceRole::Master, PERIOD, &DeviceOptions::default()).unwrap();
-    let mut scheduled = Scheduled::new(bank, PERIOD);
+    let mut scheduled = Scheduled::new(bank, None, PERIOD);
     let mut force = [0.0; MAX_AXES];
     scheduled.step(&force, None, &mut Events::default());
     own.start(&[0.0], &[]);
@@ -130,7 +130,21 @@ fn until_something_is_known_the_firmest_hand_is_cancelled_and_half_of_what_it_do
     }
     // At rest the handle gives way by F/k, and the linkage and the cable by their own.
     let gives = 2.0 / (400.0 * firmest) + 2.0 / 3950.0 + 2.0 / 39500.0;
-    assert!((induced / gives - 0.5).abs() < 0.005, "{induced} of {gives}");
+    assert!((induced / gives - 0.5 * 0.97).abs() < 0.005, "{induced} of {gives}");
+}
+
+#[test]
+fn what_is_left_acts_as_no_canceller_far_below_its_edge() {
+    let mut scheduled = Scheduled::new(bank(&master("impulse-engine-linear")), Some(2.0), PERIOD);
+    for gain in [0.1, 0.6, 1.0, 3.0, 10.0, 100.0] {
+        scheduled.set_gain(gain);
+        let left = (1.0 - scheduled.share()) * gain;
+        // All of a low gain, of a higher one no more than 0.3 of the edge, of a very high one what is never cancelled.
+        let expected = if gain < 0.6 { gain } else { f64::max(0.6, 0.03 * gain) };
+        assert!((left - expected).abs() < 1e-12, "{gain}: {left}");
+    }
+    let unknown = Scheduled::new(bank(&master("impulse-engine-linear")), None, PERIOD);
+    assert_eq!(unknown.share(), 0.97);
 }
 
 #[test]

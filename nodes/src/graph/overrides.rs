@@ -27,6 +27,8 @@ pub struct Overrides {
     pub high_pass_hz: Option<f64>,
     /// Whether the canceller takes the hand as its grip says (`as_modelled`) or estimates it (`estimated`).
     pub hand: Option<String>,
+    /// Of a canceller that estimates the hand: the gain product from which on the loop shakes without a canceller.
+    pub edge_without: Option<f64>,
     /// Position scale.
     pub mu: Option<f64>,
     /// Force scale.
@@ -114,7 +116,7 @@ impl Overrides {
             let keep = path.as_os_str() == "none";
             value(if keep { "none".to_string() } else { absolute(here, path).display().to_string() })
         };
-        let wanted: [(&str, NodeKind, &str, Option<Item>); 16] = [
+        let wanted: [(&str, NodeKind, &str, Option<Item>); 17] = [
             ("--master", NodeKind::Master, "model", self.master.as_ref().map(file)),
             ("--grip", NodeKind::Master, "grip", self.grip.as_ref().map(file)),
             ("--slave", NodeKind::Slave, "model", self.slave.as_ref().map(file)),
@@ -123,6 +125,7 @@ impl Overrides {
             ("--canceller-grip", NodeKind::Canceller, "grip", self.canceller_grip.as_ref().map(file)),
             ("--high-pass", NodeKind::Canceller, "high_pass_hz", self.high_pass_hz.map(value)),
             ("--hand", NodeKind::Canceller, "hand", self.hand.as_deref().map(value)),
+            ("--edge-without", NodeKind::Canceller, "edge_without", self.edge_without.map(value)),
             ("--dither", NodeKind::Scaling, "dither", self.dither.as_deref().map(value)),
             ("--guard", NodeKind::Scaling, "guard", self.guard.map(value)),
             ("--bag", NodeKind::Recorder, "bag", self.bag.as_ref().map(file)),

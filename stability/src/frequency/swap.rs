@@ -77,7 +77,8 @@ pub(super) fn induced(
     let mut core = match (&files.model, hand) {
         (Some(model), Some(hand)) => {
             let bank = HandBank::new(model, files.fragment.as_ref(), hand, session.period_s, &options);
-            Canceller::scheduled(bank.map_err(PartError::Canceller)?, high_pass_hz, session.period_s)
+            let recorded = if n > 0 { session.gain(0) } else { f64::NAN };
+            Canceller::scheduled(bank.map_err(PartError::Canceller)?, hand.edge_without, recorded, high_pass_hz, session.period_s)
         }
         (model, _) => {
             let held = |model| Device::new(model, files.fragment.as_ref(), DeviceRole::Master, session.period_s, &options);

@@ -119,10 +119,12 @@ impl NodeReader<'_> {
         let names = axis_names(&device);
         let estimated = table.one_of("hand", &[("as_modelled", false), ("estimated", true)])?.unwrap_or(false);
         let range = table.numbers("hand_range", Range::Positive)?;
-        let hand = match (estimated, range) {
+        let edge_without = table.number("edge_without", Range::Positive)?;
+        let unused = range.as_ref().map(|_| "hand_range").or(edge_without.map(|_| "edge_without"));
+        let hand = match (estimated, unused) {
             (false, None) => None,
-            (false, Some(_)) => return Err(table.error_at("hand_range", "means nothing without hand = \"estimated\"")),
-            (true, range) => Some(hand_settings(table, range.as_deref())?),
+            (false, Some(key)) => return Err(table.error_at(key, "means nothing without hand = \"estimated\"")),
+            (true, _) => Some(HandSettings { edge_without, ..hand_settings(table, range.as_deref())? }),
         };
         Ok((Settings::Canceller(device, high_pass_hz, hand), names))
     }
@@ -236,7 +238,7 @@ fn grip_changes(table: &mut Table) -> Result<Vec<GripChange>, FileError> {
 fn hand_settings(table: &Table, range: Option<&[f64]>) -> Result<HandSettings, FileError> {
     match range {
         None => Ok(HandSettings::default()),
-        Some([softest, firmest]) if softest < firmest => Ok(HandSettings { softest: *softest, firmest: *firmest }),
+        Some([softest, firmest]) if softest < firmest => Ok(HandSettings { softest: *softest, firmest: *firmest, edge_without: None }),
         Some(_) => Err(table.error_at("hand_range", "expected two factors on the grip of the file, the softer first, such as [0.5, 2.0]")),
     }
 }
