@@ -9,6 +9,8 @@ use crate::hypothesis::Hypothesis;
 use crate::problem::{Problem, Record};
 use crate::structure::{Role, Structure};
 use crate::tuning::tuning;
+use crate::work::Steps;
+use rayon::prelude::*;
 use std::collections::HashSet;
 
 /// A structure to be fitted: its hypotheses, where each starts, and the stated parameters to start from.
@@ -133,6 +135,16 @@ impl Course<'_> {
             self.fit_to_the_end(&mut running, tuning().search.ended);
         }
         let size = evaluator.len();
+        // Where the work ended before all recordings were looked at, the best so far are what the race gives.
+        if running.iter().all(|(_, f)| f.residuals.len() != size) {
+            running.truncate(further);
+            let whole = Evaluator { budget: evaluator.budget.extended(Steps::MAX), ..evaluator.clone() };
+            running.par_iter_mut().for_each(|(structure, fit)| {
+                if let Some(there) = whole.fit(structure, &fit.values, Effort { steps: 0, tolerance: 1.0 }) {
+                    *fit = there;
+                }
+            });
+        }
         let ended = running.into_iter().filter(|(_, f)| f.residuals.len() == size && f.cost.is_finite());
         ended.map(|(s, f)| candidate(evaluator, s, f)).collect()
     }

@@ -154,8 +154,8 @@ impl<'b, 'a> Beside<'b, 'a> {
         starts
     }
 
-    /// The first of two passes: all starts on the recordings with the largest residuals, the best so many go on. At most two of each hypothesis, and one
-    /// of each at least: what does little beside the base may do much beside something else.
+    /// The first of two passes: all starts on the recordings with the largest residuals, the best so many go on, at most two of each hypothesis. Of each
+    /// physics the best goes first, whatever it promises: what does little beside the base may do much beside something else.
     fn first_pass(&self, starts: &[Start<'b>], few: &[usize], most: usize, work: Steps) -> Vec<Start<'b>> {
         let (evaluator, problem, stride) = (self.evaluator, self.evaluator.problem, self.stride);
         let layout = evaluator.layout();
@@ -183,10 +183,12 @@ impl<'b, 'a> Beside<'b, 'a> {
             seen[s.1.0] += 1;
             seen[s.1.0] <= 2
         });
-        let mut first = HashSet::new();
-        let (firsts, seconds): (Vec<_>, Vec<_>) = scores.into_iter().map(|s| s.1).partition(|job| first.insert(job.0));
-        let room = most.saturating_sub(firsts.len());
-        firsts.into_iter().take(most).chain(seconds.into_iter().take(room)).collect()
+        let (mut kinds, mut first) = (HashSet::new(), HashSet::new());
+        let (of_a_kind, others): (Vec<_>, Vec<_>) =
+            scores.into_iter().map(|s| s.1).partition(|job| kinds.insert(self.hypotheses[job.0].physics.name));
+        first.extend(of_a_kind.iter().map(|job| job.0));
+        let (firsts, seconds): (Vec<_>, Vec<_>) = others.into_iter().partition(|job| first.insert(job.0));
+        of_a_kind.into_iter().chain(firsts).chain(seconds).take(most).collect()
     }
 
     /// The effect of a start in full and weakened.

@@ -105,6 +105,11 @@ impl<'s, 'a> State<'s, 'a> {
         done(&self.found, self.course.nominal, self.samples())
     }
 
+    /// Whether the best leaves as much as the noise and more, so that another effect may be what is missing.
+    pub fn leaves_much(&self) -> bool {
+        self.found.first().is_none_or(|c| c.fit.cost > tuning().noise.near * self.samples() as f64)
+    }
+
     /// Whether the best could be claimed at all: only then rivals have to be beaten.
     pub fn may_be_claimed(&self) -> bool {
         let (nominal, claim) = (self.course.nominal, &tuning().claim);

@@ -37,6 +37,8 @@ group! {
         share_of_effects: f64 = 0.25, "of the work", Cost("laws of many parameters must not starve all other steps");
         /// Structures that also start beside the stated parameters as given.
         from_the_given: usize = 10, "structures", Cost("one fit each, of some steps");
+        /// The same where the best leaves as much as the noise and more.
+        from_the_given_far: usize = 2, "structures", Cost("what leaves so much lacks another effect, whatever it starts from");
         /// Share of the step that resolves laws more finely, far from the noise.
         share_of_finer: f64 = 0.15, "of the work", Cost("as share_of_relatives");
         /// Work in which every law at a place takes its first step.

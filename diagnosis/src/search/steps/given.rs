@@ -33,6 +33,7 @@ impl Step for Given {
             Seed { stated: course.given.to_vec(), ..Seed::beside(problem, (&c.structure, &c.fit.values), effects, false) }
         };
         let near = |c: &&Candidate| c.fit.cost < tuning().search.behind_far * best.fit.cost;
-        brought_near(&course, &coarse, state.found.iter().filter(near).take(tuning().search.from_the_given).map(as_given).collect())
+        let count = if state.leaves_much() { tuning().search.from_the_given_far } else { tuning().search.from_the_given };
+        brought_near(&course, &coarse, state.found.iter().filter(near).take(count).map(as_given).collect())
     }
 }
