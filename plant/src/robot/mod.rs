@@ -11,6 +11,7 @@
 //! The algorithms are those of R. Featherstone, Rigid Body Dynamics Algorithms, Springer 2008 (RBDA below). Nothing is allocated while computing: a
 //! [`Workspace`] is made once and handed in. Units are SI: a coordinate and its force are rad and N m of a revolute joint, m and N of a prismatic one.
 
+mod arm;
 mod articulated;
 mod check;
 mod coriolis;
@@ -19,6 +20,8 @@ mod energy;
 mod error;
 mod file;
 mod forward_dynamics;
+mod found;
+mod gravity_stiffness;
 mod inertia;
 mod inverse_dynamics;
 mod kinematics;
@@ -29,9 +32,11 @@ mod tree;
 mod urdf;
 mod xml;
 
+pub use arm::Arm;
 pub use description::{Actuator, Joint, JointKind, Limits, Link, LinkInertia, Robot};
 pub use error::{Part, RobotError};
-pub use file::{Remark, RobotFile};
+pub use file::RobotFile;
+pub use found::Remark;
 pub use inertia::Inertia;
 pub use spatial::{Placement, Twist, Wrench};
 pub use tree::{Coordinate, Tree, Workspace};

@@ -80,9 +80,10 @@ impl Work {
 }
 
 impl Constraints {
-    /// Lists the friction contacts and those path elements that are too stiff for the substep; the latter are told so.
+    /// Lists the friction contacts and those path elements that are too stiff for the substep; the latter are told so. `from_forces` are what the bodies
+    /// answer to forces: first as they begin, then as they may come to answer where that changes on the way.
     pub(super) fn new(
-        from_force: &Columns,
+        from_forces: &[Columns],
         free: usize,
         substep: f64,
         frictions: &[FrictionContact],
@@ -92,21 +93,13 @@ impl Constraints {
         for contact in frictions {
             all.ends.push((contact.first, contact.second));
         }
-        let weight = |slot: usize, column: &Slots| if slot < free { column[slot] } else { 0.0 };
-        let respond = |(first, second): (usize, usize)| {
-            let mut response = [0.0; SLOTS];
-            for i in 0..free {
-                response[i] = weight(first, &transposed(from_force, i)) - weight(second, &transposed(from_force, i));
-            }
-            response
-        };
         // Several in one place add up: all that stay explicit must be stable together.
         let stiff = STIFF.min(0.5 / paths.len().max(1) as f64);
         for (index, path) in paths.iter_mut().enumerate() {
             let ends = (path.first, path.second);
-            let response = respond(ends);
             let slopes = path.law.slopes();
-            let stiffness = (weight(ends.0, &response) - weight(ends.1, &response)) * (0.5 * substep * slopes.stiffness + slopes.damping);
+            let most = from_forces.iter().fold(0.0, |most: f64, columns| most.max(across(ends, free, &respond(columns, free, ends))));
+            let stiffness = most * (0.5 * substep * slopes.stiffness + slopes.damping);
             if stiffness > if slopes.bounded { stiff } else { STIFF_UNBOUNDED } {
                 path.constraint = Some(all.ends.len());
                 path.unresolved = stiffness > if slopes.bounded { UNRESOLVED } else { STIFF };
@@ -115,13 +108,25 @@ impl Constraints {
                 all.ends.push(ends);
             }
         }
-        all.response = all.ends.iter().map(|ends| respond(*ends)).collect();
-        for ends in &all.ends {
-            for response in &all.response {
-                all.compliance.push(weight(ends.0, response) - weight(ends.1, response));
-            }
+        all.response = vec![[0.0; SLOTS]; all.ends.len()];
+        all.compliance = vec![0.0; all.ends.len() * all.ends.len()];
+        if let Some(now) = from_forces.first() {
+            all.answer_by(now, free);
         }
         all
+    }
+
+    /// What the bodies answer to forces is now this.
+    pub(super) fn answer_by(&mut self, from_force: &Columns, free: usize) {
+        for (response, ends) in self.response.iter_mut().zip(&self.ends) {
+            *response = respond(from_force, free, *ends);
+        }
+        let count = self.ends.len();
+        for (c, ends) in self.ends.iter().enumerate() {
+            for (d, response) in self.response.iter().enumerate() {
+                self.compliance[c * count + d] = across(*ends, free, response);
+            }
+        }
     }
 
     #[inline]
@@ -270,13 +275,20 @@ impl Constraints {
     }
 }
 
-/// Row i of A⁻¹ as a column (it is symmetric but for rounding).
-fn transposed(columns: &Columns, i: usize) -> Slots {
-    let mut row = [0.0; SLOTS];
-    for (j, column) in columns.iter().enumerate() {
-        row[j] = column[i];
+/// What a unit of a constraint's force takes from the velocities of the free bodies.
+fn respond(from_force: &Columns, free: usize, (first, second): (usize, usize)) -> Slots {
+    let weight = |slot: usize, i: usize| if slot < free { from_force[slot][i] } else { 0.0 };
+    let mut response = [0.0; SLOTS];
+    for (i, value) in response.iter_mut().enumerate().take(free) {
+        *value = weight(first, i) - weight(second, i);
     }
-    row
+    response
+}
+
+/// What of velocities of free bodies is seen across two places.
+fn across((first, second): (usize, usize), free: usize, velocity: &Slots) -> f64 {
+    let at = |slot: usize| if slot < free { velocity[slot] } else { 0.0 };
+    at(first) - at(second)
 }
 
 impl PathElement {

@@ -10,6 +10,8 @@ use super::state::Plant;
 
 /// Sweeps over the friction contacts: accelerations need no more digits than an output has.
 const SWEEPS: usize = 200;
+/// Of a network without a robot.
+const NO_BIAS: Slots = [0.0; SLOTS];
 
 impl Plant {
     /// The balance of forces now. Sliding contacts have the level of their speed; those that stick what keeps their
@@ -24,6 +26,7 @@ impl Plant {
     pub(super) fn balance(&self, now: &mut Endpoint) {
         let fixed = &self.fixed;
         let mut force = [0.0; SLOTS];
+        let bias = self.links.as_ref().map_or(&NO_BIAS, |links| &links.bias);
         let prescribed = GROUND - fixed.prescribed;
         for i in prescribed..GROUND {
             now.acceleration[i] = self.prescribed_acceleration[i];
@@ -37,7 +40,7 @@ impl Plant {
             for j in prescribed..GROUND {
                 f -= mass[j] * self.prescribed_acceleration[j];
             }
-            force[i] = f;
+            force[i] = f - bias[i];
         }
         for (path, f) in self.paths.iter().zip(&mut now.path) {
             let (first, second) = (path.first, path.second);
@@ -115,7 +118,8 @@ impl Plant {
             return 0.0;
         }
         let fixed = &self.fixed;
-        let mut reaction = -fixed.constant[slot] - self.pushed[slot];
+        let bias = self.links.as_ref().map_or(0.0, |links| links.bias[slot]);
+        let mut reaction = bias - fixed.constant[slot] - self.pushed[slot];
         for j in (0..fixed.free).chain(GROUND - fixed.prescribed..GROUND) {
             reaction +=
                 fixed.mass[slot][j] * now.acceleration[j] + fixed.damping[slot][j] * self.v[j] + fixed.stiffness[slot][j] * self.x[j];

@@ -6,6 +6,7 @@ use super::constraints::Work;
 use super::contact::FrictionContact;
 use super::drive::Drive;
 use super::instant::Endpoint;
+use super::links::Links;
 use super::motion::Motion;
 use super::path::PathElement;
 use super::propagator::Propagator;
@@ -47,6 +48,7 @@ pub struct Plant {
     pub(super) sense: Sense,
     pub(super) energy: Option<Account>,
     pub(super) exact: Option<Propagator>,
+    pub(super) links: Option<Box<Links>>,
 }
 
 impl Plant {
@@ -80,6 +82,7 @@ impl Plant {
             path.rise = 1.0;
             path.absorbed = 0.0;
         }
+        self.links_here();
         self.restart_energy();
         self.restart_sense();
     }
@@ -93,6 +96,7 @@ impl Plant {
         for path in self.paths.iter_mut().filter(|path| path.first == slot || path.second == slot) {
             path.reached = self.x[path.first] - self.x[path.second];
         }
+        self.links_here();
         self.restart_energy();
         self.restart_sense();
     }

@@ -93,3 +93,21 @@ pub fn rods(rods: &[(f64, f64)]) -> Robot {
     }
     robot
 }
+
+/// The same chain as a URDF.
+pub fn rods_urdf(rods: &[(f64, f64)]) -> String {
+    let mut text = "<robot name=\"rods\"><link name=\"base\"/>".to_owned();
+    let (mut reach, mut parent) = (0.0, "base".to_owned());
+    for (i, (mass, length)) in rods.iter().enumerate() {
+        let across = mass * length * length / 12.0;
+        text += &format!(
+            "<link name=\"rod{i}\"><inertial><origin xyz=\"{} 0 0\"/><mass value=\"{mass}\"/>\
+             <inertia ixx=\"0\" ixy=\"0\" ixz=\"0\" iyy=\"{across}\" iyz=\"0\" izz=\"{across}\"/></inertial></link>\
+             <joint name=\"joint{i}\" type=\"continuous\"><parent link=\"{parent}\"/><child link=\"rod{i}\"/>\
+             <origin xyz=\"{reach} 0 0\"/><axis xyz=\"0 -1 0\"/></joint>",
+            0.5 * length
+        );
+        (reach, parent) = (*length, format!("rod{i}"));
+    }
+    text + "</robot>"
+}

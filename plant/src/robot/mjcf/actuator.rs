@@ -3,7 +3,7 @@
 use super::compiler::Compiler;
 use super::defaults::{Defaults, Styled};
 use crate::robot::description::Actuator;
-use crate::robot::file::Found;
+use crate::robot::found::Found;
 use crate::robot::xml::Element;
 use crate::tomlfile::{FileError, unknown};
 

@@ -1,14 +1,13 @@
 //! `<body>`: links, the joints that carry them, and their inertia.
 
-use super::SAVE_WHOLE;
-use super::compiler::{Compiler, FromGeoms};
+use super::compiler::{Compiler, FromGeoms, SAVE_WHOLE};
 use super::defaults::{ClassIndex, Defaults, Styled};
 use super::geom;
 use super::joint::{self, Anchored};
 use super::orientation::{placement, rotation};
 use crate::elements::Range;
 use crate::robot::description::{Joint, JointKind, Link, LinkInertia};
-use crate::robot::file::Found;
+use crate::robot::found::Found;
 use crate::robot::inertia::Inertia;
 use crate::robot::spatial::Placement;
 use crate::robot::xml::Element;

@@ -1,9 +1,11 @@
 //! `<compiler>`: how the numbers of a file are to be understood.
 
-use super::SAVE_WHOLE;
 use crate::elements::Range;
 use crate::robot::xml::Element;
 use crate::tomlfile::FileError;
+
+/// What to do about what is not read in.
+pub(super) const SAVE_WHOLE: &str = "let MuJoCo write the whole model (mujoco.mj_saveLastXML in Python) and name that file";
 
 /// Where a body's inertia comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

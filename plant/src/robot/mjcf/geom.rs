@@ -1,7 +1,6 @@
 //! Inertia of simple geoms: sphere, capsule, cylinder, ellipsoid, box.
 
-use super::SAVE_WHOLE;
-use super::compiler::Compiler;
+use super::compiler::{Compiler, SAVE_WHOLE};
 use super::defaults::Styled;
 use super::orientation::placement;
 use crate::elements::Range;

@@ -1,11 +1,10 @@
 //! `<joint>`.
 
-use super::SAVE_WHOLE;
-use super::compiler::Compiler;
+use super::compiler::{Compiler, SAVE_WHOLE};
 use super::defaults::Styled;
 use crate::elements::Range;
 use crate::robot::description::{Joint, JointKind, Limits};
-use crate::robot::file::Remarks;
+use crate::robot::found::Remarks;
 use crate::robot::spatial::Placement;
 use crate::tomlfile::{FileError, unknown};
 use nalgebra::Vector3;

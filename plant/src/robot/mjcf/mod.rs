@@ -12,15 +12,12 @@ mod joint;
 mod orientation;
 
 use super::description::{Link, Robot};
-use super::file::{Found, Remarks};
+use super::found::{Found, Remarks};
 use super::xml::Element;
 use crate::tomlfile::FileError;
-use compiler::Compiler;
+use compiler::{Compiler, SAVE_WHOLE};
 use defaults::Defaults;
 use nalgebra::Vector3;
-
-/// What a file can be made of that has nothing of this in it any more.
-const SAVE_WHOLE: &str = "let MuJoCo write the whole model (mujoco.mj_saveLastXML in Python) and name that file";
 
 pub(super) fn read(root: Element) -> Result<Found, FileError> {
     let mut found =

@@ -1,9 +1,9 @@
 //! Joints of a URDF.
 
-use super::{number_or, origin};
+use super::origin::{number_or, origin};
 use crate::elements::Range;
 use crate::robot::description::{Joint, JointKind, Limits, Robot};
-use crate::robot::file::Remarks;
+use crate::robot::found::Remarks;
 use crate::robot::xml::Element;
 use crate::tomlfile::{FileError, unknown};
 use nalgebra::Vector3;

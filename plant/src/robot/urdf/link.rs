@@ -1,9 +1,9 @@
 //! Links of a URDF.
 
-use super::origin;
+use super::origin::origin;
 use crate::elements::Range;
 use crate::robot::description::{Link, LinkInertia};
-use crate::robot::file::Remarks;
+use crate::robot::found::Remarks;
 use crate::robot::xml::Element;
 use crate::tomlfile::FileError;
 use nalgebra::Matrix3;

@@ -5,14 +5,12 @@
 
 mod joint;
 mod link;
+mod origin;
 
 use super::description::{Link, Robot};
-use super::file::Found;
+use super::found::Found;
 use super::xml::Element;
-use crate::elements::Range;
-use crate::robot::Placement;
 use crate::tomlfile::FileError;
-use nalgebra::{Rotation3, Vector3};
 
 /// The name that a joint may give the world by, without a link of that name (Drake reads files so).
 const WORLD: &str = "world";
@@ -75,17 +73,4 @@ fn base_first(root: Element, found: &mut Found) -> Result<(), FileError> {
     let line = found.link_lines.remove(base);
     found.link_lines.insert(0, line);
     Ok(())
-}
-
-/// `<origin xyz rpy>`; nothing is no shift and no turn.
-fn origin(element: Option<Element>) -> Result<Placement, FileError> {
-    let Some(element) = element else { return Ok(Placement::default()) };
-    let translation = element.vector("xyz")?.unwrap_or_else(Vector3::zeros);
-    let turns = element.vector("rpy")?.unwrap_or_else(Vector3::zeros);
-    Ok(Placement { rotation: *Rotation3::from_euler_angles(turns.x, turns.y, turns.z).matrix(), translation })
-}
-
-/// A number that may be left out.
-fn number_or(element: Option<Element>, name: &str, range: Range, default: f64) -> Result<f64, FileError> {
-    Ok(element.map(|element| element.number(name, range)).transpose()?.flatten().unwrap_or(default))
 }
