@@ -1,4 +1,4 @@
-//! Random trees read from URDF and MJCF, against what Pinocchio and MuJoCo make of the same files.
+//! Random trees read from URDF and MJCF, against what Pinocchio and MuJoCo make of the same files, and arms in motion against MuJoCo.
 //!
 //! `BACKDRIVE_PYTHON` names a Python that has `tests/python/requirements.txt`. Without it the test is skipped, unless `BACKDRIVE_REQUIRE_PYTHON=1`.
 
@@ -6,7 +6,9 @@
 mod python;
 mod robot_common;
 
+use backdrive_plant::model::Model;
 use backdrive_plant::robot::{RobotFile, Tree};
+use backdrive_plant::stepper::{Options, simulate};
 use python::python;
 use robot_common::{mass_matrix, share};
 use serde::Deserialize;
@@ -73,13 +75,20 @@ fn compare(case: &Case, folder: &Path) -> [f64; 6] {
     ]
 }
 
+/// What a script draws and works out, in a folder; `None` without a Python.
+fn drawn(script: &str) -> Option<tempfile::TempDir> {
+    let python = python("that has tests/python/requirements.txt")?;
+    let folder = tempfile::tempdir().unwrap();
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/python").join(script);
+    let mut command = Command::new(python);
+    let output = command.arg(script).arg(folder.path()).env("OMP_NUM_THREADS", "1").env("PYTHONDONTWRITEBYTECODE", "1").output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    Some(folder)
+}
+
 #[test]
 fn random_trees_agree_with_pinocchio_and_mujoco() {
-    let Some(python) = python("that has tests/python/requirements.txt") else { return };
-    let folder = tempfile::tempdir().unwrap();
-    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/python/robot_trees.py");
-    let output = Command::new(python).arg(script).arg(folder.path()).env("OMP_NUM_THREADS", "1").output().unwrap();
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let Some(folder) = drawn("robot_trees.py") else { return };
     let cases: Vec<Case> = serde_json::from_slice(&std::fs::read(folder.path().join("expected.json")).unwrap()).unwrap();
     assert!(cases.len() >= 60);
     let mut broken = Vec::new();
@@ -98,6 +107,56 @@ fn random_trees_agree_with_pinocchio_and_mujoco() {
         }
         let shown: Vec<String> = RESPECTS.iter().zip(worst.0).map(|(what, worst)| format!("{what} {worst:.1e}")).collect();
         println!("{name} trees against {tool}: {count} of them, largest differences: {}", shown.join(", "));
+    }
+    assert!(broken.is_empty(), "{}", broken.join("\n"));
+}
+
+#[derive(Deserialize)]
+struct Moved {
+    name: String,
+    push: Vec<Vec<f64>>,
+    steps: Vec<f64>,
+    /// At each of MuJoCo's steps, of each joint.
+    positions: Vec<Vec<Vec<f64>>>,
+}
+
+/// Largest difference of any joint, as a share of its range.
+fn apart(found: &[Vec<f64>], expected: &[Vec<f64>]) -> f64 {
+    let of = |(found, expected): (&Vec<f64>, &Vec<f64>)| {
+        let range = |f: fn(f64, f64) -> f64| expected.iter().copied().reduce(f).unwrap();
+        let largest = found.iter().zip(expected).fold(0.0, |most: f64, (a, b)| most.max((a - b).abs()));
+        largest / (range(f64::max) - range(f64::min))
+    };
+    found.iter().zip(expected).map(of).fold(0.0, f64::max)
+}
+
+#[test]
+fn arms_move_as_mujoco_moves_them() {
+    let Some(folder) = drawn("robot_motions.py") else { return };
+    let cases: Vec<Moved> = serde_json::from_slice(&std::fs::read(folder.path().join("expected.json")).unwrap()).unwrap();
+    let mut broken = Vec::new();
+    for case in &cases {
+        let model = Model::load(&folder.path().join(format!("{}.toml", case.name))).unwrap_or_else(|e| panic!("{e}"));
+        let run = |substeps: Option<usize>| simulate(&model, &case.push, 1e-3, &Options { substeps, ..Options::default() }).unwrap();
+        let theirs = case.positions.last().unwrap();
+        let [coarse, fine] = [4, 16].map(|substeps| apart(&run(Some(substeps)), theirs));
+        let chosen = apart(&run(None), theirs);
+        println!(
+            "{}: ours from MuJoCo at {:.0e} s: as chosen {chosen:.1e}, 250 us {coarse:.1e}, 62.5 us {fine:.1e}",
+            case.name,
+            case.steps.last().unwrap()
+        );
+        if case.name == "rubbing" {
+            // MuJoCo comes to our solution as its step shrinks.
+            let exact = run(Some(64));
+            let distances: Vec<f64> = case.positions.iter().map(|theirs| apart(&exact, theirs)).collect();
+            println!("{}: MuJoCo from ours at 16 us, at its steps {:?}: {distances:?}", case.name, case.steps);
+            if !(distances[0] > 2.0 * distances[1] && distances[1] > 2.0 * distances[2] && distances[2] < 1e-3) {
+                broken.push(format!("{}: {distances:?}", case.name));
+            }
+        } else if !(fine < 1e-5 && coarse / fine > 12.0 && chosen < 1e-3) {
+            broken.push(format!("{}: {chosen} {coarse} {fine}", case.name));
+        }
     }
     assert!(broken.is_empty(), "{}", broken.join("\n"));
 }
