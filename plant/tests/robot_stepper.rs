@@ -282,6 +282,32 @@ fn a_joint_that_is_led_moves_the_others() {
     assert!(errors[0] < 1e-4 && errors[1] < 3e-5, "{errors:?}");
 }
 
+#[test]
+fn an_arm_falls_onto_its_stops_and_rests_there() {
+    let mut text = String::new();
+    for (i, gap) in [0.3, 0.5].into_iter().enumerate() {
+        text += &format!(
+            "[[elements]]\nname = 'stop{i}'\nkind = 'contact'\nbetween = ['ground', 'joint{i}']\nstiffness = 1e7\ndamping = 300\ngap = {gap}\n\
+             [[elements]]\nkind = 'damper'\nbetween = ['joint{i}', 'ground']\ndamping = 0.2\n\
+             [[outputs]]\nname = 'f{i}'\nkind = 'force'\nelement = 'stop{i}'\n"
+        );
+    }
+    let mut plant = Plant::new(&arm(&RODS, "", &text), 1e-3, &Options::default()).unwrap();
+    let total = |plant: &Plant| plant.energy().kinetic + plant.energy().stored;
+    let first = total(&plant);
+    for _ in 0..4000 {
+        plant.step(&held(0));
+        assert!(total(&plant) < first + 1e-3, "a stop gives no energy: {} {first}", total(&plant));
+    }
+    assert!((plant.position(0) + 0.3).abs() < 1e-5 && (plant.position(1) + 0.5).abs() < 1e-5 && plant.velocity(0).abs() < 1e-6);
+    // The stops carry what gravity asks.
+    let tree = Tree::new(&rods(&RODS)).unwrap();
+    let (mut outputs, mut gravity) = ([0.0; 2], [0.0; 2]);
+    plant.outputs(&mut outputs);
+    tree.gravity(&[plant.position(0), plant.position(1)], &mut tree.workspace(), &mut gravity);
+    assert!(share(&outputs, &gravity) < 1e-4, "{outputs:?} {gravity:?}");
+}
+
 fn model_pushed() -> Model {
     let outputs: String = (0..2).map(|i| format!("[[outputs]]\nname = 'q{i}'\nkind = 'position'\nof = 'joint{i}'\n")).collect();
     arm(&RODS, "", &format!("[[inputs]]\nname = 'push'\nkind = 'force'\non = 'joint0'\nhold = 'cubic'\n{outputs}"))

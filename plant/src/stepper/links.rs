@@ -59,6 +59,11 @@ impl Links {
         }
     }
 
+    /// How many coordinates there are.
+    pub(super) fn len(&self) -> usize {
+        self.slots.len()
+    }
+
     /// Inertia of the network with the links at these coordinates.
     pub(super) fn mass_at(&mut self, coordinates: &[f64]) -> Square {
         self.q.copy_from_slice(coordinates);
@@ -126,15 +131,17 @@ impl Links {
             }
         }
         for j in 0..n {
-            for i in 0..n {
-                let (mut by_position, mut by_damping) = (0.0, 0.0);
-                for k in 0..n {
-                    by_position += system[i][k] * fixed.stiffness[k][j];
-                    by_damping += system[i][k] * fixed.damping[k][j];
+            let (mut by_position, mut by_velocity) = ([0.0; SLOTS], [0.0; SLOTS]);
+            // Few bodies are tied to each other.
+            for k in (0..n).filter(|k| fixed.stiffness[*k][j] != 0.0 || fixed.damping[*k][j] != 0.0) {
+                let (stiffness, column) = (fixed.stiffness[k][j], &fixed.from_force[k]);
+                let damping = fixed.damping[k][j] + 0.5 * substep * stiffness;
+                for i in 0..n {
+                    by_position[i] -= column[i] * stiffness;
+                    by_velocity[i] -= column[i] * damping;
                 }
-                fixed.from_position[j][i] = -by_position;
-                fixed.from_velocity[j][i] = -(by_damping + 0.5 * substep * by_position);
             }
+            (fixed.from_position[j], fixed.from_velocity[j]) = (by_position, by_velocity);
         }
         for p in 0..fixed.prescribed {
             let slot = prescribed_slot(p);

@@ -20,6 +20,9 @@ const IMPLICIT: usize = 6;
 /// What a costly law adds to a substep, in steps of a linear network.
 const COSTLY: usize = 6;
 
+/// What the links of a robot add to a substep, in steps of a linear network, for each pair of coordinates.
+const LINKS: usize = 5;
+
 /// The balance of forces at a sample, in steps of a linear network.
 const BALANCE: usize = 3;
 
@@ -159,7 +162,9 @@ impl Plant {
     /// implicitly several evaluations of their law, and costly laws more.
     pub fn cost(&self) -> u64 {
         let (implicit, costly) = self.dear();
-        (self.substeps * (1 + self.frictions.len() + self.paths.len() + IMPLICIT * implicit + COSTLY * costly) + self.balances()) as u64
+        let links = self.links.as_ref().map_or(0, |links| LINKS * links.len() * links.len());
+        (self.substeps * (1 + links + self.frictions.len() + self.paths.len() + IMPLICIT * implicit + COSTLY * costly) + self.balances())
+            as u64
     }
 
     /// The same of derivatives by one parameter that are carried along (see [`crate::stepper::Tangents`]).
