@@ -2,6 +2,7 @@
 
 mod robot_common;
 
+use backdrive_plant::describe::{Severity, check, describe};
 use backdrive_plant::elements::Law;
 use backdrive_plant::linear::{LinearModel, Operating};
 use backdrive_plant::model::{Model, Motion};
@@ -179,4 +180,51 @@ fn a_joint_can_not_be_locked_but_other_bodies_can() {
     assert_eq!(model.bodies.len(), 3);
     assert_eq!(model.arm.as_ref().unwrap().bodies, [0, 1]);
     assert!(Plant::new(&model, 1e-3, &Options::default()).is_ok());
+}
+
+#[test]
+fn the_robots_of_this_folder_can_be_shown_and_moved() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("robots/two-joint-arm.toml");
+    let model = Model::load(&path).unwrap_or_else(|e| panic!("{e}"));
+    let shown = describe(&model, &Operating::small());
+    let text = shown.to_string();
+    println!("{text}");
+    for line in [
+        "robot two-joint-arm: 2 joints move 3 kg, gravity (0, 0, -9.81) m/s²",
+        "shoulder  revolute  upper_arm  0.4 rad",
+        "[shoulder] joint of the robot",
+        "[elbow.rotor] 0.06 kg m²",
+        "note: robot file: line 25 and 1 more: <limit>: read, but nothing stops a joint at its limits",
+    ] {
+        assert!(text.contains(line), "{line}\n{text}");
+    }
+    assert_eq!(shown.not_linear, None);
+    assert!(check(&model, &Operating::small()).iter().all(|remark| remark.severity != Severity::Error));
+    assert_eq!(Model::from_toml(&model.to_toml(), "again").unwrap(), model);
+    // Let go, it swings and comes to rest.
+    let mut plant = Plant::new(&model, 1e-3, &Options::default()).unwrap();
+    (0..6000).for_each(|_| plant.step(&[]));
+    assert!(
+        plant.is_finite() && plant.velocity(0).abs() < 1e-6 && plant.position(0).abs() > 0.01,
+        "{} {}",
+        plant.position(0),
+        plant.velocity(0)
+    );
+}
+
+#[test]
+fn a_slide_is_told_in_metres_and_a_hinge_in_radians() {
+    let mjcf = "<mujoco><worldbody><body name='a'><joint name='lift' type='slide'/><geom size='0.1'/><body name='b'><joint name='turn' axis='0 1 0' armature='2'/>\
+                <geom size='0.1' pos='0.2 0 0'/></body></body></worldbody></mujoco>";
+    let text = format!(
+        "[robot]\nxml = \"\"\"{mjcf}\"\"\"\n[bodies]\nnut = 3\n[[elements]]\nname = 'screw'\nkind = 'spring'\nbetween = ['nut', 'lift']\nstiffness = 10\n\
+         [[elements]]\nname = 'shaft'\nkind = 'spring'\nbetween = ['turn', 'ground']\nstiffness = 20\n"
+    );
+    let shown = describe(&Model::from_toml(&text, "mixed").unwrap(), &Operating::small());
+    let units: Vec<&str> = shown.bodies.iter().map(|b| b.unit.as_str()).collect();
+    assert_eq!(units, ["kg", "kg m²", "kg"]);
+    let of = |name: &str| shown.elements.iter().find(|e| e.name == name).unwrap().parameters[0].unit.clone();
+    assert_eq!((of("screw").as_str(), of("shaft").as_str()), ("N/m", "N m/rad"));
+    assert_eq!(shown.robot.unwrap().joints[0].unit, "m");
+    assert!(shown.diagram.contains("[turn] joint of the robot, armature 2 kg m²"), "{}", shown.diagram);
 }

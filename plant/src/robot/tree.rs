@@ -173,6 +173,11 @@ impl Tree {
         }
     }
 
+    /// Mass of all bodies that move, kg.
+    pub fn moving_mass(&self) -> f64 {
+        self.bodies.iter().map(|body| body.inertia.mass).sum()
+    }
+
     /// Space for computing.
     pub fn workspace(&self) -> Workspace {
         let count = self.len();
