@@ -141,7 +141,8 @@ impl Joint {
         if !finite || (rotation.transpose() * rotation - Matrix3::identity()).amax() > 1e-9 {
             return Err("its place in the parent must be a rotation and a finite shift".to_owned());
         }
-        if self.kind != JointKind::Fixed && !((self.axis.norm() - 1.0).abs() < 1e-9) {
+        let is_unit = self.axis.iter().all(|x| x.is_finite()) && (self.axis.norm() - 1.0).abs() <= 1e-9;
+        if self.kind != JointKind::Fixed && !is_unit {
             return Err(format!("its axis must be a vector of length 1, is ({}, {}, {})", self.axis.x, self.axis.y, self.axis.z));
         }
         for (what, value) in

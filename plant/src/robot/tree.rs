@@ -96,7 +96,7 @@ impl Tree {
         let mut matrix = DMatrix::zeros(tree.len(), tree.len());
         let rest: Vec<f64> = tree.bodies.iter().map(|body| body.reference).collect();
         tree.mass_matrix(&rest, &mut tree.workspace(), &mut matrix);
-        match (0..tree.len()).find(|i| !(matrix[(*i, *i)] > 0.0)) {
+        match (0..tree.len()).find(|i| matrix[(*i, *i)].is_nan() || matrix[(*i, *i)] <= 0.0) {
             None => Ok(tree),
             Some(i) => {
                 let joint = tree.coordinates[i].joint;

@@ -9,7 +9,7 @@ impl Plant {
     #[inline]
     pub(super) fn links_to_the_middle(&mut self, motion: &mut Motion) {
         if let Some(links) = &mut self.links {
-            links.to_the_middle(&mut self.fixed, self.substep, &self.v, motion);
+            links.enter(&mut self.fixed, self.substep, &self.v, motion);
         }
     }
 

@@ -82,7 +82,7 @@ impl Links {
     }
 
     /// What the links make of the substep that begins with velocities `v` and has the bodies at `motion.middle` in its middle.
-    pub(super) fn to_the_middle(&mut self, fixed: &mut Compiled, substep: f64, v: &Slots, motion: &mut Motion) {
+    pub(super) fn enter(&mut self, fixed: &mut Compiled, substep: f64, v: &Slots, motion: &mut Motion) {
         for (i, slot) in self.slots.iter().enumerate() {
             (self.q[i], self.v[i]) = (self.pose[i] + motion.middle[*slot], v[*slot]);
         }

@@ -161,7 +161,7 @@ impl<'a> Around<'a, '_> {
                 if let Some(inertial) = replaced {
                     found.remarks.add("<inertial>", inertial.line(), "not read: inertiafromgeom=\"true\" takes inertia from geoms", false);
                 }
-                self.from_geoms(held)
+                self.inertia_of_geoms(held)
             }
         }
     }
@@ -181,7 +181,7 @@ impl<'a> Around<'a, '_> {
         Ok(LinkInertia { mass, centre: Vector3::from(centre), about_centre: 0.5 * (turned + turned.transpose()) })
     }
 
-    fn from_geoms(&self, held: &[Held<'a>]) -> Result<Option<LinkInertia>, FileError> {
+    fn inertia_of_geoms(&self, held: &[Held<'a>]) -> Result<Option<LinkInertia>, FileError> {
         let mut sum = Inertia::default();
         for (element, frame, class) in held.iter().filter(|(element, ..)| element.tag() == "geom") {
             sum += geom::inertia(&self.defaults.styled(*element, *class, &["geom"])?, self.compiler, frame)?;

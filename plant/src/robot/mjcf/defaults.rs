@@ -83,7 +83,7 @@ impl<'a> Styled<'a, '_> {
         while let Some(index) = class {
             let class_here = &self.defaults.classes[index];
             let speaks = |element: &&Element<'a>| self.tags.contains(&element.tag());
-            let last = class_here.elements.iter().filter(speaks).filter_map(|e| e.attribute(name).map(|text| (*e, text))).last();
+            let last = class_here.elements.iter().filter(speaks).filter_map(|e| e.attribute(name).map(|text| (*e, text))).next_back();
             if last.is_some() {
                 return last;
             }

@@ -70,9 +70,10 @@ fn left_aside(section: Element, remarks: &mut Remarks) -> Result<(), FileError> 
         "compiler" | "default" | "worldbody" | "actuator" => return Ok(()),
         "include" => return Err(section.error(format!("other files are not read in: {SAVE_WHOLE}"))),
         "equality" => {
-            for equality in section.children().filter(|e| e.attribute("active") != Some("false")) {
-                let message = "ties bodies or joints to each other, which a tree cannot: take it out, or give it active=\"false\"; a stiff spring between two joints \
-                     in the model file can tie them";
+            let acting = section.children().find(|e| e.attribute("active") != Some("false"));
+            if let Some(equality) = acting {
+                let message = "ties bodies or joints to each other, which a tree cannot: take it out, or give it active=\"false\"; a stiff spring between two \
+                               joints in the model file can tie them";
                 return Err(equality.error(message));
             }
             return Ok(());
