@@ -1,6 +1,8 @@
 //! Robot files: what is read of URDF and MJCF, what is said of the rest, and what they are refused with.
 
-use backdrive_plant::robot::{JointKind, RobotFile};
+mod robot_common;
+
+use backdrive_plant::robot::{JointKind, RobotFile, Tree};
 use nalgebra::Vector3;
 
 const ARM: &str = r#"<?xml version="1.0"?>
@@ -230,4 +232,38 @@ fn an_mjcf_is_refused_in_a_sentence_with_its_line() {
     );
     let deep = format!("<mujoco><worldbody>{}{}</worldbody></mujoco>", "<body>".repeat(300), "</body>".repeat(300));
     refused(&deep, "more than 200 bodies within each other");
+}
+
+#[test]
+fn whatever_a_file_holds_it_is_read_or_refused() {
+    // Values of good files changed at random: an error may come of it, or a robot that can be computed.
+    let (mut draw, mut read) = (robot_common::Draw::new(9), 0);
+    let words = ["nan", "inf", "-1", "0", "1e308", "", "<", "\"", "joint", "fixed", "ball", "box", "1 2", "world", "true", "]]>", "&#0;"];
+    for round in 0..6000 {
+        let mut text = [ARM, MUJOCO][round % 2].to_owned();
+        for _ in 0..1 + draw.below(3) {
+            let quotes: Vec<usize> = text.match_indices('"').map(|(at, _)| at).collect();
+            let spans: Vec<(usize, usize)> = quotes.windows(2).map(|w| (w[0] + 1, w[1])).collect();
+            if spans.is_empty() {
+                break;
+            }
+            let (from, to) = spans[draw.below(spans.len())];
+            match draw.below(3) {
+                0 => text.replace_range(from..to, words[draw.below(words.len())]),
+                1 => text.replace_range(from..to, ""),
+                _ => {
+                    let (other_from, other_to) = spans[draw.below(spans.len())];
+                    let other = text[other_from..other_to].to_owned();
+                    text.replace_range(from..to, &other);
+                }
+            }
+        }
+        if let Ok(file) = RobotFile::from_xml(&text, "arm.xml") {
+            read += 1;
+            let tree = Tree::new(&file.robot).unwrap();
+            let (q, mut tau) = (tree.references(), vec![0.0; tree.len()]);
+            tree.bias(&q, &q, &mut tree.workspace(), &mut tau);
+        }
+    }
+    assert!(read > 300, "{read}");
 }

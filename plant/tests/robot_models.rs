@@ -148,6 +148,7 @@ fn about_its_pose_an_arm_is_a_linear_system() {
 fn what_is_wrong_is_said_with_its_line() {
     refused("[robot]\nfile = 'none.urdf'\n", "model.toml:2: robot.file: \"none.urdf\": there is no such file");
     refused("[robot]\nfil = 'rods.urdf'\n", "unknown key \"fil\"; did you mean \"file\"?");
+    refused("[robot]\nfile = 'rods.urdf'\nbase = 1\n", "robot.base: expected a list of numbers");
     refused("[robot]\nfile = 'rods.urdf'\ngravity = [0, 1]\n", "model.toml:3: robot.gravity: expected three numbers");
     refused(
         "[robot]\nfile = 'rods.urdf'\npose = { joint7 = 1 }\n",
@@ -170,6 +171,17 @@ fn what_is_wrong_is_said_with_its_line() {
 }
 
 #[test]
+fn a_base_on_the_ceiling_is_gravity_turned_round() {
+    let gravity = |keys: &str| load(&format!("[robot]\nfile = 'rods.urdf'\n{keys}")).arm.unwrap().robot.gravity;
+    let near =
+        |found: nalgebra::Vector3<f64>, expected: [f64; 3]| assert!((found - nalgebra::Vector3::from(expected)).norm() < 1e-12, "{found}");
+    near(gravity(""), [0.0, 0.0, -9.81]);
+    near(gravity("base = [3.141592653589793, 0, 0]"), [0.0, 0.0, 9.81]);
+    // Rolled by a quarter: the base's y axis points up, its z axis along the world's -y.
+    near(gravity("base = [1.5707963267948966, 0, 0]\ngravity = [1, 0, -9]"), [1.0, -9.0, 0.0]);
+}
+
+#[test]
 fn a_joint_can_not_be_locked_but_other_bodies_can() {
     let mut model = load(ARM);
     let said = model.lock(&["joint1".to_string()]).unwrap_err();
@@ -188,7 +200,6 @@ fn the_robots_of_this_folder_can_be_shown_and_moved() {
     let model = Model::load(&path).unwrap_or_else(|e| panic!("{e}"));
     let shown = describe(&model, &Operating::small());
     let text = shown.to_string();
-    println!("{text}");
     for line in [
         "robot two-joint-arm: 2 joints move 3 kg, gravity (0, 0, -9.81) m/s²",
         "shoulder  revolute  upper_arm  0.4 rad",

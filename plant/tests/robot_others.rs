@@ -7,8 +7,9 @@ mod python;
 mod robot_common;
 
 use backdrive_plant::model::Model;
-use backdrive_plant::robot::{RobotFile, Tree};
+use backdrive_plant::robot::{RobotFile, Tree, Twist};
 use backdrive_plant::stepper::{Options, simulate};
+use nalgebra::Vector3;
 use python::python;
 use robot_common::{mass_matrix, share};
 use serde::Deserialize;
@@ -31,6 +32,8 @@ struct Case {
     kinetic: f64,
     potential: f64,
     tip: Tip,
+    /// Three rows of velocity, three of turning.
+    jacobian: Vec<Vec<f64>>,
 }
 
 #[derive(Deserialize)]
@@ -41,13 +44,13 @@ struct Tip {
 
 /// The greatest of what was found in one respect.
 #[derive(Default)]
-struct Worst([f64; 6]);
+struct Worst([f64; 7]);
 
-const RESPECTS: [&str; 6] = ["inverse", "forward", "mass", "kinetic", "potential", "tip"];
+const RESPECTS: [&str; 7] = ["inverse", "forward", "mass", "kinetic", "potential", "tip", "jacobian"];
 /// Largest differences, as shares (of the tip: m, and of a unit vector).
-const LIMITS: [f64; 6] = [1e-11; 6];
+const LIMITS: [f64; 7] = [1e-11; 7];
 
-fn compare(case: &Case, folder: &Path) -> [f64; 6] {
+fn compare(case: &Case, folder: &Path) -> [f64; 7] {
     let file = RobotFile::load(&folder.join(&case.file)).unwrap_or_else(|e| panic!("{e}"));
     let tree = Tree::new(&file.robot).unwrap();
     assert_eq!(tree.len(), case.joints.len(), "{}", case.file);
@@ -63,6 +66,12 @@ fn compare(case: &Case, folder: &Path) -> [f64; 6] {
     let apart = |found: f64, expected: f64| (found - expected).abs() / expected.abs().max(1.0);
     tree.place(&q, &mut work);
     let tip = tree.link_placement(file.robot.link(&case.last).unwrap(), &work).unwrap();
+    let mut columns = vec![Twist::default(); tree.len()];
+    tree.jacobian(file.robot.link(&case.last).unwrap(), &Vector3::zeros(), &work, &mut columns);
+    let of_column = |(column, i): (&Twist, &usize)| {
+        let rows: Vec<f64> = column.linear.iter().chain(column.angular.iter()).copied().collect();
+        rows.iter().zip(&case.jacobian).fold(0.0, |most: f64, (row, theirs)| most.max((row - theirs[*i]).abs()))
+    };
     let turned = (0..3).flat_map(|i| (0..3).map(move |j| (i, j))).map(|(i, j)| (tip.rotation[(i, j)] - case.tip.rotation[i][j]).abs());
     let moved = (0..3).map(|i| (tip.translation[i] - case.tip.translation[i]).abs());
     [
@@ -72,6 +81,7 @@ fn compare(case: &Case, folder: &Path) -> [f64; 6] {
         apart(tree.kinetic_energy(&q, &v, &mut work), case.kinetic),
         apart(tree.potential_energy(&q, &mut work), case.potential),
         turned.chain(moved).fold(0.0, f64::max),
+        columns.iter().zip(&theirs).map(of_column).fold(0.0, f64::max),
     ]
 }
 
@@ -90,9 +100,9 @@ fn drawn(script: &str) -> Option<tempfile::TempDir> {
 fn random_trees_agree_with_pinocchio_and_mujoco() {
     let Some(folder) = drawn("robot_trees.py") else { return };
     let cases: Vec<Case> = serde_json::from_slice(&std::fs::read(folder.path().join("expected.json")).unwrap()).unwrap();
-    assert!(cases.len() >= 60);
+    assert_eq!(cases.len(), 100);
     let mut broken = Vec::new();
-    for (name, tool) in [("shared", "pinocchio"), ("shared", "mujoco"), ("wild", "mujoco")] {
+    for (name, tool) in [("shared", "pinocchio"), ("shared", "mujoco"), ("wild", "mujoco"), ("saved", "mujoco")] {
         let mut worst = Worst::default();
         let mut count = 0;
         for case in cases.iter().filter(|case| case.tool == tool && case.file.starts_with(name)) {

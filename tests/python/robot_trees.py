@@ -4,11 +4,11 @@
 
 In FOLDER come to be `NAME.urdf` or `NAME.xml` for each case, and `expected.json`: for each case the file, who computed, the joints by name in their order,
 q, v, a and tau (random), the forces that inverse dynamics finds for a, the accelerations that forward dynamics finds for tau, the mass matrix, kinetic and
-potential energy (without its constant, see below), and where the last link is. Whoever reads the file by other means has to come to the same.
+potential energy (see below), where the last link is, and how its origin moves with the joints (three rows of velocity, three of turning). Whoever reads the file by other means has to come to the same.
 
 - "shared" trees are written in both formats with the same numbers.
 - "wild" ones use what only MJCF has: degrees, Euler angles of any order, several joints in a body with anchors, references, armatures, frames, classes of
-  defaults, inertia from geoms.
+  defaults, inertia from geoms. "saved" ones are these as MuJoCo writes them itself.
 
 Potential energy is that of all masses about the origin, without those fixed to the world.
 """
@@ -180,7 +180,9 @@ def by_pinocchio(text, names, last, q, v, a, tau):
     mass = np.array(pin.crba(model, data, Q))
     mass = np.triu(mass) + np.triu(mass, 1).T
     pin.framesForwardKinematics(model, data, Q)
-    tip = data.oMf[model.getFrameId(last)]
+    frame = model.getFrameId(last)
+    tip = data.oMf[frame]
+    jacobian = pin.computeFrameJacobian(model, data, Q, frame, pin.LOCAL_WORLD_ALIGNED).reshape(6, -1)[:, order]
     pin.computePotentialEnergy(model, data, Q)
     return dict(
         inverse=pin.rnea(model, data, Q, V, A)[order].tolist(),
@@ -189,6 +191,7 @@ def by_pinocchio(text, names, last, q, v, a, tau):
         kinetic=pin.computeKineticEnergy(model, data, Q, V),
         potential=data.potential_energy,
         tip=dict(rotation=tip.rotation.tolist(), translation=tip.translation.tolist()),
+        jacobian=jacobian.tolist(),
     )
 
 
@@ -206,6 +209,8 @@ def by_mujoco(text, names, last, q, v, a, tau):
     mass = np.zeros((model.nv, model.nv))
     mujoco.mj_fullM(model, data, mass)
     body = data.body(last)
+    linear, angular = np.zeros((2, 3, model.nv))
+    mujoco.mj_jacBody(model, data, linear, angular, body.id)
     still = sum(m * (model.opt.gravity @ p) for m, p, w in zip(model.body_mass, data.xipos, model.body_weldid) if w == 0)
     return dict(
         inverse=inverse,
@@ -214,6 +219,7 @@ def by_mujoco(text, names, last, q, v, a, tau):
         kinetic=data.energy[1],
         potential=data.energy[0] + still,
         tip=dict(rotation=body.xmat.reshape(3, 3).tolist(), translation=body.xpos.tolist()),
+        jacobian=np.vstack([linear, angular])[:, at].tolist(),
     )
 
 
@@ -239,6 +245,10 @@ def main():
         text = wild(bodies)
         names = [joint.name for joint in mujoco.MjSpec.from_string(text).joints]
         case(f"wild{i}.xml", text, "mujoco", names, f"link{bodies}", states(len(names)))
+        # As MuJoCo writes it, with what it has worked out, in fewer digits.
+        spec = mujoco.MjSpec.from_string(text)
+        spec.compile()
+        case(f"saved{i}.xml", spec.to_xml(), "mujoco", names, f"link{bodies}", states(len(names)))
     (folder / "expected.json").write_text(json.dumps(cases))
 
 

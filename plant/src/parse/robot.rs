@@ -5,7 +5,7 @@ use crate::elements::{Coulomb, Damper, Law, Range, Spring};
 use crate::model::{Body, Element, Hold, Input, InputKind, Model, Motion};
 use crate::robot::{Arm, JointKind, RobotFile};
 use crate::tomlfile::{self, FileError, Table};
-use nalgebra::Vector3;
+use nalgebra::{Rotation3, Vector3};
 use std::path::Path;
 
 /// Reads `[robot]`: its joints become the first bodies of the model, what its file says of their friction and springs elements.
@@ -15,7 +15,14 @@ pub(super) fn read_robot(table: &mut Table, model: &mut Model, folder: Option<&P
     match table.numbers("gravity", Range::Any)?.as_deref() {
         None => {}
         Some(&[x, y, z]) => robot.gravity = Vector3::new(x, y, z),
-        Some(_) => return Err(table.error_at("gravity", "expected three numbers, m/s²: free fall along the base's x, y and z")),
+        Some(_) => return Err(table.error_at("gravity", "expected three numbers, m/s²: free fall along x, y and z")),
+    }
+    match table.numbers("base", Range::Any)?.as_deref() {
+        None => {}
+        Some(&[roll, pitch, yaw]) => robot.gravity = Rotation3::from_euler_angles(roll, pitch, yaw).inverse() * robot.gravity,
+        Some(_) => {
+            return Err(table.error_at("base", "expected three numbers, rad: how the base is turned about the world's x, y and z axes"));
+        }
     }
     let mut arm = Arm::new(xml, robot, 0).map_err(|error| FileError::whole(name, error.to_string()))?;
     arm.remarks = remarks;
