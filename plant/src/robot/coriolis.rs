@@ -9,6 +9,11 @@ impl Tree {
     /// Christoffel symbols, so `dM/dt - 2 C` is skew. Column j is the Newton-Euler recursion for that form with the unit rate of coordinate j.
     pub fn coriolis_matrix(&self, coordinates: &[f64], rates: &[f64], work: &mut Workspace, matrix: &mut DMatrix<f64>) {
         self.velocities(coordinates, rates, work);
+        self.coriolis_matrix_here(rates, work, matrix);
+    }
+
+    /// The same of the bodies as they move, at these rates.
+    pub(crate) fn coriolis_matrix_here(&self, rates: &[f64], work: &mut Workspace, matrix: &mut DMatrix<f64>) {
         for j in 0..self.len() {
             let end = self.bodies[j].branch_end;
             for i in j..end {

@@ -16,6 +16,11 @@ impl Tree {
     /// Energy in gravity, J; 0 where all centres of mass were at the origin of the base.
     pub fn potential_energy(&self, coordinates: &[f64], work: &mut Workspace) -> f64 {
         self.place(coordinates, work);
+        self.potential_energy_here(work)
+    }
+
+    /// The same of the bodies where they are.
+    pub(crate) fn potential_energy_here(&self, work: &Workspace) -> f64 {
         let of = |i: usize| {
             let (inertia, place) = (&self.bodies[i].inertia, &work.in_base[i]);
             -self.gravity.dot(&(place.rotation * inertia.first_moment + inertia.mass * place.translation))

@@ -7,22 +7,35 @@ use nalgebra::Vector3;
 impl Tree {
     /// Forces of the joints that make them accelerate so, N m or N: `M(q) a + c(q, v) + g(q)`, with coordinates q (rad, m), rates v and accelerations a.
     pub fn inverse_dynamics(&self, coordinates: &[f64], rates: &[f64], accelerations: &[f64], work: &mut Workspace, forces: &mut [f64]) {
-        self.newton_euler(coordinates, rates, Some(accelerations), self.gravity, work, forces);
+        self.velocities(coordinates, rates, work);
+        self.newton_euler(rates, Some(accelerations), self.gravity, work, forces);
     }
 
     /// Forces that keep the rates as they are: `c(q, v) + g(q)`, N m or N.
     pub fn bias(&self, coordinates: &[f64], rates: &[f64], work: &mut Workspace, forces: &mut [f64]) {
-        self.newton_euler(coordinates, rates, None, self.gravity, work, forces);
+        self.velocities(coordinates, rates, work);
+        self.bias_here(rates, work, forces);
+    }
+
+    /// The same of the bodies as they move, at these rates.
+    pub(crate) fn bias_here(&self, rates: &[f64], work: &mut Workspace, forces: &mut [f64]) {
+        self.newton_euler(rates, None, self.gravity, work, forces);
     }
 
     /// Coriolis and centrifugal forces alone: `c(q, v)`, N m or N.
     pub fn coriolis(&self, coordinates: &[f64], rates: &[f64], work: &mut Workspace, forces: &mut [f64]) {
-        self.newton_euler(coordinates, rates, None, Vector3::zeros(), work, forces);
+        self.velocities(coordinates, rates, work);
+        self.newton_euler(rates, None, Vector3::zeros(), work, forces);
     }
 
     /// Forces that hold the robot still: `g(q)`, N m or N.
     pub fn gravity(&self, coordinates: &[f64], work: &mut Workspace, forces: &mut [f64]) {
         self.place(coordinates, work);
+        self.gravity_here(work, forces);
+    }
+
+    /// The same of the bodies where they are.
+    pub(crate) fn gravity_here(&self, work: &mut Workspace, forces: &mut [f64]) {
         let lift = Twist { angular: Vector3::zeros(), linear: -self.gravity };
         for (i, body) in self.bodies.iter().enumerate() {
             let outside = body.parent.map_or(lift, |parent| work.acceleration[parent]);
@@ -33,16 +46,7 @@ impl Tree {
     }
 
     #[inline]
-    fn newton_euler(
-        &self,
-        coordinates: &[f64],
-        rates: &[f64],
-        accelerations: Option<&[f64]>,
-        gravity: Vector3<f64>,
-        work: &mut Workspace,
-        forces: &mut [f64],
-    ) {
-        self.velocities(coordinates, rates, work);
+    fn newton_euler(&self, rates: &[f64], accelerations: Option<&[f64]>, gravity: Vector3<f64>, work: &mut Workspace, forces: &mut [f64]) {
         // As if the base were lifted against gravity.
         let lift = Twist { angular: Vector3::zeros(), linear: -gravity };
         for (i, body) in self.bodies.iter().enumerate() {

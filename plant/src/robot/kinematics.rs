@@ -39,9 +39,9 @@ impl Tree {
         }
     }
 
-    /// Velocities of all bodies in their own frames; the bodies are placed first.
+    /// Places the bodies, and moves them at these rates; what follows and ends on `_here` is about them as they move then.
     #[inline]
-    pub(super) fn velocities(&self, coordinates: &[f64], rates: &[f64], work: &mut Workspace) {
+    pub(crate) fn velocities(&self, coordinates: &[f64], rates: &[f64], work: &mut Workspace) {
         self.place(coordinates, work);
         for (i, body) in self.bodies.iter().enumerate() {
             let carried = body.parent.map_or_else(Twist::default, |parent| work.in_parent[i].twist_inside(&work.velocity[parent]));

@@ -7,6 +7,11 @@ impl Tree {
     /// M(q), the whole symmetric matrix, kg m², kg m or kg; armatures are on its diagonal. `matrix` has a row and a column for each coordinate.
     pub fn mass_matrix(&self, coordinates: &[f64], work: &mut Workspace, matrix: &mut DMatrix<f64>) {
         self.place(coordinates, work);
+        self.mass_matrix_here(work, matrix);
+    }
+
+    /// The same of the bodies where they are.
+    pub(crate) fn mass_matrix_here(&self, work: &mut Workspace, matrix: &mut DMatrix<f64>) {
         for (i, body) in self.bodies.iter().enumerate() {
             work.composite[i] = body.inertia;
         }

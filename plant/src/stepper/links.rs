@@ -66,14 +66,15 @@ impl Links {
 
     /// Inertia of the network with the links at these coordinates.
     pub(super) fn mass_at(&mut self, coordinates: &[f64]) -> Square {
-        self.q.copy_from_slice(coordinates);
+        self.tree.place(coordinates, &mut self.work);
         let mut mass = self.own_mass.clone();
         self.join_mass(&mut mass);
         mass
     }
 
+    /// The inertia of the links as they are placed, beside the network's own.
     fn join_mass(&mut self, mass: &mut Square) {
-        self.tree.mass_matrix(&self.q, &mut self.work, &mut self.mass);
+        self.tree.mass_matrix_here(&mut self.work, &mut self.mass);
         for (i, a) in self.slots.iter().enumerate() {
             for (j, b) in self.slots.iter().enumerate() {
                 mass[*a][*b] = self.own_mass[*a][*b] + self.mass[(i, j)];
@@ -86,9 +87,10 @@ impl Links {
         for (i, slot) in self.slots.iter().enumerate() {
             (self.q[i], self.v[i]) = (self.pose[i] + motion.middle[*slot], v[*slot]);
         }
+        self.tree.velocities(&self.q, &self.v, &mut self.work);
         self.join_mass(&mut fixed.mass);
-        self.tree.coriolis_matrix(&self.q, &self.v, &mut self.work, &mut self.coriolis);
-        self.tree.gravity(&self.q, &mut self.work, &mut self.gravity);
+        self.tree.coriolis_matrix_here(&self.v, &mut self.work, &mut self.coriolis);
+        self.tree.gravity_here(&mut self.work, &mut self.gravity);
         let free = fixed.free;
         // C(v₀) v₁, as far as it is known before: of free bodies at v₀.
         self.bias_with(|slot| if slot < free { v[slot] } else { motion.end_velocity[slot] });
@@ -154,25 +156,17 @@ impl Links {
         fixed.constraints.answer_by(&fixed.from_force, n);
     }
 
-    /// What is known of the links at an instant.
+    /// What is known of the links at an instant; `fixed.mass` is then of it, too.
     pub(super) fn at(&mut self, fixed: &mut Compiled, x: &Slots, v: &Slots) {
         for (i, slot) in self.slots.iter().enumerate() {
             (self.q[i], self.v[i]) = (self.pose[i] + x[*slot], v[*slot]);
         }
+        self.tree.velocities(&self.q, &self.v, &mut self.work);
         self.join_mass(&mut fixed.mass);
-        self.tree.bias(&self.q, &self.v, &mut self.work, &mut self.gravity);
+        self.tree.bias_here(&self.v, &mut self.work, &mut self.gravity);
         for (i, slot) in self.slots.iter().enumerate() {
             self.bias[*slot] = self.gravity[i];
         }
-        self.potential = self.tree.potential_energy(&self.q, &mut self.work) - self.potential_at_pose;
-        let n = fixed.free;
-        let mut inverse: Columns = [[0.0; SLOTS]; SLOTS];
-        for i in 0..n {
-            inverse[i][..n].copy_from_slice(&fixed.mass[i][..n]);
-        }
-        if !dense::invert(&mut inverse, n) {
-            inverse = [[f64::NAN; SLOTS]; SLOTS];
-        }
-        fixed.inverse_mass = inverse;
+        self.potential = self.tree.potential_energy_here(&self.work) - self.potential_at_pose;
     }
 }
