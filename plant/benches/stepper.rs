@@ -69,6 +69,30 @@ fn presliding() -> Model {
     model
 }
 
+/// Rods in a row, each joint driven by a motor through a soft gear, with friction on both sides.
+fn arm(joints: usize) -> Option<Plant> {
+    let (mut robot, mut network) = ("<robot name='arm'><link name='link0'/>".to_owned(), String::from("[bodies]\n"));
+    let (mut elements, mut axis) = (String::new(), "0 1 0");
+    for i in 0..joints {
+        robot += &format!(
+            "<link name='link{}'><inertial><origin xyz='0.1 0 0'/><mass value='1'/><inertia ixx='0.001' ixy='0' ixz='0' iyy='0.01' iyz='0' izz='0.01'/>\
+             </inertial></link><joint name='j{i}' type='continuous'><parent link='link{i}'/><child link='link{}'/><origin xyz='0.2 0 0'/>\
+             <axis xyz='{axis}'/></joint>",
+            i + 1,
+            i + 1
+        );
+        axis = if axis == "0 1 0" { "1 0 1" } else { "0 1 0" };
+        network += &format!("m{i} = 0.1\n");
+        elements += &format!("[[elements]]\nkind = 'spring'\nbetween = ['m{i}', 'j{i}']\nstiffness = 1000\n");
+        for body in ["m", "j"] {
+            elements += &format!("[[elements]]\nkind = 'coulomb'\nbetween = ['{body}{i}', 'ground']\nforce = 0.5\n");
+        }
+        elements += &format!("[[inputs]]\nname = 'u{i}'\nkind = 'force'\non = 'm{i}'\n");
+    }
+    let text = format!("[robot]\nxml = \"{robot}</robot>\"\n{network}{elements}");
+    Plant::new(&Model::from_toml(&text, "arm").ok()?, PERIOD_S, &Options::default()).ok()
+}
+
 fn bench(criterion: &mut Criterion) {
     for (name, model, substeps) in [
         ("linear master, period", master(false), None),
@@ -95,6 +119,16 @@ fn bench(criterion: &mut Criterion) {
                 plant.outputs(&mut outputs);
                 next = (next + 1) % inputs.len();
                 black_box(outputs[0])
+            })
+        });
+    }
+    for joints in [2, 7] {
+        let Some(mut plant) = arm(joints) else { continue };
+        let inputs = vec![Segment::held(1.0); joints];
+        criterion.bench_function(&format!("arm of {joints} joints with motors and friction, period ({} in it)", plant.substeps()), |b| {
+            b.iter(|| {
+                plant.step(black_box(&inputs));
+                black_box(plant.position(0))
             })
         });
     }

@@ -43,6 +43,11 @@ impl Model {
         if let Some(input) = self.inputs.iter().find(|i| i.on == body) {
             return Err(format!("body \"{name}\" is driven by the input \"{}\" and cannot be locked or taken off", input.name));
         }
+        if self.arm.as_ref().is_some_and(|arm| arm.bodies.contains(&body)) {
+            return Err(format!(
+                "\"{name}\" is a joint of the robot and cannot be locked or taken off; make its type fixed in the robot file"
+            ));
+        }
         let renumber = |b: usize| if b > body { b - 1 } else { b };
         let kept: Vec<bool> = self.elements.iter().map(|e| !(with_elements && e.between.contains(&Some(body)))).collect();
         let new_index = |old: usize| kept[..old].iter().filter(|k| **k).count();
@@ -93,6 +98,9 @@ impl Model {
             input.on = renumber(input.on);
         }
         self.bodies.remove(body);
+        for joint in self.arm.iter_mut().flat_map(|arm| arm.bodies.iter_mut()) {
+            *joint = renumber(*joint);
+        }
         for axis in &mut self.axes {
             axis.user = if axis.user == body {
                 match self.outputs[axis.measured].kind {

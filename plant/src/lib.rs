@@ -18,6 +18,7 @@ pub mod model;
 pub mod parse;
 pub mod preisach;
 pub mod recording;
+pub mod robot;
 pub mod set;
 pub mod stepper;
 pub mod tomlfile;

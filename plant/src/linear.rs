@@ -147,6 +147,10 @@ impl<'a> LinearModel<'a> {
             join(&mut stiffness, element.between, linear.stiffness);
             elements.push(linear);
         }
+        if let Some(arm) = &model.arm {
+            inertia += arm.inertia_at_pose(n);
+            stiffness += arm.gravity_stiffness_at_pose(n);
+        }
         let prescribed = |body: usize| model.inputs.iter().any(|i| i.kind == InputKind::Motion && i.on == body);
         for input in &model.inputs {
             // The force lost is proportional to the velocity of the driven body: a damper to ground.

@@ -3,6 +3,7 @@
 //! Names are resolved: a place is an index into [`Model::bodies`], and `None` is ground.
 
 use crate::elements::Law;
+use crate::robot::Arm;
 
 /// Whether the axes are linear or rotational. The units follow: m, N, kg or rad, N m, kg m².
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -38,6 +39,8 @@ pub struct Model {
     pub outputs: Vec<Output>,
     /// Where a graph holds, pushes and reads it.
     pub axes: Vec<Axis>,
+    /// The robot whose joints are bodies of the network; `None` for a device without one.
+    pub arm: Option<Box<Arm>>,
 }
 
 /// A body.
@@ -45,7 +48,7 @@ pub struct Model {
 pub struct Body {
     /// Unique in the model.
     pub name: String,
-    /// kg or kg m², at least 0; 0 only where an inerter or a motion input makes that possible.
+    /// kg or kg m², at least 0; 0 only where an inerter or a motion input makes that possible, or for a joint of a robot, whose links have theirs.
     pub inertia: f64,
 }
 

@@ -38,7 +38,8 @@ pub fn check(model: &Model, at: &Operating) -> Vec<Remark> {
         add(Severity::Error, model.name.clone(), error.to_string());
     }
     for (index, body) in model.bodies.iter().enumerate() {
-        if !model.elements.iter().any(|e| e.between.contains(&Some(index))) && !model.inputs.iter().any(|i| i.on == index) {
+        let is_joint = model.arm.as_ref().is_some_and(|arm| arm.bodies.contains(&index));
+        if !is_joint && !model.elements.iter().any(|e| e.between.contains(&Some(index))) && !model.inputs.iter().any(|i| i.on == index) {
             add(Severity::Warning, format!("bodies.{}", body.name), "nothing is tied to this body and nothing drives it".into());
         }
     }
@@ -46,6 +47,9 @@ pub fn check(model: &Model, at: &Operating) -> Vec<Remark> {
         if let Some(message) = active(&element.law, at, &super::units::unit_for(model.motion, "m")) {
             add(Severity::Warning, format!("elements.{}", element.name), message);
         }
+    }
+    for remark in model.arm.iter().flat_map(|arm| &arm.remarks).filter(|remark| remark.matters) {
+        add(Severity::Note, "robot file".into(), remark.to_string());
     }
     if model.inputs.is_empty() {
         add(Severity::Warning, "inputs".into(), "nothing drives this model".into());

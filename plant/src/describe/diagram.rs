@@ -1,11 +1,13 @@
 //! The network as a drawing of lines.
 
-use crate::model::{InputKind, Model, OutputKind, Place};
+use super::robot::motions;
+use crate::model::{InputKind, Model, Motion, OutputKind, Place};
 
 /// Draws the network downwards, from the first driven body on: each body, what ties it to ground, what pushes
 /// and reads it, and the elements that lead to the next. Branches are set in.
 pub fn diagram(model: &Model) -> String {
-    let mut drawing = Drawing { model, drawn: vec![false; model.bodies.len()], tied: vec![false; model.elements.len()], lines: Vec::new() };
+    let (drawn, tied) = (vec![false; model.bodies.len()], vec![false; model.elements.len()]);
+    let mut drawing = Drawing { model, motions: motions(model), drawn, tied, lines: Vec::new() };
     // A prescribed body comes first: it is where the motion enters.
     let driven = model.inputs.iter().filter(|i| i.kind == InputKind::Motion).chain(&model.inputs).map(|i| i.on);
     let starts: Vec<usize> = driven.chain(0..model.bodies.len()).collect();
@@ -24,6 +26,7 @@ pub fn diagram(model: &Model) -> String {
 
 struct Drawing<'a> {
     model: &'a Model,
+    motions: Vec<Motion>,
     drawn: Vec<bool>,
     tied: Vec<bool>,
     lines: Vec<String>,
@@ -32,9 +35,15 @@ struct Drawing<'a> {
 impl Drawing<'_> {
     fn body(&mut self, body: usize, indent: &str) {
         self.drawn[body] = true;
-        let unit = super::units::unit_for(self.model.motion, "kg");
+        let unit = super::units::unit_for(self.motions[body], "kg");
         let b = &self.model.bodies[body];
-        self.lines.push(format!("{indent}[{}] {} {unit}{}", b.name, b.inertia, self.notes(body)));
+        let is_joint = self.model.arm.as_ref().is_some_and(|arm| arm.bodies.contains(&body));
+        let inertia = match (is_joint, b.inertia) {
+            (true, 0.0) => "joint of the robot".to_string(),
+            (true, armature) => format!("joint of the robot, armature {armature} {unit}"),
+            (false, inertia) => format!("{inertia} {unit}"),
+        };
+        self.lines.push(format!("{indent}[{}] {inertia}{}", b.name, self.notes(body)));
         let to_ground = self.between(Some(body), None);
         if !to_ground.is_empty() {
             self.lines.push(format!("{indent}  |-- ground: {}", self.names(&to_ground)));

@@ -2,15 +2,17 @@
 
 mod check;
 mod diagram;
+mod robot;
 mod text;
 mod units;
 
 pub use check::{Remark, Severity, check};
 pub use diagram::diagram;
+pub use robot::{JointRow, RobotRow};
 pub use units::unit_for;
 
 use crate::linear::{LinearError, LinearModel, Operating, log_frequencies};
-use crate::model::{Model, Motion};
+use crate::model::{Model, Motion, OutputKind};
 use serde::Serialize;
 
 /// All there is to show of a model. Displays as text; serialises as data.
@@ -26,6 +28,9 @@ pub struct Description {
     pub motion: &'static str,
     /// The network as a drawing of lines.
     pub diagram: String,
+    /// The robot whose joints are bodies; `None` of a device without one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub robot: Option<RobotRow>,
     /// Bodies.
     pub bodies: Vec<NamedNumber>,
     /// Elements.
@@ -114,6 +119,7 @@ pub struct ResponsePoint {
 
 /// Everything about a model, with what is not linear looked at as `at` says.
 pub fn describe(model: &Model, at: &Operating) -> Description {
+    let motions = robot::motions(model);
     let mut description = Description {
         name: model.name.clone(),
         title: model.title.clone(),
@@ -123,12 +129,14 @@ pub fn describe(model: &Model, at: &Operating) -> Description {
             Motion::Rotation => "rotation",
         },
         diagram: diagram(model),
+        robot: model.arm.as_ref().map(|arm| robot::robot_row(arm)),
         bodies: model
             .bodies
             .iter()
-            .map(|b| NamedNumber { name: b.name.clone(), values: vec![b.inertia], unit: unit_for(model.motion, "kg") })
+            .zip(&motions)
+            .map(|(b, motion)| NamedNumber { name: b.name.clone(), values: vec![b.inertia], unit: unit_for(*motion, "kg") })
             .collect(),
-        elements: (0..model.elements.len()).map(|index| element_row(model, index)).collect(),
+        elements: (0..model.elements.len()).map(|index| element_row(model, index, &motions)).collect(),
         modes: Vec::new(),
         poles: Vec::new(),
         responses: Vec::new(),
@@ -142,15 +150,16 @@ pub fn describe(model: &Model, at: &Operating) -> Description {
     description
 }
 
-fn element_row(model: &Model, index: usize) -> ElementRow {
+fn element_row(model: &Model, index: usize, motions: &[Motion]) -> ElementRow {
     let element = &model.elements[index];
+    let motion = element.between.iter().flatten().next().map_or(model.motion, |body| motions[*body]);
     let kind = element.law.kind();
     let parameters = kind
         .parameters
         .iter()
         .zip(element.law.values())
         .filter(|(p, values)| !(values.is_empty() || !p.list && p.default == Some(values[0])))
-        .map(|(p, values)| NamedNumber { name: p.key.to_string(), values, unit: unit_for(model.motion, p.unit) })
+        .map(|(p, values)| NamedNumber { name: p.key.to_string(), values, unit: unit_for(motion, p.unit) })
         .collect();
     let between = element.between.map(|place| model.place_name(place).to_string());
     ElementRow { name: element.name.clone(), kind: kind.name, between, equation: kind.equation, parameters }
@@ -180,7 +189,7 @@ fn add_linear(description: &mut Description, model: &Model, at: &Operating) -> R
         description.responses.push(Response {
             input: model.inputs[input].name.clone(),
             output: model.outputs[output].name.clone(),
-            unit: response_unit(model, input, output),
+            unit: response_unit(model, input, output, &robot::motions(model)),
             points: points.collect(),
         });
     }
@@ -199,9 +208,16 @@ fn frequencies_around(modes: impl Iterator<Item = f64>) -> Vec<f64> {
     log_frequencies(from, from * 10.0_f64.powf((count - 1) as f64 / 6.0), count)
 }
 
-fn response_unit(model: &Model, input: usize, output: usize) -> String {
-    let (from, to) = (model.inputs[input].kind.unit(), model.outputs[output].kind.unit());
-    let (from, to) = (unit_for(model.motion, from), unit_for(model.motion, to));
+fn response_unit(model: &Model, input: usize, output: usize, motions: &[Motion]) -> String {
+    let (from, to) = (&model.inputs[input], &model.outputs[output]);
+    let read = match &to.kind {
+        OutputKind::Position(body) | OutputKind::Velocity(body) | OutputKind::Acceleration(body) | OutputKind::Reaction(body) => {
+            Some(*body)
+        }
+        OutputKind::Force(elements) => elements.first().and_then(|e| model.elements[*e].between.into_iter().flatten().next()),
+    };
+    let from = unit_for(motions[from.on], from.kind.unit());
+    let to = unit_for(read.map_or(model.motion, |body| motions[body]), to.kind.unit());
     match (to == from, from.contains(' ')) {
         (true, _) => "-".to_string(),
         (false, true) => format!("{to}/({from})"),

@@ -1,6 +1,6 @@
 //! A description as text.
 
-use super::{Description, NamedNumber, Severity};
+use super::{Description, NamedNumber, RobotRow, Severity};
 use std::fmt;
 
 impl fmt::Display for Description {
@@ -14,6 +14,9 @@ impl fmt::Display for Description {
             writeln!(f, "from {}", self.source)?;
         }
         writeln!(f, "\n{}", self.diagram)?;
+        if let Some(robot) = &self.robot {
+            robot.write(f)?;
+        }
         let rows: Vec<Vec<String>> = self
             .elements
             .iter()
@@ -37,6 +40,33 @@ impl fmt::Display for Description {
             writeln!(f, "\n{word}: {}: {}", remark.about, remark.message)?;
         }
         Ok(())
+    }
+}
+
+impl RobotRow {
+    fn write(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let [x, y, z] = self.gravity.map(short);
+        writeln!(f, "robot {}: {} joints move {} kg, gravity ({x}, {y}, {z}) m/s²", self.name, self.joints.len(), short(self.mass))?;
+        let rows: Vec<Vec<String>> = self
+            .joints
+            .iter()
+            .map(|j| {
+                let (inertia, force) = if j.unit == "m" { ("kg", "N") } else { ("kg m²", "N m") };
+                vec![
+                    j.name.clone(),
+                    j.kind.to_string(),
+                    j.link.clone(),
+                    format!("{} {}", short(j.pose), j.unit),
+                    format!("{} {inertia}", short(j.inertia)),
+                    format!("{} {force}", short(j.gravity)),
+                ]
+            })
+            .collect();
+        table(f, &["joint", "kind", "carries", "pose", "inertia there", "gravity there"], &rows)?;
+        for line in &self.left_aside {
+            writeln!(f, "left aside: {line}")?;
+        }
+        writeln!(f)
     }
 }
 

@@ -1,13 +1,15 @@
 //! Model files: TOML text to [`Model`] and [`Fragment`], with every error at its line.
 
+mod network;
 mod paths;
+mod robot;
 mod signals;
 
+pub use network::{HAND, PORT};
 pub use paths::{InputKey, NumberOf, OutputKey};
 
-use crate::elements::{KINDS, Kind, Law, Range, Role};
-use crate::model::{Body, Element, Fragment, InputKind, Model, Motion, Place};
-use crate::tomlfile::{self, FileError, Table};
+use crate::model::{Fragment, Model};
+use crate::tomlfile::{FileError, Table};
 use std::path::Path;
 
 /// What a model file may hold.
@@ -46,12 +48,12 @@ impl Model {
 impl Fragment {
     /// Reads a grip or an environment. Errors name file, line and key; a device is refused.
     pub fn load(path: &Path) -> Result<Fragment, FileError> {
-        fragment(ModelFile::load(path)?, &path.display().to_string())
+        network::only_fragment(Table::open(path)?, path.parent())
     }
 
     /// Reads a fragment from text; `name` stands for the file in errors.
     pub fn from_toml(text: &str, name: &str) -> Result<Fragment, FileError> {
-        fragment(ModelFile::from_toml(text, name)?, name)
+        network::only_fragment(Table::parse(text, name)?, None)
     }
 }
 
@@ -62,204 +64,24 @@ fn device(file: ModelFile, name: &str) -> Result<Model, FileError> {
     }
 }
 
-fn fragment(file: ModelFile, name: &str) -> Result<Fragment, FileError> {
-    match file {
-        ModelFile::Fragment(fragment) => Ok(fragment),
-        ModelFile::Device(_) => Err(FileError::whole(
-            name,
-            "is the model of a device, expected a fragment (a grip or an environment): its file says kind = \"fragment\"",
-        )),
-    }
-}
-
-/// Name of the place in a fragment that stands for the body it is attached to.
-pub const PORT: &str = "port";
-/// Name of the body in a fragment whose motion is the operator's intent.
-pub const HAND: &str = "hand";
-const GROUND: &str = "ground";
-
 fn read(mut top: Table, folder: Option<&Path>) -> Result<ModelFile, FileError> {
-    let stem = Path::new(top.file_name()).file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
-    let mut model = Model {
-        name: top.string("name")?.unwrap_or(stem),
-        title: top.string("title")?.unwrap_or_default(),
-        source: top.string("source")?.unwrap_or_default(),
-        motion: top.one_of("motion", &[("translation", Motion::Translation), ("rotation", Motion::Rotation)])?.unwrap_or_default(),
-        ..Model::default()
-    };
-    let is_fragment = top.one_of("kind", &[("device", false), ("fragment", true)])?.unwrap_or(false);
-    let mut bodies = top.table("bodies")?;
+    let (mut model, motion, is_fragment) = network::read_head(&mut top)?;
     if is_fragment {
-        model.bodies.push(Body { name: PORT.to_string(), inertia: 0.0 });
+        return Ok(ModelFile::Fragment(network::read_fragment_file(top, model, motion, folder)?));
     }
-    if let Some(table) = &mut bodies {
-        read_bodies(table, is_fragment, &mut model)?;
-    }
-    let elements = top.tables("elements")?;
-    for (index, mut table) in elements.into_iter().enumerate() {
-        let element = read_element(&mut table, index, is_fragment, &mut model, folder)?;
+    if let Some(mut table) = top.table("robot")? {
+        robot::read_robot(&mut table, &mut model, folder)?;
         table.finish()?;
-        model.elements.push(element);
     }
-    for mut table in top.tables("inputs")? {
-        let input = signals::read_input(&mut table, &model)?;
+    model.motion = motion.or(robot::motion(&model)).unwrap_or_default();
+    let bodies = network::read_bodies(&mut top, false, &mut model)?;
+    robot::read_joints(&mut top, &mut model, folder)?;
+    network::read_what_acts(&mut top, bodies.as_ref(), false, &mut model, folder)?;
+    for mut table in top.tables("axes")? {
+        let axis = signals::read_axis(&mut table, &model)?;
         table.finish()?;
-        model.inputs.push(input);
+        model.axes.push(axis);
     }
-    for mut table in top.tables("outputs")? {
-        let output = signals::read_output(&mut table, &model)?;
-        table.finish()?;
-        model.outputs.push(output);
-    }
-    if !is_fragment {
-        for mut table in top.tables("axes")? {
-            let axis = signals::read_axis(&mut table, &model)?;
-            table.finish()?;
-            model.axes.push(axis);
-        }
-    }
-    let hand = if is_fragment { model.bodies.iter().position(|b| b.name == HAND) } else { None };
-    refuse_free_bodies_without_inertia(&model, is_fragment, hand, bodies.as_ref(), &top)?;
     top.finish()?;
-    Ok(if is_fragment { ModelFile::Fragment(Fragment { network: model, hand }) } else { ModelFile::Device(model) })
-}
-
-fn read_bodies(table: &mut Table, is_fragment: bool, model: &mut Model) -> Result<(), FileError> {
-    for name in table.keys() {
-        if name == GROUND {
-            return Err(table.error_at(&name, "ground always exists and has no inertia; leave it out"));
-        }
-        if is_fragment && name == PORT {
-            return Err(table.error_at(&name, "stands for the body of the device that the fragment is attached to; leave it out"));
-        }
-        let inertia = table.need_number(&name, Range::NonNegative)?;
-        model.bodies.push(Body { name, inertia });
-    }
-    Ok(())
-}
-
-fn refuse_free_bodies_without_inertia(
-    model: &Model,
-    is_fragment: bool,
-    hand: Option<usize>,
-    bodies: Option<&Table>,
-    top: &Table,
-) -> Result<(), FileError> {
-    for (index, body) in model.bodies.iter().enumerate() {
-        let stands_for_another = is_fragment && index == 0 || hand == Some(index);
-        let moved = model.inputs.iter().any(|i| i.kind == InputKind::Motion && i.on == index);
-        let inerter = model
-            .elements
-            .iter()
-            .any(|e| matches!(e.law.role(), Role::Linear(linear) if linear.inertance > 0.0) && e.between.contains(&Some(index)));
-        if body.inertia == 0.0 && !stands_for_another && !moved && !inerter {
-            let message = "a free body without inertia; give it some, or an inerter, or prescribe it with a motion input";
-            return Err(bodies.map_or_else(|| top.error(message), |t| t.error_at(&body.name, message)));
-        }
-    }
-    Ok(())
-}
-
-/// Index of a named body; ground is `None`. In a fragment the hand comes to be by being named.
-fn place(table: &Table, key: &str, name: &str, is_fragment: bool, model: &mut Model) -> Result<Place, FileError> {
-    if name == GROUND {
-        return Ok(None);
-    }
-    if let Some(index) = model.bodies.iter().position(|b| b.name == name) {
-        return Ok(Some(index));
-    }
-    if is_fragment && name == HAND {
-        model.bodies.push(Body { name: HAND.to_string(), inertia: 0.0 });
-        return Ok(Some(model.bodies.len() - 1));
-    }
-    if name == PORT {
-        return Err(table.error_at(key, "only a fragment has a port: its file says kind = \"fragment\""));
-    }
-    let bodies = model.bodies.iter().map(|b| b.name.as_str()).chain(std::iter::once(GROUND));
-    Err(table.error_at(key, tomlfile::unknown("body", name, bodies)))
-}
-
-fn read_element(
-    table: &mut Table,
-    index: usize,
-    is_fragment: bool,
-    model: &mut Model,
-    folder: Option<&Path>,
-) -> Result<Element, FileError> {
-    let name = match table.contains("name") {
-        true => table.need_string("name")?,
-        false => format!("element{index}"),
-    };
-    table.label(&name);
-    if model.elements.iter().any(|e| e.name == name) {
-        return Err(table.error_at("name", "another element has this name"));
-    }
-    let word = table.string("kind")?.ok_or_else(|| table.missing("kind"))?;
-    let kind = KINDS.iter().find(|k| k.name == word).copied();
-    let kind = kind.ok_or_else(|| table.error_at("kind", tomlfile::unknown("element kind", &word, KINDS.iter().map(|k| k.name))))?;
-    let names = table.strings("between")?.ok_or_else(|| table.missing("between"))?;
-    let [first, second] = names.as_slice() else {
-        return Err(table.error_at("between", format!("expected two bodies, found {}", names.len())));
-    };
-    if first == second {
-        return Err(table.error_at("between", format!("both ends are \"{first}\"")));
-    }
-    let between = [place(table, "between", first, is_fragment, model)?, place(table, "between", second, is_fragment, model)?];
-    let law = read_law(table, kind, folder)?;
-    Ok(Element { name, between, law })
-}
-
-fn read_law(table: &mut Table, kind: &Kind, folder: Option<&Path>) -> Result<Law, FileError> {
-    let mut values = Vec::with_capacity(kind.parameters.len());
-    for p in kind.parameters {
-        let found = match (p.list, table.is_string(p.key)) {
-            (true, true) => Some(read_list_file(table, p.key, p.range, folder)?),
-            (true, false) => table.numbers(p.key, p.range)?,
-            (false, _) => table.number(p.key, p.range)?.map(|value| vec![value]),
-        };
-        let value = match (found, p.default_values()) {
-            (Some(value), _) => value,
-            (None, Some(default)) => default,
-            (None, None) => {
-                let mut error = table.missing(p.key);
-                // A misspelt key needs no explanation, a forgotten one does.
-                if error.message.starts_with("missing") {
-                    error.message = format!("{} of kind \"{}\": {}, {}", error.message, kind.name, p.doc, p.unit);
-                }
-                return Err(error);
-            }
-        };
-        values.push(value);
-    }
-    (kind.build)(&values).map_err(|message| table.error(message))
-}
-
-/// A list parameter may name a CSV file beside the model; its numbers are taken row by row.
-fn read_list_file(table: &mut Table, key: &str, range: Range, folder: Option<&Path>) -> Result<Vec<f64>, FileError> {
-    let name = table.need_string(key)?;
-    let Some(folder) = folder else {
-        return Err(table.error_at(key, format!("names the file \"{name}\", and this model is not in a folder")));
-    };
-    let path = folder.join(&name);
-    let shown = path.display().to_string();
-    let text = tomlfile::read_text(&path).map_err(|e| table.error_at(key, format!("\"{name}\": {}", e.message)))?;
-    let mut numbers = Vec::new();
-    for (index, line) in text.lines().enumerate() {
-        let row = line.trim();
-        if row.is_empty() || row.starts_with('#') {
-            continue;
-        }
-        let cells: Vec<&str> = row.split(',').map(str::trim).collect();
-        // The first row may be a heading.
-        if numbers.is_empty() && cells.iter().all(|c| c.parse::<f64>().is_err()) {
-            continue;
-        }
-        for (column, cell) in cells.iter().enumerate() {
-            let at = |message: String| FileError::at(&shown, index + 1, format!("column {}", column + 1), message);
-            let value: f64 = cell.parse().map_err(|_| at(format!("expected a number, found \"{cell}\"")))?;
-            tomlfile::check_range(value, range).map_err(at)?;
-            numbers.push(value);
-        }
-    }
-    Ok(numbers)
+    Ok(ModelFile::Device(model))
 }

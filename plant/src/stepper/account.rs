@@ -30,6 +30,8 @@ pub(super) struct Done<'a> {
     pub(super) end_velocity: &'a Slots,
     /// Mean force of the force inputs on each place.
     pub(super) pushed: &'a Slots,
+    /// What the links of a robot push back with.
+    pub(super) bias: &'a Slots,
     /// Its length, s.
     pub(super) length: f64,
 }
@@ -57,7 +59,7 @@ impl Account {
         // What friction and path elements do to the prescribed bodies.
         let mut pull = *done.pushed;
         for i in 0..pull.len() {
-            pull[i] = -pull[i] - fixed.constant[i];
+            pull[i] = done.bias[i] - pull[i] - fixed.constant[i];
         }
         for contact in frictions {
             self.dissipated += contact.force * (done.mean_velocity[contact.first] - done.mean_velocity[contact.second]) * h;

@@ -39,11 +39,13 @@ impl Plant {
             }
             if self.sense.watches_substeps() {
                 self.note_pushes(to);
+                self.links_here();
                 self.note_outputs();
                 follower.noted(self);
             }
         }
         self.note_pushes(self.period);
+        self.links_here();
     }
 
     /// `N` is the number of free bodies, or [`ANY`].
@@ -52,6 +54,7 @@ impl Plant {
         let n = if N == ANY { self.fixed.free.min(SLOTS) } else { N };
         let Some(mut motion) = self.motion.take() else { return };
         self.drive(n, from, to, &mut motion);
+        self.links_to_the_middle(&mut motion);
         self.paths_to_the_middle(&mut motion);
         self.move_freely(n, &mut motion);
         if self.fixed.constraints.len() > 0 {
@@ -233,6 +236,7 @@ impl Plant {
 
     #[inline(always)]
     fn count_energy(&mut self, motion: &Motion) {
+        let bias = if self.energy.is_some() { self.bias_over(motion) } else { [0.0; SLOTS] };
         if let Some(account) = &mut self.energy {
             let done = Done {
                 velocity: &self.v,
@@ -240,6 +244,7 @@ impl Plant {
                 mean_velocity: &motion.mean_velocity,
                 end_velocity: &motion.end_velocity,
                 pushed: &motion.pushed,
+                bias: &bias,
                 length: self.substep,
             };
             account.count(&self.fixed, &self.drives, &self.frictions, &mut self.paths, &done);

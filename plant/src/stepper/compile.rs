@@ -7,6 +7,7 @@ use super::dense;
 use super::drive::Drive;
 use super::error::CompileError;
 use super::instant::Endpoint;
+use super::links::Links;
 use super::motion::Motion;
 use super::options::Options;
 use super::path::PathElement;
@@ -210,7 +211,7 @@ const LONGEST_SUBSTEP_UNBOUNDED_S: f64 = 1.25e-4;
 /// Shortest substep that is chosen, s. What is faster than that is stable, but not resolved.
 const SHORTEST_SUBSTEP_S: f64 = 4e-6;
 
-fn choose_substeps(network: &Network, model: &Model, factor: &DMatrix<f64>, period: f64) -> usize {
+fn choose_substeps(network: &Network, model: &Model, factors: &[DMatrix<f64>], period: f64) -> usize {
     let free = network.free_bodies.len();
     let (mut stiffness, mut damping) = (network.stiffness.clone(), network.damping.clone());
     let mut longest = LONGEST_SUBSTEP_S;
@@ -225,11 +226,16 @@ fn choose_substeps(network: &Network, model: &Model, factor: &DMatrix<f64>, peri
             join(&mut damping, first, second, slopes.damping);
         }
     }
-    let fastest = dense::largest_ratio(factor, &block(&stiffness, free)).sqrt();
-    let quickest_decay = dense::largest_ratio(factor, &block(&damping, free));
+    let fastest = largest_ratio(factors, &block(&stiffness, free)).sqrt();
+    let quickest_decay = largest_ratio(factors, &block(&damping, free));
     let longest = longest.min(PHASE_PER_SUBSTEP / fastest).min(DECAY_PER_SUBSTEP / quickest_decay).max(SHORTEST_SUBSTEP_S);
     let count = (period / longest - 1e-9).ceil();
     if count.is_finite() { count.clamp(1.0, 100_000.0) as usize } else { 1 }
+}
+
+/// The largest of all poses of a robot.
+fn largest_ratio(factors: &[DMatrix<f64>], matrix: &DMatrix<f64>) -> f64 {
+    factors.iter().fold(0.0, |largest: f64, factor| largest.max(dense::largest_ratio(factor, matrix)))
 }
 
 /// Every element by what a stepper makes of it.
@@ -290,22 +296,33 @@ impl Plant {
 fn plant(model: &Model, period: f64, options: &Options) -> Result<Plant, CompileError> {
     check_sizes(model, period, options)?;
     check(model)?;
-    let network = assemble(model)?;
+    let mut network = assemble(model)?;
     let free = network.free_bodies.len();
+    let mut links = model.arm.as_ref().map(|arm| Box::new(Links::new(arm, &network.slots, network.mass.clone())));
+    let poses = model.arm.as_ref().map_or_else(Vec::new, |arm| arm.poses());
+    let masses: Vec<Square> = links.iter_mut().flat_map(|links| poses.iter().map(|pose| links.mass_at(pose))).collect();
+    if let Some(at_pose) = masses.first() {
+        network.mass.clone_from(at_pose);
+    }
     let mass = block(&network.mass, free);
     let massless = |row: usize| CompileError::Massless(model.bodies[network.free_bodies[row]].name.clone());
     let factor = dense::cholesky(&mass).map_err(massless)?;
     let inverse_mass = dense::inverse(&mass).ok_or(CompileError::Singular)?;
+    // In other poses the links may weigh less on their joints.
+    let others: Vec<DMatrix<f64>> = masses.iter().skip(1).map(|mass| block(mass, free)).collect();
+    let mut factors = vec![factor];
+    factors.extend(others.iter().filter_map(|mass| dense::cholesky(mass).ok()));
 
-    let linear = model.elements.iter().all(|element| {
-        let nothing_between = element.between[0] == element.between[1];
-        nothing_between || matches!(element.law.role(), Role::Linear(_))
-    });
+    let linear = links.is_none()
+        && model.elements.iter().all(|element| {
+            let nothing_between = element.between[0] == element.between[1];
+            nothing_between || matches!(element.law.role(), Role::Linear(_))
+        });
     let delayed = model.outputs.iter().any(|output| output.delay > 0.0);
     let substeps = match options.substeps {
         Some(n) => n,
         None if linear && !delayed => 1,
-        None => choose_substeps(&network, model, &factor, period),
+        None => choose_substeps(&network, model, &factors, period),
     };
     let substep = period / substeps as f64;
     let drives: Vec<Drive> = model.inputs.iter().map(|input| Drive::new(input, network.slots[input.on], period, substep)).collect();
@@ -314,9 +331,11 @@ fn plant(model: &Model, period: f64, options: &Options) -> Result<Plant, Compile
 
     let stiffness = block(&network.stiffness, free);
     let damping = block(&network.damping, free);
-    let theta = if dense::largest_ratio(&factor, &stiffness).sqrt() * substep < 1.2 { 1.0 / 3.0 } else { 1.0 };
-    let system = &mass * (2.0 / substep) + &damping + &stiffness * (theta * 0.5 * substep);
-    let from_force = dense::inverse(&system).ok_or(CompileError::Singular)?;
+    let theta = if largest_ratio(&factors, &stiffness).sqrt() * substep < 1.2 { 1.0 / 3.0 } else { 1.0 };
+    let system = |mass: &DMatrix<f64>| mass * (2.0 / substep) + &damping + &stiffness * (theta * 0.5 * substep);
+    let from_force = dense::inverse(&system(&mass)).ok_or(CompileError::Singular)?;
+    let mut from_forces = vec![columns(&from_force)];
+    from_forces.extend(others.iter().filter_map(|mass| dense::inverse(&system(mass))).map(|inverse| columns(&inverse)));
     let mut from_prescribed = [[[0.0; SLOTS]; SLOTS]; 3];
     for (matrix, weights) in [&network.stiffness, &network.damping, &network.mass].into_iter().zip(&mut from_prescribed) {
         for (p, weights) in weights.iter_mut().enumerate().take(network.prescribed) {
@@ -325,7 +344,7 @@ fn plant(model: &Model, period: f64, options: &Options) -> Result<Plant, Compile
             }
         }
     }
-    let constraints = Constraints::new(&columns(&from_force), free, substep, &frictions, &mut paths);
+    let constraints = Constraints::new(&from_forces, free, substep, &frictions, &mut paths);
     let fixed = Compiled {
         free,
         prescribed: network.prescribed,
@@ -364,6 +383,7 @@ fn plant(model: &Model, period: f64, options: &Options) -> Result<Plant, Compile
         sense,
         energy: None,
         exact,
+        links,
     };
     plant.reset();
     Ok(plant)

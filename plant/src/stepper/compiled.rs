@@ -27,7 +27,7 @@ pub(super) struct Compiled {
     pub(super) stiffness: Square,
     /// Constant force onto each place, N.
     pub(super) constant: Slots,
-    /// Inverse of the free bodies' inertia, 1/kg.
+    /// Inverse of the free bodies' inertia, 1/kg; of a robot only where it begins.
     pub(super) inverse_mass: Columns,
     /// Share θ of the implicit rule in the position.
     pub(super) theta: f64,

@@ -11,6 +11,8 @@ use super::slots::{Columns, MAX_ELEMENTS, SLOTS, Slots};
 
 /// Sweeps before the sticking contacts are solved directly.
 const SWEEPS: usize = 25;
+/// The same where a robot's links couple all joints: there sweeps converge slowly, and fewer of them cost half as much in all.
+const SWEEPS_OF_LINKS: usize = 6;
 /// Direct solutions at most.
 const ROUNDS: usize = 12;
 /// Change of a force in a sweep, against its span, that counts as none.
@@ -40,6 +42,8 @@ pub(super) struct Constraints {
     paths: Vec<usize>,
     /// How many are friction contacts.
     frictions: usize,
+    /// Sweeps before the sticking contacts are solved directly.
+    sweeps: usize,
     /// P, row by row, m/s per N.
     compliance: Vec<f64>,
     /// A⁻¹ Gᵀ: change of the mean velocity of each free body per unit of each force, m/s per N.
@@ -80,33 +84,27 @@ impl Work {
 }
 
 impl Constraints {
-    /// Lists the friction contacts and those path elements that are too stiff for the substep; the latter are told so.
+    /// Lists the friction contacts and those path elements that are too stiff for the substep; the latter are told so. `from_forces` are what the bodies
+    /// answer to forces: first as they begin, then as they may come to answer where that changes on the way.
     pub(super) fn new(
-        from_force: &Columns,
+        from_forces: &[Columns],
         free: usize,
         substep: f64,
         frictions: &[FrictionContact],
         paths: &mut [PathElement],
     ) -> Constraints {
-        let mut all = Constraints { frictions: frictions.len(), ..Constraints::default() };
+        let sweeps = if from_forces.len() > 1 { SWEEPS_OF_LINKS } else { SWEEPS };
+        let mut all = Constraints { frictions: frictions.len(), sweeps, ..Constraints::default() };
         for contact in frictions {
             all.ends.push((contact.first, contact.second));
         }
-        let weight = |slot: usize, column: &Slots| if slot < free { column[slot] } else { 0.0 };
-        let respond = |(first, second): (usize, usize)| {
-            let mut response = [0.0; SLOTS];
-            for i in 0..free {
-                response[i] = weight(first, &transposed(from_force, i)) - weight(second, &transposed(from_force, i));
-            }
-            response
-        };
         // Several in one place add up: all that stay explicit must be stable together.
         let stiff = STIFF.min(0.5 / paths.len().max(1) as f64);
         for (index, path) in paths.iter_mut().enumerate() {
             let ends = (path.first, path.second);
-            let response = respond(ends);
             let slopes = path.law.slopes();
-            let stiffness = (weight(ends.0, &response) - weight(ends.1, &response)) * (0.5 * substep * slopes.stiffness + slopes.damping);
+            let most = from_forces.iter().fold(0.0, |most: f64, columns| most.max(across(ends, free, &respond(columns, free, ends))));
+            let stiffness = most * (0.5 * substep * slopes.stiffness + slopes.damping);
             if stiffness > if slopes.bounded { stiff } else { STIFF_UNBOUNDED } {
                 path.constraint = Some(all.ends.len());
                 path.unresolved = stiffness > if slopes.bounded { UNRESOLVED } else { STIFF };
@@ -115,13 +113,25 @@ impl Constraints {
                 all.ends.push(ends);
             }
         }
-        all.response = all.ends.iter().map(|ends| respond(*ends)).collect();
-        for ends in &all.ends {
-            for response in &all.response {
-                all.compliance.push(weight(ends.0, response) - weight(ends.1, response));
-            }
+        all.response = vec![[0.0; SLOTS]; all.ends.len()];
+        all.compliance = vec![0.0; all.ends.len() * all.ends.len()];
+        if let Some(now) = from_forces.first() {
+            all.answer_by(now, free);
         }
         all
+    }
+
+    /// What the bodies answer to forces is now this.
+    pub(super) fn answer_by(&mut self, from_force: &Columns, free: usize) {
+        for (response, ends) in self.response.iter_mut().zip(&self.ends) {
+            *response = respond(from_force, free, *ends);
+        }
+        let count = self.ends.len();
+        for (c, ends) in self.ends.iter().enumerate() {
+            for (d, response) in self.response.iter().enumerate() {
+                self.compliance[c * count + d] = across(*ends, free, response);
+            }
+        }
     }
 
     #[inline]
@@ -199,7 +209,7 @@ impl Constraints {
             return;
         }
         for _ in 0..ROUNDS {
-            for _ in 0..SWEEPS {
+            for _ in 0..self.sweeps {
                 let mut settled = true;
                 for c in 0..count {
                     let change = self.relax(c, work, paths).abs();
@@ -270,13 +280,20 @@ impl Constraints {
     }
 }
 
-/// Row i of A⁻¹ as a column (it is symmetric but for rounding).
-fn transposed(columns: &Columns, i: usize) -> Slots {
-    let mut row = [0.0; SLOTS];
-    for (j, column) in columns.iter().enumerate() {
-        row[j] = column[i];
+/// What a unit of a constraint's force takes from the velocities of the free bodies.
+fn respond(from_force: &Columns, free: usize, (first, second): (usize, usize)) -> Slots {
+    let weight = |slot: usize, i: usize| if slot < free { from_force[slot][i] } else { 0.0 };
+    let mut response = [0.0; SLOTS];
+    for (i, value) in response.iter_mut().enumerate().take(free) {
+        *value = weight(first, i) - weight(second, i);
     }
-    row
+    response
+}
+
+/// What of velocities of free bodies is seen across two places.
+fn across((first, second): (usize, usize), free: usize, velocity: &Slots) -> f64 {
+    let at = |slot: usize| if slot < free { velocity[slot] } else { 0.0 };
+    at(first) - at(second)
 }
 
 impl PathElement {

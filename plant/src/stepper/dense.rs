@@ -1,5 +1,6 @@
-//! Small dense matrices at compile time.
+//! Small dense matrices.
 
+use super::slots::{Columns, SLOTS};
 use nalgebra::DMatrix;
 
 /// Cholesky factor of a symmetric matrix.
@@ -50,4 +51,61 @@ pub(super) fn largest_ratio(l: &DMatrix<f64>, k: &DMatrix<f64>) -> f64 {
     forward(l, &mut whole);
     let symmetric = (&whole + whole.transpose()) * 0.5;
     symmetric.symmetric_eigenvalues().iter().fold(0.0, |largest: f64, e| largest.max(e.abs()))
+}
+
+/// Inverse of the leading `n` rows and columns of a matrix, in place of it (Gauss and Jordan, with the greatest pivot of each column). Nothing is allocated.
+/// `false` when it is singular; what is there then is no inverse.
+pub(super) fn invert(a: &mut Columns, n: usize) -> bool {
+    let mut rows = [0usize; SLOTS];
+    for j in 0..n {
+        let pivot = (j..n).fold(j, |best, i| if a[i][j].abs() > a[best][j].abs() { i } else { best });
+        if a[pivot][j] == 0.0 || !a[pivot][j].is_finite() {
+            return false;
+        }
+        a.swap(j, pivot);
+        rows[j] = pivot;
+        let by = 1.0 / a[j][j];
+        a[j][j] = 1.0;
+        a[j][..n].iter_mut().for_each(|value| *value *= by);
+        let row = a[j];
+        for i in (0..n).filter(|i| *i != j) {
+            let factor = std::mem::take(&mut a[i][j]);
+            for (value, own) in a[i][..n].iter_mut().zip(&row) {
+                *value -= factor * own;
+            }
+        }
+    }
+    for j in (0..n).rev().filter(|j| rows[*j] != *j) {
+        for row in a[..n].iter_mut() {
+            row.swap(j, rows[j]);
+        }
+    }
+    true
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_matrix_times_its_inverse_is_one() {
+        for n in [1, 2, 5, SLOTS] {
+            let mut a = [[0.0; SLOTS]; SLOTS];
+            for i in 0..n {
+                for j in 0..n {
+                    // The first pivot is 0, so that rows are exchanged.
+                    a[i][j] = ((3 * i + 7 * j) as f64 * 1.7).sin() + if i + 1 == n - j { 2.0 } else { 0.0 };
+                }
+            }
+            let first = a;
+            assert!(invert(&mut a, n));
+            for i in 0..n {
+                for j in 0..n {
+                    let product: f64 = (0..n).map(|k| first[i][k] * a[k][j]).sum();
+                    assert!((product - f64::from(u8::from(i == j))).abs() < 1e-10, "{n} {i} {j} {product}");
+                }
+            }
+        }
+        assert!(!invert(&mut [[0.0; SLOTS]; SLOTS], 3));
+    }
 }

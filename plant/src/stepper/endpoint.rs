@@ -4,12 +4,27 @@
 
 use super::compiled::Share;
 use super::contact::Bounds;
+use super::dense;
 use super::instant::Endpoint;
-use super::slots::{GROUND, SLOTS, Slots};
+use super::slots::{Columns, GROUND, SLOTS, Slots, Square};
 use super::state::Plant;
 
 /// Sweeps over the friction contacts: accelerations need no more digits than an output has.
 const SWEEPS: usize = 200;
+/// Of a network without a robot.
+const NO_BIAS: Slots = [0.0; SLOTS];
+
+/// Inverse of the inertia of the free bodies; not numbers where there is none.
+fn inverted(mass: &Square, free: usize) -> Columns {
+    let mut inverse: Columns = [[0.0; SLOTS]; SLOTS];
+    for i in 0..free {
+        inverse[i][..free].copy_from_slice(&mass[i][..free]);
+    }
+    if !dense::invert(&mut inverse, free) {
+        inverse = [[f64::NAN; SLOTS]; SLOTS];
+    }
+    inverse
+}
 
 impl Plant {
     /// The balance of forces now. Sliding contacts have the level of their speed; those that stick what keeps their
@@ -24,6 +39,7 @@ impl Plant {
     pub(super) fn balance(&self, now: &mut Endpoint) {
         let fixed = &self.fixed;
         let mut force = [0.0; SLOTS];
+        let bias = self.links.as_ref().map_or(&NO_BIAS, |links| &links.bias);
         let prescribed = GROUND - fixed.prescribed;
         for i in prescribed..GROUND {
             now.acceleration[i] = self.prescribed_acceleration[i];
@@ -37,7 +53,7 @@ impl Plant {
             for j in prescribed..GROUND {
                 f -= mass[j] * self.prescribed_acceleration[j];
             }
-            force[i] = f;
+            force[i] = f - bias[i];
         }
         for (path, f) in self.paths.iter().zip(&mut now.path) {
             let (first, second) = (path.first, path.second);
@@ -51,20 +67,28 @@ impl Plant {
             force[contact.first] -= *f;
             force[contact.second] += *f;
         }
-        self.accelerate(&force, &mut now.acceleration);
-        self.hold_sticking(&mut force, now);
+        let of_pose;
+        let inverse_mass = match &self.links {
+            None => &fixed.inverse_mass,
+            Some(_) => {
+                of_pose = inverted(&fixed.mass, fixed.free);
+                &of_pose
+            }
+        };
+        self.accelerate(inverse_mass, &force, &mut now.acceleration);
+        self.hold_sticking(inverse_mass, &mut force, now);
     }
 
-    fn accelerate(&self, force: &Slots, acceleration: &mut Slots) {
+    fn accelerate(&self, inverse_mass: &Columns, force: &Slots, acceleration: &mut Slots) {
         for i in 0..self.fixed.free {
-            acceleration[i] = (0..self.fixed.free).map(|j| self.fixed.inverse_mass[j][i] * force[j]).sum();
+            acceleration[i] = (0..self.fixed.free).map(|j| inverse_mass[j][i] * force[j]).sum();
         }
     }
 
     /// Gauss-Seidel over the sticking contacts: no relative acceleration, within the level at rest.
-    fn hold_sticking(&self, force: &mut Slots, now: &mut Endpoint) {
+    fn hold_sticking(&self, inverse_mass: &Columns, force: &mut Slots, now: &mut Endpoint) {
         let free = self.fixed.free;
-        let inverse = |i: usize, j: usize| if i < free && j < free { self.fixed.inverse_mass[j][i] } else { 0.0 };
+        let inverse = |i: usize, j: usize| if i < free && j < free { inverse_mass[j][i] } else { 0.0 };
         for _ in 0..SWEEPS {
             let mut settled = true;
             for (contact, f) in self.frictions.iter().zip(&mut now.friction).filter(|(contact, _)| contact.mode == 0) {
@@ -115,7 +139,8 @@ impl Plant {
             return 0.0;
         }
         let fixed = &self.fixed;
-        let mut reaction = -fixed.constant[slot] - self.pushed[slot];
+        let bias = self.links.as_ref().map_or(0.0, |links| links.bias[slot]);
+        let mut reaction = bias - fixed.constant[slot] - self.pushed[slot];
         for j in (0..fixed.free).chain(GROUND - fixed.prescribed..GROUND) {
             reaction +=
                 fixed.mass[slot][j] * now.acceleration[j] + fixed.damping[slot][j] * self.v[j] + fixed.stiffness[slot][j] * self.x[j];

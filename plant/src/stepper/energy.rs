@@ -10,9 +10,9 @@ use super::state::Plant;
 /// not measured is not zero.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Energy {
-    /// Of all bodies and inerters, now.
+    /// Of all bodies, links and inerters, now.
     pub kinetic: f64,
-    /// In springs, contacts, bristles and biases, now; 0 where every displacement and memory is 0.
+    /// In springs, contacts, bristles, biases and gravity, now; 0 where every displacement and memory is 0.
     pub stored: f64,
     /// Put in by force and motion inputs since the start.
     pub work_in: f64,
@@ -31,7 +31,8 @@ impl Plant {
     /// Energies now.
     pub fn energy(&self) -> Energy {
         let fixed = &self.fixed;
-        let (mut kinetic, mut stored) = (0.0, self.stored_in_paths());
+        let lifted = self.links.as_ref().map_or(0.0, |links| links.potential);
+        let (mut kinetic, mut stored) = (0.0, self.stored_in_paths() + lifted);
         for i in (0..fixed.free).chain(GROUND - fixed.prescribed..GROUND) {
             stored -= fixed.constant[i] * self.x[i];
             for j in (0..fixed.free).chain(GROUND - fixed.prescribed..GROUND) {

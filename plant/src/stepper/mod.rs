@@ -9,10 +9,12 @@
 //!   solved for all contacts at once: what sticks has velocity 0, not a small one (`constraints.rs`).
 //! - Hysteresis is advanced along its path by the kind's own update. An element that is too stiff for the substep
 //!   joins the friction contacts in their implicit solution.
+//! - A robot's links add an inertia that changes with their pose, Coriolis forces and gravity to the bodies that are its joints (`links.rs`).
 
 mod account;
 mod advance;
 mod ahead;
+mod carry;
 mod compile;
 mod compiled;
 mod constraints;
@@ -25,6 +27,7 @@ mod error;
 mod exact;
 mod follow;
 mod instant;
+mod links;
 mod motion;
 mod options;
 mod path;

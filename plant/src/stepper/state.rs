@@ -6,6 +6,7 @@ use super::constraints::Work;
 use super::contact::FrictionContact;
 use super::drive::Drive;
 use super::instant::Endpoint;
+use super::links::Links;
 use super::motion::Motion;
 use super::path::PathElement;
 use super::propagator::Propagator;
@@ -18,6 +19,9 @@ const IMPLICIT: usize = 6;
 
 /// What a costly law adds to a substep, in steps of a linear network.
 const COSTLY: usize = 6;
+
+/// What the links of a robot add to a substep, in steps of a linear network, for each pair of coordinates.
+const LINKS: usize = 5;
 
 /// The balance of forces at a sample, in steps of a linear network.
 const BALANCE: usize = 3;
@@ -47,6 +51,7 @@ pub struct Plant {
     pub(super) sense: Sense,
     pub(super) energy: Option<Account>,
     pub(super) exact: Option<Propagator>,
+    pub(super) links: Option<Box<Links>>,
 }
 
 impl Plant {
@@ -80,6 +85,7 @@ impl Plant {
             path.rise = 1.0;
             path.absorbed = 0.0;
         }
+        self.links_here();
         self.restart_energy();
         self.restart_sense();
     }
@@ -93,6 +99,7 @@ impl Plant {
         for path in self.paths.iter_mut().filter(|path| path.first == slot || path.second == slot) {
             path.reached = self.x[path.first] - self.x[path.second];
         }
+        self.links_here();
         self.restart_energy();
         self.restart_sense();
     }
@@ -155,7 +162,9 @@ impl Plant {
     /// implicitly several evaluations of their law, and costly laws more.
     pub fn cost(&self) -> u64 {
         let (implicit, costly) = self.dear();
-        (self.substeps * (1 + self.frictions.len() + self.paths.len() + IMPLICIT * implicit + COSTLY * costly) + self.balances()) as u64
+        let links = self.links.as_ref().map_or(0, |links| LINKS * links.len() * links.len());
+        (self.substeps * (1 + links + self.frictions.len() + self.paths.len() + IMPLICIT * implicit + COSTLY * costly) + self.balances())
+            as u64
     }
 
     /// The same of derivatives by one parameter that are carried along (see [`crate::stepper::Tangents`]).

@@ -13,12 +13,16 @@ impl Plant {
             && self.frictions.len() == other.frictions.len()
             && self.period == other.period
             && self.substeps == other.substeps
-            && self.exact.is_some() == other.exact.is_some();
+            && self.exact.is_some() == other.exact.is_some()
+            && self.links.is_some() == other.links.is_some();
         if !alike {
             return false;
         }
         std::mem::swap(&mut self.fixed, &mut other.fixed);
         std::mem::swap(&mut self.exact, &mut other.exact);
+        std::mem::swap(&mut self.links, &mut other.links);
+        self.links_here();
+        other.links_here();
         for (mine, theirs) in self.paths.iter_mut().zip(&mut other.paths) {
             std::mem::swap(&mut mine.law, &mut theirs.law);
             std::mem::swap(&mut mine.constraint, &mut theirs.constraint);

@@ -7,6 +7,7 @@ pub use patch::{Edit, ElementSpec, PatchError, Value, patch, round_significant};
 pub use text::{key, number, string};
 
 use crate::model::{Fragment, Hold, InputKind, Model, Motion, OutputKind, Place};
+use crate::robot::Arm;
 use std::fmt::Write;
 use text::{list, parameter_text, strings};
 
@@ -49,6 +50,9 @@ fn write_model(model: &Model, is_fragment: bool) -> String {
         Motion::Rotation => "rotation",
     };
     line(format!("motion = {}", string(motion)));
+    if let Some(arm) = &model.arm {
+        line(format!("\n[robot]\n{}", robot_keys(arm)));
+    }
     line("\n[bodies]".to_string());
     for body in model.bodies.iter().skip(usize::from(is_fragment)) {
         line(format!("{} = {}", key(&body.name), number(body.inertia)));
@@ -75,6 +79,18 @@ fn write_model(model: &Model, is_fragment: bool) -> String {
         line(axis_keys(model, axis));
     }
     out
+}
+
+/// The robot with all that its file says; joint friction, springs and motors are among the elements and inputs already.
+fn robot_keys(arm: &Arm) -> String {
+    let pose = arm.tree.coordinates().iter().zip(&arm.pose).map(|(c, value)| format!("{} = {}", key(&c.name), number(*value)));
+    [
+        format!("xml = {}", string(&arm.xml)),
+        format!("gravity = {}", list(arm.robot.gravity.as_slice())),
+        format!("pose = {{ {} }}", pose.collect::<Vec<_>>().join(", ")),
+        "passive = false".to_string(),
+    ]
+    .join("\n")
 }
 
 fn element_keys(name: &str, kind: &str, between: &str, law: &crate::elements::Law) -> String {

@@ -35,11 +35,13 @@ enum Wide {
 impl Tangents {
     /// Follows `plant`, which was compiled from `model` for samples `period` seconds apart and has not moved yet. Each parameter is given by a model that
     /// differs from `model` in it alone, and by how much it differs: small enough for a straight line. `None` where a model differs in more than its bodies
-    /// and elements, where there are more than [`LANES`], and for a linear model, whose exact solution has no substeps to follow.
+    /// and elements, where there are more than [`LANES`], for a linear model, whose exact solution has no substeps to follow, and for a robot, whose inertia
+    /// changes on the way.
     pub fn new(plant: &Plant, model: &Model, moved: &[(Model, f64)], period: f64) -> Option<Tangents> {
         let options = Options { substeps: Some(plant.substeps), ..Options::default() };
         let alike = |m: &Model| m.inputs == model.inputs && m.outputs == model.outputs && m.elements.len() == model.elements.len();
-        if plant.exact.is_some() || moved.len() > LANES || moved.iter().any(|(m, step)| !alike(m) || *step == 0.0) {
+        if plant.exact.is_some() || plant.links.is_some() || moved.len() > LANES || moved.iter().any(|(m, step)| !alike(m) || *step == 0.0)
+        {
             return None;
         }
         let lanes: Option<Vec<Lane>> =

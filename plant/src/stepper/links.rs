@@ -1,0 +1,172 @@
+//! A robot at work: what its links make of a substep.
+//!
+//! Over a substep h, with `M` the mass matrix of the links, `C` their Coriolis matrix and `g` gravity, all in the middle `q + h v/2`,
+//!
+//! `M (v₁ - v₀)/h + C(v₀) v₁ + g = F`, `q₁ = q₀ + h (v₀ + v₁)/2`.
+//!
+//! `C(v₀) v₁ = C(v₁) v₀`, and the middle is also `q₁ - h v₁/2`, so the rule is the same backwards in time: of second order, and without a drift of the energy.
+//! It is linear in `v₁`, so it joins what the elements already are to a substep, and dry friction and stiff elements are solved with it, over all joints
+//! at once. (Polarising a quadratic force so is Kahan's method, see E. Celledoni, R. McLachlan, B. Owren and G. Quispel, J. Phys. A 46 (2013) 025201.)
+
+use super::compiled::Compiled;
+use super::dense;
+use super::motion::Motion;
+use super::slots::{Columns, SLOTS, Slots, Square, prescribed_slot};
+use crate::robot::{Arm, Tree, Workspace};
+use nalgebra::DMatrix;
+
+/// The links of a robot at work.
+#[derive(Debug, Clone)]
+pub(super) struct Links {
+    tree: Tree,
+    work: Workspace,
+    /// Place of each coordinate.
+    slots: Vec<usize>,
+    pose: Vec<f64>,
+    /// Inertia of the network without the links.
+    own_mass: Square,
+    q: Vec<f64>,
+    v: Vec<f64>,
+    gravity: Vec<f64>,
+    mass: DMatrix<f64>,
+    coriolis: DMatrix<f64>,
+    /// Coriolis forces and gravity by place, at the last instant that was looked at, N m or N.
+    pub(super) bias: Slots,
+    /// Energy in gravity there, less that at the pose, J.
+    pub(super) potential: f64,
+    potential_at_pose: f64,
+}
+
+impl Links {
+    /// `slots`: place of each body of the model; `own_mass`: inertia of the network without the links.
+    pub(super) fn new(arm: &Arm, slots: &[usize], own_mass: Square) -> Links {
+        let (tree, count) = (arm.tree.clone(), arm.tree.len());
+        let mut work = tree.workspace();
+        Links {
+            potential_at_pose: tree.potential_energy(&arm.pose, &mut work),
+            slots: arm.bodies.iter().map(|body| slots[*body]).collect(),
+            pose: arm.pose.clone(),
+            own_mass,
+            q: vec![0.0; count],
+            v: vec![0.0; count],
+            gravity: vec![0.0; count],
+            mass: DMatrix::zeros(count, count),
+            coriolis: DMatrix::zeros(count, count),
+            bias: [0.0; SLOTS],
+            potential: 0.0,
+            tree,
+            work,
+        }
+    }
+
+    /// How many coordinates there are.
+    pub(super) fn len(&self) -> usize {
+        self.slots.len()
+    }
+
+    /// Inertia of the network with the links at these coordinates.
+    pub(super) fn mass_at(&mut self, coordinates: &[f64]) -> Square {
+        self.tree.place(coordinates, &mut self.work);
+        let mut mass = self.own_mass.clone();
+        self.join_mass(&mut mass);
+        mass
+    }
+
+    /// The inertia of the links as they are placed, beside the network's own.
+    fn join_mass(&mut self, mass: &mut Square) {
+        self.tree.mass_matrix_here(&mut self.work, &mut self.mass);
+        for (i, a) in self.slots.iter().enumerate() {
+            for (j, b) in self.slots.iter().enumerate() {
+                mass[*a][*b] = self.own_mass[*a][*b] + self.mass[(i, j)];
+            }
+        }
+    }
+
+    /// What the links make of the substep that begins with velocities `v` and has the bodies at `motion.middle` in its middle.
+    pub(super) fn enter(&mut self, fixed: &mut Compiled, substep: f64, v: &Slots, motion: &mut Motion) {
+        for (i, slot) in self.slots.iter().enumerate() {
+            (self.q[i], self.v[i]) = (self.pose[i] + motion.middle[*slot], v[*slot]);
+        }
+        self.tree.velocities(&self.q, &self.v, &mut self.work);
+        self.join_mass(&mut fixed.mass);
+        self.tree.coriolis_matrix_here(&self.v, &mut self.work, &mut self.coriolis);
+        self.tree.gravity_here(&mut self.work, &mut self.gravity);
+        let free = fixed.free;
+        // C(v₀) v₁, as far as it is known before: of free bodies at v₀.
+        self.bias_with(|slot| if slot < free { v[slot] } else { motion.end_velocity[slot] });
+        for slot in self.slots.iter().filter(|slot| **slot < free) {
+            motion.force[*slot] -= self.bias[*slot];
+        }
+        self.answer(fixed, substep);
+    }
+
+    /// Coriolis forces `C(v₀) u` and gravity, by place.
+    #[inline]
+    pub(super) fn bias_with(&mut self, u: impl Fn(usize) -> f64) {
+        for (i, a) in self.slots.iter().enumerate() {
+            let turned: f64 = self.slots.iter().enumerate().map(|(j, b)| self.coriolis[(i, j)] * u(*b)).sum();
+            self.bias[*a] = self.gravity[i] + turned;
+        }
+    }
+
+    /// What the bodies answer to forces in this substep.
+    fn answer(&self, fixed: &mut Compiled, substep: f64) {
+        let n = fixed.free;
+        let mut system: Columns = [[0.0; SLOTS]; SLOTS];
+        for i in 0..n {
+            for j in 0..n {
+                system[i][j] = 2.0 / substep * fixed.mass[i][j] + fixed.damping[i][j] + fixed.theta * 0.5 * substep * fixed.stiffness[i][j];
+            }
+        }
+        for (i, a) in self.slots.iter().enumerate().filter(|(_, slot)| **slot < n) {
+            for (j, b) in self.slots.iter().enumerate().filter(|(_, slot)| **slot < n) {
+                // The end's velocity is the start's and twice what is solved for.
+                system[*a][*b] += 2.0 * self.coriolis[(i, j)];
+            }
+        }
+        if !dense::invert(&mut system, n) {
+            system = [[f64::NAN; SLOTS]; SLOTS];
+        }
+        for j in 0..n {
+            for i in 0..n {
+                fixed.from_force[j][i] = system[i][j];
+            }
+        }
+        for j in 0..n {
+            let (mut by_position, mut by_velocity) = ([0.0; SLOTS], [0.0; SLOTS]);
+            // Few bodies are tied to each other.
+            for k in (0..n).filter(|k| fixed.stiffness[*k][j] != 0.0 || fixed.damping[*k][j] != 0.0) {
+                let (stiffness, column) = (fixed.stiffness[k][j], &fixed.from_force[k]);
+                let damping = fixed.damping[k][j] + 0.5 * substep * stiffness;
+                for i in 0..n {
+                    by_position[i] -= column[i] * stiffness;
+                    by_velocity[i] -= column[i] * damping;
+                }
+            }
+            (fixed.from_position[j], fixed.from_velocity[j]) = (by_position, by_velocity);
+        }
+        for p in 0..fixed.prescribed {
+            let slot = prescribed_slot(p);
+            for (weights, matrix) in fixed.from_prescribed.iter_mut().zip([&fixed.stiffness, &fixed.damping, &fixed.mass]) {
+                for (i, weight) in weights[p].iter_mut().enumerate().take(n) {
+                    *weight = -(0..n).map(|j| system[i][j] * matrix[j][slot]).sum::<f64>();
+                }
+            }
+        }
+        fixed.constraints.answer_by(&fixed.from_force, n);
+    }
+
+    /// What is known of the links at an instant; `fixed.mass` is then of it, too.
+    pub(super) fn at(&mut self, fixed: &mut Compiled, x: &Slots, v: &Slots) {
+        for (i, slot) in self.slots.iter().enumerate() {
+            (self.q[i], self.v[i]) = (self.pose[i] + x[*slot], v[*slot]);
+        }
+        self.tree.velocities(&self.q, &self.v, &mut self.work);
+        self.join_mass(&mut fixed.mass);
+        self.tree.bias_here(&self.v, &mut self.work, &mut self.gravity);
+        for (i, slot) in self.slots.iter().enumerate() {
+            self.bias[*slot] = self.gravity[i];
+        }
+        self.potential = self.tree.potential_energy_here(&self.work) - self.potential_at_pose;
+    }
+}
