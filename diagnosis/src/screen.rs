@@ -154,8 +154,8 @@ impl<'b, 'a> Beside<'b, 'a> {
         starts
     }
 
-    /// The first of two passes: all starts on the recordings with the largest residuals, the best so many go on, at most two of each hypothesis. Of each
-    /// physics the best goes first, whatever it promises: what does little beside the base may do much beside something else.
+    /// The first of two passes: all starts on the recordings with the largest residuals, the best so many go on, at most two of each hypothesis. Half of them are what
+    /// promises most; then comes the best of each other physics, whatever it promises: what does little beside the base may do much beside something else.
     fn first_pass(&self, starts: &[Start<'b>], few: &[usize], most: usize, work: Steps) -> Vec<Start<'b>> {
         let (evaluator, problem, stride) = (self.evaluator, self.evaluator.problem, self.stride);
         let layout = evaluator.layout();
@@ -183,12 +183,13 @@ impl<'b, 'a> Beside<'b, 'a> {
             seen[s.1.0] += 1;
             seen[s.1.0] <= 2
         });
-        let (mut kinds, mut first) = (HashSet::new(), HashSet::new());
-        let (of_a_kind, others): (Vec<_>, Vec<_>) =
-            scores.into_iter().map(|s| s.1).partition(|job| kinds.insert(self.hypotheses[job.0].physics.name));
-        first.extend(of_a_kind.iter().map(|job| job.0));
-        let (firsts, seconds): (Vec<_>, Vec<_>) = others.into_iter().partition(|job| first.insert(job.0));
-        of_a_kind.into_iter().chain(firsts).chain(seconds).take(most).collect()
+        let mut first = HashSet::new();
+        let (firsts, seconds): (Vec<_>, Vec<_>) = scores.into_iter().map(|s| s.1).partition(|job| first.insert(job.0));
+        let kind = |job: &Start| self.hypotheses[job.0].physics.name;
+        let (promising, others) = firsts.split_at(firsts.len().min(most / 2));
+        let mut kinds: HashSet<&str> = promising.iter().map(kind).collect();
+        let (of_a_kind, others): (Vec<_>, Vec<_>) = others.iter().copied().partition(|job| kinds.insert(kind(job)));
+        promising.iter().copied().chain(of_a_kind).chain(others).chain(seconds).take(most).collect()
     }
 
     /// The effect of a start in full and weakened.

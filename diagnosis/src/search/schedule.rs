@@ -12,41 +12,38 @@ use crate::race::{Course, distinct};
 use crate::tuning::tuning;
 use std::collections::HashSet;
 
-/// Single effects: every search begins with them.
-const SINGLES: [&dyn Step; 8] = [&Ripples, &Singles::NEXT, &Plain, &GivenBack, &Split::ALONE, &Laws, &Singles::NEXT, &Plain];
-
-/// How much the best single effect leaves.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Left {
-    /// The nominal model left noise: only what may be wrong with single effects is asked.
-    Noise,
-    /// Less than the noise.
-    Little,
-    /// More than the noise.
-    Much,
-}
-
-/// The steps that follow single effects in a search for so many, in their order. Where the best leaves much, another effect is missing: the work must not be gone before
-/// pairs are fitted, and other forms of what leaves so much wait until they are.
-fn steps(left: Left, effects: usize) -> Vec<&'static dyn Step> {
-    let forms: [&'static dyn Step; 4] = [&Given, &Relatives, &Elsewhere, &Relatives];
-    let pairs: [&'static dyn Step; 4] = [&Pairs, &Split::BESIDE, &Laws, &Exchanges];
-    let mut steps: Vec<&'static dyn Step> = Vec::new();
-    match left {
-        Left::Noise => return forms.to_vec(),
-        Left::Little => {
-            steps.extend(forms);
-            steps.push(&Finer);
-            steps.extend(pairs);
-        }
-        Left::Much => {
-            steps.extend([&Given as &dyn Step, &Relatives]);
-            steps.extend(pairs);
-            steps.extend(forms);
-            steps.push(&Finer);
-        }
+/// The steps of a search for so many effects, in their order. Where the residual is noise, only what may be wrong with single effects is asked.
+fn steps(is_quiet: bool, effects: usize) -> Vec<&'static dyn Step> {
+    let mut steps: Vec<&'static dyn Step> = vec![
+        &Ripples,
+        &Singles::NEXT,
+        &Plain,
+        &GivenBack,
+        &Split::ALONE,
+        &Laws,
+        &Singles::NEXT,
+        &Plain,
+        &Given,
+        &Relatives,
+        &Elsewhere,
+        &Relatives,
+    ];
+    if is_quiet {
+        return steps;
     }
-    steps.extend([&Richer as &dyn Step, &Singles::REST, &MorePairs, &Laws, &Exchanges, &Elsewhere]);
+    steps.extend([
+        &Finer as &dyn Step,
+        &Pairs,
+        &Split::BESIDE,
+        &Laws,
+        &Exchanges,
+        &Richer,
+        &Singles::REST,
+        &MorePairs,
+        &Laws,
+        &Exchanges,
+        &Elsewhere,
+    ]);
     for _ in 2..effects {
         steps.extend([&More as &dyn Step, &Split::BESIDE, &Anew, &Exchanges]);
     }
@@ -66,7 +63,7 @@ pub struct StepRow {
 /// The steps of a search for three effects in their order, each where it comes first.
 pub fn table() -> Vec<StepRow> {
     let mut rows: Vec<StepRow> = Vec::new();
-    for step in SINGLES.into_iter().chain(steps(Left::Much, 3)) {
+    for step in steps(false, 3) {
         let row = StepRow { name: step.name(), share: step.terms().share };
         if !rows.contains(&row) {
             rows.push(row);
@@ -77,18 +74,7 @@ pub fn table() -> Vec<StepRow> {
 
 /// Takes all steps, as far as there is work to be done and something left to explain.
 pub(super) fn run(state: &mut State, settings: &Settings, report: &(dyn Fn(&str) + Sync)) {
-    take_all(&SINGLES, state, report);
-    let left = match () {
-        () if state.is_quiet() => Left::Noise,
-        () if state.leaves_much() => Left::Much,
-        () => Left::Little,
-    };
-    take_all(&steps(left, settings.effects), state, report);
-}
-
-fn take_all(steps: &[&dyn Step], state: &mut State, report: &(dyn Fn(&str) + Sync)) {
-    for step in steps {
-        let step = *step;
+    for step in steps(state.is_quiet(), settings.effects) {
         let outcome = match hindrance(step, state) {
             Some(hindrance) => hindrance,
             None => {
