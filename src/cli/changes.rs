@@ -35,7 +35,7 @@ pub struct SwappedParts {
     pub hand: Option<Hand>,
     /// Gain product from which on the loop shakes without a canceller, whichever hand holds (`backdrive stability` says it): a canceller that estimates the hand
     /// then cancels no more than the gain needs.
-    #[arg(long, value_name = "MU_LAMBDA", value_parser = positive)]
+    #[arg(long, value_name = "MU_LAMBDA", value_parser = positive, allow_negative_numbers = true)]
     pub edge_without: Option<f64>,
     /// Whether sensors round and are noisy as the model files say.
     #[arg(long, value_enum)]
