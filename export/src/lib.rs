@@ -1,10 +1,12 @@
 //! Models written for others. Each writer is a pure function: a [`Model`](backdrive_plant::model::Model) in, text and a list of what the text cannot hold out.
 //!
 //! - [`mjcf`]: MuJoCo 4.0. Bodies are joints, elements are attributes of joints and tendons, inputs actuators, outputs sensors.
+//! - [`feedforward`]: the force of a joint's friction as a function of position, velocity and load, for a controller: C, Python or numbers as YAML.
 //!
 //! A target that has no word for an element gets what is nearest, or nothing; a [`LeftOut`] says so, and how the model is changed by it, so that the error
 //! that this makes can be simulated.
 
+pub mod feedforward;
 mod left_out;
 pub mod mjcf;
 mod names;
