@@ -2,14 +2,19 @@
 //!
 //! - [`mjcf`]: MuJoCo 4.0. Bodies are joints, elements are attributes of joints and tendons, inputs actuators, outputs sensors.
 //! - [`feedforward`]: the force of a joint's friction as a function of position, velocity and load, for a controller: C, Python or numbers as YAML.
+//! - [`urdf`]: `<dynamics>` and `<limit>` of a robot's joints.
+//! - [`isaac`]: joint parameters for Isaac Lab.
 //!
 //! A target that has no word for an element gets what is nearest, or nothing; a [`LeftOut`] says so, and how the model is changed by it, so that the error
 //! that this makes can be simulated.
 
 pub mod feedforward;
+pub mod isaac;
+mod joint_terms;
 mod left_out;
 pub mod mjcf;
 mod names;
+pub mod urdf;
 mod xml;
 
 pub use left_out::{Change, LeftOut, Part, change_all};
