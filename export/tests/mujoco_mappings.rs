@@ -143,7 +143,11 @@ fn what_has_no_word_is_told_with_what_stands_in_its_place() {
         ("kind = 'hunt_crossley'\nstiffness = 3\ndamping = 1\nexponent = 2", Some("hunt_crossley")),
         ("kind = 'hunt_crossley'\nstiffness = 3", None),
         ("kind = 'backlash'\ngap = 0.1\nstiffness = 3\ndamping = 1", Some("backlash")),
-        ("kind = 'bouc_wen'\nstiffness = 10\nratio = 0.3\namplitude = 1\nbeta = 1\ngamma = 1\nexponent = 1", Some("spring")),
+        ("kind = 'bouc_wen'\nstiffness = 10\nratio = 0.3\namplitude = 1\nbeta = 1\ngamma = 1\nexponent = 1", Some("maxwell_slip")),
+        (
+            "kind = 'hysteretic_spring'\nstiffness_positive = 90\nstiffness_negative = 110\noffset_positive = 3\noffset_negative = -1\nbandwidth = 50",
+            Some("spring"),
+        ),
         ("kind = 'cogging'\namplitude = 3\nperiod = 0.1", None),
     ];
     for (element, instead) in cases {

@@ -9,6 +9,8 @@ use backdrive_plant::stepper::{Options, Plant};
 
 /// Longest step that is chosen, s.
 const LONGEST: f64 = 1e-3;
+/// Shortest step that is chosen, s.
+const SHORTEST: f64 = 1e-6;
 /// Longest step with dry friction, for which MuJoCo's rules are of first order, s.
 const LONGEST_WITH_FRICTION: f64 = 1e-4;
 /// Damping that the rule of Runge and Kutta is trusted with: share of the speed that is lost in a step.
@@ -26,7 +28,7 @@ pub(super) fn integration(model: &Model, layout: &Layout, network: &Network, ste
     let longest = if has_friction || jumps { own.min(LONGEST_WITH_FRICTION) } else { own };
     let delays = model.inputs.iter().map(|i| i.delay).chain(model.outputs.iter().map(|o| o.delay)).filter(|d| *d > 0.0);
     // MuJoCo reads what is delayed at least one step late.
-    let step = step.unwrap_or_else(|| round(delays.fold(longest, f64::min)));
+    let step = step.unwrap_or_else(|| round(delays.fold(longest, f64::min).max(SHORTEST)));
     let is_smooth = !has_friction && !jumps && lost(model, layout, network) * step < MOST_LOST;
     Ok(Integration { step, integrator: if is_smooth { "RK4" } else { "implicitfast" } })
 }

@@ -29,9 +29,9 @@ pub fn export(model: &Model, step: Option<f64>) -> Result<Exported, ExportError>
         return Err(ExportError::new("it is the model of nothing: it has no bodies"));
     }
     let layout = Layout::of(model);
-    let (network, mut left_out) = network(model, &layout.pose);
+    let (network, mut left_out) = network(model, &layout.pose, names_in(model, "tendon"));
     let integration = integration::integration(model, &layout, &network, step)?;
-    let mut signals = signals(model, &network, &layout.names, integration);
+    let mut signals = signals(model, &network, &layout.names, integration, names_in(model, "actuator"));
     left_out.append(&mut signals.left_out);
     let mut notes = Vec::new();
     let text = match &model.arm {
@@ -40,6 +40,13 @@ pub fn export(model: &Model, step: Option<f64>) -> Result<Exported, ExportError>
     };
     notes.extend(of_commands(model));
     Ok(Exported { text, left_out, notes })
+}
+
+/// Names in a section of the robot's own MJCF.
+fn names_in(model: &Model, section: &str) -> BTreeSet<String> {
+    let Some(document) = model.arm.as_ref().and_then(|arm| roxmltree::Document::parse(&arm.xml).ok()) else { return BTreeSet::new() };
+    let sections = document.root_element().children().filter(|n| n.has_tag_name(section));
+    sections.flat_map(|s| s.children()).filter_map(|n| n.attribute("name")).map(str::to_owned).collect()
 }
 
 /// What MuJoCo has of every model.

@@ -56,9 +56,9 @@ pub(super) struct Network {
     names: BTreeSet<String>,
 }
 
-/// The network of a model whose bodies have their zero at the coordinates `pose`, and what is not in it.
-pub(super) fn network(model: &Model, pose: &[f64]) -> (Network, Vec<LeftOut>) {
-    let mut network = Network { joints: vec![OnJoint::default(); model.bodies.len()], ..Network::default() };
+/// The network of a model whose bodies have their zero at the coordinates `pose`, and what is not in it. `names`: of tendons that are there already.
+pub(super) fn network(model: &Model, pose: &[f64], names: BTreeSet<String>) -> (Network, Vec<LeftOut>) {
+    let mut network = Network { joints: vec![OnJoint::default(); model.bodies.len()], names, ..Network::default() };
     let mut left_out = Vec::new();
     for (index, element) in model.elements.iter().enumerate() {
         let ends: Ends = match element.between {

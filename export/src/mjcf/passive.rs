@@ -3,7 +3,7 @@
 //! MuJoCo 4.0, XML reference, `joint` and `tendon`: a spring `-(a x + b x² + c x³)` outside of a dead band, elastic until it yields; a damper
 //! `-(a v + b v |v| + c v³)`; dry friction; inertia.
 
-use backdrive_plant::elements::{Backlash, Contact, Coulomb, Damper, HuntCrossley, Law, MaxwellSlip, Spring};
+use backdrive_plant::elements::{Backlash, BoucWen, Contact, Coulomb, Damper, HuntCrossley, Law, MaxwellSlip, Spring};
 
 /// An end of a dead band that is never reached, m or rad.
 pub(super) const NEVER: f64 = 1e10;
@@ -111,11 +111,27 @@ pub(super) fn nearest(law: &Law) -> (String, Option<(Law, String)>) {
                 Some((law, "a sharp gap without damping".to_owned())),
             )
         }
-        Law::BoucWen(l) => {
-            let law = Law::Spring(Spring { stiffness: l.stiffness * l.ratio, rest: 0.0 });
-            ("MuJoCo has no such memory of the path".to_owned(), Some((law, "the spring that is its elastic share".to_owned())))
+        Law::BoucWen(l) => ("MuJoCo's springs give way at once, and not bit by bit".to_owned(), bouc_wen(l)),
+        Law::HystereticSpring(l) => {
+            let stiffness = 0.5 * (l.stiffness_positive + l.stiffness_negative);
+            let offset = 0.5 * (l.offset_positive + l.offset_negative);
+            let law = Law::Spring(Spring { stiffness, rest: if stiffness == 0.0 { 0.0 } else { -offset / stiffness } });
+            ("MuJoCo has no such memory of the path".to_owned(), Some((law, "the spring midway between its two lines".to_owned())))
         }
         Law::Cogging(_) => ("no spring of MuJoCo repeats with position".to_owned(), None),
         other => (format!("MuJoCo has no {}", other.kind().name.replace('_', " ")), None),
     }
+}
+
+/// Yields that are never reached, as a multiple of what an ordinary one is, m or rad.
+const NEVER_YIELDS: f64 = 1e9;
+
+/// A spring that is the elastic share, and one beside it that gives way where z comes to its bound.
+fn bouc_wen(l: &BoucWen) -> Option<(Law, String)> {
+    let bound = (l.amplitude / (l.beta + l.gamma)).powf(1.0 / l.exponent);
+    let (slips, stays) = ((1.0 - l.ratio) * l.stiffness * l.amplitude, l.ratio * l.stiffness);
+    let springs = [(slips, (1.0 - l.ratio) * l.stiffness * bound), (stays, stays * NEVER_YIELDS)];
+    let (stiffness, force) = springs.into_iter().filter(|(k, _)| *k > 0.0).unzip();
+    let law = MaxwellSlip::new(stiffness, force).ok()?;
+    Some((Law::MaxwellSlip(law), "its elastic share, and beside it a spring that gives way at its bound".to_owned()))
 }

@@ -109,7 +109,7 @@ fn joints<'a>(body: Node<'a, 'a>) -> Vec<Node<'a, 'a>> {
 
 /// rad per unit of an angle in the file.
 fn angle(root: Node) -> f64 {
-    let said = root.children().filter(|n| n.has_tag_name("compiler")).filter_map(|n| n.attribute("angle")).last();
+    let said = root.children().filter(|n| n.has_tag_name("compiler")).filter_map(|n| n.attribute("angle")).next_back();
     if said == Some("radian") { 1.0 } else { 1f64.to_radians() }
 }
 

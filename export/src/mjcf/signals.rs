@@ -19,10 +19,15 @@ pub(super) struct Signals {
     pub left_out: Vec<LeftOut>,
 }
 
-/// All signals of a model; `joints` are the names of the joints by body.
-pub(super) fn signals(model: &Model, network: &Network, joints: &[String], integration: Integration) -> Signals {
+/// All signals of a model; `joints` are the names of the joints by body, `names` those of actuators that are there already.
+pub(super) fn signals(
+    model: &Model,
+    network: &Network,
+    joints: &[String],
+    integration: Integration,
+    mut names: BTreeSet<String>,
+) -> Signals {
     let mut signals = Signals::default();
-    let mut names = BTreeSet::new();
     for (index, input) in model.inputs.iter().enumerate() {
         names.insert(input.name.clone());
         let joint = joints.get(input.on).map_or("", String::as_str);
