@@ -7,6 +7,7 @@ mod changes;
 mod compare;
 mod diagnose;
 mod doctor;
+mod export;
 mod fit;
 mod graph;
 mod init;
@@ -29,6 +30,7 @@ pub use bridge::Bridge;
 pub use compare::Compare;
 pub use diagnose::Diagnose;
 pub use doctor::Doctor;
+pub use export::{Export, Language, Target};
 pub use fit::Fit;
 pub use graph::Graph;
 pub use init::{Answer, Attached, Driven, Init, Motion, Start};
@@ -105,6 +107,9 @@ pub enum Command {
     /// Run a model on a recording, a set of recordings, or a named excitation.
     #[command(after_help = simulate::HELP)]
     Simulate(Simulate),
+    /// Write a model for MuJoCo, as URDF, for Isaac, or as feed-forward of friction, and say what that leaves out.
+    #[command(after_help = export::HELP)]
+    Export(Export),
     /// Look at a model file.
     #[command(subcommand)]
     Model(Model),

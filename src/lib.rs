@@ -14,6 +14,7 @@ mod diagnose_text;
 mod doctor;
 mod experiments;
 mod explain;
+mod export;
 pub mod failure;
 mod fit;
 mod graph;
@@ -69,6 +70,7 @@ pub fn main() -> ExitCode {
         Command::Check(options) => graph::check(&options),
         Command::Graph(options) => graph::draw(&options),
         Command::Simulate(options) => simulate::simulate(&options),
+        Command::Export(options) => export::export(&options),
         Command::Model(command) => model::model(&command),
         Command::Bag(command) => bag::bag(&command),
         Command::Clean => run::clean(),

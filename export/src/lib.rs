@@ -1,0 +1,44 @@
+//! Models written for others. Each writer is a pure function: a [`Model`](backdrive_plant::model::Model) in, text and a list of what the text cannot hold out.
+//!
+//! - [`mjcf`]: MuJoCo 4.0. Bodies are joints, elements are attributes of joints and tendons, inputs actuators, outputs sensors.
+//! - [`feedforward`]: the force of a joint's friction as a function of position, velocity and load, for a controller: C, Python or numbers as YAML.
+//! - [`urdf`]: `<dynamics>` and `<limit>` of a robot's joints.
+//! - [`isaac`]: joint parameters for Isaac Lab.
+//!
+//! A target that has no word for an element gets what is nearest, or nothing; a [`LeftOut`] says so, and how the model is changed by it, so that the error
+//! that this makes can be simulated.
+
+pub mod feedforward;
+pub mod isaac;
+mod joint_terms;
+mod left_out;
+pub mod mjcf;
+mod names;
+pub mod urdf;
+mod xml;
+
+pub use left_out::{Change, LeftOut, Part, change_all};
+
+use std::fmt;
+
+/// A model as another program's text.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Exported {
+    /// The file.
+    pub text: String,
+    /// What is not in it, or is in it as something else.
+    pub left_out: Vec<LeftOut>,
+    /// What a user should know besides.
+    pub notes: Vec<String>,
+}
+
+/// Why a model cannot be exported at all: one sentence.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{0}")]
+pub struct ExportError(pub String);
+
+impl ExportError {
+    fn new(message: impl fmt::Display) -> ExportError {
+        ExportError(message.to_string())
+    }
+}

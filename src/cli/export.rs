@@ -1,0 +1,76 @@
+//! Options of `backdrive export`.
+
+use super::values::positive;
+use clap::{Args, ValueEnum};
+use std::path::PathBuf;
+
+/// Examples and exit codes.
+pub const HELP: &str = "Examples:
+  backdrive export out/diagnosis/model.diagnosed.toml --to mjcf --out device.xml
+  backdrive export arm.toml --to urdf --on set/ --out arm.urdf
+  backdrive export plant/models/impulse-engine.toml --to feedforward --language python
+
+What the target cannot hold is listed on standard error (with --out on standard output), each with what stands in its place and, with --on, the
+error on the held-out recordings with it and without.
+
+Exit codes: 0 exported whole, 1 exported without what is listed, 2 usage, 3 the model or a recording is wrong, or there is nothing to export,
+5 a file cannot be written.";
+
+/// What a model is written as.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Target {
+    /// MuJoCo 4.0.
+    Mjcf,
+    /// Joints of a robot: dynamics and limits.
+    Urdf,
+    /// Joints of a robot for Isaac Lab 2.3 on Isaac Sim 5.
+    Isaac,
+    /// Friction as a function of position, velocity and load, for a controller.
+    Feedforward,
+}
+
+/// What a feed-forward is written in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
+pub enum Language {
+    /// C99.
+    #[default]
+    C,
+    /// Python 3.
+    Python,
+    /// Numbers and equations.
+    Yaml,
+}
+
+/// `backdrive export`
+#[derive(Debug, Args)]
+pub struct Export {
+    /// The model file: a network of one axis, or a model with a [robot].
+    pub model: PathBuf,
+    /// For what.
+    #[arg(long, value_enum)]
+    pub to: Target,
+    /// Of a feed-forward: what it is written in.
+    #[arg(long, value_enum, default_value_t)]
+    pub language: Language,
+    /// Of a feed-forward: width w of the smooth sign tanh(v/w), m/s or rad/s; without this 1 mm/s or 10 mrad/s, and less where friction falls within less.
+    #[arg(long, value_name = "W", value_parser = positive, allow_negative_numbers = true)]
+    pub width: Option<f64>,
+    /// Of an MJCF: its time step, s; without this one that suits the model.
+    #[arg(long, value_name = "SECONDS", value_parser = positive, allow_negative_numbers = true)]
+    pub step: Option<f64>,
+    /// Recordings (a set, a folder, or files) on which the error is worked out that leaving something out makes: on those held out, or else on all.
+    #[arg(long, value_name = "SET", num_args = 1..)]
+    pub on: Vec<PathBuf>,
+    /// A recorded input that may have no place in the model; may be given several times.
+    #[arg(long, value_name = "NAME", requires = "on")]
+    pub ignore_signal: Vec<String>,
+    /// Where it goes; without this to standard output.
+    #[arg(long, value_name = "FILE")]
+    pub out: Option<PathBuf>,
+    /// Replace a file that exists.
+    #[arg(long)]
+    pub overwrite: bool,
+    /// Print what was exported and what was left out as JSON.
+    #[arg(long)]
+    pub json: bool,
+}

@@ -1,0 +1,139 @@
+//! `backdrive export`: a model as another program's text, and what that leaves out.
+
+mod error_without;
+
+use crate::bag::may_replace;
+use crate::cli;
+use crate::failure::{Failure, code};
+use crate::output;
+use crate::progress::busy;
+use backdrive_export::{Exported, LeftOut, feedforward, isaac, mjcf, urdf};
+use backdrive_plant::model::Model;
+use backdrive_report::percent;
+use error_without::{Errors, errors};
+use serde_json::{Value, json};
+
+/// Exports, and says what is left out.
+pub fn export(options: &cli::Export) -> Result<u8, Failure> {
+    if let Some(out) = &options.out {
+        may_replace(out, options.overwrite)?;
+        output::writable(out)?;
+    }
+    let model = Model::load(&options.model)?;
+    let exported = written(&model, options).map_err(|e| Failure::input(format!("{}: {e}", options.model.display())))?;
+    let errors = match options.on.is_empty() {
+        true => None,
+        false => Some(busy("simulating the recordings without what is left out", || {
+            errors(&options.on, &options.model, &options.ignore_signal, &exported.left_out)
+        })?),
+    };
+    if let Some(out) = &options.out {
+        output::file(out, &exported.text)?;
+    }
+    for note in exported.notes.iter().chain(errors.iter().flat_map(|e| &e.notes)) {
+        output::note(format_args!("note: {note}"));
+    }
+    if options.json {
+        output::json(&as_json(&model, options, &exported, errors.as_ref()))?;
+    } else {
+        told(options, &exported, errors.as_ref())?;
+    }
+    Ok(if exported.left_out.is_empty() { 0 } else { code::NEGATIVE })
+}
+
+fn written(model: &Model, options: &cli::Export) -> Result<Exported, backdrive_export::ExportError> {
+    match options.to {
+        cli::Target::Mjcf => mjcf::export(model, options.step),
+        cli::Target::Urdf => urdf::export(model),
+        cli::Target::Isaac => isaac::export(model),
+        cli::Target::Feedforward => {
+            let language = match options.language {
+                cli::Language::C => feedforward::Language::C,
+                cli::Language::Python => feedforward::Language::Python,
+                cli::Language::Yaml => feedforward::Language::Yaml,
+            };
+            feedforward::export(model, language, options.width)
+        }
+    }
+}
+
+/// For a person: the text where it has no file, and the list.
+fn told(options: &cli::Export, exported: &Exported, errors: Option<&Errors>) -> Result<(), Failure> {
+    let list = list(options, &exported.left_out, errors);
+    match &options.out {
+        Some(out) => {
+            output::note(format_args!("wrote {}", out.display()));
+            output::line(list)
+        }
+        None => {
+            output::text(&exported.text)?;
+            output::note(list);
+            Ok(())
+        }
+    }
+}
+
+fn list(options: &cli::Export, left_out: &[LeftOut], errors: Option<&Errors>) -> String {
+    if left_out.is_empty() {
+        return "nothing is left out".to_string();
+    }
+    let error = |index: usize| match (errors, left_out[index].changes.is_empty()) {
+        (_, true) => "; the motion is the same".to_string(),
+        (None, false) => String::new(),
+        (Some(errors), false) => match errors.without.get(index).copied().flatten() {
+            Some(without) => format!("; nrmse {} without it", percent(without)),
+            None => "; without it the recordings cannot be simulated".to_string(),
+        },
+    };
+    let mut text = "left out:\n".to_string();
+    for (index, left) in left_out.iter().enumerate() {
+        let instead = left.instead.as_deref().map_or(String::new(), |instead| format!("; in its place: {instead}"));
+        text += &format!("  {} ({}): {}{instead}{}\n", left.name, left.kind, left.why, error(index));
+    }
+    match errors {
+        Some(errors) => {
+            let all = errors.as_exported.map_or("cannot be simulated".to_string(), percent);
+            text += &format!("nrmse on {}: {} with everything, {all} as exported\n", errors.of, percent(errors.with_all));
+        }
+        None => {
+            text += &format!(
+                "the error that this makes on recordings: backdrive export {} --to {} --on SET\n",
+                options.model.display(),
+                word(options.to)
+            )
+        }
+    }
+    text.trim_end().to_string()
+}
+
+fn word(target: cli::Target) -> &'static str {
+    match target {
+        cli::Target::Mjcf => "mjcf",
+        cli::Target::Urdf => "urdf",
+        cli::Target::Isaac => "isaac",
+        cli::Target::Feedforward => "feedforward",
+    }
+}
+
+fn as_json(model: &Model, options: &cli::Export, exported: &Exported, errors: Option<&Errors>) -> Value {
+    let one = |(index, left): (usize, &LeftOut)| {
+        json!({
+            "part": left.part, "name": left.name, "kind": left.kind, "why": left.why, "instead": left.instead,
+            "changes_the_motion": !left.changes.is_empty(),
+            "nrmse_without": errors.and_then(|e| e.without.get(index).copied().flatten()),
+        })
+    };
+    let left_out: Vec<Value> = exported.left_out.iter().enumerate().map(one).collect();
+    let mut all = json!({
+        "model": model.name,
+        "to": word(options.to),
+        "out": options.out,
+        "left_out": left_out,
+        "notes": exported.notes,
+        "held_out": errors.map(|e| json!({ "of": e.of, "nrmse": e.with_all, "nrmse_as_exported": e.as_exported })),
+    });
+    if options.out.is_none() {
+        all["text"] = json!(exported.text);
+    }
+    all
+}
