@@ -4,6 +4,7 @@ use crate::core::{Core, Events, Port, Tick};
 use crate::device::Device;
 use crate::freshness::Freshness;
 use crate::hand::{HandBank, Scheduled};
+use crate::scaling::{GainPlan, GainsInForce};
 use backdrive_msgs::{Gains, MAX_AXES, Sample};
 
 /// Input `measured` (position; effort = applied force); outputs `motion` (position without the predicted induced motion,
@@ -12,7 +13,7 @@ use backdrive_msgs::{Gains, MAX_AXES, Sample};
 /// Kuchenbecker & Niemeyer 2005, Fig. 3: the model is driven by the applied force alone, with the hand at rest.
 pub struct Canceller {
     model: Option<Device>,
-    scheduled: Option<Scheduled>,
+    scheduled: Option<(Scheduled, GainsInForce)>,
     high_pass: Option<HighPass>,
     measured: Freshness,
     force: [f64; MAX_AXES],
@@ -36,12 +37,11 @@ impl Canceller {
         }
     }
 
-    /// With a model for each of several hands, and the hand estimated while the loop runs ([`crate::hand`]), at the gain product `gain` until another is
-    /// set. `edge_without` as in [`Scheduled::new`], `high_pass_hz` as in [`Canceller::new`].
-    pub fn scheduled(bank: HandBank, edge_without: Option<f64>, gain: f64, high_pass_hz: f64, period_s: f64) -> Canceller {
-        let mut scheduled = Scheduled::new(bank, edge_without, period_s);
-        scheduled.set_gain(gain);
-        Canceller { scheduled: Some(scheduled), ..Canceller::new(None, high_pass_hz, period_s) }
+    /// With a model for each of several hands, and the hand estimated while the loop runs ([`crate::hand`]), at the loop's `gains` (NaN where they are not
+    /// known). `edge_without` as in [`Scheduled::new`], `high_pass_hz` as in [`Canceller::new`].
+    pub fn scheduled(bank: HandBank, edge_without: Option<f64>, gains: GainPlan, high_pass_hz: f64, period_s: f64) -> Canceller {
+        let scheduled = Some((Scheduled::new(bank, edge_without, period_s), GainsInForce::new(gains, period_s)));
+        Canceller { scheduled, ..Canceller::new(None, high_pass_hz, period_s) }
     }
 }
 
@@ -68,7 +68,9 @@ impl Core for Canceller {
                 }
             }
         }
-        if let Some(scheduled) = &mut self.scheduled {
+        if let Some((scheduled, gains)) = &mut self.scheduled {
+            let (mu, lambda) = gains.step(tick);
+            scheduled.set_gain(mu * lambda);
             let predicted = scheduled.step(&self.force, fresh.as_ref().map(|s| &s.position), events);
             if self.trusted && !scheduled.is_finite() {
                 self.trusted = false;
@@ -93,8 +95,8 @@ impl Core for Canceller {
     }
 
     fn set_gains(&mut self, gains: &Gains) {
-        if let Some(scheduled) = &mut self.scheduled {
-            scheduled.set_gain(gains.mu * gains.lambda);
+        if let Some((_, in_force)) = &mut self.scheduled {
+            in_force.set(gains);
         }
     }
 }

@@ -70,32 +70,57 @@ impl GainPlan {
     }
 }
 
+/// Both gains as they are in force: those of a plan, or what was asked for since, ramped.
+#[derive(Debug, Clone)]
+pub(crate) struct GainsInForce {
+    plan: GainPlan,
+    changes_done: usize,
+    pub(crate) mu: Ramp,
+    pub(crate) lambda: Ramp,
+    period_s: f64,
+}
+
+impl GainsInForce {
+    /// The plan's first gains.
+    pub(crate) fn new(plan: GainPlan, period_s: f64) -> GainsInForce {
+        let (mu, lambda) = (Ramp::new(plan.mu), Ramp::new(plan.lambda));
+        GainsInForce { plan, changes_done: 0, mu, lambda, period_s }
+    }
+
+    /// The gains of the next step: (mu, lambda).
+    pub(crate) fn step(&mut self, tick: &Tick) -> (f64, f64) {
+        if let Some(change) = self.plan.due(&mut self.changes_done, tick) {
+            self.mu.aim(change.mu, self.plan.ramp_s, self.period_s);
+            self.lambda.aim(change.lambda, self.plan.ramp_s, self.period_s);
+        }
+        (self.mu.step(), self.lambda.step())
+    }
+
+    /// Other gains are wanted from now on.
+    pub(crate) fn set(&mut self, gains: &Gains) {
+        self.mu.aim(gains.mu, gains.ramp_s, self.period_s);
+        self.lambda.aim(gains.lambda, gains.ramp_s, self.period_s);
+    }
+}
+
 /// Input `motion` (position); output `command` (position x_c = mu x).
 ///
 /// Without a new input the output is not measured: the slave then holds.
 pub struct Forward {
-    plan: GainPlan,
-    changes_done: usize,
-    mu: Ramp,
-    lambda: f64,
-    period_s: f64,
+    gains: GainsInForce,
     motion: Freshness,
 }
 
 impl Forward {
     /// Starts at the plan's first gains.
     pub fn new(plan: GainPlan, period_s: f64) -> Forward {
-        let (mu, lambda) = (Ramp::new(plan.mu), plan.lambda);
-        Forward { plan, changes_done: 0, mu, lambda, period_s, motion: Freshness::default() }
+        Forward { gains: GainsInForce::new(plan, period_s), motion: Freshness::default() }
     }
 }
 
 impl Core for Forward {
     fn step(&mut self, tick: &Tick, inputs: &[Port], outputs: &mut [Sample], _events: &mut Events) {
-        if let Some(change) = self.plan.due(&mut self.changes_done, tick) {
-            self.mu.aim(change.mu, self.plan.ramp_s, self.period_s);
-        }
-        let mu = self.mu.step();
+        let (mu, _) = self.gains.step(tick);
         if let Some(motion) = self.motion.new_sample(&inputs[0], |s| s.position[0]) {
             for axis in 0..motion.len().min(outputs[0].len()) {
                 outputs[0].position[axis] = mu * motion.position[axis];
@@ -104,8 +129,7 @@ impl Core for Forward {
     }
 
     fn set_gains(&mut self, gains: &Gains) {
-        self.mu.aim(gains.mu, gains.ramp_s, self.period_s);
-        self.lambda = gains.lambda;
+        self.gains.set(gains);
     }
 
     // The backward path tells the gains of both, for the guard acts there.
@@ -117,11 +141,7 @@ impl Core for Forward {
 /// When contact forces stop coming the output is not measured: the master then lets go. It does so too where the contact
 /// force is that of a slave that holds because no command reaches it.
 pub struct Backward {
-    plan: GainPlan,
-    changes_done: usize,
-    mu: Ramp,
-    lambda: Ramp,
-    period_s: f64,
+    gains: GainsInForce,
     contact: Freshness,
     dither: Vec<Vec<f64>>,
     guard: Option<Guard>,
@@ -136,12 +156,12 @@ pub struct Backward {
 impl Backward {
     /// Starts at the plan's first gains. `dither` has one list of forces per axis, N or N m, one value per step, repeated from the start when they end; it may be empty.
     pub fn new(plan: GainPlan, dither: Vec<Vec<f64>>, guard: Option<Guard>, period_s: f64) -> Backward {
-        let (mu, lambda) = (Ramp::new(plan.mu), Ramp::new(plan.lambda));
+        let gains = GainsInForce::new(plan, period_s);
         let of = |axis: usize| dither.get(axis).and_then(|d| LiveMargin::new(d, LEAST_FORCE, period_s));
         let live = (0..MAX_AXES).map(of).collect();
         let ring = vec![RingDown::new(LEAST_RING, period_s); MAX_AXES];
         let (contact, reflected) = (Freshness::default(), [0.0; MAX_AXES]);
-        Backward { plan, changes_done: 0, mu, lambda, period_s, contact, dither, guard, reflected, live, ring, axes: 1 }
+        Backward { gains, contact, dither, guard, reflected, live, ring, axes: 1 }
     }
 }
 
@@ -167,18 +187,13 @@ impl Backward {
     }
 
     fn lambda_in_force(&self) -> f64 {
-        self.lambda.now * self.guard.as_ref().map_or(1.0, Guard::share)
+        self.gains.lambda.now * self.guard.as_ref().map_or(1.0, Guard::share)
     }
 }
 
 impl Core for Backward {
     fn step(&mut self, tick: &Tick, inputs: &[Port], outputs: &mut [Sample], events: &mut Events) {
-        if let Some(change) = self.plan.due(&mut self.changes_done, tick) {
-            self.mu.aim(change.mu, self.plan.ramp_s, self.period_s);
-            self.lambda.aim(change.lambda, self.plan.ramp_s, self.period_s);
-        }
-        let mu = self.mu.step();
-        let lambda = self.lambda.step();
+        let (mu, lambda) = self.gains.step(tick);
         let guarded = self.watch(lambda, inputs.get(1).and_then(|p| p.sample), events);
         let (force, dither) = outputs.split_at_mut(1);
         for axis in 0..force[0].len() {
@@ -223,19 +238,18 @@ impl Core for Backward {
     }
 
     fn set_gains(&mut self, gains: &Gains) {
-        self.mu.aim(gains.mu, gains.ramp_s, self.period_s);
-        self.lambda.aim(gains.lambda, gains.ramp_s, self.period_s);
+        self.gains.set(gains);
         if let Some(guard) = &mut self.guard {
             guard.restore();
         }
     }
 
     fn gains(&self) -> Option<(f64, f64)> {
-        Some((self.mu.now, self.lambda_in_force()))
+        Some((self.gains.mu.now, self.lambda_in_force()))
     }
 
     fn margin(&self) -> Option<Told> {
-        let (mu, lambda) = (self.mu.now, self.lambda_in_force());
+        let (mu, lambda) = (self.gains.mu.now, self.lambda_in_force());
         let of = |axis: usize| Told::of(axis, self.live[axis].as_ref().map(LiveMargin::edge), mu, lambda, self.ring[axis].decay_per_s());
         (0..self.axes.min(MAX_AXES)).map(of).reduce(|a, b| if b.is_tighter_than(&a) { b } else { a })
     }

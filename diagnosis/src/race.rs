@@ -136,7 +136,7 @@ impl Course<'_> {
         }
         let size = evaluator.len();
         // Where the work ended before all recordings were looked at, the best so far are what the race gives.
-        if running.iter().all(|(_, f)| f.residuals.len() != size) {
+        if !evaluator.budget.is_halted() && running.iter().all(|(_, f)| f.residuals.len() != size) {
             running.truncate(further);
             let whole = Evaluator { budget: evaluator.budget.extended(Steps::MAX), ..evaluator.clone() };
             running.par_iter_mut().for_each(|(structure, fit)| {

@@ -253,7 +253,7 @@ fn cores(graph: &Graph, node: &Node) -> Result<Vec<Box<dyn Core>>, DeviceError> 
         Settings::Canceller(files, high_pass_hz, hand) => vec![Box::new(match (hand, &files.model) {
             (Some(hand), Some(model)) => {
                 let bank = HandBank::new(model, files.fragment.as_ref(), hand, period_s, &options(files, seed))?;
-                Canceller::scheduled(bank, hand.edge_without, graph.gains.mu * graph.gains.lambda, *high_pass_hz, period_s)
+                Canceller::scheduled(bank, hand.edge_without, graph.gains.clone(), *high_pass_hz, period_s)
             }
             _ => Canceller::new(simulated(files, DeviceRole::Master)?, *high_pass_hz, period_s),
         })],

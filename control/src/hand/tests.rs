@@ -1,9 +1,11 @@
 use super::*;
+use crate::canceller::Canceller;
 use crate::changing_grip::{ChangingGrip, GripChange};
-use crate::core::Events;
+use crate::core::{Core, Events, Port, Tick};
 use crate::device::{Device, DeviceOptions, DeviceRole};
 use crate::mechanism::Mechanism;
-use backdrive_msgs::MAX_AXES;
+use crate::scaling::{GainChange, GainPlan};
+use backdrive_msgs::{Gains, MAX_AXES, Sample};
 use backdrive_plant::model::{Fragment, Model};
 use std::path::Path;
 
@@ -182,4 +184,31 @@ fn a_hand_that_is_part_of_the_model_is_a_hand() {
         assert_eq!(own.position(hand, 0), attached.position(hand, 0));
         assert!(hand == 0 || own.position(hand, 0) < own.position(hand - 1, 0), "a softer hand gives way more");
     }
+}
+
+#[test]
+fn what_is_cancelled_follows_the_gains_of_the_plan_and_those_asked_for_since() {
+    let plan = GainPlan { mu: 0.5, lambda: 1.0, ramp_s: 0.01, changes: vec![GainChange { at_s: 0.05, mu: 1.0, lambda: 4.0 }] };
+    let mut canceller = Canceller::scheduled(bank(&master("impulse-engine-linear")), Some(2.0), plan, 0.0, PERIOD);
+    let mut events = Events::default();
+    let mut induced = |step: u64, canceller: &mut Canceller| {
+        let mut measured = Sample::new(1);
+        (measured.step, measured.position[0], measured.effort[0]) = (step, 0.0, -2.0);
+        let mut outputs = [Sample::new(1), Sample::new(1)];
+        let tick = Tick { step, time_s: step as f64 * PERIOD, period_s: PERIOD };
+        canceller.step(&tick, &[Port { sample: Some(measured), age_steps: 0 }], &mut outputs, &mut events);
+        outputs[1].position[0].abs()
+    };
+    let at = |seconds: f64| (seconds / PERIOD) as u64;
+    let all: Vec<f64> = (0..at(0.1)).map(|step| induced(step, &mut canceller)).collect();
+    // Nothing at 0.5, a quarter of 2; at 4 a share of 0.85, which comes with the ramp and not in a step.
+    assert!(all[..at(0.05) as usize].iter().all(|x| *x == 0.0));
+    let (ramped, end) = (all[at(0.056) as usize], all[at(0.062) as usize]);
+    assert!(ramped > 0.0 && ramped < 0.9 * end, "{ramped} {end}");
+    let largest = all.windows(2).map(|w| (w[1] - w[0]).abs()).fold(0.0, f64::max);
+    assert!(largest < 0.2 * end, "{largest} {end}");
+    let asked = Gains { layout: 0, source: 0, step: 0, sequence: 0, stamp_ns: 0, mu: 0.5, lambda: 1.0, ramp_s: 0.01 };
+    canceller.set_gains(&asked);
+    let later: Vec<f64> = (at(0.1)..at(0.2)).map(|step| induced(step, &mut canceller)).collect();
+    assert_eq!(later.last(), Some(&0.0));
 }

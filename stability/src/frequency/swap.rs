@@ -5,6 +5,7 @@ use backdrive_control::canceller::Canceller;
 use backdrive_control::core::{Core, Events, Port, Tick};
 use backdrive_control::device::{Device, DeviceError, DeviceOptions, DeviceRole};
 use backdrive_control::hand::{HandBank, HandSettings};
+use backdrive_control::scaling::GainPlan;
 use backdrive_msgs::{MAX_AXES, Sample};
 use backdrive_nodes::graph::DeviceFiles;
 use backdrive_plant::linear::{LinearError, LinearModel, Operating};
@@ -77,7 +78,8 @@ pub(super) fn induced(
     let mut core = match (&files.model, hand) {
         (Some(model), Some(hand)) => {
             let bank = HandBank::new(model, files.fragment.as_ref(), hand, session.period_s, &options);
-            let recorded = if n > 0 { session.gain(0) } else { f64::NAN };
+            let first = |gains: &[f64]| gains.first().copied().unwrap_or(f64::NAN);
+            let recorded = GainPlan { mu: first(&session.mu), lambda: first(&session.lambda), ramp_s: 0.0, changes: Vec::new() };
             Canceller::scheduled(bank.map_err(PartError::Canceller)?, hand.edge_without, recorded, high_pass_hz, session.period_s)
         }
         (model, _) => {
