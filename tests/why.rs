@@ -86,7 +86,7 @@ fn what_the_canceller_does_not_know_is_named() {
 #[test]
 fn hidden_faults_are_found_from_the_bag_alone() {
     let example = std::env::current_exe().unwrap().parent().unwrap().parent().unwrap().join("examples/sealed_loops");
-    let count = if std::env::var("BACKDRIVE_LONG").as_deref() == Ok("1") { "20" } else { "4" };
+    let count = if std::env::var("BACKDRIVE_LONG").as_deref() == Ok("1") { "10" } else { "4" };
     let said = Command::new(&example).args(["--seed", "77", "--count", count]).current_dir(env!("CARGO_MANIFEST_DIR")).output();
     let said = said.unwrap_or_else(|e| panic!("{}: {e}; it is built with the tests", example.display()));
     let text = String::from_utf8_lossy(&said.stdout);
