@@ -80,14 +80,16 @@ pub enum LinearError {
 pub struct LinearModel<'a> {
     model: &'a Model,
     at: Operating,
-    /// Inertia with inerters, kg, all bodies.
+    /// Inertia with inerters, kg, all bodies; here and below, what a point of a robot has is that of the joints that carry it.
     pub inertia: DMatrix<f64>,
     /// Damping with back-EMF, N s/m, all bodies.
     pub damping: DMatrix<f64>,
     /// Stiffness, N/m, all bodies.
     pub stiffness: DMatrix<f64>,
-    /// Bodies that no motion input prescribes.
+    /// Bodies that no motion input prescribes, but for points of a robot, which go with its joints.
     pub free: Vec<usize>,
+    /// Displacement of every body per displacement of each, at a robot's pose: 1 of itself, of a point its row of the Jacobian.
+    with: DMatrix<f64>,
     /// What each element is taken as.
     pub elements: Vec<Linear>,
 }
@@ -140,6 +142,8 @@ impl<'a> LinearModel<'a> {
         let mut damping = DMatrix::zeros(n, n);
         let mut stiffness = DMatrix::zeros(n, n);
         let mut elements = Vec::with_capacity(model.elements.len());
+        let with = with_points(model);
+        let join = |matrix: &mut DMatrix<f64>, between: [Place; 2], value: f64| join(&with, matrix, between, value);
         for (index, element) in model.elements.iter().enumerate() {
             let linear = element.law.linearised(&sine_across(index, at, at.frequency_hz));
             join(&mut inertia, element.between, linear.inertance);
@@ -158,8 +162,8 @@ impl<'a> LinearModel<'a> {
                 damping[(input.on, input.on)] += input.back_emf;
             }
         }
-        let free = (0..n).filter(|body| !prescribed(*body)).collect();
-        Ok(LinearModel { model, at: at.clone(), inertia, damping, stiffness, free, elements })
+        let free = (0..n).filter(|body| !prescribed(*body) && !model.is_point(*body)).collect();
+        Ok(LinearModel { model, at: at.clone(), inertia, damping, stiffness, free, with, elements })
     }
 
     fn of_free(&self, all: &DMatrix<f64>) -> DMatrix<f64> {
@@ -185,6 +189,7 @@ impl<'a> LinearModel<'a> {
             for (body, x) in self.free.iter().zip(moved.iter()) {
                 shape[*body] = x / scale;
             }
+            let shape = (&self.with * DVector::from_vec(shape)).as_slice().to_vec();
             // What rounding leaves of a rigid mode is 0.
             let omega_squared = if value.abs() < 1e-12 * largest { 0.0 } else { *value };
             modes.push(Mode { omega_squared, shape });
@@ -262,8 +267,8 @@ impl<'a> LinearModel<'a> {
         for (index, element) in self.model.elements.iter().enumerate().filter(|(_, element)| element.law.is_viscoelastic()) {
             let (before, now) = (self.elements[index], element.law.linearised(&sine_across(index, &self.at, frequency_hz)));
             let there = there.to_mut();
-            join(&mut there.stiffness, element.between, now.stiffness - before.stiffness);
-            join(&mut there.damping, element.between, now.damping - before.damping);
+            join(&self.with, &mut there.stiffness, element.between, now.stiffness - before.stiffness);
+            join(&self.with, &mut there.damping, element.between, now.damping - before.damping);
             there.elements[index] = now;
         }
         there
@@ -281,7 +286,7 @@ impl<'a> LinearModel<'a> {
         let mut motion = DVector::from_element(n, Complex::new(0.0, 0.0));
         let mut force = motion.clone();
         match input.kind {
-            InputKind::Force => force[input.on] = drive,
+            InputKind::Force => force.iter_mut().enumerate().for_each(|(body, force)| *force = drive * self.with[(input.on, body)]),
             InputKind::Motion => motion[input.on] = drive,
         }
         if !self.free.is_empty() {
@@ -295,6 +300,9 @@ impl<'a> LinearModel<'a> {
             for (body, x) in self.free.iter().zip(moved.ok_or_else(infinite)?.iter()) {
                 motion[*body] = *x;
             }
+        }
+        for body in (0..n).filter(|body| self.model.is_point(*body)) {
+            motion[body] = (0..n).map(|joint| motion[joint] * self.with[(body, joint)]).sum();
         }
         let at = |place: Place| place.map_or(Complex::new(0.0, 0.0), |body| motion[body]);
         let read = match &output.kind {
@@ -320,14 +328,28 @@ fn sine_across(element: usize, at: &Operating, frequency_hz: f64) -> Sine {
     Sine { about, amplitude: at.amplitude, frequency_hz, friction: at.friction }
 }
 
-/// Adds a coefficient between two places to a matrix over the bodies.
-fn join(matrix: &mut DMatrix<f64>, between: [Place; 2], value: f64) {
-    for (end, other) in [(between[0], between[1]), (between[1], between[0])] {
-        if let Some(i) = end {
-            matrix[(i, i)] += value;
-            if let Some(j) = other {
-                matrix[(i, j)] -= value;
-            }
+/// Displacement of every body per displacement of each: itself, or of a point of a robot the joints, at the pose.
+fn with_points(model: &Model) -> DMatrix<f64> {
+    let n = model.bodies.len();
+    let mut with = DMatrix::identity(n, n);
+    for arm in &model.arm {
+        for (point, row) in arm.points.iter().zip(arm.gradients_at_pose(n)) {
+            with.row_mut(point.body).copy_from_slice(&row);
+        }
+    }
+    with
+}
+
+/// Adds a coefficient between two places to a matrix over the bodies: `value gᵀ g` with g the derivative of the displacement across them.
+fn join(with: &DMatrix<f64>, matrix: &mut DMatrix<f64>, between: [Place; 2], value: f64) {
+    if value == 0.0 {
+        return;
+    }
+    let share = |place: Place, body: usize| place.map_or(0.0, |end| with[(end, body)]);
+    let across: Vec<f64> = (0..matrix.nrows()).map(|body| share(between[0], body) - share(between[1], body)).collect();
+    for (i, a) in across.iter().enumerate().filter(|(_, a)| **a != 0.0) {
+        for (j, b) in across.iter().enumerate().filter(|(_, b)| **b != 0.0) {
+            matrix[(i, j)] += value * a * b;
         }
     }
 }

@@ -1,7 +1,7 @@
 //! A model at work: its state, and what can be asked of it.
 
 use super::account::Account;
-use super::compiled::Compiled;
+use super::compiled::{Compiled, Share};
 use super::constraints::Work;
 use super::contact::FrictionContact;
 use super::drive::Drive;
@@ -77,6 +77,7 @@ impl Plant {
         for contact in &mut self.frictions {
             contact.reset();
         }
+        self.links_here();
         for path in &mut self.paths {
             path.memory.fill(0.0);
             path.reached = self.x[path.first] - self.x[path.second];
@@ -85,7 +86,6 @@ impl Plant {
             path.rise = 1.0;
             path.absorbed = 0.0;
         }
-        self.links_here();
         self.restart_energy();
         self.restart_sense();
     }
@@ -96,10 +96,12 @@ impl Plant {
         let Some(slot) = self.fixed.slots.get(body).copied().filter(|slot| *slot < self.fixed.free) else { return };
         self.x[slot] = position;
         self.v[slot] = velocity;
-        for path in self.paths.iter_mut().filter(|path| path.first == slot || path.second == slot) {
+        self.links_here();
+        let points = self.fixed.points.places();
+        let moved = |place: usize| place == slot || points.contains(&place);
+        for path in self.paths.iter_mut().filter(|path| moved(path.first) || moved(path.second)) {
             path.reached = self.x[path.first] - self.x[path.second];
         }
-        self.links_here();
         self.restart_energy();
         self.restart_sense();
     }
@@ -139,7 +141,30 @@ impl Plant {
 
     /// Force of an element of the model, N, positive when it is stretched.
     pub fn element_force(&self, element: usize) -> f64 {
-        self.force_at(element, &self.endpoint())
+        match self.fixed.elements.get(element) {
+            // It needs no accelerations, so no balance of forces.
+            Some(Share::Path(path)) => self.paths.get(*path).map_or(f64::NAN, |path| {
+                path.law.force(&path.memory, self.x[path.first] - self.x[path.second], self.v[path.first] - self.v[path.second])
+            }),
+            _ => self.force_at(element, &self.endpoint()),
+        }
+    }
+
+    /// Force of an element on a body of the model, N or N m: of one at a point of a robot what it is on a joint, `Jᵀ F`. 0 where it does not reach the
+    /// body; not a number when there is no such body or element.
+    pub fn force_on(&self, element: usize, body: usize) -> f64 {
+        let (Some(slot), Some([first, second])) = (self.fixed.slots.get(body), self.ends_of(element)) else { return f64::NAN };
+        let share = |place: usize| self.fixed.points.share(place, *slot);
+        (share(second) - share(first)) * self.element_force(element)
+    }
+
+    /// Places of an element's ends.
+    fn ends_of(&self, element: usize) -> Option<[usize; 2]> {
+        match *self.fixed.elements.get(element)? {
+            Share::Linear(_, first, second) => Some([first, second]),
+            Share::Friction(contact) => self.frictions.get(contact).map(|c| [c.first, c.second]),
+            Share::Path(path) => self.paths.get(path).map(|p| [p.first, p.second]),
+        }
     }
 
     /// Force that the mover exerts on a body with a motion input, N, that body's own inertia included;
