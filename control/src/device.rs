@@ -261,6 +261,18 @@ impl Device {
         attached + axis.touches.iter().map(|element| self.plant.force_on(*element, axis.user)).sum::<f64>()
     }
 
+    /// Elements of the network whose force on an axis' user's body is that of the attached grip or environment.
+    pub fn touching(&self, axis: usize) -> Vec<usize> {
+        let axis = &self.axes[axis];
+        axis.port_forces.iter().map(|(element, _)| *element).chain(axis.touches.iter().copied()).collect()
+    }
+
+    /// Displacement across an element of the network, m or rad; not a number where there is none.
+    pub fn across(&self, element: usize) -> f64 {
+        let at = |place: Option<usize>| place.map_or(0.0, |body| self.plant.position(body));
+        self.model.elements.get(element).map_or(f64::NAN, |element| at(element.between[0]) - at(element.between[1]))
+    }
+
     /// Energy of the springs of the attached grip as it was at the start, J, on an axis whose hand is `stretch` (m or rad) from the user's body.
     pub(crate) fn spring_energy(&self, axis: usize, stretch: f64) -> f64 {
         let stiffness = |element: usize| match self.model.elements[element].law.role() {

@@ -106,7 +106,7 @@ impl Model {
             input.on = renumber(input.on);
         }
         self.bodies.remove(body);
-        for arm in &mut self.arm {
+        if let Some(arm) = &mut self.arm {
             arm.bodies.iter_mut().for_each(|joint| *joint = renumber(*joint));
             arm.points.iter_mut().for_each(|point| point.body = renumber(point.body));
         }

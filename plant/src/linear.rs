@@ -261,6 +261,32 @@ impl<'a> LinearModel<'a> {
         frequencies_hz.iter().map(|f| self.at_frequency(*f).response_at(input, output, *f)).collect()
     }
 
+    /// The same from several inputs to several outputs (rows) at one frequency, Hz.
+    pub fn responses(&self, inputs: &[usize], outputs: &[usize], frequency_hz: f64) -> Result<DMatrix<Complex<f64>>, LinearError> {
+        let there = self.at_frequency(frequency_hz);
+        let mut matrix = DMatrix::zeros(outputs.len(), inputs.len());
+        for (column, input) in inputs.iter().enumerate() {
+            self.model.inputs.get(*input).ok_or(LinearError::NoSuch { what: "input", index: *input })?;
+            let answer = there.answer_at(*input, frequency_hz)?;
+            for (row, output) in outputs.iter().enumerate() {
+                self.model.outputs.get(*output).ok_or(LinearError::NoSuch { what: "output", index: *output })?;
+                matrix[(row, column)] = there.read(*output, &answer, frequency_hz);
+            }
+        }
+        Ok(matrix)
+    }
+
+    /// Force on a body per force of an element, N per N or N m per N: of an element at a point of a robot what it is on a joint at the pose, `Jᵀ`. 0 where
+    /// it does not reach the body, or there is no such element.
+    pub fn force_share(&self, element: usize, body: usize) -> f64 {
+        let share = |place: Place| match place {
+            Some(end) if end == body => 1.0,
+            Some(end) => self.with[(end, body)],
+            None => 0.0,
+        };
+        self.model.elements.get(element).map_or(0.0, |element| share(element.between[1]) - share(element.between[0]))
+    }
+
     /// With the stiffness and damping that viscoelastic elements have at a frequency, Hz.
     fn at_frequency(&self, frequency_hz: f64) -> Cow<'_, LinearModel<'a>> {
         let mut there = Cow::Borrowed(self);
@@ -275,14 +301,19 @@ impl<'a> LinearModel<'a> {
     }
 
     fn response_at(&self, input: usize, output: usize, frequency_hz: f64) -> Result<Complex<f64>, LinearError> {
-        let (input, output) = (&self.model.inputs[input], &self.model.outputs[output]);
+        Ok(self.read(output, &self.answer_at(input, frequency_hz)?, frequency_hz))
+    }
+
+    /// How the bodies move with an input.
+    fn answer_at(&self, input: usize, frequency_hz: f64) -> Result<Answer, LinearError> {
+        let input = &self.model.inputs[input];
         let s = Complex::new(0.0, TAU * frequency_hz);
         let mut drive = Complex::new(input.gain, 0.0) * (-s * input.delay).exp();
         if input.bandwidth.is_finite() {
             drive /= Complex::new(1.0, 0.0) + s / (TAU * input.bandwidth);
         }
         let n = self.model.bodies.len();
-        let dynamic = |i: usize, j: usize| s * s * self.inertia[(i, j)] + s * self.damping[(i, j)] + self.stiffness[(i, j)];
+        let dynamic = |i: usize, j: usize| self.dynamic(i, j, s);
         let mut motion = DVector::from_element(n, Complex::new(0.0, 0.0));
         let mut force = motion.clone();
         match input.kind {
@@ -304,6 +335,16 @@ impl<'a> LinearModel<'a> {
         for body in (0..n).filter(|body| self.model.is_point(*body)) {
             motion[body] = (0..n).map(|joint| motion[joint] * self.with[(body, joint)]).sum();
         }
+        Ok(Answer { motion, force })
+    }
+
+    fn dynamic(&self, i: usize, j: usize, s: Complex<f64>) -> Complex<f64> {
+        s * s * self.inertia[(i, j)] + s * self.damping[(i, j)] + self.stiffness[(i, j)]
+    }
+
+    /// What an output says of that.
+    fn read(&self, output: usize, Answer { motion, force }: &Answer, frequency_hz: f64) -> Complex<f64> {
+        let (output, s) = (&self.model.outputs[output], Complex::new(0.0, TAU * frequency_hz));
         let at = |place: Place| place.map_or(Complex::new(0.0, 0.0), |body| motion[body]);
         let read = match &output.kind {
             OutputKind::Position(body) => motion[*body],
@@ -316,10 +357,18 @@ impl<'a> LinearModel<'a> {
                     (s * s * linear.inertance + s * linear.damping + linear.stiffness) * (at(between[0]) - at(between[1]))
                 })
                 .sum(),
-            OutputKind::Reaction(body) => (0..n).map(|j| dynamic(*body, j) * motion[j]).sum::<Complex<f64>>() - force[*body],
+            OutputKind::Reaction(body) => {
+                (0..motion.len()).map(|j| self.dynamic(*body, j, s) * motion[j]).sum::<Complex<f64>>() - force[*body]
+            }
         };
-        Ok(read * output.gain * (-s * output.delay).exp())
+        read * output.gain * (-s * output.delay).exp()
     }
+}
+
+/// How the bodies move with an input, and what pushes at them.
+struct Answer {
+    motion: DVector<Complex<f64>>,
+    force: DVector<Complex<f64>>,
 }
 
 /// The sine that an element sees, by its index.
@@ -332,7 +381,7 @@ fn sine_across(element: usize, at: &Operating, frequency_hz: f64) -> Sine {
 fn with_points(model: &Model) -> DMatrix<f64> {
     let n = model.bodies.len();
     let mut with = DMatrix::identity(n, n);
-    for arm in &model.arm {
+    if let Some(arm) = &model.arm {
         for (point, row) in arm.points.iter().zip(arm.gradients_at_pose(n)) {
             with.row_mut(point.body).copy_from_slice(&row);
         }

@@ -58,7 +58,10 @@ fn read_point(table: &mut Table, name: &str, model: &mut Model) -> Result<(), Fi
 
 /// The direction of a vector; one that is written as a unit vector stays what it is to the last bit. `None` where there is none.
 fn unit(vector: Vector3<f64>) -> Option<Vector3<f64>> {
-    let scaled = vector / vector.amax();
-    let is_unit = (vector.norm() - 1.0).abs() < 1e-12;
-    if is_unit { Some(vector) } else { scaled.try_normalize(0.5) }
+    let largest = vector.amax();
+    match (vector.norm() - 1.0).abs() < 1e-12 {
+        true => Some(vector),
+        false if largest > 0.0 => Some((vector / largest).normalize()),
+        false => None,
+    }
 }

@@ -21,6 +21,7 @@ mod types;
 mod undithered;
 
 pub use answer::{FrequencyAnswer, Verdict};
+pub(crate) use edge::{crossing, eigenvalues};
 pub use delays::{Delays, Hop};
 pub use edge::Edge;
 pub use note::Note;
