@@ -9,9 +9,9 @@ use std::path::Path;
 use system::{Place, file, graph_text, samples};
 
 /// A run over both transports and from its bag again, bit for bit; its messages on the master's and the slave's topics.
-fn one_answer(place: &Place, graph: &str, duration: &str) {
+fn one_answer(place: &Place, graph: &str) {
     for (transport, bag) in [("inproc", "here.mcap"), ("iceoryx2", "apart.mcap")] {
-        let done = place.backdrive(&["run", graph, "--transport", transport, "--bag", bag, "--duration", duration, "--json"]);
+        let done = place.backdrive(&["run", graph, "--transport", transport, "--bag", bag, "--json"]);
         assert_eq!(done.code, Some(0), "{done:?}");
         assert_eq!(done.json()["lost"], 0, "{done:?}");
     }
@@ -26,15 +26,15 @@ fn one_answer(place: &Place, graph: &str, duration: &str) {
 #[test]
 fn the_three_joint_arms_are_one_answer_and_judged_stable() {
     let place = Place::new();
-    one_answer(&place, &file("launch/three-joint.toml"), "1.6");
+    one_answer(&place, &file("launch/three-joint.toml"));
     let [master, slave] = ["/master/measured_js", "/slave/measured_js"].map(|topic| samples(&place.path("here.mcap"), topic));
     assert!(master.iter().chain(&slave).all(|s| s.axes == 3));
-    let last = slave.last().unwrap();
+    let last = &slave[4800];
     // It pushes the wall ahead, and slides along it: nothing stands in its way there.
     assert!(last.effort[0] < -2.0 && last.effort[1] == 0.0 && last.effort[2] == 0.0, "{:?}", last.effort);
     assert!(last.position[1] > 0.02 && last.position[2] > 0.01, "{:?}", last.position);
     // What comes back is lambda times that.
-    let force = master.last().unwrap().effort[0];
+    let force = master[4800].effort[0];
     assert!((force / (0.15 * last.effort[0]) - 1.0).abs() < 0.05, "{force} {}", last.effort[0]);
 
     let asked = place.backdrive(&["stability", "here.mcap", "--grips", "1", "--json"]);
@@ -48,7 +48,7 @@ fn the_three_joint_arms_are_one_answer_and_judged_stable() {
 #[test]
 fn leader_and_follower_are_one_answer_and_torque_comes_back_to_every_joint() {
     let place = Place::new();
-    one_answer(&place, &file("launch/leader-follower.toml"), "1.2");
+    one_answer(&place, &file("launch/leader-follower.toml"));
     let [master, slave] = ["/master/measured_js", "/slave/measured_js"].map(|topic| samples(&place.path("here.mcap"), topic));
     assert!(master.iter().chain(&slave).all(|s| s.axes == 7));
     let touching = slave.iter().rev().find(|s| s.effort[1] != 0.0).unwrap();
@@ -69,7 +69,8 @@ fn what_the_wall_takes_is_what_the_joints_give() {
     let place = Place::new();
     let short = ["--transport", "inproc", "--bag", "arm.mcap", "--duration", "0.9"];
     let done = place.backdrive(&[&["run", &file("launch/leader-follower.toml")], &short[..]].concat());
-    assert_eq!(done.code, Some(0), "{done:?}");
+    // So short a hold is not judged.
+    assert_eq!(done.code, Some(7), "{done:?}");
     let slave = samples(&place.path("arm.mcap"), "/slave/measured_js");
     let (mut given, mut pushed) = (0.0, 0.0_f64);
     for pair in slave.windows(2) {
@@ -101,7 +102,7 @@ fn a_bag_of_arms_needs_no_other_file() {
     let text = graph_text("launch/three-joint.toml").replace(&format!("{}/", file("plant/robots")), "");
     let graph = place.write("own.toml", &text).display().to_string();
     let done = place.backdrive(&["run", &graph, "--transport", "inproc", "--bag", "own.mcap", "--duration", "0.6"]);
-    assert_eq!(done.code, Some(0), "{done:?}");
+    assert_eq!(done.code, Some(7), "{done:?}");
     let held = Reader::open(&place.path("own.mcap")).unwrap();
     let files = &held.header().unwrap().files;
     let model = files.iter().find(|(name, _)| name.ends_with("three-joint-haptic.toml")).unwrap();
@@ -113,7 +114,7 @@ fn a_bag_of_arms_needs_no_other_file() {
         }
     }
     let again = place.backdrive(&["replay", "own.mcap", "--bag", "again.mcap"]);
-    assert_eq!(again.code, Some(0), "{again:?}");
+    assert_eq!(again.code, Some(7), "{again:?}");
     assert_eq!(place.backdrive(&["bag", "diff", "own.mcap", "again.mcap"]).code, Some(0));
 }
 
@@ -147,7 +148,7 @@ fn what_an_arm_cannot_be_in_a_graph_is_said_with_its_place() {
     }
     place.write("many.toml", &many);
     let lead = graph_text("launch/leader-follower.toml").replace(&format!("{}/seven-joint-leader.toml", file("plant/robots")), "many.toml");
-    refused(lead, &["9 axes", "8"]);
+    refused(lead, &["node \"master\" model", "9 axes", "at most 8"]);
 }
 
 #[test]
@@ -156,4 +157,17 @@ fn the_examples_say_what_they_are() {
         let graph = Graph::load(Path::new(&file(&format!("launch/{name}.toml"))), &Overrides::default()).unwrap();
         assert!(graph.nodes.iter().filter(|n| n.name == "master" || n.name == "slave").all(|n| n.axes == axes));
     }
+}
+
+#[test]
+fn an_export_says_why_points_have_no_place_in_it() {
+    let place = Place::new();
+    for target in ["mjcf", "urdf", "isaac", "feedforward"] {
+        let done = place.backdrive(&["export", &file("plant/robots/three-joint-haptic.toml"), "--to", target]);
+        assert_eq!(done.code, Some(3), "{target}: {done:?}");
+        assert!(done.stderr.contains("three-joint-haptic.toml") && done.stderr.contains("tip.x"), "{target}: {}", done.stderr);
+    }
+    // The leader has none; that its weight is held is said.
+    let done = place.backdrive(&["export", &file("plant/robots/seven-joint-leader.toml"), "--to", "urdf"]);
+    assert!(done.stderr.contains("gravity_compensated"), "{done:?}");
 }

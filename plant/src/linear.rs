@@ -12,6 +12,9 @@ use nalgebra::{Complex, DMatrix, DVector, Schur, SymmetricEigen};
 use std::borrow::Cow;
 use std::f64::consts::TAU;
 
+/// Below this a force at a point has no lever on a joint, m or 1: rounding leaves that much.
+const NO_LEVER: f64 = 1e-9;
+
 /// The sine at which elements that are not linear are looked at.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Operating {
@@ -284,7 +287,8 @@ impl<'a> LinearModel<'a> {
             Some(end) => self.with[(end, body)],
             None => 0.0,
         };
-        self.model.elements.get(element).map_or(0.0, |element| share(element.between[1]) - share(element.between[0]))
+        let lever = self.model.elements.get(element).map_or(0.0, |element| share(element.between[1]) - share(element.between[0]));
+        if lever.abs() > NO_LEVER { lever } else { 0.0 }
     }
 
     /// With the stiffness and damping that viscoelastic elements have at a frequency, Hz.

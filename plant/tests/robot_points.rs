@@ -54,7 +54,8 @@ fn jacobian(q: [f64; 2]) -> [[f64; 2]; 2] {
 fn led() -> Model {
     let mut rest = String::new();
     for joint in ["joint0", "joint1"] {
-        rest += &signal("inputs", &[("name", &format!("'{joint}'")), ("kind", "'motion'"), ("on", &format!("'{joint}'")), ("hold", "'cubic'")]);
+        rest +=
+            &signal("inputs", &[("name", &format!("'{joint}'")), ("kind", "'motion'"), ("on", &format!("'{joint}'")), ("hold", "'cubic'")]);
     }
     rest += &signal("inputs", &[("name", "'push'"), ("kind", "'force'"), ("on", "'slant'")]);
     for kind in ["position", "velocity", "acceleration"] {
@@ -74,9 +75,7 @@ fn a_point_goes_where_the_geometry_says() {
     // Parabolas, which a cubic line is exact for.
     let (rate, pull) = ([0.7, -1.1], [2.0, 1.5]);
     let at = |i: usize, t: f64| rate[i] * t + 0.5 * pull[i] * t * t;
-    let line = |i: usize, from: f64| {
-        Segment { c: [at(i, from), rate[i] + pull[i] * from, 0.5 * pull[i], 0.0] }
-    };
+    let line = |i: usize, from: f64| Segment { c: [at(i, from), rate[i] + pull[i] * from, 0.5 * pull[i], 0.0] };
     plant.start_at(&[0.0, 0.0]);
     let mut values = [0.0; 14];
     for step in 0..200 {
@@ -280,7 +279,8 @@ on = 'slant'
 
 #[test]
 fn weight_that_motors_hold_is_no_weight() {
-    let rest = format!("{}{}", signal("inputs", &[("name", "'push'"), ("kind", "'force'"), ("on", "'tip.z'")]), output("z", "position", "tip.z"));
+    let rest =
+        format!("{}{}", signal("inputs", &[("name", "'push'"), ("kind", "'force'"), ("on", "'tip.z'")]), output("z", "position", "tip.z"));
     let [held, floating, falling] = ["gravity_compensated = true", "gravity = [0, 0, 0]", ""].map(|keys| arm(keys, &rest));
     let push: Vec<f64> = (0..500).map(|i| if i < 200 { 0.0 } else { 2.0 }).collect();
     let run = |model: &Model| simulate(model, &[push.clone()], 1e-3, &options(2)).unwrap();

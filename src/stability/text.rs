@@ -143,8 +143,8 @@ fn axes_together(found: &Answer, lines: &mut Lines) {
         Some(Ok(loops)) => loops,
     };
     let limit = |limit: &Limit| match (limit.critical_gain, limit.frequency_hz) {
-        (Some(gain), Some(hz)) if hz > 0.0 => format!("{gain:.3} at {hz:.1} Hz"),
-        (Some(gain), _) => format!("{gain:.3}"),
+        (Some(gain), Some(hz)) if hz > 0.0 => format!("up to {gain:.3} ({hz:.1} Hz)"),
+        (Some(gain), _) => format!("up to {gain:.3}"),
         (None, _) => "at any gain".to_string(),
     };
     let each: Vec<String> = loops.alone.iter().map(|(axis, alone)| format!("{axis} {}", limit(alone))).collect();
@@ -154,7 +154,10 @@ fn axes_together(found: &Answer, lines: &mut Lines) {
     };
     lines.put(
         "axes",
-        format!("together stable up to mu*lambda = {} (generalised Nyquist criterion, from the models without dry friction); {now}", limit(&loops.together)),
+        format!(
+            "together stable {} (generalised Nyquist criterion; the models about the contact, without dry friction); {now}",
+            limit(&loops.together)
+        ),
     );
     lines.put("", format!("alone, the others open: {}", each.join(", ")));
     if loops.alone_misleads() {

@@ -74,7 +74,9 @@ impl Closes {
     fn of(graph: &Graph) -> Closes {
         let [master, slave] = [NodeKind::Master, NodeKind::Slave].map(|kind| graph.node_of(kind));
         match (master, graph.loop_node(), slave.map(|n| (&n.settings, n.command.is_some()))) {
-            (Some(_), Some(_), Some((Settings::Slave(files), false))) if files.fragment.is_none() && !touches(files) => Closes::OnlyIfTouched,
+            (Some(_), Some(_), Some((Settings::Slave(files), false))) if files.fragment.is_none() && !touches(files) => {
+                Closes::OnlyIfTouched
+            }
             (Some(_), Some(_), Some(_)) => Closes::Yes,
             _ => Closes::Never,
         }

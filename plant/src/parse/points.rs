@@ -35,7 +35,9 @@ fn read_point(table: &mut Table, name: &str, model: &mut Model) -> Result<(), Fi
         Some(&[x, y, z]) => {
             Some(unit(Vector3::new(x, y, z)).ok_or_else(|| table.error_at("axis", "is no direction: its three numbers are 0"))?)
         }
-        Some(_) => return Err(table.error_at("axis", "expected three numbers: a direction in the frame of the robot's base, of any length")),
+        Some(_) => {
+            return Err(table.error_at("axis", "expected three numbers: a direction in the frame of the robot's base, of any length"));
+        }
     };
     let Some(arm) = &model.arm else { return Ok(()) };
     let Some(link) = arm.robot.link(&link) else {

@@ -82,7 +82,8 @@ pub(super) fn read_input(table: &mut Table, model: &Model) -> Result<Input, File
 /// A point of a robot can be pushed, not moved: it goes where the joints let it go.
 fn refuse_at_a_point(table: &Table, input: &Input) -> Result<(), FileError> {
     if input.kind == InputKind::Motion {
-        let message = "is a point of the robot, whose place the joints tell: prescribe a joint, or a body of its own that a spring ties to the point";
+        let message =
+            "is a point of the robot, whose place the joints tell: prescribe a joint, or a body of its own that a spring ties to the point";
         return Err(table.error_at("on", message));
     }
     if input.back_emf != 0.0 {

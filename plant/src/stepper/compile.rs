@@ -108,7 +108,8 @@ fn check(model: &Model) -> Result<(), CompileError> {
             && at_a_point
             && linear.inertance != 0.0
         {
-            let message = "an inerter cannot end at a point of the robot; tie it to a joint, or to a body of its own that a spring ties to the point";
+            let message =
+                "an inerter cannot end at a point of the robot; tie it to a joint, or to a body of its own that a spring ties to the point";
             return Err(reason(message.to_owned()));
         }
     }
@@ -208,16 +209,8 @@ fn assemble(model: &Model) -> Result<Network, CompileError> {
         slots[point.body] = free_bodies.len() + index;
     }
     let points = Points::new(free_bodies.len(), points.len());
-    let mut network = Network {
-        slots,
-        free_bodies,
-        points,
-        prescribed,
-        mass: square(),
-        damping: square(),
-        stiffness: square(),
-        constant: [0.0; SLOTS],
-    };
+    let mut network =
+        Network { slots, free_bodies, points, prescribed, mass: square(), damping: square(), stiffness: square(), constant: [0.0; SLOTS] };
     for (body, slot) in model.bodies.iter().zip(&network.slots) {
         network.mass[*slot][*slot] += body.inertia;
     }

@@ -104,9 +104,9 @@ impl Constraints {
         for (index, path) in paths.iter_mut().enumerate() {
             let ends = (path.first, path.second);
             let slopes = path.law.slopes();
-            let most = from_forces.iter().fold(0.0, |most: f64, (columns, points)| {
-                most.max(across(points, ends, free, &respond(columns, points, free, ends)))
-            });
+            let most = from_forces
+                .iter()
+                .fold(0.0, |most: f64, (columns, points)| most.max(across(points, ends, free, &respond(columns, points, free, ends))));
             let stiffness = most * (0.5 * substep * slopes.stiffness + slopes.damping);
             if stiffness > if slopes.bounded { stiff } else { STIFF_UNBOUNDED } {
                 path.constraint = Some(all.ends.len());

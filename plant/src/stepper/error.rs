@@ -36,7 +36,9 @@ pub enum CompileError {
     #[error("{0} names something that the model does not have")]
     Dangling(String),
     /// An input that a point cannot have.
-    #[error("input `{input}` acts on `{point}`, a point of the robot: it can push there, and neither prescribe a motion nor lose force by back-EMF")]
+    #[error(
+        "input `{input}` acts on `{point}`, a point of the robot: it can push there, and neither prescribe a motion nor lose force by back-EMF"
+    )]
     AtPoint {
         /// The input.
         input: String,

@@ -23,6 +23,9 @@ const COSTLY: usize = 6;
 /// What the links of a robot add to a substep, in steps of a linear network, for each pair of coordinates.
 const LINKS: usize = 5;
 
+/// Below this a force has no lever on a joint, m or, of a slide, 1.
+const NO_LEVER: f64 = 1e-9;
+
 /// The balance of forces at a sample, in steps of a linear network.
 const BALANCE: usize = 3;
 
@@ -155,7 +158,9 @@ impl Plant {
     pub fn force_on(&self, element: usize, body: usize) -> f64 {
         let (Some(slot), Some([first, second])) = (self.fixed.slots.get(body), self.ends_of(element)) else { return f64::NAN };
         let share = |place: usize| self.fixed.points.share(place, *slot);
-        (share(second) - share(first)) * self.element_force(element)
+        let lever = share(second) - share(first);
+        // A joint whose axis the force meets has no lever but what rounding leaves, and is not touched.
+        if lever.abs() > NO_LEVER { lever * self.element_force(element) } else { 0.0 }
     }
 
     /// Places of an element's ends.

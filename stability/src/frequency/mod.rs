@@ -21,9 +21,9 @@ mod types;
 mod undithered;
 
 pub use answer::{FrequencyAnswer, Verdict};
-pub(crate) use edge::{crossing, eigenvalues};
 pub use delays::{Delays, Hop};
 pub use edge::Edge;
+pub(crate) use edge::{crossing, eigenvalues};
 pub use note::Note;
 pub use rows::RowCount;
 pub use swap::{ExchangedParts, PartError};

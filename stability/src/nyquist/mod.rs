@@ -28,6 +28,8 @@ use serde::Serialize;
 const LINES: f64 = 300.0;
 /// The lowest line, Hz: below what moves in a held device.
 const LOWEST_HZ: f64 = 0.02;
+/// No larger gain is asked for: what crosses there is rounding.
+const LARGEST: f64 = 1e6;
 /// An axis alone is no measure of all where it has this many times their gain.
 const MISLEADING: f64 = 1.1;
 
@@ -100,6 +102,6 @@ fn of_loops(hz: &[f64], l: &[Matrix], session: &Session, touched: Vec<bool>, gai
 }
 
 fn limit(hz: &[f64], l: &[Matrix]) -> Limit {
-    let found = crossing(hz, l, &vec![true; hz.len()]);
+    let found = crossing(hz, l, &vec![true; hz.len()]).filter(|crossing| crossing.factor < LARGEST);
     Limit { critical_gain: found.map(|c| c.factor), frequency_hz: found.map(|c| c.frequency_hz) }
 }

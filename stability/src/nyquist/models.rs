@@ -1,7 +1,7 @@
 //! The matrix of the loops from the models of a graph: master with its hands, canceller, slave with what it touched, and the delays between them.
 
 use super::Matrix;
-use crate::session::Session;
+use crate::session::{AxisSignals, Session};
 use backdrive_control::device::{Device, DeviceOptions, DeviceRole};
 use backdrive_nodes::graph::{Connection, DeviceFiles, Graph, NodeKind, Settings};
 use backdrive_plant::linear::{LinearModel, Operating};
@@ -84,7 +84,8 @@ fn slave_responses(files: &DeviceFiles, session: &Session, hz: &[f64]) -> Result
         return Err("a controller drives the slave, whose law is no part of its model".to_string());
     }
     let options = DeviceOptions { substeps: files.substeps, ..DeviceOptions::default() };
-    let mut device = Device::new(given, files.fragment.as_ref(), DeviceRole::Slave, session.period_s, &options).map_err(|e| e.to_string())?;
+    let mut device =
+        Device::new(given, files.fragment.as_ref(), DeviceRole::Slave, session.period_s, &options).map_err(|e| e.to_string())?;
     let axes = device.axes().min(session.axes.len());
     let mut elements: Vec<usize> = (0..axes).flat_map(|axis| device.touching(axis)).collect();
     elements.sort_unstable();
@@ -119,8 +120,15 @@ fn slave_responses(files: &DeviceFiles, session: &Session, hz: &[f64]) -> Result
     Ok((hz.iter().map(response).collect::<Result<Vec<Matrix>, String>>()?, touched))
 }
 
-/// Mean displacement across each of these elements while the slave touched, as its model goes along the session's commands; and which axes touched.
+/// Mean displacement across each of these elements while the slave touched with as many axes as it ever did, as its model goes along the session's
+/// commands; and which axes these were.
 fn contact(device: &mut Device, session: &Session, elements: &[usize]) -> Result<(Vec<(usize, f64)>, Vec<bool>), String> {
+    let touches = |axis: &AxisSignals, row: usize| axis.contact.get(row).is_some_and(|f| f.is_finite() && *f != 0.0);
+    let axes_at = |row: usize| session.axes.iter().filter(|axis| touches(axis, row)).count();
+    let most = (0..session.len()).map(axes_at).max().unwrap_or(0);
+    if most == 0 {
+        return Err("the slave touched nothing in the recording, so the loop was open".to_string());
+    }
     let mut sums = vec![(0.0, 0usize); elements.len()];
     let mut commands = vec![0.0; session.axes.len()];
     for row in 0..session.len() {
@@ -128,18 +136,19 @@ fn contact(device: &mut Device, session: &Session, elements: &[usize]) -> Result
             // Where nothing was recorded the slave stays where it is.
             *command = axis.command.get(row).copied().filter(|x| x.is_finite()).unwrap_or(*command);
         }
-        if row == 0 { device.start(&commands, &[]) } else { device.step(&commands, &[]) }
-        if session.axes.iter().any(|axis| axis.contact.get(row).is_some_and(|f| f.is_finite() && *f != 0.0)) {
+        if row == 0 {
+            device.start(&commands, &[])
+        } else {
+            device.step(&commands, &[])
+        }
+        if axes_at(row) == most {
             for ((sum, count), element) in sums.iter_mut().zip(elements) {
                 (*sum, *count) = (*sum + device.across(*element), *count + 1);
             }
         }
     }
-    if sums.iter().all(|(_, count)| *count == 0) {
-        return Err("the slave touched nothing in the recording, so the loop was open".to_string());
-    }
     let mean = |((sum, count), element): (&(f64, usize), &usize)| (*element, sum / (*count).max(1) as f64);
-    let touched = session.axes.iter().map(|axis| axis.contact.iter().any(|f| f.is_finite() && *f != 0.0)).collect();
+    let touched = session.axes.iter().map(|axis| (0..session.len()).any(|row| axes_at(row) == most && touches(axis, row))).collect();
     Ok((sums.iter().zip(elements).map(mean).collect(), touched))
 }
 

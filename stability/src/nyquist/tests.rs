@@ -20,7 +20,8 @@ struct Turned {
     angle: f64,
 }
 
-const TURNED: Turned = Turned { mass: [0.3, 0.5], damping: [9.0, 14.0], stiffness: [400.0, 500.0], wall: 3000.0, servo_hz: 25.0, angle: 1.25 };
+const TURNED: Turned =
+    Turned { mass: [0.3, 0.5], damping: [9.0, 14.0], stiffness: [400.0, 500.0], wall: 3000.0, servo_hz: 25.0, angle: 1.25 };
 
 impl Turned {
     /// The force that comes back per position of the slave.
@@ -123,9 +124,14 @@ fn sensor_turned(degrees: f64) -> Graph {
     let robots = file("plant/robots");
     let read = |name: &str| std::fs::read_to_string(robots.join(name)).unwrap();
     for (arm, mounted) in [("three-joint-haptic", false), ("three-joint-slave", true)] {
-        let xml: String = read(&format!("{arm}.urdf")).lines().map(|line| line.split(" friction=").next().map_or(String::new(), |l| {
-            if l.len() < line.len() { format!("{l}/>\n") } else { format!("{l}\n") }
-        })).collect();
+        let xml: String = read(&format!("{arm}.urdf"))
+            .lines()
+            .map(|line| {
+                line.split(" friction=")
+                    .next()
+                    .map_or(String::new(), |l| if l.len() < line.len() { format!("{l}/>\n") } else { format!("{l}\n") })
+            })
+            .collect();
         std::fs::write(folder.path().join(format!("{arm}.urdf")), xml).unwrap();
         let mut model = read(&format!("{arm}.toml"));
         if mounted {

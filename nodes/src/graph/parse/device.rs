@@ -2,6 +2,7 @@
 
 use crate::graph::files::Files;
 use crate::graph::{DeviceFiles, Graph};
+use backdrive_msgs::MAX_AXES;
 use backdrive_plant::model::{Fragment, Model};
 use backdrive_plant::tomlfile::{FileError, Table};
 use std::path::Path;
@@ -21,6 +22,9 @@ impl NodeReader<'_> {
             Some(self.files.read_whole(Path::new(&model_path), &mut self.graph.files, Model::from_toml_in, Model::to_toml)?)
         };
         let model = model.map(|model| isolate(model, table)).transpose()?;
+        if let Some(axes) = model.as_ref().map(|model| model.axes.len()).filter(|axes| *axes > MAX_AXES) {
+            return Err(table.error_at("model", format!("\"{model_path}\" has {axes} axes; a message carries at most {MAX_AXES}")));
+        }
         let fragment = match fragment_key.map(|key| table.string(key)).transpose()?.flatten() {
             Some(path) if path != "none" => {
                 Some(self.files.read_whole(Path::new(&path), &mut self.graph.files, Fragment::from_toml_in, Fragment::to_toml)?)
