@@ -51,7 +51,8 @@ fn leader_and_follower_are_one_answer_and_torque_comes_back_to_every_joint() {
     one_answer(&place, &file("launch/leader-follower.toml"));
     let [master, slave] = ["/master/measured_js", "/slave/measured_js"].map(|topic| samples(&place.path("here.mcap"), topic));
     assert!(master.iter().chain(&slave).all(|s| s.axes == 7));
-    let touching = slave.iter().rev().find(|s| s.effort[1] != 0.0).unwrap();
+    // In the hold.
+    let touching = &slave[2000];
     // A wall ahead of the tip turns the joints whose axes lie across, and no joint whose axis points at it.
     let torque: Vec<f64> = touching.effort[..7].to_vec();
     assert!(torque[1].abs() > 0.5 && torque[3].abs() > 0.1, "{torque:?}");
@@ -148,7 +149,7 @@ fn what_an_arm_cannot_be_in_a_graph_is_said_with_its_place() {
     }
     place.write("many.toml", &many);
     let lead = graph_text("launch/leader-follower.toml").replace(&format!("{}/seven-joint-leader.toml", file("plant/robots")), "many.toml");
-    refused(lead, &["node \"master\" model", "9 axes", "at most 8"]);
+    refused(lead, &["\"master\" model", "9 axes", "at most 8"]);
 }
 
 #[test]

@@ -44,7 +44,9 @@ pub enum PartError {
     #[error("slave: a controller drives it, so that its response does not follow from its model alone; run the graph with it instead")]
     Driven,
     /// What the slave touches is at a point of it.
-    #[error("slave: what it touches is attached elsewhere than at its axes (environment_on, touches), so that its response about the contact does not follow from their positions; run the graph with it instead")]
+    #[error(
+        "slave: what it touches is attached elsewhere than at its axes (environment_on, touches), so that its response about the contact does not follow from their positions; run the graph with it instead"
+    )]
     Touches,
     /// The model has not as many axes as the session.
     #[error("{part}: the model has {model} axes, the session has {session}")]

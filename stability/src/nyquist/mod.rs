@@ -6,7 +6,7 @@
 //! Y.-T. Wang, IEEE Trans. Automatic Control 25 (1980) 187-196). Our sign: a force comes back with its sign, so +1 stands where textbooks have -1.
 //!
 //! Where an axis is looked at alone, the others open, its loop is the element on the diagonal. **That each of these is stable says nothing of all of them
-//! closed**: what an axis does to another and back is in none of them. `tests` has a loop whose axes are stable to three times the gain at which
+//! closed**: what an axis does to another and back is in none of them. `tests` has a loop whose axes are stable to eight times the gain at which
 //! they are not together.
 //!
 //! The models are linear here, about their pose and about the contact that was recorded; dry friction is left out, whose loss makes a loop more stable.

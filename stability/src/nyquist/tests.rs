@@ -196,11 +196,11 @@ fn coupled_arms_run_stable_below_the_edge_and_not_above() {
     let found = coupled_loops(&graph, &recorded, 0.02).unwrap().unwrap();
     let Limit { critical_gain: Some(edge), frequency_hz: Some(hz) } = found.together else { panic!("no edge: {found:?}") };
     println!("arms, sensor turned by 70 degrees: together {edge:.4} at {hz:.2} Hz, alone {:?}", found.alone);
-    let (below, above) = (grew(&graph, 0.93 * edge), grew(&graph, 1.07 * edge));
-    println!("motion grows by {below:.3} at 0.93 of the edge and by {above:.3} at 1.07");
+    let (below, above) = (grew(&graph, 0.96 * edge), grew(&graph, 1.04 * edge));
+    println!("motion grows by {below:.3} at 0.96 of the edge and by {above:.3} at 1.04");
     assert!(below < 0.9 && above > 1.1, "{below} {above}");
-    // Each axis alone would allow twice that.
-    assert!(found.lowest_alone() > 2.0 * edge && found.alone_misleads(), "{found:?}");
+    // Each axis alone would allow many times that.
+    assert!(found.lowest_alone() > 5.0 * edge && found.alone_misleads(), "{found:?}");
     assert_eq!(found.encirclements, 0);
     let beyond = coupled_loops(&graph, &recorded, 1.5 * edge).unwrap().unwrap();
     assert!(beyond.encirclements > 0, "{beyond:?}");
