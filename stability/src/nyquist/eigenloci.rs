@@ -1,9 +1,11 @@
 //! Windings of the loops of several axes.
 
-use super::Matrix;
 use crate::frequency::eigenvalues;
-use nalgebra::Complex;
+use nalgebra::{Complex, DMatrix};
 use std::f64::consts::{PI, TAU};
+
+/// A matrix over the axes.
+pub(super) type Matrix = DMatrix<Complex<f64>>;
 
 /// The loop of one axis, the others open.
 pub(super) fn alone(l: &[Matrix], axis: usize) -> Vec<Matrix> {

@@ -19,9 +19,8 @@ mod tests;
 use crate::frequency::crossing;
 use crate::session::Session;
 use backdrive_nodes::graph::Graph;
-use eigenloci::{alone, encirclements};
+use eigenloci::{Matrix, alone, encirclements};
 use models::loops;
-use nalgebra::{Complex, DMatrix};
 use serde::Serialize;
 
 /// Lines in a decade: closer than the modes of a device are wide.
@@ -32,9 +31,6 @@ const LOWEST_HZ: f64 = 0.02;
 const LARGEST: f64 = 1e6;
 /// An axis alone is no measure of all where it has this many times their gain.
 const MISLEADING: f64 = 1.1;
-
-/// A matrix over the axes.
-pub(crate) type Matrix = DMatrix<Complex<f64>>;
 
 /// Where a loop stops being stable.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]

@@ -1,6 +1,6 @@
 //! The matrix of the loops from the models of a graph: master with its hands, canceller, slave with what it touched, and the delays between them.
 
-use super::Matrix;
+use super::eigenloci::Matrix;
 use crate::session::{AxisSignals, Session};
 use backdrive_control::device::{Device, DeviceOptions, DeviceRole};
 use backdrive_nodes::graph::{Connection, DeviceFiles, Graph, NodeKind, Settings};
@@ -120,9 +120,12 @@ fn slave_responses(files: &DeviceFiles, session: &Session, hz: &[f64]) -> Result
     Ok((hz.iter().map(response).collect::<Result<Vec<Matrix>, String>>()?, touched))
 }
 
+/// Of elements by their index, m or rad.
+type Displacements = Vec<(usize, f64)>;
+
 /// Mean displacement across each of these elements while the slave touched with as many axes as it ever did, as its model goes along the session's
 /// commands; and which axes these were.
-fn contact(device: &mut Device, session: &Session, elements: &[usize]) -> Result<(Vec<(usize, f64)>, Vec<bool>), String> {
+fn contact(device: &mut Device, session: &Session, elements: &[usize]) -> Result<(Displacements, Vec<bool>), String> {
     let touches = |axis: &AxisSignals, row: usize| axis.contact.get(row).is_some_and(|f| f.is_finite() && *f != 0.0);
     let axes_at = |row: usize| session.axes.iter().filter(|axis| touches(axis, row)).count();
     let most = (0..session.len()).map(axes_at).max().unwrap_or(0);
@@ -155,10 +158,14 @@ fn contact(device: &mut Device, session: &Session, elements: &[usize]) -> Result
 /// Delay once round the loop, s.
 fn delay_s(graph: &Graph) -> Result<f64, String> {
     let kind = |node: usize| graph.nodes.get(node).map(|n| n.kind);
-    let in_loop = |c: &&Connection| match (kind(c.to.0), c.to.1.as_str()) {
-        (Some(NodeKind::Canceller), "measured") | (Some(NodeKind::Scaling), "motion" | "contact") => true,
-        (Some(NodeKind::Slave), "command") | (Some(NodeKind::Master), "force") => true,
-        _ => false,
+    let in_loop = |c: &&Connection| {
+        matches!(
+            (kind(c.to.0), c.to.1.as_str()),
+            (Some(NodeKind::Canceller), "measured")
+                | (Some(NodeKind::Scaling), "motion" | "contact")
+                | (Some(NodeKind::Slave), "command")
+                | (Some(NodeKind::Master), "force")
+        )
     };
     let mut late = 0.0;
     for connection in graph.connections.iter().filter(in_loop) {

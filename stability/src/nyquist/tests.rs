@@ -1,7 +1,7 @@
 //! The criterion against the eigenvalues of closed loops in state space, and against coupled arms that are run.
 
-use super::{Limit, Matrix, coupled_loops, encirclements, limit};
-use crate::nyquist::eigenloci::alone;
+use super::eigenloci::{Matrix, alone, encirclements};
+use super::{Limit, coupled_loops, limit};
 use crate::resimulate::{Gain, RunOptions, Scenario};
 use backdrive_nodes::graph::{Graph, Overrides};
 use nalgebra::{Complex, DMatrix, DVector};
