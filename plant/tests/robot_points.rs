@@ -283,7 +283,7 @@ fn weight_that_motors_hold_is_no_weight() {
         format!("{}{}", signal("inputs", &[("name", "'push'"), ("kind", "'force'"), ("on", "'tip.z'")]), output("z", "position", "tip.z"));
     let [held, floating, falling] = ["gravity_compensated = true", "gravity = [0, 0, 0]", ""].map(|keys| arm(keys, &rest));
     let push: Vec<f64> = (0..500).map(|i| if i < 200 { 0.0 } else { 2.0 }).collect();
-    let run = |model: &Model| simulate(model, &[push.clone()], 1e-3, &options(2)).unwrap();
+    let run = |model: &Model| simulate(model, std::slice::from_ref(&push), 1e-3, &options(2)).unwrap();
     let (found, expected, fallen) = (run(&held), run(&floating), run(&falling));
     assert!(found[0][..200].iter().all(|z| *z == 0.0), "it moves by itself");
     assert_eq!(found, expected);
