@@ -1,4 +1,4 @@
-//! Models written for others. Each writer is a pure function: a [`Model`](backdrive_plant::model::Model) in, text and a list of what the text cannot hold out.
+//! Models written for others. Each writer is a pure function: a [`Model`] in, text and a list of what the text cannot hold out.
 //!
 //! - [`mjcf`]: MuJoCo 4.0. Bodies are joints, elements are attributes of joints and tendons, inputs actuators, outputs sensors.
 //! - [`feedforward`]: the force of a joint's friction as a function of position, velocity and load, for a controller: C, Python or numbers as YAML.
