@@ -7,6 +7,7 @@ use backdrive_nodes::graph::{Files, Graph, Overrides};
 use backdrive_stability::collect::Collector;
 use backdrive_stability::outcome::{Outcome, Trace};
 use backdrive_stability::unjudged::Unjudged;
+use std::collections::BTreeSet;
 use std::path::Path;
 
 /// What happened in a run.
@@ -76,7 +77,8 @@ impl Traces {
             let values = traces.iter().flat_map(|t| pick(t).iter()).filter(|f| !f.is_nan());
             values.fold(None, |m: Option<f64>, f| Some(m.unwrap_or(0.0).max(f.abs())))
         };
-        let touching: Vec<usize> =
+        // Rows in which any axis touches.
+        let touching: BTreeSet<usize> =
             traces.iter().flat_map(|t| t.contact.iter().enumerate().filter(|(_, f)| **f != 0.0).map(|(i, _)| i)).collect();
         Summary {
             loop_gain: graph.gains.mu * graph.gains.lambda,
@@ -84,7 +86,7 @@ impl Traces {
             outcome: self.0.outcome(),
             peak_contact_force: peak(|t| &t.contact),
             peak_feedback_force: peak(|t| &t.feedback),
-            first_contact_s: touching.iter().min().map(|i| *i as f64 * graph.period_s()),
+            first_contact_s: touching.first().map(|i| *i as f64 * graph.period_s()),
             contact_s: touching.len() as f64 * graph.period_s(),
         }
     }

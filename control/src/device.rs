@@ -73,6 +73,8 @@ struct Bound {
     hand: Option<usize>,
     /// Elements of the fragment that end on the user's body, and +1 where that is their first end.
     port_forces: Vec<(usize, f64)>,
+    /// Elements of the model that are its environment.
+    touches: Vec<usize>,
     scale: f64,
 }
 
@@ -254,7 +256,21 @@ impl Device {
 
     /// Force that the attached grip or environment exerts on the user's body, N or N m, positive along +x.
     pub fn port_force(&self, axis: usize) -> f64 {
-        self.axes[axis].port_forces.iter().map(|(element, sign)| -sign * self.plant.element_force(*element)).sum()
+        let axis = &self.axes[axis];
+        let attached: f64 = axis.port_forces.iter().map(|(element, sign)| -sign * self.plant.element_force(*element)).sum();
+        attached + axis.touches.iter().map(|element| self.plant.force_on(*element, axis.user)).sum::<f64>()
+    }
+
+    /// Elements of the network whose force on an axis' user's body is that of the attached grip or environment.
+    pub fn touching(&self, axis: usize) -> Vec<usize> {
+        let axis = &self.axes[axis];
+        axis.port_forces.iter().map(|(element, _)| *element).chain(axis.touches.iter().copied()).collect()
+    }
+
+    /// Displacement across an element of the network, m or rad; not a number where there is none.
+    pub fn across(&self, element: usize) -> f64 {
+        let at = |place: Option<usize>| place.map_or(0.0, |body| self.plant.position(body));
+        self.model.elements.get(element).map_or(f64::NAN, |element| at(element.between[0]) - at(element.between[1]))
     }
 
     /// Energy of the springs of the attached grip as it was at the start, J, on an axis whose hand is `stretch` (m or rad) from the user's body.
@@ -285,8 +301,15 @@ impl Device {
 }
 
 fn attach(model: &mut Model, axis: &Axis, index: usize, fragment: Option<&Fragment>) -> Bound {
-    let mut bound =
-        Bound { feedback: axis.feedback, measured: axis.measured, user: axis.user, hand: None, port_forces: Vec::new(), scale: axis.scale };
+    let mut bound = Bound {
+        feedback: axis.feedback,
+        measured: axis.measured,
+        user: axis.user,
+        hand: None,
+        port_forces: Vec::new(),
+        touches: axis.touches.clone(),
+        scale: axis.scale,
+    };
     // A model whose user is part of it (a fitted second-order master) takes no grip.
     if let Some(fragment) = fragment.filter(|_| !axis.holds_user) {
         let several = model.axes.len() > 1;

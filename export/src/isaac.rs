@@ -10,7 +10,7 @@
 //! `stiffness` and `damping` there are gains of a drive to a commanded position and are 0, so that commands are efforts.
 
 use crate::joint_terms::{JointTerms, Knows, joint_terms};
-use crate::{ExportError, Exported};
+use crate::{ExportError, Exported, of_robot};
 use backdrive_plant::model::Model;
 use backdrive_plant::robot::Joint;
 
@@ -27,6 +27,7 @@ pub fn export(model: &Model) -> Result<Exported, ExportError> {
             "Isaac's parameters are those of a robot's joints, and this model has no [robot]; --to mjcf takes networks of one axis",
         ));
     };
+    let mut notes = of_robot(model)?;
     let knows = Knows { target: "Isaac", armature: true, rest: true };
     let (terms, mut left_out) = joint_terms(model, arm, knows);
     for left in left_out.iter_mut().filter(|left| left.kind == "delay") {
@@ -39,10 +40,10 @@ pub fn export(model: &Model) -> Result<Exported, ExportError> {
         .zip(terms)
         .filter_map(|(c, terms)| arm.robot.joints.get(c.joint).map(|joint| (c.name.as_str(), joint, terms)))
         .collect();
-    let notes = vec![
+    notes.extend([
         "friction and dynamic_friction are efforts (N m, N) from Isaac Sim 5.0 on; in Isaac Sim 4.5 they are unitless and mean something else".to_owned(),
         "links, their inertia and gravity come from the robot's own USD or URDF".to_owned(),
-    ];
+    ]);
     Ok(Exported { text: python(model, &rows), left_out, notes })
 }
 

@@ -1,4 +1,4 @@
-//! Models written for others. Each writer is a pure function: a [`Model`](backdrive_plant::model::Model) in, text and a list of what the text cannot hold out.
+//! Models written for others. Each writer is a pure function: a [`Model`] in, text and a list of what the text cannot hold out.
 //!
 //! - [`mjcf`]: MuJoCo 4.0. Bodies are joints, elements are attributes of joints and tendons, inputs actuators, outputs sensors.
 //! - [`feedforward`]: the force of a joint's friction as a function of position, velocity and load, for a controller: C, Python or numbers as YAML.
@@ -19,6 +19,7 @@ mod xml;
 
 pub use left_out::{Change, LeftOut, Part, change_all};
 
+use backdrive_plant::model::Model;
 use std::fmt;
 
 /// A model as another program's text.
@@ -36,6 +37,24 @@ pub struct Exported {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{0}")]
 pub struct ExportError(pub String);
+
+/// What every writer has to know of a robot: it writes joints and what acts on them. Notes of what else the model's controller does.
+///
+/// # Errors
+/// Where the model has points of links: what acts there acts on all joints at once, through a Jacobian that changes with the pose.
+fn of_robot(model: &Model) -> Result<Vec<String>, ExportError> {
+    let Some(arm) = &model.arm else { return Ok(Vec::new()) };
+    if !arm.points.is_empty() {
+        let names: Vec<&str> = arm.points.iter().map(|point| model.place_name(Some(point.body))).collect();
+        return Err(ExportError::new(format!(
+            "it has points of the robot ({}), on which elements and inputs act through the transposed Jacobian; an export holds joints and what acts on \
+             them: export a model file of the same arm without [point.NAME], and let the graph's file name the one with them",
+            names.join(", ")
+        )));
+    }
+    let held = "the weight of the links that gravity_compensated has the motors hold is not in it: that is the controller's; in MuJoCo gravcomp=\"1\" of a body is the same";
+    Ok(if arm.gravity_compensated { vec![held.to_owned()] } else { Vec::new() })
+}
 
 impl ExportError {
     fn new(message: impl fmt::Display) -> ExportError {

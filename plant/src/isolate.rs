@@ -48,6 +48,9 @@ impl Model {
                 "\"{name}\" is a joint of the robot and cannot be locked or taken off; make its type fixed in the robot file"
             ));
         }
+        if self.is_point(body) {
+            return Err(format!("\"{name}\" is a point of the robot and cannot be locked or taken off; leave the point out of the file"));
+        }
         let renumber = |b: usize| if b > body { b - 1 } else { b };
         let kept: Vec<bool> = self.elements.iter().map(|e| !(with_elements && e.between.contains(&Some(body)))).collect();
         let new_index = |old: usize| kept[..old].iter().filter(|k| **k).count();
@@ -69,6 +72,9 @@ impl Model {
                 },
             };
         }
+        for axis in &mut self.axes {
+            axis.touches = axis.touches.iter().filter(|e| kept[**e]).map(|e| new_index(*e)).collect();
+        }
         let mut index = 0;
         self.elements.retain(|_| {
             index += 1;
@@ -80,7 +86,8 @@ impl Model {
         }
         // What now joins ground to ground does nothing.
         let idle: Vec<bool> = self.elements.iter().map(|e| e.between == [None, None]).collect();
-        let read = self.outputs.iter().any(|o| matches!(&o.kind, OutputKind::Force(list) if list.iter().any(|e| idle[*e])));
+        let read = self.outputs.iter().any(|o| matches!(&o.kind, OutputKind::Force(list) if list.iter().any(|e| idle[*e])))
+            || self.axes.iter().any(|axis| axis.touches.iter().any(|e| idle[*e]));
         if !read && idle.contains(&true) {
             let new_index = |old: usize| idle[..old].iter().filter(|k| !**k).count();
             for output in &mut self.outputs {
@@ -88,6 +95,7 @@ impl Model {
                     elements.iter_mut().for_each(|e| *e = new_index(*e));
                 }
             }
+            self.axes.iter_mut().flat_map(|axis| &mut axis.touches).for_each(|e| *e = new_index(*e));
             let mut index = 0;
             self.elements.retain(|_| {
                 index += 1;
@@ -98,8 +106,9 @@ impl Model {
             input.on = renumber(input.on);
         }
         self.bodies.remove(body);
-        for joint in self.arm.iter_mut().flat_map(|arm| arm.bodies.iter_mut()) {
-            *joint = renumber(*joint);
+        if let Some(arm) = &mut self.arm {
+            arm.bodies.iter_mut().for_each(|joint| *joint = renumber(*joint));
+            arm.points.iter_mut().for_each(|point| point.body = renumber(point.body));
         }
         for axis in &mut self.axes {
             axis.user = if axis.user == body {

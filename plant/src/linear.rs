@@ -12,6 +12,9 @@ use nalgebra::{Complex, DMatrix, DVector, Schur, SymmetricEigen};
 use std::borrow::Cow;
 use std::f64::consts::TAU;
 
+/// Below this a force at a point has no lever on a joint, m or 1: rounding leaves that much.
+const NO_LEVER: f64 = 1e-9;
+
 /// The sine at which elements that are not linear are looked at.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Operating {
@@ -80,14 +83,16 @@ pub enum LinearError {
 pub struct LinearModel<'a> {
     model: &'a Model,
     at: Operating,
-    /// Inertia with inerters, kg, all bodies.
+    /// Inertia with inerters, kg, all bodies; here and below, what a point of a robot has is that of the joints that carry it.
     pub inertia: DMatrix<f64>,
     /// Damping with back-EMF, N s/m, all bodies.
     pub damping: DMatrix<f64>,
     /// Stiffness, N/m, all bodies.
     pub stiffness: DMatrix<f64>,
-    /// Bodies that no motion input prescribes.
+    /// Bodies that no motion input prescribes, but for points of a robot, which go with its joints.
     pub free: Vec<usize>,
+    /// Displacement of every body per displacement of each, at a robot's pose: 1 of itself, of a point its row of the Jacobian.
+    with: DMatrix<f64>,
     /// What each element is taken as.
     pub elements: Vec<Linear>,
 }
@@ -140,6 +145,8 @@ impl<'a> LinearModel<'a> {
         let mut damping = DMatrix::zeros(n, n);
         let mut stiffness = DMatrix::zeros(n, n);
         let mut elements = Vec::with_capacity(model.elements.len());
+        let with = with_points(model);
+        let join = |matrix: &mut DMatrix<f64>, between: [Place; 2], value: f64| join(&with, matrix, between, value);
         for (index, element) in model.elements.iter().enumerate() {
             let linear = element.law.linearised(&sine_across(index, at, at.frequency_hz));
             join(&mut inertia, element.between, linear.inertance);
@@ -158,8 +165,8 @@ impl<'a> LinearModel<'a> {
                 damping[(input.on, input.on)] += input.back_emf;
             }
         }
-        let free = (0..n).filter(|body| !prescribed(*body)).collect();
-        Ok(LinearModel { model, at: at.clone(), inertia, damping, stiffness, free, elements })
+        let free = (0..n).filter(|body| !prescribed(*body) && !model.is_point(*body)).collect();
+        Ok(LinearModel { model, at: at.clone(), inertia, damping, stiffness, free, with, elements })
     }
 
     fn of_free(&self, all: &DMatrix<f64>) -> DMatrix<f64> {
@@ -185,6 +192,7 @@ impl<'a> LinearModel<'a> {
             for (body, x) in self.free.iter().zip(moved.iter()) {
                 shape[*body] = x / scale;
             }
+            let shape = (&self.with * DVector::from_vec(shape)).as_slice().to_vec();
             // What rounding leaves of a rigid mode is 0.
             let omega_squared = if value.abs() < 1e-12 * largest { 0.0 } else { *value };
             modes.push(Mode { omega_squared, shape });
@@ -256,32 +264,64 @@ impl<'a> LinearModel<'a> {
         frequencies_hz.iter().map(|f| self.at_frequency(*f).response_at(input, output, *f)).collect()
     }
 
+    /// The same from several inputs to several outputs (rows) at one frequency, Hz.
+    pub fn responses(&self, inputs: &[usize], outputs: &[usize], frequency_hz: f64) -> Result<DMatrix<Complex<f64>>, LinearError> {
+        let there = self.at_frequency(frequency_hz);
+        let mut matrix = DMatrix::zeros(outputs.len(), inputs.len());
+        for (column, input) in inputs.iter().enumerate() {
+            self.model.inputs.get(*input).ok_or(LinearError::NoSuch { what: "input", index: *input })?;
+            let answer = there.answer_at(*input, frequency_hz)?;
+            for (row, output) in outputs.iter().enumerate() {
+                self.model.outputs.get(*output).ok_or(LinearError::NoSuch { what: "output", index: *output })?;
+                matrix[(row, column)] = there.read(*output, &answer, frequency_hz);
+            }
+        }
+        Ok(matrix)
+    }
+
+    /// Force on a body per force of an element, N per N or N m per N: of an element at a point of a robot what it is on a joint at the pose, `Jᵀ`. 0 where
+    /// it does not reach the body, or there is no such element.
+    pub fn force_share(&self, element: usize, body: usize) -> f64 {
+        let share = |place: Place| match place {
+            Some(end) if end == body => 1.0,
+            Some(end) => self.with[(end, body)],
+            None => 0.0,
+        };
+        let lever = self.model.elements.get(element).map_or(0.0, |element| share(element.between[1]) - share(element.between[0]));
+        if lever.abs() > NO_LEVER { lever } else { 0.0 }
+    }
+
     /// With the stiffness and damping that viscoelastic elements have at a frequency, Hz.
     fn at_frequency(&self, frequency_hz: f64) -> Cow<'_, LinearModel<'a>> {
         let mut there = Cow::Borrowed(self);
         for (index, element) in self.model.elements.iter().enumerate().filter(|(_, element)| element.law.is_viscoelastic()) {
             let (before, now) = (self.elements[index], element.law.linearised(&sine_across(index, &self.at, frequency_hz)));
             let there = there.to_mut();
-            join(&mut there.stiffness, element.between, now.stiffness - before.stiffness);
-            join(&mut there.damping, element.between, now.damping - before.damping);
+            join(&self.with, &mut there.stiffness, element.between, now.stiffness - before.stiffness);
+            join(&self.with, &mut there.damping, element.between, now.damping - before.damping);
             there.elements[index] = now;
         }
         there
     }
 
     fn response_at(&self, input: usize, output: usize, frequency_hz: f64) -> Result<Complex<f64>, LinearError> {
-        let (input, output) = (&self.model.inputs[input], &self.model.outputs[output]);
+        Ok(self.read(output, &self.answer_at(input, frequency_hz)?, frequency_hz))
+    }
+
+    /// How the bodies move with an input.
+    fn answer_at(&self, input: usize, frequency_hz: f64) -> Result<Answer, LinearError> {
+        let input = &self.model.inputs[input];
         let s = Complex::new(0.0, TAU * frequency_hz);
         let mut drive = Complex::new(input.gain, 0.0) * (-s * input.delay).exp();
         if input.bandwidth.is_finite() {
             drive /= Complex::new(1.0, 0.0) + s / (TAU * input.bandwidth);
         }
         let n = self.model.bodies.len();
-        let dynamic = |i: usize, j: usize| s * s * self.inertia[(i, j)] + s * self.damping[(i, j)] + self.stiffness[(i, j)];
+        let dynamic = |i: usize, j: usize| self.dynamic(i, j, s);
         let mut motion = DVector::from_element(n, Complex::new(0.0, 0.0));
         let mut force = motion.clone();
         match input.kind {
-            InputKind::Force => force[input.on] = drive,
+            InputKind::Force => force.iter_mut().enumerate().for_each(|(body, force)| *force = drive * self.with[(input.on, body)]),
             InputKind::Motion => motion[input.on] = drive,
         }
         if !self.free.is_empty() {
@@ -296,6 +336,19 @@ impl<'a> LinearModel<'a> {
                 motion[*body] = *x;
             }
         }
+        for body in (0..n).filter(|body| self.model.is_point(*body)) {
+            motion[body] = (0..n).map(|joint| motion[joint] * self.with[(body, joint)]).sum();
+        }
+        Ok(Answer { motion, force })
+    }
+
+    fn dynamic(&self, i: usize, j: usize, s: Complex<f64>) -> Complex<f64> {
+        s * s * self.inertia[(i, j)] + s * self.damping[(i, j)] + self.stiffness[(i, j)]
+    }
+
+    /// What an output says of that.
+    fn read(&self, output: usize, Answer { motion, force }: &Answer, frequency_hz: f64) -> Complex<f64> {
+        let (output, s) = (&self.model.outputs[output], Complex::new(0.0, TAU * frequency_hz));
         let at = |place: Place| place.map_or(Complex::new(0.0, 0.0), |body| motion[body]);
         let read = match &output.kind {
             OutputKind::Position(body) => motion[*body],
@@ -308,10 +361,18 @@ impl<'a> LinearModel<'a> {
                     (s * s * linear.inertance + s * linear.damping + linear.stiffness) * (at(between[0]) - at(between[1]))
                 })
                 .sum(),
-            OutputKind::Reaction(body) => (0..n).map(|j| dynamic(*body, j) * motion[j]).sum::<Complex<f64>>() - force[*body],
+            OutputKind::Reaction(body) => {
+                (0..motion.len()).map(|j| self.dynamic(*body, j, s) * motion[j]).sum::<Complex<f64>>() - force[*body]
+            }
         };
-        Ok(read * output.gain * (-s * output.delay).exp())
+        read * output.gain * (-s * output.delay).exp()
     }
+}
+
+/// How the bodies move with an input, and what pushes at them.
+struct Answer {
+    motion: DVector<Complex<f64>>,
+    force: DVector<Complex<f64>>,
 }
 
 /// The sine that an element sees, by its index.
@@ -320,14 +381,28 @@ fn sine_across(element: usize, at: &Operating, frequency_hz: f64) -> Sine {
     Sine { about, amplitude: at.amplitude, frequency_hz, friction: at.friction }
 }
 
-/// Adds a coefficient between two places to a matrix over the bodies.
-fn join(matrix: &mut DMatrix<f64>, between: [Place; 2], value: f64) {
-    for (end, other) in [(between[0], between[1]), (between[1], between[0])] {
-        if let Some(i) = end {
-            matrix[(i, i)] += value;
-            if let Some(j) = other {
-                matrix[(i, j)] -= value;
-            }
+/// Displacement of every body per displacement of each: itself, or of a point of a robot the joints, at the pose.
+fn with_points(model: &Model) -> DMatrix<f64> {
+    let n = model.bodies.len();
+    let mut with = DMatrix::identity(n, n);
+    if let Some(arm) = &model.arm {
+        for (point, row) in arm.points.iter().zip(arm.gradients_at_pose(n)) {
+            with.row_mut(point.body).copy_from_slice(&row);
+        }
+    }
+    with
+}
+
+/// Adds a coefficient between two places to a matrix over the bodies: `value gᵀ g` with g the derivative of the displacement across them.
+fn join(with: &DMatrix<f64>, matrix: &mut DMatrix<f64>, between: [Place; 2], value: f64) {
+    if value == 0.0 {
+        return;
+    }
+    let share = |place: Place, body: usize| place.map_or(0.0, |end| with[(end, body)]);
+    let across: Vec<f64> = (0..matrix.nrows()).map(|body| share(between[0], body) - share(between[1], body)).collect();
+    for (i, a) in across.iter().enumerate().filter(|(_, a)| **a != 0.0) {
+        for (j, b) in across.iter().enumerate().filter(|(_, b)| **b != 0.0) {
+            matrix[(i, j)] += value * a * b;
         }
     }
 }

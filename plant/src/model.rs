@@ -43,12 +43,19 @@ pub struct Model {
     pub arm: Option<Box<Arm>>,
 }
 
+impl Model {
+    /// Whether a body is a point of a robot's link.
+    pub fn is_point(&self, body: usize) -> bool {
+        self.arm.as_ref().is_some_and(|arm| arm.is_point(body))
+    }
+}
+
 /// A body.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Body {
     /// Unique in the model.
     pub name: String,
-    /// kg or kg m², at least 0; 0 only where an inerter or a motion input makes that possible, or for a joint of a robot, whose links have theirs.
+    /// kg or kg m², at least 0; 0 only where an inerter or a motion input makes that possible, or for a joint of a robot, whose links have theirs, and for a point of one.
     pub inertia: f64,
 }
 
@@ -191,6 +198,9 @@ pub struct Axis {
     pub user: usize,
     /// Whether the model already holds the user's hand (a master fitted as held), so that no grip is attached.
     pub holds_user: bool,
+    /// Elements of the model that are what the axis touches, where the model has that in it; their force on the user's body is that of the environment. On a
+    /// robot's joint it is that of the wall at a point, through the transposed Jacobian.
+    pub touches: Vec<usize>,
     /// Index of the input that carries the reflected force (of a slave: the command).
     pub feedback: usize,
     /// Index of the output that is the measured position.

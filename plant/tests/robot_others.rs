@@ -1,4 +1,5 @@
-//! Random trees read from URDF and MJCF, against what Pinocchio and MuJoCo make of the same files, and arms in motion against MuJoCo.
+//! Random trees read from URDF and MJCF, against what Pinocchio and MuJoCo make of the same files, and arms in motion, held and pushed at points too, against
+//! MuJoCo.
 //!
 //! `BACKDRIVE_PYTHON` names a Python that has `tests/python/requirements.txt`. Without it the test is skipped, unless `BACKDRIVE_REQUIRE_PYTHON=1`.
 
@@ -169,4 +170,23 @@ fn arms_move_as_mujoco_moves_them() {
         }
     }
     assert!(broken.is_empty(), "{}", broken.join("\n"));
+}
+
+#[derive(Deserialize)]
+struct Held {
+    push: Vec<Vec<f64>>,
+    /// Of each joint, then of each point, at every millisecond.
+    positions: Vec<Vec<f64>>,
+}
+
+#[test]
+fn an_arm_held_and_pushed_at_points_moves_as_mujoco_says() {
+    let Some(folder) = drawn("robot_points.py") else { return };
+    let case: Held = serde_json::from_slice(&std::fs::read(folder.path().join("expected.json")).unwrap()).unwrap();
+    let model = Model::load(&folder.path().join("arm.toml")).unwrap_or_else(|e| panic!("{e}"));
+    let run = |substeps: Option<usize>| simulate(&model, &case.push, 1e-3, &Options { substeps, ..Options::default() }).unwrap();
+    let [coarse, fine] = [4, 16].map(|substeps| apart(&run(Some(substeps)), &case.positions));
+    let chosen = apart(&run(None), &case.positions);
+    println!("points: ours from MuJoCo: as chosen {chosen:.1e}, 250 us {coarse:.1e}, 62.5 us {fine:.1e}");
+    assert!(fine < 1e-5 && coarse / fine > 12.0 && chosen < 1e-3, "{chosen} {coarse} {fine}");
 }

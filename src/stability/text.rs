@@ -1,5 +1,6 @@
 //! The answer as text.
 
+use backdrive_stability::nyquist::Limit;
 use backdrive_stability::verdict::Answer;
 use std::fmt::Write as _;
 
@@ -36,6 +37,7 @@ pub(super) fn text(found: &Answer) -> String {
     if let Some(f) = &found.frequency_answer {
         lines.put("measured", f.reason.clone());
     }
+    axes_together(found, &mut lines);
     run_again(found, &mut lines);
     felt(found, &mut lines);
     for d in &found.disagreements {
@@ -130,6 +132,36 @@ fn margins(found: &Answer, lines: &mut Lines) {
                 m.modulus
             ),
         );
+    }
+}
+
+/// The loops of several axes, by the models: together, and one by one.
+fn axes_together(found: &Answer, lines: &mut Lines) {
+    let loops = match &found.loops {
+        None => return,
+        Some(Err(why)) => return lines.put("axes", format!("their loops together are not told from the models: {why}")),
+        Some(Ok(loops)) => loops,
+    };
+    let limit = |limit: &Limit| match (limit.critical_gain, limit.frequency_hz) {
+        (Some(gain), Some(hz)) if hz > 0.0 => format!("up to {gain:.3} ({hz:.1} Hz)"),
+        (Some(gain), _) => format!("up to {gain:.3}"),
+        (None, _) => "at any gain".to_string(),
+    };
+    let each: Vec<String> = loops.alone.iter().map(|(axis, alone)| format!("{axis} {}", limit(alone))).collect();
+    let now = match loops.encirclements {
+        0 => "at the gain asked their eigenloci do not encircle +1: stable".to_string(),
+        n => format!("at the gain asked their eigenloci encircle +1: {n} unstable poles"),
+    };
+    lines.put(
+        "axes",
+        format!(
+            "together stable {} (generalised Nyquist criterion; the models about the contact, without dry friction); {now}",
+            limit(&loops.together)
+        ),
+    );
+    lines.put("", format!("alone, the others open: {}", each.join(", ")));
+    if loops.alone_misleads() {
+        lines.put("", "the axes act on each other round the loop: what each allows alone is no answer for all of them".to_string());
     }
 }
 

@@ -4,7 +4,7 @@ use crate::outcome::{Outcome, Trace, judge};
 use crate::session::{AxisSignals, Session};
 use crate::unjudged::{Gaps, Unjudged};
 use backdrive_msgs::{Gains, Message, Sample, flag};
-use backdrive_nodes::graph::{Graph, NodeKind, Settings};
+use backdrive_nodes::graph::{DeviceFiles, Graph, NodeKind, Settings};
 
 /// What a topic carries.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -74,11 +74,18 @@ impl Closes {
     fn of(graph: &Graph) -> Closes {
         let [master, slave] = [NodeKind::Master, NodeKind::Slave].map(|kind| graph.node_of(kind));
         match (master, graph.loop_node(), slave.map(|n| (&n.settings, n.command.is_some()))) {
-            (Some(_), Some(_), Some((Settings::Slave(files), false))) if files.fragment.is_none() => Closes::OnlyIfTouched,
+            (Some(_), Some(_), Some((Settings::Slave(files), false))) if files.fragment.is_none() && !touches(files) => {
+                Closes::OnlyIfTouched
+            }
             (Some(_), Some(_), Some(_)) => Closes::Yes,
             _ => Closes::Never,
         }
     }
+}
+
+/// Whether what a slave touches is part of its model.
+fn touches(files: &DeviceFiles) -> bool {
+    files.model.iter().flat_map(|model| &model.axes).any(|axis| !axis.touches.is_empty())
 }
 
 impl Collector {

@@ -13,6 +13,7 @@ mod grid;
 mod master_run;
 mod model_check;
 pub mod moving;
+pub mod nyquist;
 pub mod oscillation;
 pub mod outcome;
 mod phases;

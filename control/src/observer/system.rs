@@ -38,6 +38,9 @@ pub enum SystemError {
     /// The model has no `[[axes]]`.
     #[error("has no [[axes]]: an observer needs to know which body the unknown force acts on and what is measured")]
     NoAxes,
+    /// A force acts on a point of a robot.
+    #[error("has points of a robot ([point.{0}]): an observer knows bodies with an inertia of their own; make the joints its axes")]
+    Points(String),
     /// Something is moved from outside.
     #[error("input \"{0}\" prescribes a motion; an observer's model has forces as inputs and no hand in it")]
     Moved(String),
@@ -105,6 +108,9 @@ impl System {
         }
         if let Some(input) = model.inputs.iter().find(|i| i.kind == InputKind::Motion) {
             return Err(SystemError::Moved(input.name.clone()));
+        }
+        if let Some(point) = (0..model.bodies.len()).find(|body| model.is_point(*body)) {
+            return Err(SystemError::Points(model.place_name(Some(point)).to_owned()));
         }
         let linear = LinearModel::new(model, at)?;
         let (bodies, axes) = (model.bodies.len(), model.axes.len());

@@ -208,6 +208,10 @@ fn remove(model: &mut Model, name: &str) -> Result<(), String> {
             read.iter_mut().filter(|index| **index > gone).for_each(|index| *index -= 1);
         }
     }
+    for axis in &mut model.axes {
+        axis.touches.retain(|index| *index != gone);
+        axis.touches.iter_mut().filter(|index| **index > gone).for_each(|index| *index -= 1);
+    }
     model.elements.remove(gone);
     Ok(())
 }

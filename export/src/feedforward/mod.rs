@@ -6,7 +6,7 @@ mod yaml;
 
 pub use terms::{Joint, Term};
 
-use crate::{ExportError, Exported};
+use crate::{ExportError, Exported, of_robot};
 use backdrive_plant::model::Model;
 
 /// What the snippet is written in.
@@ -37,7 +37,7 @@ pub fn export(model: &Model, language: Language, width: Option<f64>) -> Result<E
         Language::Python => code::python(model, &joints),
         Language::Yaml => yaml::yaml(model, &joints),
     };
-    let mut notes = Vec::new();
+    let mut notes = of_robot(model)?;
     if model.arm.is_some() {
         notes.push(
             "the links' own gravity and inertia are not in it: they depend on the pose, and the controller's model of the arm has them"

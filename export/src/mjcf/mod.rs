@@ -10,7 +10,7 @@ mod patch;
 mod signals;
 
 use crate::xml::{comment, escaped, number, numbers};
-use crate::{ExportError, Exported};
+use crate::{ExportError, Exported, of_robot};
 use attributes::{Integration, tendons};
 use backdrive_plant::model::Model;
 use backdrive_plant::robot::{Arm, JointKind, Robot};
@@ -28,12 +28,12 @@ pub fn export(model: &Model, step: Option<f64>) -> Result<Exported, ExportError>
     if model.bodies.is_empty() {
         return Err(ExportError::new("it is the model of nothing: it has no bodies"));
     }
+    let mut notes = of_robot(model)?;
     let layout = Layout::of(model);
     let (network, mut left_out) = network(model, &layout.pose, names_in(model, "tendon"));
     let integration = integration::integration(model, &layout, &network, step)?;
     let mut signals = signals(model, &network, &layout.names, integration, names_in(model, "actuator"));
     left_out.append(&mut signals.left_out);
-    let mut notes = Vec::new();
     let text = match &model.arm {
         None => of_network(model, &layout, &network, &signals, integration),
         Some(arm) => of_arm(model, arm, &layout, &network, &signals, integration, &mut notes)?,

@@ -4,7 +4,7 @@ mod patch;
 mod write;
 
 use crate::joint_terms::{Knows, joint_terms};
-use crate::{ExportError, Exported};
+use crate::{ExportError, Exported, of_robot};
 use backdrive_plant::model::Model;
 use backdrive_plant::robot::Robot;
 
@@ -26,7 +26,7 @@ pub fn export(model: &Model) -> Result<Exported, ExportError> {
             *place = Some(terms);
         }
     }
-    let mut notes = Vec::new();
+    let mut notes = of_robot(model)?;
     let is_urdf = roxmltree::Document::parse(&arm.xml).is_ok_and(|d| d.root_element().has_tag_name("robot"));
     let text = match is_urdf {
         true => patch::patched(&arm.xml, &arm.robot, &of_joints)?,

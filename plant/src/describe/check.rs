@@ -38,8 +38,8 @@ pub fn check(model: &Model, at: &Operating) -> Vec<Remark> {
         add(Severity::Error, model.name.clone(), error.to_string());
     }
     for (index, body) in model.bodies.iter().enumerate() {
-        let is_joint = model.arm.as_ref().is_some_and(|arm| arm.bodies.contains(&index));
-        if !is_joint && !model.elements.iter().any(|e| e.between.contains(&Some(index))) && !model.inputs.iter().any(|i| i.on == index) {
+        let has_links = model.arm.as_ref().is_some_and(|arm| arm.moves(index));
+        if !has_links && !model.elements.iter().any(|e| e.between.contains(&Some(index))) && !model.inputs.iter().any(|i| i.on == index) {
             add(Severity::Warning, format!("bodies.{}", body.name), "nothing is tied to this body and nothing drives it".into());
         }
     }

@@ -39,6 +39,7 @@ impl Drawing<'_> {
         let b = &self.model.bodies[body];
         let is_joint = self.model.arm.as_ref().is_some_and(|arm| arm.bodies.contains(&body));
         let inertia = match (is_joint, b.inertia) {
+            (false, _) if self.model.is_point(body) => "point of the robot".to_string(),
             (true, 0.0) => "joint of the robot".to_string(),
             (true, armature) => format!("joint of the robot, armature {armature} {unit}"),
             (false, inertia) => format!("{inertia} {unit}"),

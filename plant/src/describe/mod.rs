@@ -8,7 +8,7 @@ mod units;
 
 pub use check::{Remark, Severity, check};
 pub use diagram::diagram;
-pub use robot::{JointRow, RobotRow};
+pub use robot::{JointRow, PointRow, RobotRow};
 pub use units::unit_for;
 
 use crate::linear::{LinearError, LinearModel, Operating, log_frequencies};
@@ -129,7 +129,7 @@ pub fn describe(model: &Model, at: &Operating) -> Description {
             Motion::Rotation => "rotation",
         },
         diagram: diagram(model),
-        robot: model.arm.as_ref().map(|arm| robot::robot_row(arm)),
+        robot: model.arm.as_ref().map(|arm| robot::robot_row(model, arm)),
         bodies: model
             .bodies
             .iter()

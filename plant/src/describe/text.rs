@@ -1,6 +1,6 @@
 //! A description as text.
 
-use super::{Description, NamedNumber, RobotRow, Severity};
+use super::{Description, NamedNumber, PointRow, RobotRow, Severity};
 use std::fmt;
 
 impl fmt::Display for Description {
@@ -63,6 +63,16 @@ impl RobotRow {
             })
             .collect();
         table(f, &["joint", "kind", "carries", "pose", "inertia there", "gravity there"], &rows)?;
+        if self.gravity_compensated {
+            writeln!(f, "the motors hold the weight of the links in every pose")?;
+        }
+        let vector = |v: [f64; 3]| format!("({})", v.map(short).join(", "));
+        let row = |p: &PointRow| vec![p.name.clone(), p.link.clone(), vector(p.at), vector(p.axis), format!("{} kg", short(p.mass))];
+        let rows: Vec<Vec<String>> = self.points.iter().map(row).collect();
+        if !rows.is_empty() {
+            writeln!(f)?;
+            table(f, &["point", "of", "at, m", "along", "mass there"], &rows)?;
+        }
         for line in &self.left_aside {
             writeln!(f, "left aside: {line}")?;
         }

@@ -18,6 +18,24 @@ pub struct Linear {
     pub force: f64,
 }
 
+impl Linear {
+    /// Force at `x`, m, and `v`, m/s, while the velocity does not change, N.
+    #[inline]
+    pub(super) fn at(&self, x: f64, v: f64) -> f64 {
+        self.stiffness * x + self.damping * v + self.force
+    }
+
+    /// Energy that can be had back at `x`, m, less that at 0, J.
+    pub(super) fn stored(&self, x: f64) -> f64 {
+        (0.5 * self.stiffness * x + self.force) * x
+    }
+
+    /// Slopes of its force.
+    pub(super) fn slopes(&self) -> Slopes {
+        Slopes { stiffness: self.stiffness.abs(), damping: self.damping.abs(), bounded: true }
+    }
+}
+
 /// A law that is part of the constant matrices.
 pub trait LinearLaw {
     /// Its coefficients.

@@ -101,9 +101,12 @@ macro_rules! register {
                 match self { $(Law::$law(_law) => where_it_is!(friction, $role, _law.rubbed(memory, work, dt), {})),* }
             }
 
-            /// Largest slopes of the force of a [`Role::Path`].
+            /// Largest slopes of the force of a [`Role::Path`]; 0 of dry friction.
             pub fn slopes(&self) -> Slopes {
-                match self { $(Law::$law(_law) => where_it_is!(path, $role, _law.slopes(), Slopes::default())),* }
+                match self {
+                    $(Law::$law(_law) => where_it_is!(path, $role, _law.slopes(),
+                        where_it_is!(linear, $role, _law.coefficients().slopes(), Slopes::default()))),*
+                }
             }
 
             /// Advances the memory of a [`Role::Path`] along the straight path from `from` to `to`, m, which takes `dt` seconds.
@@ -112,21 +115,30 @@ macro_rules! register {
                 match self { $(Law::$law(_law) => where_it_is!(path, $role, _law.advance(memory, from, to, dt), {})),* }
             }
 
-            /// Force of a [`Role::Path`] at `x`, m, and `v`, m/s, with the memory as it is, N; 0 of other laws.
+            /// Force of a [`Role::Path`], or of a linear law without inertance, at `x`, m, and `v`, m/s, with the memory as it is, N; 0 of dry friction.
             #[inline]
             pub fn force(&self, memory: &[f64], x: f64, v: f64) -> f64 {
-                match self { $(Law::$law(_law) => where_it_is!(path, $role, _law.force(memory, x, v), 0.0)),* }
+                match self {
+                    $(Law::$law(_law) => where_it_is!(path, $role, _law.force(memory, x, v),
+                        where_it_is!(linear, $role, _law.coefficients().at(x, v), 0.0))),*
+                }
             }
 
-            /// See [`PathLaw::mean_force`]; 0 of other laws.
+            /// See [`PathLaw::mean_force`]; of other laws as [`Law::force`].
             #[inline]
             pub fn mean_force(&self, memory: &[f64], from: f64, to: f64, v: f64) -> f64 {
-                match self { $(Law::$law(_law) => where_it_is!(path, $role, _law.mean_force(memory, from, to, v), 0.0)),* }
+                match self {
+                    $(Law::$law(_law) => where_it_is!(path, $role, _law.mean_force(memory, from, to, v),
+                        where_it_is!(linear, $role, _law.coefficients().at(0.5 * (from + to), v), 0.0))),*
+                }
             }
 
-            /// Energy in a [`Role::Path`] that can be had back, J.
+            /// Energy in a [`Role::Path`] or a linear law that can be had back, J.
             pub fn stored(&self, memory: &[f64], x: f64) -> f64 {
-                match self { $(Law::$law(_law) => where_it_is!(path, $role, _law.stored(memory, x), 0.0)),* }
+                match self {
+                    $(Law::$law(_law) => where_it_is!(path, $role, _law.stored(memory, x),
+                        where_it_is!(linear, $role, _law.coefficients().stored(x), 0.0))),*
+                }
             }
 
             /// One sentence where a [`Role::Path`] creates energy in cycles of this amplitude (in `unit`).

@@ -2,6 +2,7 @@
 
 mod network;
 mod paths;
+mod points;
 mod robot;
 mod signals;
 
@@ -43,6 +44,12 @@ impl Model {
     pub fn from_toml(text: &str, name: &str) -> Result<Model, FileError> {
         device(ModelFile::from_toml(text, name)?, name)
     }
+
+    /// Reads a device's model from the text of a file that stands in `folder`, which files that the model names are looked for in; `name` stands for the
+    /// file in errors.
+    pub fn from_toml_in(text: &str, name: &str, folder: Option<&Path>) -> Result<Model, FileError> {
+        device(read(Table::parse(text, name)?, folder)?, name)
+    }
 }
 
 impl Fragment {
@@ -54,6 +61,11 @@ impl Fragment {
     /// Reads a fragment from text; `name` stands for the file in errors.
     pub fn from_toml(text: &str, name: &str) -> Result<Fragment, FileError> {
         network::only_fragment(Table::parse(text, name)?, None)
+    }
+
+    /// As [`Model::from_toml_in`].
+    pub fn from_toml_in(text: &str, name: &str, folder: Option<&Path>) -> Result<Fragment, FileError> {
+        network::only_fragment(Table::parse(text, name)?, folder)
     }
 }
 
@@ -73,6 +85,7 @@ fn read(mut top: Table, folder: Option<&Path>) -> Result<ModelFile, FileError> {
         robot::read_robot(&mut table, &mut model, folder)?;
         table.finish()?;
     }
+    points::read_points(&mut top, &mut model)?;
     model.motion = motion.or(robot::motion(&model)).unwrap_or_default();
     let bodies = network::read_bodies(&mut top, false, &mut model)?;
     robot::read_joints(&mut top, &mut model, folder)?;

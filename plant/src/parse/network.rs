@@ -109,8 +109,11 @@ fn read_names(table: &mut Table, is_fragment: bool, model: &mut Model) -> Result
         }
         let inertia = table.need_number(&name, Range::NonNegative)?;
         // A joint of a robot is there already: this is its armature.
-        match model.bodies.iter_mut().find(|body| body.name == name) {
-            Some(joint) => joint.inertia = inertia,
+        match model.bodies.iter().position(|body| body.name == name) {
+            Some(point) if model.is_point(point) => {
+                return Err(table.error_at(&name, "is a point of the robot, which has the inertia of its link; leave it out"));
+            }
+            Some(joint) => model.bodies[joint].inertia = inertia,
             None => model.bodies.push(Body { name, inertia }),
         }
     }
@@ -125,8 +128,8 @@ fn refuse_free_bodies_without_inertia(
     top: &Table,
 ) -> Result<(), FileError> {
     for (index, body) in model.bodies.iter().enumerate() {
-        let is_joint = model.arm.as_ref().is_some_and(|arm| arm.bodies.contains(&index));
-        let stands_for_another = is_fragment && index == 0 || hand == Some(index) || is_joint;
+        let has_links = model.arm.as_ref().is_some_and(|arm| arm.moves(index));
+        let stands_for_another = is_fragment && index == 0 || hand == Some(index) || has_links;
         let moved = model.inputs.iter().any(|i| i.kind == InputKind::Motion && i.on == index);
         let inerter = model
             .elements

@@ -36,6 +36,7 @@ pub(super) fn read_robot(table: &mut Table, model: &mut Model, folder: Option<&P
         }
         pose.finish()?;
     }
+    arm.gravity_compensated = table.boolean("gravity_compensated")?.unwrap_or(false);
     let passive = table.boolean("passive")?.unwrap_or(true);
     let actuators = table.boolean("actuators")?.unwrap_or(false);
     for (body, coordinate) in arm.tree.coordinates().iter().enumerate() {

@@ -61,6 +61,9 @@ pub(super) fn read_input(table: &mut Table, model: &Model) -> Result<Input, File
         back_emf: table.number_or("back_emf", Range::Any, 0.0)?,
         offset: table.number_or("offset", Range::Any, 0.0)?,
     };
+    if model.is_point(on) {
+        refuse_at_a_point(table, &input)?;
+    }
     if kind == InputKind::Force && input.offset != 0.0 {
         let message = "says where the zero of a recorded motion lies; a force that is always there is an element of kind \"bias\"";
         return Err(table.error_at("offset", message));
@@ -74,6 +77,19 @@ pub(super) fn read_input(table: &mut Table, model: &Model) -> Result<Input, File
         }
     }
     Ok(input)
+}
+
+/// A point of a robot can be pushed, not moved: it goes where the joints let it go.
+fn refuse_at_a_point(table: &Table, input: &Input) -> Result<(), FileError> {
+    if input.kind == InputKind::Motion {
+        let message =
+            "is a point of the robot, whose place the joints tell: prescribe a joint, or a body of its own that a spring ties to the point";
+        return Err(table.error_at("on", message));
+    }
+    if input.back_emf != 0.0 {
+        return Err(table.error_at("back_emf", "is what the speed of a motor takes; a point of the robot has no motor, its joints have"));
+    }
+    Ok(())
 }
 
 #[derive(Clone, Copy)]
@@ -98,7 +114,7 @@ pub(super) fn read_output(table: &mut Table, model: &Model) -> Result<Output, Fi
         Kind::Position => OutputKind::Position(body(table, "of", model)?),
         Kind::Velocity => OutputKind::Velocity(body(table, "of", model)?),
         Kind::Acceleration => OutputKind::Acceleration(body(table, "of", model)?),
-        Kind::Force => OutputKind::Force(elements(table, model)?),
+        Kind::Force => OutputKind::Force(elements(table, "element", model)?.ok_or_else(|| table.missing("element"))?),
         Kind::Reaction => {
             let of = body(table, "of", model)?;
             if !model.inputs.iter().any(|i| i.kind == InputKind::Motion && i.on == of) {
@@ -119,23 +135,23 @@ pub(super) fn read_output(table: &mut Table, model: &Model) -> Result<Output, Fi
     })
 }
 
-fn elements(table: &mut Table, model: &Model) -> Result<Vec<usize>, FileError> {
-    let names = table.string_or_strings("element")?.ok_or_else(|| table.missing("element"))?;
+fn elements(table: &mut Table, key: &str, model: &Model) -> Result<Option<Vec<usize>>, FileError> {
+    let Some(names) = table.string_or_strings(key)? else { return Ok(None) };
     if names.is_empty() {
-        return Err(table.error_at("element", "names no element"));
+        return Err(table.error_at(key, "names no element"));
     }
     let mut found = Vec::with_capacity(names.len());
     for name in &names {
         match model.elements.iter().position(|e| e.name == *name) {
-            Some(index) if found.contains(&index) => return Err(table.error_at("element", format!("names \"{name}\" twice"))),
+            Some(index) if found.contains(&index) => return Err(table.error_at(key, format!("names \"{name}\" twice"))),
             Some(index) => found.push(index),
             None => {
                 let all = model.elements.iter().map(|e| e.name.as_str());
-                return Err(table.error_at("element", tomlfile::unknown("element", name, all)));
+                return Err(table.error_at(key, tomlfile::unknown("element", name, all)));
             }
         }
     }
-    Ok(found)
+    Ok(Some(found))
 }
 
 pub(super) fn read_axis(table: &mut Table, model: &Model) -> Result<Axis, FileError> {
@@ -171,6 +187,7 @@ pub(super) fn read_axis(table: &mut Table, model: &Model) -> Result<Axis, FileEr
         name,
         user,
         holds_user: table.boolean("holds_user")?.unwrap_or(false),
+        touches: elements(table, "touches", model)?.unwrap_or_default(),
         feedback,
         measured,
         scale,

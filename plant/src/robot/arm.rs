@@ -3,6 +3,8 @@
 use super::description::{JointKind, Robot};
 use super::error::RobotError;
 use super::found::Remark;
+use super::point::Point;
+use super::spatial::Twist;
 use super::tree::{Tree, Workspace};
 use nalgebra::DMatrix;
 
@@ -25,6 +27,10 @@ pub struct Arm {
     pub bodies: Vec<usize>,
     /// Coordinates when every position of the network is 0, rad or m.
     pub pose: Vec<f64>,
+    /// Points of links that are bodies of the network, too.
+    pub points: Vec<Point>,
+    /// Whether the joints' motors hold the weight of the links: forces `g(q)` of the present pose, as a controller with a right model adds them.
+    pub gravity_compensated: bool,
     /// What of the file was left aside.
     pub remarks: Vec<Remark>,
 }
@@ -38,7 +44,7 @@ impl Arm {
         let mut tree = Tree::new(&robot)?;
         (0..tree.len()).for_each(|i| tree.set_armature(i, 0.0));
         let (bodies, pose) = ((first_body..first_body + tree.len()).collect(), tree.references());
-        Ok(Arm { xml, robot, tree, bodies, pose, remarks: Vec::new() })
+        Ok(Arm { xml, robot, tree, bodies, pose, points: Vec::new(), gravity_compensated: false, remarks: Vec::new() })
     }
 
     /// The mass matrix of the links over all bodies of a network, at the pose, kg m² or kg.
@@ -46,9 +52,36 @@ impl Arm {
         self.over_bodies(bodies, |work, matrix| self.tree.mass_matrix(&self.pose, work, matrix))
     }
 
-    /// Stiffness that gravity makes, over all bodies of a network, at the pose, N m/rad and the like.
+    /// Stiffness that gravity makes, over all bodies of a network, at the pose, N m/rad and the like; none where motors hold the links' weight in every pose.
     pub fn gravity_stiffness_at_pose(&self, bodies: usize) -> DMatrix<f64> {
+        if self.gravity_compensated {
+            return DMatrix::zeros(bodies, bodies);
+        }
         self.over_bodies(bodies, |work, matrix| self.tree.gravity_stiffness(&self.pose, work, matrix))
+    }
+
+    /// How each point's displacement changes with each body of a network, at the pose: 0 but for the joints.
+    pub fn gradients_at_pose(&self, bodies: usize) -> Vec<Vec<f64>> {
+        let mut work = self.tree.workspace();
+        self.tree.place(&self.pose, &mut work);
+        let (mut columns, mut row) = (vec![Twist::default(); self.tree.len()], vec![0.0; self.tree.len()]);
+        let over_bodies = |point| {
+            self.tree.gradient_here(point, &work, &mut columns, &mut row);
+            let mut all = vec![0.0; bodies];
+            self.bodies.iter().zip(&row).for_each(|(body, value)| all[*body] = *value);
+            all
+        };
+        self.points.iter().map(over_bodies).collect()
+    }
+
+    /// Whether a body of the network is a joint or a point, whose motion the links tell.
+    pub fn moves(&self, body: usize) -> bool {
+        self.bodies.contains(&body) || self.is_point(body)
+    }
+
+    /// Whether a body of the network is a point of a link.
+    pub fn is_point(&self, body: usize) -> bool {
+        self.points.iter().any(|point| point.body == body)
     }
 
     fn over_bodies(&self, bodies: usize, compute: impl Fn(&mut Workspace, &mut DMatrix<f64>)) -> DMatrix<f64> {

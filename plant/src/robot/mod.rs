@@ -6,7 +6,8 @@
 //! - what force a motion takes (recursive Newton-Euler, [`Tree::inverse_dynamics`]) and what motion a force makes (articulated bodies,
 //!   [`Tree::forward_dynamics`]),
 //! - the mass matrix (composite bodies, [`Tree::mass_matrix`]) and the matrix of Coriolis forces ([`Tree::coriolis_matrix`]),
-//! - what gravity asks of the joints, and the energies.
+//! - what gravity asks of the joints, and the energies,
+//! - how a [`Point`] of a link moves, and so what a force on it does to the joints.
 //!
 //! The algorithms are those of R. Featherstone, Rigid Body Dynamics Algorithms, Springer 2008 (RBDA below). Nothing is allocated while computing: a
 //! [`Workspace`] is made once and handed in. Units are SI: a coordinate and its force are rad and N m of a revolute joint, m and N of a prismatic one.
@@ -27,6 +28,7 @@ mod inverse_dynamics;
 mod kinematics;
 mod mass_matrix;
 mod mjcf;
+mod point;
 mod spatial;
 mod tree;
 mod urdf;
@@ -38,5 +40,6 @@ pub use error::{Part, RobotError};
 pub use file::RobotFile;
 pub use found::Remark;
 pub use inertia::Inertia;
+pub use point::Point;
 pub use spatial::{Placement, Twist, Wrench};
 pub use tree::{Coordinate, Tree, Workspace};

@@ -173,6 +173,11 @@ impl Tree {
         }
     }
 
+    /// Without gravity: as the joints feel it where forces of their motors hold the links' weight in every pose.
+    pub fn weightless(&mut self) {
+        self.gravity = Vector3::zeros();
+    }
+
     /// Mass of all bodies that move, kg.
     pub fn moving_mass(&self) -> f64 {
         self.bodies.iter().map(|body| body.inertia.mass).sum()

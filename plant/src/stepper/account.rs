@@ -71,7 +71,11 @@ impl Account {
             pull[path.first] += path.force;
             pull[path.second] -= path.force;
         }
+        fixed.points.pass_on(&mut pull);
         let places = || (0..fixed.free).chain(GROUND - fixed.prescribed..GROUND);
+        for i in fixed.points.places() {
+            self.work_in += done.pushed[i] * done.mean_velocity[i] * h;
+        }
         for i in places() {
             self.work_in += done.pushed[i] * done.mean_velocity[i] * h;
             for j in places() {

@@ -56,9 +56,19 @@ impl Plant {
         self.drive(n, from, to, &mut motion);
         self.links_to_the_middle(&mut motion);
         self.paths_to_the_middle(&mut motion);
+        let points = !self.fixed.points.is_empty();
+        if points {
+            self.fixed.points.pass_on(&mut motion.force);
+        }
         self.move_freely(n, &mut motion);
+        if points {
+            self.carry_points(&mut motion);
+        }
         if self.fixed.constraints.len() > 0 {
             self.constrain(n, &mut motion);
+            if points {
+                self.carry_points(&mut motion);
+            }
         }
         self.count_energy(&motion);
         follower.forces(self, n, &motion);
@@ -75,6 +85,9 @@ impl Plant {
         for i in 0..n {
             motion.force[i] = self.fixed.constant[i];
             motion.end[i] = 0.0;
+        }
+        for i in self.fixed.points.places() {
+            motion.force[i] = 0.0;
         }
         for drive in &self.drives {
             motion.pushed[drive.slot] = 0.0;
@@ -264,6 +277,7 @@ impl Plant {
             self.x[drive.slot] = motion.end[drive.slot];
             self.v[drive.slot] = motion.end_velocity[drive.slot];
         }
+        self.bring_points();
         for path in &mut self.paths {
             let x = self.x[path.first] - self.x[path.second];
             // An explicit one has already come to the middle.
@@ -271,6 +285,12 @@ impl Plant {
             path.law.advance(&mut path.memory, path.reached, x, left);
             path.reached = x;
         }
+    }
+
+    /// The points go with the joints.
+    fn carry_points(&self, motion: &mut Motion) {
+        self.fixed.points.carry(&mut motion.mean_velocity);
+        self.fixed.points.carry(&mut motion.end_velocity);
     }
 
     /// Forces of the inputs at `s` of this period, seen from before.

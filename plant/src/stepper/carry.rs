@@ -26,7 +26,15 @@ impl Plant {
     #[inline]
     pub(super) fn links_here(&mut self) {
         if let Some(links) = &mut self.links {
-            links.at(&mut self.fixed, &self.x, &self.v);
+            links.at(&mut self.fixed, &mut self.x, &mut self.v);
+        }
+    }
+
+    /// The points of the links at the end of a substep.
+    #[inline]
+    pub(super) fn bring_points(&mut self) {
+        if let (false, Some(links)) = (self.fixed.points.is_empty(), &mut self.links) {
+            links.bring_points(&mut self.fixed.points, &mut self.x, &mut self.v);
         }
     }
 }

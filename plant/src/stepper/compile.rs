@@ -11,6 +11,7 @@ use super::links::Links;
 use super::motion::Motion;
 use super::options::Options;
 use super::path::PathElement;
+use super::points::Points;
 use super::propagator::Propagator;
 use super::sensor::Sense;
 use super::slots::{Columns, GROUND, MAX_BODIES, MAX_ELEMENTS, SLOTS, Slots, Square, prescribed_slot};
@@ -25,11 +26,23 @@ struct Network {
     slots: Vec<usize>,
     /// Body of each free place, for messages.
     free_bodies: Vec<usize>,
+    points: Points,
     prescribed: usize,
     mass: Square,
     damping: Square,
     stiffness: Square,
     constant: Slots,
+}
+
+impl Network {
+    fn ends(&self, element: &Element) -> [usize; 2] {
+        element.between.map(|place| place.map_or(GROUND, |body| self.slots[body]))
+    }
+
+    /// Whether an element ends at a point of a robot: what it is in the joints' coordinates changes with the pose.
+    fn at_a_point(&self, element: &Element) -> bool {
+        self.ends(element).iter().any(|place| self.points.places().contains(place))
+    }
 }
 
 fn square() -> Square {
@@ -90,6 +103,15 @@ fn check(model: &Model) -> Result<(), CompileError> {
             }
         }
         (kind.build)(&values).map_err(reason)?;
+        let at_a_point = element.between.iter().flatten().any(|body| model.is_point(*body));
+        if let Role::Linear(linear) = element.law.role()
+            && at_a_point
+            && linear.inertance != 0.0
+        {
+            let message =
+                "an inerter cannot end at a point of the robot; tie it to a joint, or to a body of its own that a spring ties to the point";
+            return Err(reason(message.to_owned()));
+        }
     }
     for input in &model.inputs {
         let place = || format!("input `{}`", input.name);
@@ -106,6 +128,9 @@ fn check(model: &Model) -> Result<(), CompileError> {
         number(place, "bandwidth", input.bandwidth, "above 0", input.bandwidth > 0.0)?;
         number(place, "back_emf", input.back_emf, "a finite number", input.back_emf.is_finite())?;
         number(place, "offset", input.offset, "a finite number", input.offset.is_finite())?;
+        if model.is_point(input.on) && (input.kind == InputKind::Motion || input.back_emf != 0.0) {
+            return Err(CompileError::AtPoint { input: input.name.clone(), point: model.bodies[input.on].name.clone() });
+        }
     }
     for output in &model.outputs {
         let place = || format!("output `{}`", output.name);
@@ -168,7 +193,10 @@ fn assemble(model: &Model) -> Result<Network, CompileError> {
     }
     let (mut slots, mut free_bodies, mut prescribed) = (Vec::new(), Vec::new(), 0);
     for (body, mover) in mover.iter().enumerate() {
-        if mover.is_some() {
+        if model.is_point(body) {
+            // Behind the free bodies, when it is known how many these are.
+            slots.push(GROUND);
+        } else if mover.is_some() {
             slots.push(prescribed_slot(prescribed));
             prescribed += 1;
         } else {
@@ -176,8 +204,13 @@ fn assemble(model: &Model) -> Result<Network, CompileError> {
             free_bodies.push(body);
         }
     }
+    let points = model.arm.as_ref().map_or(&[][..], |arm| &arm.points);
+    for (index, point) in points.iter().enumerate() {
+        slots[point.body] = free_bodies.len() + index;
+    }
+    let points = Points::new(free_bodies.len(), points.len());
     let mut network =
-        Network { slots, free_bodies, prescribed, mass: square(), damping: square(), stiffness: square(), constant: [0.0; SLOTS] };
+        Network { slots, free_bodies, points, prescribed, mass: square(), damping: square(), stiffness: square(), constant: [0.0; SLOTS] };
     for (body, slot) in model.bodies.iter().zip(&network.slots) {
         network.mass[*slot][*slot] += body.inertia;
     }
@@ -185,6 +218,7 @@ fn assemble(model: &Model) -> Result<Network, CompileError> {
         let [first, second] = element.between.map(|place| place.map_or(GROUND, |body| network.slots[body]));
         if let Role::Linear(linear) = element.law.role()
             && first != second
+            && !network.at_a_point(element)
         {
             join(&mut network.mass, first, second, linear.inertance);
             join(&mut network.damping, first, second, linear.damping);
@@ -211,12 +245,12 @@ const LONGEST_SUBSTEP_UNBOUNDED_S: f64 = 1.25e-4;
 /// Shortest substep that is chosen, s. What is faster than that is stable, but not resolved.
 const SHORTEST_SUBSTEP_S: f64 = 4e-6;
 
-fn choose_substeps(network: &Network, model: &Model, factors: &[DMatrix<f64>], period: f64) -> usize {
-    let free = network.free_bodies.len();
+fn choose_substeps(network: &Network, model: &Model, poses: &[Pose], period: f64) -> usize {
     let (mut stiffness, mut damping) = (network.stiffness.clone(), network.damping.clone());
     let mut longest = LONGEST_SUBSTEP_S;
-    for element in model.elements.iter().filter(|element| element.law.role() == Role::Path) {
-        let [first, second] = element.between.map(|place| place.map_or(GROUND, |body| network.slots[body]));
+    let along_paths = |element: &&Element| element.law.role() == Role::Path || network.at_a_point(element);
+    for element in model.elements.iter().filter(along_paths) {
+        let [first, second] = network.ends(element);
         if first != second {
             let slopes = element.law.slopes();
             if !slopes.bounded {
@@ -226,31 +260,48 @@ fn choose_substeps(network: &Network, model: &Model, factors: &[DMatrix<f64>], p
             join(&mut damping, first, second, slopes.damping);
         }
     }
-    let fastest = largest_ratio(factors, &block(&stiffness, free)).sqrt();
-    let quickest_decay = largest_ratio(factors, &block(&damping, free));
+    let free = network.free_bodies.len();
+    let fastest = largest_ratio(poses, &stiffness, free).sqrt();
+    let quickest_decay = largest_ratio(poses, &damping, free);
     let longest = longest.min(PHASE_PER_SUBSTEP / fastest).min(DECAY_PER_SUBSTEP / quickest_decay).max(SHORTEST_SUBSTEP_S);
     let count = (period / longest - 1e-9).ceil();
     if count.is_finite() { count.clamp(1.0, 100_000.0) as usize } else { 1 }
 }
 
+/// What depends on a robot's pose; the only one of a network without a robot.
+struct Pose {
+    mass: DMatrix<f64>,
+    /// Its Cholesky factor.
+    factor: DMatrix<f64>,
+    points: Points,
+}
+
 /// The largest of all poses of a robot.
-fn largest_ratio(factors: &[DMatrix<f64>], matrix: &DMatrix<f64>) -> f64 {
-    factors.iter().fold(0.0, |largest: f64, factor| largest.max(dense::largest_ratio(factor, matrix)))
+fn largest_ratio(poses: &[Pose], matrix: &Square, free: usize) -> f64 {
+    poses.iter().fold(0.0, |largest: f64, pose| largest.max(dense::largest_ratio(&pose.factor, &folded(matrix, free, &pose.points))))
+}
+
+/// The block between the free places, with what a matrix has at points brought to the joints that carry them: `Tᵀ matrix T`.
+fn folded(matrix: &Square, free: usize, points: &Points) -> DMatrix<f64> {
+    let places: Vec<usize> = (0..free).chain(points.places()).collect();
+    let to_places = DMatrix::from_fn(places.len(), free, |place, slot| points.share(places[place], slot));
+    let all = DMatrix::from_fn(places.len(), places.len(), |i, j| matrix[places[i]][places[j]]);
+    if points.is_empty() { all } else { to_places.transpose() * all * to_places }
 }
 
 /// Every element by what a stepper makes of it.
-fn parts(model: &Model, slots: &[usize]) -> (Vec<Share>, Vec<FrictionContact>, Vec<PathElement>) {
-    let ends = |element: &Element| element.between.map(|place| place.map_or(GROUND, |body| slots[body]));
+fn parts(model: &Model, network: &Network) -> (Vec<Share>, Vec<FrictionContact>, Vec<PathElement>) {
+    let ends = |element: &Element| network.ends(element);
     let (mut elements, mut frictions, mut paths) = (Vec::new(), Vec::new(), Vec::new());
     for element in &model.elements {
         let [first, second] = ends(element);
         elements.push(match element.law.role() {
-            Role::Linear(linear) => Share::Linear(linear, first, second),
+            Role::Linear(linear) if !network.at_a_point(element) => Share::Linear(linear, first, second),
             Role::Friction => {
                 frictions.push(FrictionContact::new(first, second, &element.law));
                 Share::Friction(frictions.len() - 1)
             }
-            Role::Path => {
+            Role::Path | Role::Linear(_) => {
                 paths.push(PathElement::new(first, second, &element.law));
                 Share::Path(paths.len() - 1)
             }
@@ -299,19 +350,27 @@ fn plant(model: &Model, period: f64, options: &Options) -> Result<Plant, Compile
     let mut network = assemble(model)?;
     let free = network.free_bodies.len();
     let mut links = model.arm.as_ref().map(|arm| Box::new(Links::new(arm, &network.slots, network.mass.clone())));
-    let poses = model.arm.as_ref().map_or_else(Vec::new, |arm| arm.poses());
-    let masses: Vec<Square> = links.iter_mut().flat_map(|links| poses.iter().map(|pose| links.mass_at(pose))).collect();
-    if let Some(at_pose) = masses.first() {
-        network.mass.clone_from(at_pose);
+    // In other poses the links may weigh less on their joints, and their points move otherwise.
+    let mut others: Vec<(Square, Points)> = Vec::new();
+    if let (Some(arm), Some(links)) = (&model.arm, &mut links) {
+        for pose in arm.poses() {
+            let (mass, mut points) = (links.mass_at(&pose), network.points.clone());
+            links.find_points(&mut points, &mut [0.0; SLOTS]);
+            others.push((mass, points));
+        }
+    }
+    if !others.is_empty() {
+        (network.mass, network.points) = others.remove(0);
     }
     let mass = block(&network.mass, free);
     let massless = |row: usize| CompileError::Massless(model.bodies[network.free_bodies[row]].name.clone());
     let factor = dense::cholesky(&mass).map_err(massless)?;
     let inverse_mass = dense::inverse(&mass).ok_or(CompileError::Singular)?;
-    // In other poses the links may weigh less on their joints.
-    let others: Vec<DMatrix<f64>> = masses.iter().skip(1).map(|mass| block(mass, free)).collect();
-    let mut factors = vec![factor];
-    factors.extend(others.iter().filter_map(|mass| dense::cholesky(mass).ok()));
+    let mut poses = vec![Pose { mass, factor, points: network.points.clone() }];
+    for (mass, points) in others {
+        let mass = block(&mass, free);
+        poses.extend(dense::cholesky(&mass).ok().map(|factor| Pose { mass, factor, points }));
+    }
 
     let linear = links.is_none()
         && model.elements.iter().all(|element| {
@@ -322,20 +381,20 @@ fn plant(model: &Model, period: f64, options: &Options) -> Result<Plant, Compile
     let substeps = match options.substeps {
         Some(n) => n,
         None if linear && !delayed => 1,
-        None => choose_substeps(&network, model, &factors, period),
+        None => choose_substeps(&network, model, &poses, period),
     };
     let substep = period / substeps as f64;
     let drives: Vec<Drive> = model.inputs.iter().map(|input| Drive::new(input, network.slots[input.on], period, substep)).collect();
 
-    let (elements, frictions, mut paths) = parts(model, &network.slots);
+    let (elements, frictions, mut paths) = parts(model, &network);
 
     let stiffness = block(&network.stiffness, free);
     let damping = block(&network.damping, free);
-    let theta = if largest_ratio(&factors, &stiffness).sqrt() * substep < 1.2 { 1.0 / 3.0 } else { 1.0 };
+    let theta = if largest_ratio(&poses, &network.stiffness, free).sqrt() * substep < 1.2 { 1.0 / 3.0 } else { 1.0 };
     let system = |mass: &DMatrix<f64>| mass * (2.0 / substep) + &damping + &stiffness * (theta * 0.5 * substep);
-    let from_force = dense::inverse(&system(&mass)).ok_or(CompileError::Singular)?;
-    let mut from_forces = vec![columns(&from_force)];
-    from_forces.extend(others.iter().filter_map(|mass| dense::inverse(&system(mass))).map(|inverse| columns(&inverse)));
+    let from_force = dense::inverse(&system(&poses[0].mass)).ok_or(CompileError::Singular)?;
+    let answer = |pose: &Pose| dense::inverse(&system(&pose.mass)).map(|inverse| (columns(&inverse), pose.points.clone()));
+    let from_forces: Vec<(Columns, Points)> = poses.iter().filter_map(answer).collect();
     let mut from_prescribed = [[[0.0; SLOTS]; SLOTS]; 3];
     for (matrix, weights) in [&network.stiffness, &network.damping, &network.mass].into_iter().zip(&mut from_prescribed) {
         for (p, weights) in weights.iter_mut().enumerate().take(network.prescribed) {
@@ -348,6 +407,7 @@ fn plant(model: &Model, period: f64, options: &Options) -> Result<Plant, Compile
     let fixed = Compiled {
         free,
         prescribed: network.prescribed,
+        points: network.points,
         inverse_mass: columns(&inverse_mass),
         theta,
         from_position: columns(&(-(&from_force * &stiffness))),

@@ -1,6 +1,7 @@
 //! Everything that does not change while a model moves.
 
 use super::constraints::Constraints;
+use super::points::Points;
 use super::slots::{Columns, SLOTS, Slots, Square};
 use crate::elements::Linear;
 
@@ -22,6 +23,8 @@ pub(super) struct Compiled {
     pub(super) slots: Vec<usize>,
     pub(super) free: usize,
     pub(super) prescribed: usize,
+    /// Places of a robot's points, behind the free ones.
+    pub(super) points: Points,
     pub(super) mass: Square,
     pub(super) damping: Square,
     pub(super) stiffness: Square,

@@ -7,6 +7,7 @@
 
 use super::contact::{Bounds, FrictionContact};
 use super::path::PathElement;
+use super::points::Points;
 use super::slots::{Columns, MAX_ELEMENTS, SLOTS, Slots};
 
 /// Sweeps before the sticking contacts are solved directly.
@@ -85,9 +86,9 @@ impl Work {
 
 impl Constraints {
     /// Lists the friction contacts and those path elements that are too stiff for the substep; the latter are told so. `from_forces` are what the bodies
-    /// answer to forces: first as they begin, then as they may come to answer where that changes on the way.
+    /// answer to forces, and how their points move: first as they begin, then as they may come to answer where that changes on the way.
     pub(super) fn new(
-        from_forces: &[Columns],
+        from_forces: &[(Columns, Points)],
         free: usize,
         substep: f64,
         frictions: &[FrictionContact],
@@ -103,7 +104,9 @@ impl Constraints {
         for (index, path) in paths.iter_mut().enumerate() {
             let ends = (path.first, path.second);
             let slopes = path.law.slopes();
-            let most = from_forces.iter().fold(0.0, |most: f64, columns| most.max(across(ends, free, &respond(columns, free, ends))));
+            let most = from_forces
+                .iter()
+                .fold(0.0, |most: f64, (columns, points)| most.max(across(points, ends, free, &respond(columns, points, free, ends))));
             let stiffness = most * (0.5 * substep * slopes.stiffness + slopes.damping);
             if stiffness > if slopes.bounded { stiff } else { STIFF_UNBOUNDED } {
                 path.constraint = Some(all.ends.len());
@@ -115,21 +118,21 @@ impl Constraints {
         }
         all.response = vec![[0.0; SLOTS]; all.ends.len()];
         all.compliance = vec![0.0; all.ends.len() * all.ends.len()];
-        if let Some(now) = from_forces.first() {
-            all.answer_by(now, free);
+        if let Some((now, points)) = from_forces.first() {
+            all.answer_by(now, free, points);
         }
         all
     }
 
     /// What the bodies answer to forces is now this.
-    pub(super) fn answer_by(&mut self, from_force: &Columns, free: usize) {
+    pub(super) fn answer_by(&mut self, from_force: &Columns, free: usize, points: &Points) {
         for (response, ends) in self.response.iter_mut().zip(&self.ends) {
-            *response = respond(from_force, free, *ends);
+            *response = respond(from_force, points, free, *ends);
         }
         let count = self.ends.len();
         for (c, ends) in self.ends.iter().enumerate() {
             for (d, response) in self.response.iter().enumerate() {
-                self.compliance[c * count + d] = across(*ends, free, response);
+                self.compliance[c * count + d] = across(points, *ends, free, response);
             }
         }
     }
@@ -281,7 +284,12 @@ impl Constraints {
 }
 
 /// What a unit of a constraint's force takes from the velocities of the free bodies.
-fn respond(from_force: &Columns, free: usize, (first, second): (usize, usize)) -> Slots {
+fn respond(from_force: &Columns, points: &Points, free: usize, (first, second): (usize, usize)) -> Slots {
+    if !points.is_empty() {
+        let (mut response, other) = (points.respond(from_force, free, first), points.respond(from_force, free, second));
+        response.iter_mut().zip(other).for_each(|(value, other)| *value -= other);
+        return response;
+    }
     let weight = |slot: usize, i: usize| if slot < free { from_force[slot][i] } else { 0.0 };
     let mut response = [0.0; SLOTS];
     for (i, value) in response.iter_mut().enumerate().take(free) {
@@ -291,9 +299,8 @@ fn respond(from_force: &Columns, free: usize, (first, second): (usize, usize)) -
 }
 
 /// What of velocities of free bodies is seen across two places.
-fn across((first, second): (usize, usize), free: usize, velocity: &Slots) -> f64 {
-    let at = |slot: usize| if slot < free { velocity[slot] } else { 0.0 };
-    at(first) - at(second)
+fn across(points: &Points, (first, second): (usize, usize), free: usize, velocity: &Slots) -> f64 {
+    points.seen(velocity, free, first) - points.seen(velocity, free, second)
 }
 
 impl PathElement {

@@ -55,6 +55,9 @@ impl Plant {
             }
             force[i] = f - bias[i];
         }
+        for i in fixed.points.places() {
+            force[i] = self.pushed[i];
+        }
         for (path, f) in self.paths.iter().zip(&mut now.path) {
             let (first, second) = (path.first, path.second);
             *f = path.law.force(&path.memory, self.x[first] - self.x[second], self.v[first] - self.v[second]);
@@ -75,25 +78,28 @@ impl Plant {
                 &of_pose
             }
         };
+        fixed.points.pass_on(&mut force);
         self.accelerate(inverse_mass, &force, &mut now.acceleration);
-        self.hold_sticking(inverse_mass, &mut force, now);
+        self.hold_sticking(inverse_mass, now);
     }
 
     fn accelerate(&self, inverse_mass: &Columns, force: &Slots, acceleration: &mut Slots) {
         for i in 0..self.fixed.free {
             acceleration[i] = (0..self.fixed.free).map(|j| inverse_mass[j][i] * force[j]).sum();
         }
+        self.fixed.points.carry_acceleration(acceleration);
     }
 
     /// Gauss-Seidel over the sticking contacts: no relative acceleration, within the level at rest.
-    fn hold_sticking(&self, inverse_mass: &Columns, force: &mut Slots, now: &mut Endpoint) {
-        let free = self.fixed.free;
-        let inverse = |i: usize, j: usize| if i < free && j < free { inverse_mass[j][i] } else { 0.0 };
+    fn hold_sticking(&self, inverse_mass: &Columns, now: &mut Endpoint) {
+        let (free, points) = (self.fixed.free, &self.fixed.points);
         for _ in 0..SWEEPS {
             let mut settled = true;
             for (contact, f) in self.frictions.iter().zip(&mut now.friction).filter(|(contact, _)| contact.mode == 0) {
                 let (a, b) = (contact.first, contact.second);
-                let own = inverse(a, a) + inverse(b, b) - inverse(a, b) - inverse(b, a);
+                let (from_a, from_b) = (points.respond(inverse_mass, free, a), points.respond(inverse_mass, free, b));
+                let seen = |answer: &Slots, place: usize| points.seen(answer, free, place);
+                let own = seen(&from_a, a) + seen(&from_b, b) - seen(&from_b, a) - seen(&from_a, b);
                 if own <= 0.0 {
                     continue;
                 }
@@ -105,11 +111,10 @@ impl Plant {
                     settled = false;
                 }
                 *f = wanted;
-                force[a] -= change;
-                force[b] += change;
                 for i in 0..free {
-                    now.acceleration[i] -= (inverse(i, a) - inverse(i, b)) * change;
+                    now.acceleration[i] -= (from_a[i] - from_b[i]) * change;
                 }
+                points.carry_acceleration(&mut now.acceleration);
             }
             if settled {
                 return;
@@ -148,8 +153,11 @@ impl Plant {
         let frictions = self.frictions.iter().zip(&now.friction).map(|(c, f)| (c.first, c.second, *f));
         for (first, second, f) in frictions.chain(self.paths.iter().zip(&now.path).map(|(p, f)| (p.first, p.second, *f))) {
             if first != second {
-                reaction += if first == slot { f } else { 0.0 } - if second == slot { f } else { 0.0 };
+                reaction += f * fixed.points.share(first, slot) - f * fixed.points.share(second, slot);
             }
+        }
+        for point in fixed.points.places() {
+            reaction -= fixed.points.share(point, slot) * self.pushed[point];
         }
         reaction
     }

@@ -35,6 +35,16 @@ pub enum CompileError {
     /// A place, an element or an input that the model does not have.
     #[error("{0} names something that the model does not have")]
     Dangling(String),
+    /// An input that a point cannot have.
+    #[error(
+        "input `{input}` acts on `{point}`, a point of the robot: it can push there, and neither prescribe a motion nor lose force by back-EMF"
+    )]
+    AtPoint {
+        /// The input.
+        input: String,
+        /// The point.
+        point: String,
+    },
     /// Two motion inputs on one body.
     #[error("inputs `{first}` and `{second}` both prescribe the motion of body `{body}`")]
     MovedTwice {

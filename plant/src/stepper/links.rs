@@ -11,8 +11,9 @@
 use super::compiled::Compiled;
 use super::dense;
 use super::motion::Motion;
+use super::points::Points;
 use super::slots::{Columns, SLOTS, Slots, Square, prescribed_slot};
-use crate::robot::{Arm, Tree, Workspace};
+use crate::robot::{Arm, Point, Tree, Twist, Workspace};
 use nalgebra::DMatrix;
 
 /// The links of a robot at work.
@@ -35,15 +36,28 @@ pub(super) struct Links {
     /// Energy in gravity there, less that at the pose, J.
     pub(super) potential: f64,
     potential_at_pose: f64,
+    /// Points of links, each with its distance along its axis at the pose, m.
+    points: Vec<(Point, f64)>,
+    columns: Vec<Twist>,
+    row: Vec<f64>,
 }
 
 impl Links {
     /// `slots`: place of each body of the model; `own_mass`: inertia of the network without the links.
     pub(super) fn new(arm: &Arm, slots: &[usize], own_mass: Square) -> Links {
-        let (tree, count) = (arm.tree.clone(), arm.tree.len());
+        let (mut tree, count) = (arm.tree.clone(), arm.tree.len());
+        if arm.gravity_compensated {
+            tree.weightless();
+        }
         let mut work = tree.workspace();
+        let potential_at_pose = tree.potential_energy(&arm.pose, &mut work);
+        tree.place(&arm.pose, &mut work);
+        let at_pose = |point: &Point| tree.distance_here(point, &work);
         Links {
-            potential_at_pose: tree.potential_energy(&arm.pose, &mut work),
+            potential_at_pose,
+            points: arm.points.iter().map(|point| (point.clone(), at_pose(point))).collect(),
+            columns: vec![Twist::default(); count],
+            row: vec![0.0; count],
             slots: arm.bodies.iter().map(|body| slots[*body]).collect(),
             pose: arm.pose.clone(),
             own_mass,
@@ -72,6 +86,28 @@ impl Links {
         mass
     }
 
+    /// The rows of the points as the links are placed, and with `displacement` where the points are, m.
+    pub(super) fn find_points(&mut self, points: &mut Points, displacement: &mut Slots) {
+        for (index, place) in points.places().enumerate() {
+            let Some((point, at_pose)) = self.points.get(index) else { return };
+            displacement[place] = self.tree.distance_here(point, &self.work) - at_pose;
+            self.tree.gradient_here(point, &self.work, &mut self.columns, &mut self.row);
+            for (slot, value) in self.slots.iter().zip(&self.row) {
+                points.rows[index][*slot] = *value;
+            }
+        }
+    }
+
+    /// The points at the end of a substep, with their velocities.
+    pub(super) fn bring_points(&mut self, points: &mut Points, x: &mut Slots, v: &mut Slots) {
+        for (i, slot) in self.slots.iter().enumerate() {
+            self.q[i] = self.pose[i] + x[*slot];
+        }
+        self.tree.place(&self.q, &mut self.work);
+        self.find_points(points, x);
+        points.carry(v);
+    }
+
     /// The inertia of the links as they are placed, beside the network's own.
     fn join_mass(&mut self, mass: &mut Square) {
         self.tree.mass_matrix_here(&mut self.work, &mut self.mass);
@@ -88,6 +124,9 @@ impl Links {
             (self.q[i], self.v[i]) = (self.pose[i] + motion.middle[*slot], v[*slot]);
         }
         self.tree.velocities(&self.q, &self.v, &mut self.work);
+        if !self.points.is_empty() {
+            self.find_points(&mut fixed.points, &mut motion.middle);
+        }
         self.join_mass(&mut fixed.mass);
         self.tree.coriolis_matrix_here(&self.v, &mut self.work, &mut self.coriolis);
         self.tree.gravity_here(&mut self.work, &mut self.gravity);
@@ -153,11 +192,11 @@ impl Links {
                 }
             }
         }
-        fixed.constraints.answer_by(&fixed.from_force, n);
+        fixed.constraints.answer_by(&fixed.from_force, n, &fixed.points);
     }
 
-    /// What is known of the links at an instant; `fixed.mass` is then of it, too.
-    pub(super) fn at(&mut self, fixed: &mut Compiled, x: &Slots, v: &Slots) {
+    /// What is known of the links at an instant; `fixed.mass` is then of it, too, and so are the points.
+    pub(super) fn at(&mut self, fixed: &mut Compiled, x: &mut Slots, v: &mut Slots) {
         for (i, slot) in self.slots.iter().enumerate() {
             (self.q[i], self.v[i]) = (self.pose[i] + x[*slot], v[*slot]);
         }
@@ -166,6 +205,13 @@ impl Links {
         self.tree.bias_here(&self.v, &mut self.work, &mut self.gravity);
         for (i, slot) in self.slots.iter().enumerate() {
             self.bias[*slot] = self.gravity[i];
+        }
+        if !self.points.is_empty() {
+            self.find_points(&mut fixed.points, x);
+            fixed.points.carry(v);
+            for ((point, _), drift) in self.points.iter().zip(&mut fixed.points.drift) {
+                *drift = self.tree.drift_here(point, &self.v, &self.work, &mut self.columns);
+            }
         }
         self.potential = self.tree.potential_energy_here(&self.work) - self.potential_at_pose;
     }

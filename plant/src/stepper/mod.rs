@@ -9,6 +9,7 @@
 //!   solved for all contacts at once: what sticks has velocity 0, not a small one (`constraints.rs`).
 //! - Hysteresis is advanced along its path by the kind's own update. An element that is too stiff for the substep
 //!   joins the friction contacts in their implicit solution.
+//! - Points of a robot's links are places whose motion is that of the joints (`points.rs`). Linear elements at a point act along its path.
 //! - A robot's links add an inertia that changes with their pose, Coriolis forces and gravity to the bodies that are its joints (`links.rs`).
 
 mod account;
@@ -31,6 +32,7 @@ mod links;
 mod motion;
 mod options;
 mod path;
+mod points;
 mod propagator;
 mod segment;
 mod sense;

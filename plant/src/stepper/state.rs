@@ -1,7 +1,7 @@
 //! A model at work: its state, and what can be asked of it.
 
 use super::account::Account;
-use super::compiled::Compiled;
+use super::compiled::{Compiled, Share};
 use super::constraints::Work;
 use super::contact::FrictionContact;
 use super::drive::Drive;
@@ -22,6 +22,9 @@ const COSTLY: usize = 6;
 
 /// What the links of a robot add to a substep, in steps of a linear network, for each pair of coordinates.
 const LINKS: usize = 5;
+
+/// Below this a force has no lever on a joint, m or, of a slide, 1.
+const NO_LEVER: f64 = 1e-9;
 
 /// The balance of forces at a sample, in steps of a linear network.
 const BALANCE: usize = 3;
@@ -77,6 +80,7 @@ impl Plant {
         for contact in &mut self.frictions {
             contact.reset();
         }
+        self.links_here();
         for path in &mut self.paths {
             path.memory.fill(0.0);
             path.reached = self.x[path.first] - self.x[path.second];
@@ -85,7 +89,6 @@ impl Plant {
             path.rise = 1.0;
             path.absorbed = 0.0;
         }
-        self.links_here();
         self.restart_energy();
         self.restart_sense();
     }
@@ -96,10 +99,12 @@ impl Plant {
         let Some(slot) = self.fixed.slots.get(body).copied().filter(|slot| *slot < self.fixed.free) else { return };
         self.x[slot] = position;
         self.v[slot] = velocity;
-        for path in self.paths.iter_mut().filter(|path| path.first == slot || path.second == slot) {
+        self.links_here();
+        let points = self.fixed.points.places();
+        let moved = |place: usize| place == slot || points.contains(&place);
+        for path in self.paths.iter_mut().filter(|path| moved(path.first) || moved(path.second)) {
             path.reached = self.x[path.first] - self.x[path.second];
         }
-        self.links_here();
         self.restart_energy();
         self.restart_sense();
     }
@@ -139,7 +144,32 @@ impl Plant {
 
     /// Force of an element of the model, N, positive when it is stretched.
     pub fn element_force(&self, element: usize) -> f64 {
-        self.force_at(element, &self.endpoint())
+        match self.fixed.elements.get(element) {
+            // It needs no accelerations, so no balance of forces.
+            Some(Share::Path(path)) => self.paths.get(*path).map_or(f64::NAN, |path| {
+                path.law.force(&path.memory, self.x[path.first] - self.x[path.second], self.v[path.first] - self.v[path.second])
+            }),
+            _ => self.force_at(element, &self.endpoint()),
+        }
+    }
+
+    /// Force of an element on a body of the model, N or N m: of one at a point of a robot what it is on a joint, `Jᵀ F`. 0 where it does not reach the
+    /// body; not a number when there is no such body or element.
+    pub fn force_on(&self, element: usize, body: usize) -> f64 {
+        let (Some(slot), Some([first, second])) = (self.fixed.slots.get(body), self.ends_of(element)) else { return f64::NAN };
+        let share = |place: usize| self.fixed.points.share(place, *slot);
+        let lever = share(second) - share(first);
+        // A joint whose axis the force meets has no lever but what rounding leaves, and is not touched.
+        if lever.abs() > NO_LEVER { lever * self.element_force(element) } else { 0.0 }
+    }
+
+    /// Places of an element's ends.
+    fn ends_of(&self, element: usize) -> Option<[usize; 2]> {
+        match *self.fixed.elements.get(element)? {
+            Share::Linear(_, first, second) => Some([first, second]),
+            Share::Friction(contact) => self.frictions.get(contact).map(|c| [c.first, c.second]),
+            Share::Path(path) => self.paths.get(path).map(|p| [p.first, p.second]),
+        }
     }
 
     /// Force that the mover exerts on a body with a motion input, N, that body's own inertia included;

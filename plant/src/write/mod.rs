@@ -7,7 +7,7 @@ pub use patch::{Edit, ElementSpec, PatchError, Value, patch, round_significant};
 pub use text::{key, number, string};
 
 use crate::model::{Fragment, Hold, InputKind, Model, Motion, OutputKind, Place};
-use crate::robot::Arm;
+use crate::robot::{Arm, Point};
 use std::fmt::Write;
 use text::{list, parameter_text, strings};
 
@@ -52,9 +52,13 @@ fn write_model(model: &Model, is_fragment: bool) -> String {
     line(format!("motion = {}", string(motion)));
     if let Some(arm) = &model.arm {
         line(format!("\n[robot]\n{}", robot_keys(arm)));
+        for point in &arm.points {
+            line(format!("\n[point.{}]\n{}", key(model.place_name(Some(point.body))), point_keys(arm, point)));
+        }
     }
     line("\n[bodies]".to_string());
-    for body in model.bodies.iter().skip(usize::from(is_fragment)) {
+    let points = |index: &usize| model.is_point(*index);
+    for (_, body) in model.bodies.iter().enumerate().skip(usize::from(is_fragment)).filter(|(index, _)| !points(index)) {
         line(format!("{} = {}", key(&body.name), number(body.inertia)));
     }
     for element in &model.elements {
@@ -84,13 +88,21 @@ fn write_model(model: &Model, is_fragment: bool) -> String {
 /// The robot with all that its file says; joint friction, springs and motors are among the elements and inputs already.
 fn robot_keys(arm: &Arm) -> String {
     let pose = arm.tree.coordinates().iter().zip(&arm.pose).map(|(c, value)| format!("{} = {}", key(&c.name), number(*value)));
-    [
+    let mut keys = vec![
         format!("xml = {}", string(&arm.xml)),
         format!("gravity = {}", list(arm.robot.gravity.as_slice())),
         format!("pose = {{ {} }}", pose.collect::<Vec<_>>().join(", ")),
         "passive = false".to_string(),
-    ]
-    .join("\n")
+    ];
+    if arm.gravity_compensated {
+        keys.push("gravity_compensated = true".to_string());
+    }
+    keys.join("\n")
+}
+
+fn point_keys(arm: &Arm, point: &Point) -> String {
+    let link = arm.robot.links.get(point.link).map_or("", |link| link.name.as_str());
+    format!("link = {}\nat = {}\naxis = {}", string(link), list(point.at.as_slice()), list(point.axis.as_slice()))
 }
 
 fn element_keys(name: &str, kind: &str, between: &str, law: &crate::elements::Law) -> String {
@@ -168,6 +180,10 @@ fn axis_keys(model: &Model, axis: &crate::model::Axis) -> String {
     let mut keys = vec![format!("name = {}", string(&axis.name)), format!("user = {}", string(model.place_name(Some(axis.user))))];
     if axis.holds_user {
         keys.push("holds_user = true".to_string());
+    }
+    if !axis.touches.is_empty() {
+        let names = axis.touches.iter().filter_map(|e| model.elements.get(*e)).map(|e| e.name.as_str());
+        keys.push(format!("touches = {}", strings(names)));
     }
     keys.push(format!("feedback = {}", string(input)));
     keys.push(format!("measured = {}", string(output)));

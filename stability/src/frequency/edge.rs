@@ -200,7 +200,7 @@ fn student(freedom: f64) -> f64 {
 }
 
 /// The smallest factor at which an eigenvalue of the loop passes through +1, over the lines that tell something.
-pub(super) fn crossing(hz: &[f64], l: &[Matrix], told: &[bool]) -> Option<Crossing> {
+pub(crate) fn crossing(hz: &[f64], l: &[Matrix], told: &[bool]) -> Option<Crossing> {
     let mut best: Option<Crossing> = None;
     let mut keep = |c: Option<Crossing>| {
         if let Some(c) = c.filter(|c| best.is_none_or(|b| c.factor < b.factor)) {
@@ -256,7 +256,7 @@ fn matched(then: &[Complex<f64>], mut now: Vec<Complex<f64>>) -> Vec<Complex<f64
 }
 
 /// Eigenvalues of a small matrix; empty where they cannot be found.
-pub(super) fn eigenvalues(m: &Matrix) -> Vec<Complex<f64>> {
+pub(crate) fn eigenvalues(m: &Matrix) -> Vec<Complex<f64>> {
     match m.nrows() {
         0 => Vec::new(),
         1 => vec![m[(0, 0)]],

@@ -23,6 +23,7 @@ mod undithered;
 pub use answer::{FrequencyAnswer, Verdict};
 pub use delays::{Delays, Hop};
 pub use edge::Edge;
+pub(crate) use edge::{crossing, eigenvalues};
 pub use note::Note;
 pub use rows::RowCount;
 pub use swap::{ExchangedParts, PartError};

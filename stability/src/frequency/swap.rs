@@ -43,6 +43,11 @@ pub enum PartError {
     /// A controller drives the slave, and its answer is not told from the model alone.
     #[error("slave: a controller drives it, so that its response does not follow from its model alone; run the graph with it instead")]
     Driven,
+    /// What the slave touches is at a point of it.
+    #[error(
+        "slave: what it touches is attached elsewhere than at its axes (environment_on, touches), so that its response about the contact does not follow from their positions; run the graph with it instead"
+    )]
+    Touches,
     /// The model has not as many axes as the session.
     #[error("{part}: the model has {model} axes, the session has {session}")]
     Axes {
@@ -143,6 +148,9 @@ pub(super) fn slave_response(files: &DeviceFiles, about: &[f64], hz: &[f64]) -> 
     }
     if model.axes.iter().any(|a| model.inputs[a.feedback].kind == InputKind::Force) {
         return Err(PartError::Driven);
+    }
+    if model.axes.iter().any(|axis| !axis.touches.is_empty()) {
+        return Err(PartError::Touches);
     }
     let ends: Vec<_> = model.axes.iter().map(|a| (a.feedback, a.user)).collect();
     let mut at = Operating::small();

@@ -70,6 +70,7 @@ impl Answer {
             witnesses: Vec::new(),
             decided_by: None,
             coupled,
+            loops: None,
             sensors: session.sensors.clone(),
         }
     }

@@ -9,6 +9,7 @@ use super::word::{Method, Word};
 use crate::energy::energy;
 use crate::frequency::{self, CannotTell, Frequency};
 use crate::model_check::PartCheck;
+use crate::nyquist::coupled_loops;
 use crate::outcome::Outcome;
 use crate::transparency::transparency;
 use crate::unjudged::Unjudged;
@@ -78,6 +79,7 @@ impl Answer {
             witnesses: Vec::new(),
             decided_by: None,
             coupled: Vec::new(),
+            loops: question.asked.and_then(|graph| coupled_loops(graph, session, question.gain.product()).transpose()),
             sensors: session.sensors.clone(),
         }
     }

@@ -61,6 +61,17 @@ impl Answer {
             "energy": { "recorded": self.recorded_energy_numbers() },
             "transparency": self.transparency_numbers(),
             "coupling": self.coupled,
+            "axes_together": match &self.loops {
+                Some(Ok(loops)) => json!({
+                    "together": loops.together,
+                    "alone": loops.alone.iter().map(|(axis, limit)| json!({ "axis": axis, "limit": limit })).collect::<Vec<_>>(),
+                    "encirclements": loops.encirclements,
+                    "touched": loops.touched,
+                    "alone_misleads": loops.alone_misleads(),
+                }),
+                Some(Err(why)) => json!({ "why_not": why }),
+                None => Value::Null,
+            },
             "sensors": self.sensors,
         })
     }

@@ -8,6 +8,7 @@ use crate::energy::EnergyAnswer;
 use crate::frequency::{Frequency, FrequencyAnswer, FrequencyError};
 use crate::model_check::PartCheck;
 use crate::moving::Decay;
+use crate::nyquist::CoupledLoops;
 use crate::outcome::Outcome;
 use crate::resimulate::edge::Edge;
 use crate::resimulate::grips::GripEdge;
@@ -129,6 +130,8 @@ pub struct Answer {
     pub decided_by: Option<String>,
     /// What couples the motors of each axis whose motors were both recorded; empty where none was.
     pub coupled: Vec<CoupledAxis>,
+    /// The loops of several axes together, by the models; why they do not tell it; `None` of one axis, and where there are no models.
+    pub loops: Option<Result<CoupledLoops, String>>,
     /// Signals that say nothing, or not always.
     pub sensors: Vec<SensorFault>,
 }

@@ -2,6 +2,7 @@
 
 use crate::graph::files::Files;
 use crate::graph::{DeviceFiles, Graph};
+use backdrive_msgs::MAX_AXES;
 use backdrive_plant::model::{Fragment, Model};
 use backdrive_plant::tomlfile::{FileError, Table};
 use std::path::Path;
@@ -18,14 +19,15 @@ impl NodeReader<'_> {
         let model = if may_be_none && model_path == "none" {
             None
         } else {
-            let text = self.files.read(Path::new(&model_path), &mut self.graph.files)?;
-            Some(Model::from_toml(&text, &model_path)?)
+            Some(self.files.read_whole(Path::new(&model_path), &mut self.graph.files, Model::from_toml_in, Model::to_toml)?)
         };
         let model = model.map(|model| isolate(model, table)).transpose()?;
+        if let Some(axes) = model.as_ref().map(|model| model.axes.len()).filter(|axes| *axes > MAX_AXES) {
+            return Err(table.error_at("model", format!("\"{model_path}\" has {axes} axes; a message carries at most {MAX_AXES}")));
+        }
         let fragment = match fragment_key.map(|key| table.string(key)).transpose()?.flatten() {
             Some(path) if path != "none" => {
-                let text = self.files.read(Path::new(&path), &mut self.graph.files)?;
-                Some(Fragment::from_toml(&text, &path)?)
+                Some(self.files.read_whole(Path::new(&path), &mut self.graph.files, Fragment::from_toml_in, Fragment::to_toml)?)
             }
             _ => None,
         };
@@ -41,6 +43,24 @@ impl NodeReader<'_> {
         });
         let real_sensors = table.one_of("sensors", &[("as_modelled", true), ("ideal", false)])?.unwrap_or(true);
         Ok(DeviceFiles { model, fragment, substeps, real_sensors, grip_changes: Vec::new() })
+    }
+
+    /// `environment_on`: what the device touches is attached at these bodies, once each, in the place of the user's body of every axis.
+    pub(super) fn touched_elsewhere(&self, table: &mut Table, device: &mut DeviceFiles) -> Result<(), FileError> {
+        let Some(names) = table.string_or_strings("environment_on")? else { return Ok(()) };
+        let Some(model) = &mut device.model else { return Ok(()) };
+        if names.is_empty() {
+            return Err(table.error_at("environment_on", "names no body"));
+        }
+        let bodies = names.iter().map(|name| model.body_named(name).map_err(|e| table.error_at("environment_on", e)));
+        let bodies = bodies.collect::<Result<Vec<usize>, FileError>>()?;
+        let Some(environment) = device.fragment.take() else { return Ok(()) };
+        for body in bodies {
+            let attached = model.attach(&environment, body, &environment.network.name);
+            let touching = attached.port_first.iter().chain(&attached.port_second);
+            model.axes.iter_mut().for_each(|axis| axis.touches.extend(touching.clone()));
+        }
+        Ok(())
     }
 
     /// The text of the file that a key names, and its path.

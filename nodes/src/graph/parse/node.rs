@@ -98,7 +98,7 @@ impl NodeReader<'_> {
 
     /// A slave and what it touches.
     fn slave(&mut self, table: &mut Table) -> Result<(Settings, Vec<String>), FileError> {
-        let device = self.device(table, Some("environment"), false)?;
+        let mut device = self.device(table, Some("environment"), false)?;
         if let Some(grip) = device.fragment.as_ref().filter(|f| f.hand.is_some()) {
             let told = format!(
                 "\"{}\" is a grip: it is fixed to a `hand`, which only an operator moves; name what the slave touches (plant/environments), \
@@ -107,6 +107,7 @@ impl NodeReader<'_> {
             );
             return Err(table.error_at("environment", told));
         }
+        self.touched_elsewhere(table, &mut device)?;
         let names = axis_names(&device);
         Ok((Settings::Slave(device), names))
     }
