@@ -5,7 +5,6 @@
 
 pub mod csv_columns;
 pub mod data;
-pub mod filter;
 pub mod run;
 pub mod table;
 
@@ -25,6 +24,7 @@ mod silverbox;
 pub mod steering;
 mod tue_bilateral;
 
+pub use backdrive_arms::filter;
 pub use error::StudyError;
 pub use study::{Context, Study};
 

@@ -1,0 +1,631 @@
+//! The regression of the measured torque: rows, columns, weights, and a structure fitted to them.
+
+use crate::error::ArmError;
+use crate::inertial::{COUNT, Parameters};
+use crate::motion::{Motion, Rates};
+use crate::physics::{At, Physics, Sight, Term};
+use crate::problem::Problem;
+use crate::rigid::{Signals, across, difference, regressor, torques, tree_of};
+use backdrive_plant::elements::Law;
+use nalgebra::{DMatrix, DVector};
+use std::cell::RefCell;
+use std::collections::HashMap;
+use std::ops::Range;
+use std::rc::Rc;
+
+/// Standard deviation that an inertial parameter may have about the file's, in the size of the body: as it stands, as drawn by somebody careful, free.
+pub const TOLERANCES: [f64; 3] = [0.003, 0.05, 1.0];
+/// Folds of the blocks: so many times a part of the logs is left out of a fit and predicted.
+const FOLDS: usize = 8;
+/// Blocks in which predictions are compared, at most, over all logs.
+const BLOCKS: usize = 48;
+/// Step of a numerical derivative by a joint's zero, rad or m.
+const STEP: f64 = 1e-4;
+
+/// What a fit has free.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Structure {
+    /// Which of [`TOLERANCES`] the inertial parameters have.
+    pub tolerance: usize,
+    /// Terms of the nominal model, then those that a search has added.
+    pub terms: Vec<Term>,
+    /// Displacement over which friction turns, by joint, rad or m.
+    pub slip: Vec<f64>,
+}
+
+/// Rows of a motion and a joint are neighbours; this says where.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Layout {
+    /// First row and number of rows of a joint, of each motion.
+    motions: Vec<(usize, usize)>,
+    joints: usize,
+    /// Rows in all.
+    pub rows: usize,
+}
+
+impl Layout {
+    /// Rows of a joint in a motion.
+    pub fn of(&self, motion: usize, joint: usize) -> Range<usize> {
+        let (first, count) = self.motions[motion];
+        first + joint * count..first + (joint + 1) * count
+    }
+
+    /// Number of rows that a joint has in a motion.
+    pub fn count(&self, motion: usize) -> usize {
+        self.motions[motion].1
+    }
+}
+
+/// A stretch of a log: the motion, its rows (of every joint), and the fold that it is left out in.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Block {
+    /// Index of the motion.
+    pub motion: usize,
+    /// Rows within a joint.
+    pub rows: Range<usize>,
+    /// The fold; of held-out logs none.
+    pub fold: Option<usize>,
+}
+
+/// A column over all rows.
+pub type Column = Rc<Vec<f64>>;
+
+/// Rows of the regression and everything that its columns are made of.
+pub struct Data<'a> {
+    /// The arm and its logs.
+    pub problem: &'a Problem,
+    /// Corners and rates.
+    pub rates: Rates,
+    /// Logs for fitting, then held-out ones.
+    pub motions: Vec<Motion>,
+    /// How many are for fitting.
+    pub fit_count: usize,
+    /// Where rows are.
+    pub layout: Layout,
+    /// Measured torque.
+    pub torque: Vec<f64>,
+    /// What the file's inertial parameters take of it.
+    pub nominal: Vec<f64>,
+    /// Torque per size of each inertial parameter.
+    pub inertial: Vec<Vec<f64>>,
+    /// Stretches of all logs.
+    pub blocks: Vec<Block>,
+    load: Vec<Signals>,
+    by_position: Vec<Vec<Signals>>,
+    by_tilt: Vec<Vec<Signals>>,
+    by_payload: Vec<Vec<Signals>>,
+    cache: RefCell<HashMap<String, Vec<Column>>>,
+}
+
+impl<'a> Data<'a> {
+    /// Lays the logs out.
+    ///
+    /// # Errors
+    /// Where the robot cannot be computed, or the logs are too short.
+    pub fn new(problem: &'a Problem, corner: Option<f64>) -> Result<Data<'a>, ArmError> {
+        let logs: Vec<_> = problem.fit.iter().chain(&problem.held_out).collect();
+        let rates = Rates::of(&logs, corner);
+        let motions: Vec<Motion> = logs.iter().map(|log| Motion::of(log, &rates)).collect();
+        let joints = problem.joints.len();
+        let mut layout = Layout { motions: Vec::new(), joints, rows: 0 };
+        for (motion, log) in motions.iter().zip(&logs) {
+            let count = rates.rows(&vec![0.0; motion.len()]).len();
+            if count < 12 {
+                let seconds = motion.len() as f64 * rates.period();
+                let message = format!("is {seconds:.2} s long, too short for a regression below {:.1} Hz; record some seconds more", rates.corner);
+                return Err(ArmError::Log { log: log.name.clone(), message });
+            }
+            layout.motions.push((layout.rows, count));
+            layout.rows += count * joints;
+        }
+        let fit_count = problem.fit.len();
+        let blocks = blocks(&layout, fit_count, rates.row_period());
+        let mut data = Data {
+            problem,
+            rates,
+            motions,
+            fit_count,
+            torque: vec![0.0; layout.rows],
+            nominal: vec![0.0; layout.rows],
+            inertial: Vec::new(),
+            layout,
+            blocks,
+            load: Vec::new(),
+            by_position: Vec::new(),
+            by_tilt: Vec::new(),
+            by_payload: Vec::new(),
+            cache: RefCell::new(HashMap::new()),
+        };
+        data.torque = data.column(|m| data.motions[m].torque.iter().cloned().enumerate().collect());
+        let mut by_parameter = Vec::new();
+        for motion in &data.motions {
+            by_parameter.push(regressor(&problem.robot, &problem.bodies, motion, &[])?);
+        }
+        let scales: Vec<f64> = problem.bodies.scale.iter().flatten().copied().collect();
+        for (i, scale) in scales.iter().enumerate() {
+            let signals = |m: usize| by_parameter[m][i].iter().cloned().enumerate().collect();
+            data.inertial.push(data.column(signals).into_iter().map(|x| x * scale).collect());
+        }
+        data.by_payload = by_parameter.into_iter().map(|mut p| p.split_off(p.len() - COUNT)).collect();
+        data.see(&problem.bodies.nominal)?;
+        data.nominal = data.column(|m| data.load[m].iter().cloned().enumerate().collect());
+        Ok(data)
+    }
+
+    /// Computes what columns are made of with these inertial parameters.
+    ///
+    /// # Errors
+    /// Where the robot cannot be computed with them.
+    pub fn see(&mut self, parameters: &[Parameters]) -> Result<(), ArmError> {
+        let robot = self.problem.bodies.applied(&self.problem.robot, parameters);
+        let tree = tree_of(&robot)?;
+        let joints = self.problem.joints.len();
+        let tilted = across(&robot.gravity).map(|direction| {
+            let mut other = robot.clone();
+            other.gravity += direction * robot.gravity.norm();
+            other
+        });
+        let tilted = [tree_of(&tilted[0])?, tree_of(&tilted[1])?];
+        self.load = self.motions.iter().map(|m| torques(&tree, m, &[])).collect();
+        self.by_position = self
+            .motions
+            .iter()
+            .map(|motion| {
+                let by = |j: usize| {
+                    let moved = |step: f64| {
+                        let mut offsets = vec![0.0; joints];
+                        offsets[j] = -step;
+                        torques(&tree, motion, &offsets)
+                    };
+                    difference(&moved(STEP), &moved(-STEP), 0.5 / STEP)
+                };
+                (0..joints).map(by).collect()
+            })
+            .collect();
+        let load = &self.load;
+        let by_tilt = |(m, motion): (usize, &Motion)| tilted.iter().map(|t| difference(&torques(t, motion, &[]), &load[m], 1.0)).collect();
+        self.by_tilt = self.motions.iter().enumerate().map(by_tilt).collect();
+        self.cache.borrow_mut().clear();
+        Ok(())
+    }
+
+    /// One column over all rows, from signals at joints of each motion.
+    fn column(&self, signals: impl Fn(usize) -> Vec<(usize, Vec<f64>)>) -> Vec<f64> {
+        let mut out = vec![0.0; self.layout.rows];
+        for m in 0..self.motions.len() {
+            for (joint, signal) in signals(m) {
+                let rows = self.rates.rows(&signal);
+                for (place, value) in out[self.layout.of(m, joint)].iter_mut().zip(rows) {
+                    *place += value;
+                }
+            }
+        }
+        out
+    }
+
+    /// Columns of a term, one for each of its linear numbers.
+    pub fn columns(&self, term: &Term, slip: &[f64]) -> Vec<Column> {
+        let at_slip: Vec<f64> = match term.at {
+            At::Joint(j) => vec![slip[j]],
+            At::Pair(j, k) => vec![slip[j], slip[k]],
+            At::Base => Vec::new(),
+        };
+        let key = format!("{:?} {:?} {:?} {at_slip:?}", term.physics, term.at, term.shape);
+        if let Some(found) = self.cache.borrow().get(&key) {
+            return found.clone();
+        }
+        let parts: Vec<Vec<Vec<(usize, Vec<f64>)>>> = (0..self.motions.len())
+            .map(|m| {
+                let sight = Sight {
+                    problem: self.problem,
+                    motion: &self.motions[m],
+                    rates: &self.rates,
+                    load: &self.load[m],
+                    by_position: &self.by_position[m],
+                    by_tilt: &self.by_tilt[m],
+                    by_payload: &self.by_payload[m],
+                    slip,
+                };
+                sight.columns(term)
+            })
+            .collect();
+        let count = parts.first().map_or(0, Vec::len);
+        let columns: Vec<Column> = (0..count).map(|c| Rc::new(self.column(|m| parts[m][c].clone()))).collect();
+        self.cache.borrow_mut().insert(key, columns.clone());
+        columns
+    }
+
+    /// What the nominal model has: terms of its elements and armatures, and starting values of the friction's displacement.
+    pub fn nominal_structure(&self) -> Structure {
+        let problem = self.problem;
+        let mut terms = Vec::new();
+        let mut add = |physics: Physics, joint: usize, shape: Vec<f64>, given: usize| {
+            terms.push(Term { physics, at: At::Joint(joint), shape, given: Some(given) });
+        };
+        for (joint, armature) in problem.armature.iter().enumerate() {
+            if *armature > 0.0 {
+                add(Physics::Inertia, joint, Vec::new(), usize::MAX);
+            }
+        }
+        for (index, given) in problem.given.iter().enumerate() {
+            for (physics, shape) in parts_of(&given.law) {
+                add(physics, given.joint, shape, index);
+            }
+        }
+        let mut unlike: Vec<Term> = Vec::new();
+        for term in terms {
+            // Two dampers at a joint are one to the regression.
+            if !unlike.iter().any(|t| t.is_like(&term) && t.shape == term.shape) {
+                unlike.push(term);
+            }
+        }
+        Structure { tolerance: 0, terms: unlike, slip: (0..problem.joints.len()).map(|j| self.first_slip(j)).collect() }
+    }
+
+    /// A displacement over which friction turns that the sensor can resolve, rad or m.
+    pub fn first_slip(&self, joint: usize) -> f64 {
+        let logs = self.problem.fit.iter();
+        let wide = crate::physics::range(logs.clone().flat_map(|l| l.position[joint].iter().copied()));
+        let step = logs
+            .flat_map(|l| l.position[joint].windows(2).map(|w| (w[1] - w[0]).abs()))
+            .filter(|d| *d > 0.0)
+            .fold(f64::INFINITY, f64::min);
+        let resolved = if step.is_finite() { 2.0 * step } else { 0.0 };
+        resolved.clamp(2e-4 * wide.max(1e-9), 2e-2 * wide.max(1e-9))
+    }
+}
+
+/// The terms that an element of the nominal model is to the regression; none where it has no such form.
+pub fn parts_of(law: &Law) -> Vec<(Physics, Vec<f64>)> {
+    let plain = |physics| (physics, Vec::new());
+    match law {
+        Law::Damper(_) => vec![plain(Physics::Damper)],
+        Law::Coulomb(_) => vec![plain(Physics::Coulomb)],
+        Law::Stribeck(s) => vec![plain(Physics::Coulomb), (Physics::Stribeck, vec![s.velocity])],
+        Law::LoadFriction(_) => vec![plain(Physics::Coulomb), plain(Physics::LoadFriction)],
+        Law::GearLoss(_) => vec![plain(Physics::LoadFriction)],
+        Law::AsymmetricCoulomb(_) => vec![plain(Physics::Coulomb), plain(Physics::Bias)],
+        Law::AsymmetricDamper(_) => vec![plain(Physics::Damper), plain(Physics::AsymmetricDamper)],
+        Law::QuadraticDrag(_) => vec![plain(Physics::QuadraticDrag)],
+        Law::Bias(_) => vec![plain(Physics::Bias)],
+        Law::Spring(_) => vec![plain(Physics::Spring)],
+        Law::Cogging(c) => vec![(Physics::Cogging, vec![c.period])],
+        Law::Inerter(_) => vec![plain(Physics::Inertia)],
+        Law::Dahl(d) => vec![(Physics::Presliding, vec![d.coulomb / d.stiffness])],
+        _ => Vec::new(),
+    }
+}
+
+fn blocks(layout: &Layout, fit_count: usize, row_period: f64) -> Vec<Block> {
+    let all: usize = (0..fit_count).map(|m| layout.count(m)).sum();
+    // Not shorter than what a filter smears, and long beside what one reversal is.
+    let least = (1.0 / row_period).ceil() as usize;
+    let length = (all / BLOCKS).max(least).max(4);
+    let mut out = Vec::new();
+    for m in 0..layout.motions.len() {
+        let count = layout.count(m);
+        let pieces = (count / length).max(1);
+        for p in 0..pieces {
+            out.push(Block { motion: m, rows: p * count / pieces..(p + 1) * count / pieces, fold: None });
+        }
+    }
+    let of_fit = out.iter().filter(|b| b.motion < fit_count).count();
+    let folds = FOLDS.min(of_fit);
+    for (i, block) in out.iter_mut().filter(|b| b.motion < fit_count).enumerate() {
+        block.fold = Some(i * folds / of_fit);
+    }
+    out
+}
+
+/// How much each row counts, and how many rows count as one.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Weights {
+    /// Standard deviation of the residual of each joint, N m or N.
+    pub sd: Vec<f64>,
+    /// Correlation time of the residual of each joint, rows, at least 1.
+    pub time: Vec<f64>,
+}
+
+/// A structure fitted to the logs for fitting.
+#[derive(Debug, Clone)]
+pub struct Fit {
+    /// What was free.
+    pub structure: Structure,
+    /// Changes of the inertial parameters in their sizes, then the numbers of the terms in their order.
+    pub values: Vec<f64>,
+    /// Standard errors of the same: the larger one of that of the fit and that of the folds (jackknife).
+    pub errors: Vec<f64>,
+    /// Where each term's numbers are in the values.
+    pub places: Vec<Range<usize>>,
+    /// Residuals of all rows.
+    pub residual: Vec<f64>,
+    /// Residuals of the rows for fitting, each by a fit that has not seen it; of held-out rows as `residual`.
+    pub unseen: Vec<f64>,
+    /// How many numbers the data have determined.
+    pub numbers: f64,
+    /// Information criterion, smaller is better.
+    pub score: f64,
+}
+
+impl Data<'_> {
+    /// Fits a structure with these weights.
+    pub fn fit(&self, structure: &Structure, weights: &Weights) -> Option<Fit> {
+        let (columns, places) = self.all_columns(structure);
+        let system = System::new(self, &columns, structure, weights, self.inertial.len());
+        let values = system.solve(None)?;
+        let of_folds: Vec<Option<DVector<f64>>> = (0..system.folds.len()).map(|f| system.solve(Some(f))).collect();
+        let predicted = |values: &DVector<f64>, row: usize| columns.iter().zip(values.iter()).map(|(c, x)| c[row] * x).sum::<f64>();
+        let left: Vec<f64> = self.torque.iter().zip(&self.nominal).map(|(t, n)| t - n).collect();
+        let residual: Vec<f64> = (0..self.layout.rows).map(|row| left[row] - predicted(&values, row)).collect();
+        let mut unseen = residual.clone();
+        for block in &self.blocks {
+            let Some(Some(values)) = block.fold.and_then(|f| of_folds.get(f)) else { continue };
+            for joint in 0..self.layout.joints {
+                let first = self.layout.of(block.motion, joint).start;
+                for row in first + block.rows.start..first + block.rows.end {
+                    unseen[row] = left[row] - predicted(values, row);
+                }
+            }
+        }
+        let (errors, numbers) = system.errors(&values, &of_folds, structure)?;
+        let mut fit = Fit { structure: structure.clone(), values: values.iter().copied().collect(), errors, places, residual, unseen, numbers, score: 0.0 };
+        fit.score = self.score(&fit, weights);
+        Some(fit)
+    }
+
+    fn all_columns(&self, structure: &Structure) -> (Vec<Column>, Vec<Range<usize>>) {
+        let mut columns: Vec<Column> = self.inertial.iter().map(|c| Rc::new(c.clone())).collect();
+        let mut places = Vec::new();
+        for term in &structure.terms {
+            let first = columns.len();
+            columns.extend(self.columns(term, &structure.slip));
+            places.push(first..columns.len());
+        }
+        (columns, places)
+    }
+
+    /// Mean squared residual of a joint over the logs for fitting (or those held out), N² m² or N².
+    pub fn mean_square(&self, residual: &[f64], joint: usize, held_out: bool) -> f64 {
+        let motions = if held_out { self.fit_count..self.motions.len() } else { 0..self.fit_count };
+        let (mut sum, mut count) = (0.0, 0usize);
+        for m in motions {
+            let rows = self.layout.of(m, joint);
+            count += rows.len();
+            sum += residual[rows].iter().map(|x| x * x).sum::<f64>();
+        }
+        sum / count.max(1) as f64
+    }
+
+    /// Rows of a joint that count as independent ones.
+    fn independent(&self, weights: &Weights, joint: usize) -> f64 {
+        let rows: usize = (0..self.fit_count).map(|m| self.layout.count(m)).sum();
+        (rows as f64 / weights.time[joint]).max(4.0)
+    }
+
+    /// `Σ n_j ln(mean square_j) + numbers ln(Σ n_j)` with independent rows `n_j` (Schwarz 1978).
+    fn score(&self, fit: &Fit, weights: &Weights) -> f64 {
+        let joints = 0..self.layout.joints;
+        let total: f64 = joints.clone().map(|j| self.independent(weights, j)).sum();
+        let misfit = |j| self.independent(weights, j) * self.mean_square(&fit.residual, j, false).max(f64::MIN_POSITIVE).ln();
+        joints.map(misfit).sum::<f64>() + fit.numbers * total.ln()
+    }
+
+    /// Weights from residuals.
+    pub fn weights(&self, residual: &[f64]) -> Weights {
+        let joints = 0..self.layout.joints;
+        let floor = |j: usize| 1e-9 + 1e-6 * self.mean_square(&self.torque, j, false).sqrt();
+        let sd = joints.clone().map(|j| self.mean_square(residual, j, false).sqrt().max(floor(j))).collect();
+        let time = joints.map(|j| (0..self.fit_count).map(|m| correlation_time(&residual[self.layout.of(m, j)])).fold(1.0, f64::max)).collect();
+        Weights { sd, time }
+    }
+
+    /// By how much the weighted squared residual falls where these columns are added to a fit, to first order in everything else.
+    pub fn promise(&self, system: &System, values: &DVector<f64>, columns: &[Column]) -> f64 {
+        let residual = system.residual(values);
+        let added: Vec<DVector<f64>> = columns.iter().map(|c| system.weighted(c)).collect();
+        let cross: Vec<DVector<f64>> = added.iter().map(|c| system.matrix.tr_mul(c)).collect();
+        let solved: Vec<DVector<f64>> = cross.iter().map(|c| system.factor.solve(c)).collect();
+        let n = columns.len();
+        let schur = DMatrix::from_fn(n, n, |i, j| {
+            added[i].dot(&added[j]) - cross[i].dot(&solved[j]) + if i == j { 1e-9 * added[i].norm_squared() + 1e-300 } else { 0.0 }
+        });
+        let right = DVector::from_fn(n, |i, _| added[i].dot(&residual));
+        schur.cholesky().map_or(0.0, |c| right.dot(&c.solve(&right)))
+    }
+
+    /// The weighted squared residual (with the prior) as a quadratic of the inertial parameters alone, in their sizes, all other numbers following:
+    /// its matrix and where it is least.
+    pub fn quadratic(&self, structure: &Structure, weights: &Weights) -> Option<(DMatrix<f64>, DVector<f64>)> {
+        let (system, values) = self.system(structure, weights)?;
+        let n = self.inertial.len();
+        let whole = &system.total + DMatrix::from_diagonal(&system.prior);
+        let own = whole.view((0, 0), (n, n)).into_owned();
+        let rest = values.len() - n;
+        let at = values.rows(0, n).into_owned();
+        if rest == 0 {
+            return Some((own, at));
+        }
+        let cross = whole.view((0, n), (n, rest)).into_owned();
+        let others = whole.view((n, n), (rest, rest)).into_owned();
+        let solved = others.cholesky()?.solve(&cross.transpose());
+        Some((own - cross * solved, at))
+    }
+
+    /// A fit whose inertial parameters are set, in their sizes; all other numbers are fitted again. Standard errors stay those of the fit.
+    pub fn fit_beside(&self, fit: &Fit, inertial: &[f64], weights: &Weights) -> Option<Fit> {
+        let (columns, _) = self.all_columns(&fit.structure);
+        let system = System::new(self, &columns, &fit.structure, weights, self.inertial.len());
+        let n = self.inertial.len();
+        let rest = columns.len() - n;
+        let mut values = DVector::from_iterator(columns.len(), inertial.iter().copied().chain(std::iter::repeat_n(0.0, rest)));
+        if rest > 0 {
+            let whole = &system.total + DMatrix::from_diagonal(&system.prior);
+            let right = (&system.total_right - &whole * &values).rows(n, rest).into_owned();
+            let others = whole.view((n, n), (rest, rest)).into_owned();
+            let solved = others.cholesky()?.solve(&right);
+            values.rows_mut(n, rest).copy_from(&solved);
+        }
+        let mut out = fit.clone();
+        for row in 0..self.layout.rows {
+            let predicted: f64 = columns.iter().zip(values.iter()).map(|(c, x)| c[row] * x).sum();
+            out.residual[row] = self.torque[row] - self.nominal[row] - predicted;
+        }
+        out.values = values.iter().copied().collect();
+        Some(out)
+    }
+
+    /// The system of a structure, for [`Data::promise`].
+    pub fn system(&self, structure: &Structure, weights: &Weights) -> Option<(System, DVector<f64>)> {
+        let (columns, _) = self.all_columns(structure);
+        let system = System::new(self, &columns, structure, weights, self.inertial.len());
+        let values = system.solve(None)?;
+        Some((system, values))
+    }
+}
+
+/// Weighted rows for fitting, and normal equations with the prior of the inertial parameters.
+pub struct System {
+    matrix: DMatrix<f64>,
+    right: DVector<f64>,
+    rows: Vec<(usize, f64)>,
+    prior: DVector<f64>,
+    scale: DVector<f64>,
+    total: DMatrix<f64>,
+    total_right: DVector<f64>,
+    folds: Vec<(DMatrix<f64>, DVector<f64>)>,
+    factor: Factor,
+}
+
+/// A factored matrix in scaled unknowns.
+struct Factor {
+    cholesky: Option<nalgebra::Cholesky<f64, nalgebra::Dyn>>,
+    scale: DVector<f64>,
+}
+
+impl Factor {
+    fn new(matrix: &DMatrix<f64>, scale: &DVector<f64>) -> Factor {
+        let scaled = DMatrix::from_fn(matrix.nrows(), matrix.ncols(), |i, j| matrix[(i, j)] * scale[i] * scale[j]);
+        Factor { cholesky: scaled.cholesky(), scale: scale.clone() }
+    }
+
+    fn solve(&self, right: &DVector<f64>) -> DVector<f64> {
+        let scaled = right.component_mul(&self.scale);
+        match &self.cholesky {
+            Some(c) => c.solve(&scaled).component_mul(&self.scale),
+            None => DVector::zeros(right.len()),
+        }
+    }
+}
+
+impl System {
+    fn new(data: &Data, columns: &[Column], structure: &Structure, weights: &Weights, inertial: usize) -> System {
+        let joints = data.layout.joints;
+        let weight: Vec<f64> = (0..joints).map(|j| 1.0 / (weights.sd[j] * weights.time[j].sqrt())).collect();
+        let mut rows = Vec::new();
+        let mut of_fold: Vec<Vec<usize>> = Vec::new();
+        for block in data.blocks.iter() {
+            let Some(fold) = block.fold else { continue };
+            of_fold.resize(of_fold.len().max(fold + 1), Vec::new());
+            for (joint, w) in weight.iter().enumerate() {
+                let first = data.layout.of(block.motion, joint).start;
+                for row in first + block.rows.start..first + block.rows.end {
+                    of_fold[fold].push(rows.len());
+                    rows.push((row, *w));
+                }
+            }
+        }
+        let matrix = DMatrix::from_fn(rows.len(), columns.len(), |i, j| columns[j][rows[i].0] * rows[i].1);
+        let right = DVector::from_fn(rows.len(), |i, _| (data.torque[rows[i].0] - data.nominal[rows[i].0]) * rows[i].1);
+        let mut first = 0;
+        let mut folds = Vec::new();
+        for fold in &of_fold {
+            // Rows of a fold are neighbours.
+            let part = matrix.rows(first, fold.len());
+            folds.push((part.tr_mul(&part), part.tr_mul(&right.rows(first, fold.len()))));
+            first += fold.len();
+        }
+        let n = columns.len();
+        let mut total = DMatrix::zeros(n, n);
+        let mut total_right = DVector::zeros(n);
+        for (m, r) in &folds {
+            total += m;
+            total_right += r;
+        }
+        let tolerance = TOLERANCES.get(structure.tolerance).copied().unwrap_or(1.0);
+        let prior = DVector::from_fn(n, |i, _| if i < inertial { 1.0 / (tolerance * tolerance) } else { 1e-9 * total[(i, i)] + 1e-300 });
+        let scale = DVector::from_fn(n, |i, _| 1.0 / (total[(i, i)] + prior[i]).max(1e-300).sqrt());
+        let factor = Factor::new(&(&total + DMatrix::from_diagonal(&prior)), &scale);
+        System { matrix, right, rows, prior, scale, total, total_right, folds, factor }
+    }
+
+    fn solve(&self, without: Option<usize>) -> Option<DVector<f64>> {
+        let Some((matrix, right)) = without.and_then(|f| self.folds.get(f)) else {
+            self.factor.cholesky.as_ref()?;
+            return Some(self.factor.solve(&self.total_right));
+        };
+        let factor = Factor::new(&(&self.total - matrix + DMatrix::from_diagonal(&self.prior)), &self.scale);
+        factor.cholesky.as_ref()?;
+        Some(factor.solve(&(&self.total_right - right)))
+    }
+
+    fn weighted(&self, column: &Column) -> DVector<f64> {
+        DVector::from_fn(self.rows.len(), |i, _| column[self.rows[i].0] * self.rows[i].1)
+    }
+
+    fn residual(&self, values: &DVector<f64>) -> DVector<f64> {
+        &self.right - &self.matrix * values
+    }
+
+    /// Standard errors, and how many numbers the data determine.
+    fn errors(&self, values: &DVector<f64>, of_folds: &[Option<DVector<f64>>], structure: &Structure) -> Option<(Vec<f64>, f64)> {
+        let n = values.len();
+        self.factor.cholesky.as_ref()?;
+        let mut errors = Vec::with_capacity(n);
+        let mut numbers = 0.0;
+        let folds: Vec<&DVector<f64>> = of_folds.iter().flatten().collect();
+        let shape: f64 = structure.terms.iter().filter(|t| t.given.is_none()).map(|t| t.physics.facts().numbers as f64).sum();
+        let mut added = 0.0;
+        for i in 0..n {
+            let mut unit = DVector::zeros(n);
+            unit[i] = 1.0;
+            let variance = self.factor.solve(&unit);
+            // Of the trace of (G + P)⁻¹ G: what the data say beside what was known before.
+            numbers += 1.0 - variance[i] * self.prior[i];
+            let mean = folds.iter().map(|f| f[i]).sum::<f64>() / folds.len().max(1) as f64;
+            let k = folds.len() as f64;
+            let jackknife = folds.iter().map(|f| (f[i] - mean).powi(2)).sum::<f64>() * (k - 1.0).max(0.0) / k.max(1.0);
+            errors.push(variance[i].max(jackknife).max(0.0).sqrt());
+        }
+        // Numbers of a shape were searched, and are no columns.
+        let columns: f64 = structure.terms.iter().filter(|t| t.given.is_none()).map(|t| linear_numbers(t) as f64).sum();
+        added += shape - columns;
+        Some((errors, numbers + added.max(0.0)))
+    }
+}
+
+/// Numbers in which a term is linear.
+pub fn linear_numbers(term: &Term) -> usize {
+    match term.physics {
+        Physics::Spring | Physics::Cogging | Physics::GravityDirection => 2,
+        Physics::Payload if !term.shape.is_empty() => 4,
+        _ => 1,
+    }
+}
+
+/// Correlation time of residuals, rows, at least 1: the autocorrelation is summed up to the first lag at which it is that of noise.
+fn correlation_time(part: &[f64]) -> f64 {
+    let energy: f64 = part.iter().map(|x| x * x).sum();
+    if energy <= 0.0 || part.len() < 16 {
+        return 1.0;
+    }
+    let noise = 2.0 / (part.len() as f64).sqrt();
+    let mut sum = 0.0;
+    for lag in 1..part.len() / 8 {
+        let correlation = part[lag..].iter().zip(part).map(|(a, b)| a * b).sum::<f64>() / energy;
+        if correlation < noise {
+            break;
+        }
+        sum += correlation;
+    }
+    1.0 + 2.0 * sum
+}
