@@ -7,7 +7,7 @@ fn main() {
     let corner = args.next().and_then(|c| c.parse().ok());
     let problem = Problem::open(&set, None).unwrap_or_else(|e| panic!("{e}"));
     let began = std::time::Instant::now();
-    let mut data = Data::new(&problem, corner).unwrap_or_else(|e| panic!("{e}"));
+    let mut data = Data::new(&problem, corner, false).unwrap_or_else(|e| panic!("{e}"));
     println!("{:?} rows {} blocks {} ({:.2} s)", data.rates, data.layout.rows, data.blocks.len(), began.elapsed().as_secs_f64());
     let found = search::search(&mut data, &[]).unwrap_or_else(|e| panic!("{e}"));
     for (name, fit) in [("as given", &found.as_given), ("refit", &found.refit), ("best", &found.best)] {
@@ -18,6 +18,12 @@ fn main() {
             }
         }
         println!();
+    }
+    let whole = Data::new(&problem, corner, true).unwrap_or_else(|e| panic!("{e}"));
+    for (name, fit) in [("as given", &found.as_given), ("refit", &found.refit), ("best", &found.best)] {
+        let r = whole.residual_of(fit);
+        let share = |j: usize| format!("{:.2} %", 100.0 * (whole.mean_square(&r, j, true) / whole.mean_square(&whole.torque, j, true)).sqrt());
+        println!("whole, held out, {name}: {}", (0..problem.joints.len()).map(share).collect::<Vec<_>>().join(", "));
     }
     println!("weights {:?} slip {:?}", found.weights, found.best.structure.slip);
     for (term, place) in found.best.structure.terms.iter().zip(&found.best.places) {

@@ -18,6 +18,8 @@ const ABOVE: f64 = 12.0;
 const SHARE: f64 = 0.95;
 /// Least and largest corner of the regression, Hz.
 const CORNERS: [f64; 2] = [2.0, 20.0];
+/// Speed below which a joint counts as resting, as a share of its usual one.
+const RESTING: f64 = 0.04;
 /// Corner of the positions, in times the corner of the regression.
 const POSITION: f64 = 5.0;
 
@@ -94,6 +96,8 @@ pub struct Motion {
     pub torque: Vec<Vec<f64>>,
     /// Rates as the drive told them, through the same filter.
     pub told: Vec<Option<Vec<f64>>>,
+    /// 1 while a joint moves, 0 where it hardly does: dry friction is then anything between its levels, and a regression learns nothing of it.
+    pub moves: Vec<Vec<f64>>,
 }
 
 impl Motion {
@@ -112,7 +116,10 @@ impl Motion {
         }
         let torque = log.torque.iter().map(|s| thin(smooth(s))).collect();
         let told = log.velocity.iter().map(|v| v.as_ref().map(|s| thin(smooth(s)))).collect();
-        Motion { name: log.name.clone(), position, velocity, acceleration, torque, told }
+        // What the filter smears of a jump of the torque.
+        let smeared = (0.5 / rates.position_corner / rates.period()).ceil() as usize;
+        let moves = velocity.iter().zip(&log.position).map(|(v, q)| moving(v, resting(v, q, rates), smeared)).collect();
+        Motion { name: log.name.clone(), position, velocity, acceleration, torque, told, moves }
     }
 
     /// Samples.
@@ -124,6 +131,29 @@ impl Motion {
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
+}
+
+/// The speed below which a joint hardly moves, rad/s or m/s: a share of its usual one, and no less than the sensor's steps leave of a rate.
+fn resting(velocity: &[f64], logged: &[f64], rates: &Rates) -> f64 {
+    let usual = (velocity.iter().map(|v| v * v).sum::<f64>() / velocity.len().max(1) as f64).sqrt();
+    let step = logged.windows(2).map(|w| (w[1] - w[0]).abs()).filter(|d| *d > 0.0).fold(f64::INFINITY, f64::min);
+    // Rounding is noise of step/√12 over half the rate; differentiated below a corner f it is 2π f/√3 times what lies below f.
+    let below = (2.0 * rates.position_corner / rates.grid).sqrt() * std::f64::consts::TAU * rates.position_corner / 3f64.sqrt();
+    let noise = if step.is_finite() { step / 12f64.sqrt() * below } else { 0.0 };
+    (RESTING * usual).max(4.0 * noise).min(0.2 * usual)
+}
+
+fn moving(velocity: &[f64], least: f64, smeared: usize) -> Vec<f64> {
+    let mut out = vec![1.0; velocity.len()];
+    for (i, v) in velocity.iter().enumerate() {
+        // Through 0 between two samples is a rest too.
+        let turns = i > 0 && velocity[i - 1] * v < 0.0;
+        if v.abs() < least || turns {
+            let last = velocity.len().min(i + smeared + 1);
+            out[i.saturating_sub(smeared)..last].fill(0.0);
+        }
+    }
+    out
 }
 
 fn on_grid(t: &[f64], samples: &[f64], rate: f64) -> Vec<f64> {

@@ -244,7 +244,8 @@ impl Sight<'_> {
                 None => self.by_payload.iter().take(4).map(|s| all(s, 1.0)).collect(),
             },
             Physics::GravityDirection => self.by_tilt.iter().map(|s| all(s, 1.0)).collect(),
-            Physics::Coupling => one(self.load[other].clone()),
+            // As it was measured: the motor carries the other joint's friction too.
+            Physics::Coupling => one(motion.torque[other].clone()),
             Physics::CoupledFriction => {
                 let ratio = shape(0);
                 let both = q.iter().zip(&motion.position[other]).map(|(a, b)| a + ratio * b);

@@ -13,8 +13,9 @@ use std::collections::HashMap;
 use std::ops::Range;
 use std::rc::Rc;
 
-/// Standard deviation that an inertial parameter may have about the file's, in the size of the body: as it stands, as drawn by somebody careful, free.
-pub const TOLERANCES: [f64; 3] = [0.003, 0.05, 1.0];
+/// Standard deviation that an inertial parameter may have about the file's, in the size of the body: as it stands, as drawn by
+/// somebody careful, as guessed, free.
+pub const TOLERANCES: [f64; 4] = [0.003, 0.02, 0.15, 1.0];
 /// Folds of the blocks: so many times a part of the logs is left out of a fit and predicted.
 const FOLDS: usize = 8;
 /// Blocks in which predictions are compared, at most, over all logs.
@@ -95,14 +96,16 @@ pub struct Data<'a> {
     by_tilt: Vec<Vec<Signals>>,
     by_payload: Vec<Vec<Signals>>,
     cache: RefCell<HashMap<String, Vec<Column>>>,
+    /// Whether rows count where a joint rests.
+    whole: bool,
 }
 
 impl<'a> Data<'a> {
-    /// Lays the logs out.
+    /// Lays the logs out. `corner`: of the filter, Hz, where the motion shall not say it. `whole`: rows count where a joint rests, too.
     ///
     /// # Errors
     /// Where the robot cannot be computed, or the logs are too short.
-    pub fn new(problem: &'a Problem, corner: Option<f64>) -> Result<Data<'a>, ArmError> {
+    pub fn new(problem: &'a Problem, corner: Option<f64>, whole: bool) -> Result<Data<'a>, ArmError> {
         let logs: Vec<_> = problem.fit.iter().chain(&problem.held_out).collect();
         let rates = Rates::of(&logs, corner);
         let motions: Vec<Motion> = logs.iter().map(|log| Motion::of(log, &rates)).collect();
@@ -135,6 +138,7 @@ impl<'a> Data<'a> {
             by_tilt: Vec::new(),
             by_payload: Vec::new(),
             cache: RefCell::new(HashMap::new()),
+            whole,
         };
         data.torque = data.column(|m| data.motions[m].torque.iter().cloned().enumerate().collect());
         let mut by_parameter = Vec::new();
@@ -190,10 +194,15 @@ impl<'a> Data<'a> {
     }
 
     /// One column over all rows, from signals at joints of each motion.
+    ///
+    /// Where a joint rests, torque and columns are 0 alike.
     fn column(&self, signals: impl Fn(usize) -> Vec<(usize, Vec<f64>)>) -> Vec<f64> {
         let mut out = vec![0.0; self.layout.rows];
         for m in 0..self.motions.len() {
-            for (joint, signal) in signals(m) {
+            for (joint, mut signal) in signals(m) {
+                if !self.whole {
+                    signal.iter_mut().zip(&self.motions[m].moves[joint]).for_each(|(x, moves)| *x *= moves);
+                }
                 let rows = self.rates.rows(&signal);
                 for (place, value) in out[self.layout.of(m, joint)].iter_mut().zip(rows) {
                     *place += value;
@@ -343,8 +352,10 @@ pub struct Fit {
     pub unseen: Vec<f64>,
     /// How many numbers the data have determined.
     pub numbers: f64,
-    /// Information criterion, smaller is better.
+    /// Twice the negative logarithm of the evidence, but for a constant; smaller is better.
     pub score: f64,
+    /// What of that the inertial parameters cost: how far they are from the file's, and how much the data narrow them down.
+    occam: f64,
 }
 
 impl Data<'_> {
@@ -368,9 +379,16 @@ impl Data<'_> {
             }
         }
         let (errors, numbers) = system.errors(&values, &of_folds, structure)?;
-        let mut fit = Fit { structure: structure.clone(), values: values.iter().copied().collect(), errors, places, residual, unseen, numbers, score: 0.0 };
+        let mut fit = Fit { structure: structure.clone(), values: values.iter().copied().collect(), errors, places, residual, unseen, numbers, score: 0.0, occam: system.occam(&values, self.inertial.len())? };
         fit.score = self.score(&fit, weights);
         Some(fit)
+    }
+
+    /// Residuals of a fit that was made on other rows of the same logs.
+    pub fn residual_of(&self, fit: &Fit) -> Vec<f64> {
+        let (columns, _) = self.all_columns(&fit.structure);
+        let predicted = |row: usize| columns.iter().zip(&fit.values).map(|(c, x)| c[row] * x).sum::<f64>();
+        (0..self.layout.rows).map(|row| self.torque[row] - self.nominal[row] - predicted(row)).collect()
     }
 
     fn all_columns(&self, structure: &Structure) -> (Vec<Column>, Vec<Range<usize>>) {
@@ -402,12 +420,15 @@ impl Data<'_> {
         (rows as f64 / weights.time[joint]).max(4.0)
     }
 
-    /// `Σ n_j ln(mean square_j) + numbers ln(Σ n_j)` with independent rows `n_j` (Schwarz 1978).
+    /// Twice the negative log evidence, but for a constant: `Σ n_j ln(mean square_j)` with independent rows `n_j`; of the inertial parameters, whose prior
+    /// is known, the exact Gaussian factor `δᵀ P δ + ln det(H) - ln det(P)`; of all other numbers `ln(Σ n_j)` each (Schwarz 1978).
     fn score(&self, fit: &Fit, weights: &Weights) -> f64 {
         let joints = 0..self.layout.joints;
         let total: f64 = joints.clone().map(|j| self.independent(weights, j)).sum();
         let misfit = |j| self.independent(weights, j) * self.mean_square(&fit.residual, j, false).max(f64::MIN_POSITIVE).ln();
-        joints.map(misfit).sum::<f64>() + fit.numbers * total.ln()
+        let shapes = |(t, p): (&Term, &Range<usize>)| if t.given.is_none() { t.physics.facts().numbers.max(p.len()) } else { p.len() };
+        let numbers: usize = fit.structure.terms.iter().zip(&fit.places).map(shapes).sum();
+        joints.map(misfit).sum::<f64>() + fit.occam + numbers as f64 * total.ln()
     }
 
     /// Weights from residuals.
@@ -576,6 +597,22 @@ impl System {
         &self.right - &self.matrix * values
     }
 
+    /// `δᵀ P δ + ln det(H) - ln det(P)` of the inertial parameters, the first `n`, with H their own curvature where all else follows.
+    fn occam(&self, values: &DVector<f64>, n: usize) -> Option<f64> {
+        let log_det = |from: usize| -> Option<f64> {
+            let count = values.len() - from;
+            let whole = &self.total + DMatrix::from_diagonal(&self.prior);
+            let part = DMatrix::from_fn(count, count, |i, j| whole[(from + i, from + j)] * self.scale[from + i] * self.scale[from + j]);
+            let scales: f64 = (from..values.len()).map(|i| self.scale[i].ln()).sum();
+            if count == 0 {
+                return Some(0.0);
+            }
+            Some(2.0 * part.cholesky()?.l().diagonal().iter().map(|d| d.ln()).sum::<f64>() - 2.0 * scales)
+        };
+        let prior: f64 = (0..n).map(|i| values[i] * values[i] * self.prior[i] - self.prior[i].ln()).sum();
+        Some(prior + log_det(0)? - log_det(n)?)
+    }
+
     /// Standard errors, and how many numbers the data determine.
     fn errors(&self, values: &DVector<f64>, of_folds: &[Option<DVector<f64>>], structure: &Structure) -> Option<(Vec<f64>, f64)> {
         let n = values.len();
@@ -583,8 +620,6 @@ impl System {
         let mut errors = Vec::with_capacity(n);
         let mut numbers = 0.0;
         let folds: Vec<&DVector<f64>> = of_folds.iter().flatten().collect();
-        let shape: f64 = structure.terms.iter().filter(|t| t.given.is_none()).map(|t| t.physics.facts().numbers as f64).sum();
-        let mut added = 0.0;
         for i in 0..n {
             let mut unit = DVector::zeros(n);
             unit[i] = 1.0;
@@ -597,18 +632,16 @@ impl System {
             errors.push(variance[i].max(jackknife).max(0.0).sqrt());
         }
         // Numbers of a shape were searched, and are no columns.
-        let columns: f64 = structure.terms.iter().filter(|t| t.given.is_none()).map(|t| linear_numbers(t) as f64).sum();
-        added += shape - columns;
-        Some((errors, numbers + added.max(0.0)))
+        let searched: usize = structure.terms.iter().filter(|t| t.given.is_none()).map(|t| shape_numbers(t)).sum();
+        Some((errors, numbers + searched as f64))
     }
 }
 
-/// Numbers in which a term is linear.
-pub fn linear_numbers(term: &Term) -> usize {
+/// Numbers of a term in which the torque is not linear, where they are searched.
+fn shape_numbers(term: &Term) -> usize {
     match term.physics {
-        Physics::Spring | Physics::Cogging | Physics::GravityDirection => 2,
-        Physics::Payload if !term.shape.is_empty() => 4,
-        _ => 1,
+        Physics::Stribeck | Physics::Presliding | Physics::Cogging => 1,
+        _ => 0,
     }
 }
 

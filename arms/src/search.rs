@@ -15,6 +15,8 @@ const FITTED: usize = 10;
 const WORTH: f64 = 10.0;
 /// The least share of the mean squared residual of unseen stretches, at the joint where it shows most, that a physics has to take.
 pub const LEAST_SHARE: f64 = 0.03;
+/// The least share of the rms torque of a joint, that where it shows most, that a physics has to be.
+pub const LEAST_TORQUE: f64 = 0.003;
 /// Rounds in which the friction's displacement is sought.
 const SLIP_STEPS: usize = 12;
 
@@ -153,10 +155,22 @@ pub fn largest_share(data: &Data, base: &Fit, better: &Fit) -> f64 {
         .fold(f64::NEG_INFINITY, f64::max)
 }
 
+/// The torque of a term as a share of the rms torque of the joint where that is most.
+fn torque_share(data: &Data, fit: &Fit, index: usize) -> f64 {
+    let Some(term) = fit.structure.terms.get(index) else { return 0.0 };
+    let columns = data.columns(term, &fit.structure.slip);
+    let values = &fit.values[fit.places[index].clone()];
+    let torque: Vec<f64> = (0..data.layout.rows).map(|row| columns.iter().zip(values).map(|(c, x)| c[row] * x).sum()).collect();
+    let share = |j: usize| (data.mean_square(&torque, j, false) / data.mean_square(&data.torque, j, false).max(f64::MIN_POSITIVE)).sqrt();
+    (0..data.problem.joints.len()).map(share).fold(0.0, f64::max)
+}
+
 /// Whether what must not be negative is not.
 fn is_possible(fit: &Fit) -> bool {
     fit.structure.terms.iter().zip(&fit.places).all(|(term, place)| {
-        !term.physics.facts().positive || term.given.is_some() || fit.values[place.start] > 0.0
+        let (value, error) = (fit.values[place.start], fit.errors[place.start]);
+        // What the file states may be nothing, what is added is something.
+        !term.physics.facts().positive || value > if term.given.is_some() { -3.0 * error } else { 0.0 }
     })
 }
 
@@ -261,12 +275,15 @@ fn grow(data: &Data, pool: &[Term], best: &mut Fit, weights: &Weights, tried: &m
             let Some(fit) = data.fit(&with(&best.structure, &term), weights) else { continue };
             let index = fit.structure.terms.len() - 1;
             let fit = shaped(data, fit, index, weights);
-            if is_possible(&fit) {
+            // Beside some physics the file's inertial parameters are better, beside others worse than alone.
+            let fit = tolerated(data, fit, weights);
+            if is_possible(&fit) && torque_share(data, &fit, index) >= LEAST_TORQUE {
                 offers.push(fit);
             }
         }
         let freer = tolerated(data, best.clone(), weights);
         offers.sort_by(|a, b| a.score.total_cmp(&b.score));
+        simplest_first(data, &mut offers, weights);
         let mut taken = false;
         for offer in offers {
             let worth = best.score - offer.score;
@@ -294,6 +311,23 @@ fn grow(data: &Data, pool: &[Term], best: &mut Fit, weights: &Weights, tried: &m
     }
 }
 
+/// Of fits with one more term each, the best first: brings to the front the one with the fewest numbers that unseen stretches do not surely set back.
+fn simplest_first(data: &Data, offers: &mut [Fit], weights: &Weights) {
+    let Some(best) = offers.first().cloned() else { return };
+    let numbers = |f: &Fit| f.structure.terms.last().map_or(0, |t| t.physics.facts().numbers);
+    let mut order: Vec<usize> = (1..offers.len()).filter(|i| numbers(&offers[*i]) < numbers(&best)).collect();
+    order.sort_by_key(|i| numbers(&offers[*i]));
+    if let Some(at) = order.into_iter().find(|i| is_as_good(data, &offers[*i], &best, weights)) {
+        offers[..=at].rotate_right(1);
+    }
+}
+
+/// Whether a fit with fewer numbers predicts unseen stretches as well as another one, for all that they say.
+fn is_as_good(data: &Data, simple: &Fit, other: &Fit, weights: &Weights) -> bool {
+    let sure = compare(data, simple, other, weights).is_some_and(|g| g.is_sure());
+    largest_share(data, simple, other) < LEAST_SHARE || (!sure && simple.score < other.score + WORTH)
+}
+
 /// Puts another physics in the place of one that was added, where that is better.
 fn exchange(data: &Data, pool: &[Term], best: &mut Fit, weights: &Weights) {
     for _ in 0..2 {
@@ -306,7 +340,8 @@ fn exchange(data: &Data, pool: &[Term], best: &mut Fit, weights: &Weights) {
             }
             let less = without(&best.structure, index);
             let mut better: Option<Fit> = None;
-            for tolerance in 0..TOLERANCES.len() {
+            let there = best.structure.tolerance;
+            for tolerance in there.saturating_sub(1)..(there + 2).min(TOLERANCES.len()) {
                 let less = Structure { tolerance, ..less.clone() };
                 // Without it at all, where another tolerance makes it needless.
                 let mut offers: Vec<Fit> = data.fit(&less, weights).into_iter().collect();
@@ -315,8 +350,13 @@ fn exchange(data: &Data, pool: &[Term], best: &mut Fit, weights: &Weights) {
                     let last = fit.structure.terms.len() - 1;
                     offers.push(shaped(data, fit, last, weights));
                 }
+                offers.retain(is_possible);
+                offers.sort_by(|a, b| a.score.total_cmp(&b.score));
                 for offer in offers {
-                    if is_possible(&offer) && offer.score < better.as_ref().map_or(best.score - 2.0, |b| b.score) {
+                    let now = better.as_ref().unwrap_or(best);
+                    let simpler = offer.numbers < now.numbers - 0.5 && is_as_good(data, &offer, now, weights);
+                    let clearly = offer.score < now.score - 2.0 && !(now.numbers < offer.numbers - 0.5 && is_as_good(data, now, &offer, weights));
+                    if simpler || clearly {
                         better = Some(offer);
                     }
                 }
@@ -346,7 +386,7 @@ fn shrink(data: &Data, best: &mut Fit, weights: &Weights) {
             let interval = best.places.get(index).is_some_and(|place| {
                 place.clone().any(|i| best.values[i].abs() > 1.96 * best.errors[i])
             });
-            let keep = worth > WORTH && sure && interval && largest_share(data, &less, best) >= LEAST_SHARE;
+            let keep = worth > WORTH && sure && interval && torque_share(data, best, index) >= LEAST_TORQUE && largest_share(data, &less, best) >= LEAST_SHARE;
             if !keep && worst.as_ref().is_none_or(|(w, _)| worth < *w) {
                 worst = Some((worth, less));
             }
