@@ -42,5 +42,7 @@ fn main() {
     for (k, p) in search::parameters(&data, &found.best).iter().enumerate() {
         println!("  {} {:.4?} nominal {:.4?}", problem.joints[k], p, problem.bodies.nominal[k]);
     }
+    let all: Vec<String> = search::added(&found.best.structure).iter().map(|i| { let t = &found.best.structure.terms[*i]; format!("{}@{}", t.physics.facts().name, t.at.joint().map_or("arm".to_string(), |j| problem.joints[j].clone())) }).collect();
+    println!("FOUND: {}", all.join(" "));
     println!("{:.2} s", began.elapsed().as_secs_f64());
 }

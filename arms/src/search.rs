@@ -269,7 +269,15 @@ fn tolerated(data: &Data, fit: Fit, weights: &Weights) -> Fit {
 
 /// Adds what is worth it.
 fn grow(data: &Data, pool: &[Term], best: &mut Fit, weights: &Weights, tried: &mut Vec<Tried>) {
+    // Adding and exchanging can take turns: what was there once ends it.
+    let mut seen: Vec<Vec<(Physics, crate::physics::At)>> = Vec::new();
     while added(&best.structure).len() < MOST {
+        let mut now: Vec<_> = best.structure.terms.iter().map(|t| (t.physics, t.at)).collect();
+        now.sort();
+        if seen.iter().filter(|s| **s == now).count() > 1 {
+            return;
+        }
+        seen.push(now);
         let mut offers: Vec<Fit> = Vec::new();
         for (term, _) in ranked(data, pool, &best.structure, weights).into_iter().filter(|(_, promise)| *promise > 0.0).take(FITTED) {
             let Some(fit) = data.fit(&with(&best.structure, &term), weights) else { continue };
@@ -361,12 +369,14 @@ fn exchange(data: &Data, pool: &[Term], best: &mut Fit, weights: &Weights) {
                     }
                 }
             }
-            match better {
-                Some(offer) => {
-                    *best = offer;
-                    changed = true;
-                }
-                None => index += 1,
+            if let Some(offer) = better {
+                *best = offer;
+                changed = true;
+            }
+            // One exchange a place and round: two that are as good as each other would take turns for ever.
+            index += 1;
+            if index >= best.structure.terms.len() {
+                break;
             }
         }
         if !changed {
