@@ -10,10 +10,15 @@
 // Printing panics where the other end is full or gone.
 #![cfg_attr(not(test), warn(clippy::print_stdout, clippy::print_stderr))]
 
+pub mod base;
 pub mod consistent;
+pub mod diagnose;
+pub mod audit;
 pub mod error;
 pub mod filter;
+pub mod excitation;
 pub mod inertial;
+pub mod judge;
 pub mod log;
 pub mod motion;
 pub mod physics;
@@ -21,5 +26,7 @@ pub mod problem;
 pub mod regression;
 pub mod rigid;
 pub mod search;
+pub mod verdict;
+pub mod written;
 
 pub use error::ArmError;

@@ -356,6 +356,8 @@ pub struct Fit {
     pub score: f64,
     /// What of that the inertial parameters cost: how far they are from the file's, and how much the data narrow them down.
     occam: f64,
+    covariance: DMatrix<f64>,
+    of_folds: Vec<DVector<f64>>,
 }
 
 impl Data<'_> {
@@ -378,8 +380,10 @@ impl Data<'_> {
                 }
             }
         }
-        let (errors, numbers) = system.errors(&values, &of_folds, structure)?;
-        let mut fit = Fit { structure: structure.clone(), values: values.iter().copied().collect(), errors, places, residual, unseen, numbers, score: 0.0, occam: system.occam(&values, self.inertial.len())? };
+        let (errors, numbers, covariance) = system.errors(&values, &of_folds, structure)?;
+        let occam = system.occam(&values, self.inertial.len())?;
+        let of_folds = of_folds.into_iter().flatten().collect();
+        let mut fit = Fit { structure: structure.clone(), values: values.iter().copied().collect(), errors, places, residual, unseen, numbers, score: 0.0, occam, covariance, of_folds };
         fit.score = self.score(&fit, weights);
         Some(fit)
     }
@@ -614,8 +618,9 @@ impl System {
     }
 
     /// Standard errors, and how many numbers the data determine.
-    fn errors(&self, values: &DVector<f64>, of_folds: &[Option<DVector<f64>>], structure: &Structure) -> Option<(Vec<f64>, f64)> {
+    fn errors(&self, values: &DVector<f64>, of_folds: &[Option<DVector<f64>>], structure: &Structure) -> Option<(Vec<f64>, f64, DMatrix<f64>)> {
         let n = values.len();
+        let mut covariance = DMatrix::zeros(n, n);
         self.factor.cholesky.as_ref()?;
         let mut errors = Vec::with_capacity(n);
         let mut numbers = 0.0;
@@ -624,6 +629,7 @@ impl System {
             let mut unit = DVector::zeros(n);
             unit[i] = 1.0;
             let variance = self.factor.solve(&unit);
+            covariance.set_column(i, &variance);
             // Of the trace of (G + P)⁻¹ G: what the data say beside what was known before.
             numbers += 1.0 - variance[i] * self.prior[i];
             let mean = folds.iter().map(|f| f[i]).sum::<f64>() / folds.len().max(1) as f64;
@@ -633,7 +639,7 @@ impl System {
         }
         // Numbers of a shape were searched, and are no columns.
         let searched: usize = structure.terms.iter().filter(|t| t.given.is_none()).map(|t| shape_numbers(t)).sum();
-        Some((errors, numbers + searched as f64))
+        Some((errors, numbers + searched as f64, covariance))
     }
 }
 
@@ -661,4 +667,16 @@ fn correlation_time(part: &[f64]) -> f64 {
         sum += correlation;
     }
     1.0 + 2.0 * sum
+}
+
+impl Fit {
+    /// Standard error of a sum of values, each with its factor.
+    pub fn spread(&self, factors: &[(usize, f64)]) -> f64 {
+        let own: f64 = factors.iter().map(|(i, f)| factors.iter().map(|(j, g)| f * g * self.covariance[(*i, *j)]).sum::<f64>()).sum();
+        let folds: Vec<f64> = self.of_folds.iter().map(|v| factors.iter().map(|(i, f)| f * v[*i]).sum()).collect();
+        let k = folds.len() as f64;
+        let mean = folds.iter().sum::<f64>() / k.max(1.0);
+        let jackknife = folds.iter().map(|x| (x - mean).powi(2)).sum::<f64>() * (k - 1.0).max(0.0) / k.max(1.0);
+        own.max(jackknife).max(0.0).sqrt()
+    }
 }

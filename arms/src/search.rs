@@ -16,7 +16,7 @@ const WORTH: f64 = 10.0;
 /// The least share of the mean squared residual of unseen stretches, at the joint where it shows most, that a physics has to take.
 pub const LEAST_SHARE: f64 = 0.03;
 /// The least share of the rms torque of a joint, that where it shows most, that a physics has to be.
-pub const LEAST_TORQUE: f64 = 0.003;
+pub const LEAST_TORQUE: f64 = 0.005;
 /// Rounds in which the friction's displacement is sought.
 const SLIP_STEPS: usize = 12;
 
