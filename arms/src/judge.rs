@@ -6,7 +6,9 @@
 use crate::regression::Data;
 use crate::written::Reading;
 use backdrive_plant::model::{Hold, Input, InputKind, Model};
+use backdrive_plant::robot::Arm;
 use backdrive_plant::stepper::{Options, Plant, Segment};
+use nalgebra::DMatrix;
 use std::f64::consts::TAU;
 
 /// Natural frequency of the loop, Hz, critically damped.
@@ -32,16 +34,10 @@ pub fn judge(data: &Data, model: &Model, reading: &Reading) -> Option<Vec<f64>> 
         driven.inputs.push(Input::ideal(&format!("loop_{j}"), InputKind::Force, on, Hold::Linear));
     }
     let period = data.rates.period();
-    let mass = arm.inertia_at_pose(driven.bodies.len());
-    let w = (TAU * LOOP_HZ).min(0.3 / period);
-    let gains: Vec<[f64; 2]> = arm
-        .bodies
-        .iter()
-        .map(|b| {
-            let own = mass[(*b, *b)] + driven.bodies.get(*b).map_or(0.0, |b| b.inertia);
-            [own * w * w, 2.0 * own * w]
-        })
-        .collect();
+    let w = (TAU * LOOP_HZ).min(0.2 / period);
+    // By what a joint weighs while the others are free, in the pose where that is least: a loop that is stable there is so everywhere.
+    let weight = least_inertia(arm, &driven);
+    let gains: Vec<[f64; 2]> = weight.iter().map(|own| [own * w * w, 2.0 * own * w]).collect();
     let (mut added, mut torque, mut count) = (vec![0.0; joints], vec![0.0; joints], 0usize);
     for m in motions {
         let motion = &data.motions[m];
@@ -80,4 +76,23 @@ pub fn judge(data: &Data, model: &Model, reading: &Reading) -> Option<Vec<f64>> 
         return None;
     }
     Some(added.iter().zip(&torque).map(|(a, t)| (a / t.max(f64::MIN_POSITIVE)).sqrt()).collect())
+}
+
+/// Of each joint the least inertia over the arm's poses that it moves against while all others are free.
+fn least_inertia(arm: &Arm, model: &Model) -> Vec<f64> {
+    let count = arm.tree.len();
+    let mut work = arm.tree.workspace();
+    let mut out = vec![f64::INFINITY; count];
+    for pose in arm.poses() {
+        let mut mass = DMatrix::zeros(count, count);
+        arm.tree.mass_matrix(&pose, &mut work, &mut mass);
+        for (j, body) in arm.bodies.iter().enumerate() {
+            mass[(j, j)] += model.bodies.get(*body).map_or(0.0, |b| b.inertia);
+        }
+        let Some(inverse) = mass.try_inverse() else { continue };
+        for (j, least) in out.iter_mut().enumerate() {
+            *least = least.min(1.0 / inverse[(j, j)].max(1e-300));
+        }
+    }
+    out
 }
