@@ -40,7 +40,8 @@ fn clock(log: &Log, out: &mut Vec<Remark>) {
     let mean = steps.iter().sum::<f64>() / steps.len().max(1) as f64;
     let scatter = rms(steps.iter().map(|s| s - mean)) / mean.max(1e-12);
     if scatter > 0.02 {
-        let message = format!("the clock is uneven: steps of {:.2} ms scatter by {:.0} %; the logged times are used", 1e3 * mean, 100.0 * scatter);
+        let message =
+            format!("the clock is uneven: steps of {:.2} ms scatter by {:.0} %; the logged times are used", 1e3 * mean, 100.0 * scatter);
         out.push(remark("clock", log.name.clone(), message, Weight::Note));
     }
 }
@@ -82,7 +83,10 @@ fn of_joint(problem: &Problem, data: &Data, j: usize, joint: &str, out: &mut Vec
             } else if alike > 0.97 {
                 format!("is {factor:.3} times the derivative of the position: it has another unit")
             } else {
-                format!("is not the derivative of the position (it differs by {:.0} %): another joint's column, or filtered heavily; it is not used", 100.0 * share)
+                format!(
+                    "is not the derivative of the position (it differs by {:.0} %): another joint's column, or filtered heavily; it is not used",
+                    100.0 * share
+                )
             };
             out.push(remark("unit", format!("{joint}.velocity"), message, Weight::Caution));
         }
@@ -152,7 +156,8 @@ fn swapped_positions(problem: &Problem, data: &Data, out: &mut Vec<Remark>) {
         for k in 0..j {
             if straight > 0.5 && left(Some((j, k))) < 0.2 * straight {
                 let (a, b) = (&problem.joints[j], &problem.joints[k]);
-                let message = format!("with the positions of {a} and {b} changed over, the links take what was measured: the columns are swapped");
+                let message =
+                    format!("with the positions of {a} and {b} changed over, the links take what was measured: the columns are swapped");
                 out.push(remark("sign", format!("{a}.position and {b}.position"), message, Weight::Caution));
             }
         }

@@ -127,10 +127,17 @@ pub fn of_fit(data: &Data, fit: &Fit, parameters: &[Parameters]) -> Result<Vec<B
         .iter()
         .map(|base| {
             let value = base.value(parameters);
-            let factors: Vec<(usize, f64)> = std::iter::once((base.of, 1.0)).chain(base.with.iter().copied()).map(|(i, f)| (i, f * scales[i])).collect();
+            let factors: Vec<(usize, f64)> =
+                std::iter::once((base.of, 1.0)).chain(base.with.iter().copied()).map(|(i, f)| (i, f * scales[i])).collect();
             let error = 1.96 * fit.spread(&factors);
             let ci95 = [Some(value - error), Some(value + error)];
-            BaseParameter { name: base.name(), value, ci95, nominal: base.value(&data.problem.bodies.nominal), unit: base.unit().to_string() }
+            BaseParameter {
+                name: base.name(),
+                value,
+                ci95,
+                nominal: base.value(&data.problem.bodies.nominal),
+                unit: base.unit().to_string(),
+            }
         })
         .collect())
 }

@@ -47,11 +47,21 @@ pub fn consistent(data: &Data, fit: &Fit, weights: &Weights) -> Option<Fit> {
         }
         Some(sum)
     };
+    // As far towards the least of the quadratic as bodies go, to begin with.
+    let inside = x.clone();
+    let mut share = 1.0;
+    while share > 1e-4 && value(&(&inside + share * (&at - &inside))).is_none() {
+        share *= 0.7;
+    }
+    let nearer = &inside + 0.9 * share * (&at - &inside);
+    if value(&nearer).is_some_and(|v| value(&x).is_none_or(|w| v < w)) {
+        x = nearer;
+    }
     let mut now = value(&x)?;
     for _ in 0..STEPS {
         let (mut gradient, mut curvature) = (&hessian * (&x - &at), hessian.clone());
         for k in 0..bodies.nominal.len() {
-            let inverse = pseudo_inertia(&body(data, &x, k)).try_inverse()?;
+            let Some(inverse) = pseudo_inertia(&body(data, &x, k)).try_inverse() else { continue };
             let units: Vec<Matrix4<f64>> = (0..COUNT)
                 .map(|i| {
                     let mut p = [0.0; COUNT];
@@ -66,7 +76,7 @@ pub fn consistent(data: &Data, fit: &Fit, weights: &Weights) -> Option<Fit> {
                 }
             }
         }
-        let step = solve(&curvature, &gradient)?;
+        let Some(step) = solve(&curvature, &gradient) else { break };
         let expected = gradient.dot(&step);
         let mut length = 1.0;
         let mut moved = false;

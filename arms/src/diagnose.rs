@@ -53,9 +53,8 @@ pub fn diagnose(problem: &Problem, settings: &Settings) -> Result<Found, ArmErro
     remarks.extend(load_remarks(&data));
     let mut whole = Data::new(problem, settings.corner_hz, true)?;
     for fit in [&mut found.as_given, &mut found.refit, &mut found.best] {
-        if let Some(possible) = consistent(&data, fit, &found.weights) {
-            *fit = possible;
-        }
+        *fit = consistent(&data, fit, &found.weights)
+            .ok_or_else(|| ArmError::Robot("no inertial parameters that bodies can have were found near the regression's".to_string()))?;
     }
     whole.see(&crate::search::parameters(&data, &found.best))?;
     for fit in [&mut found.as_given, &mut found.refit, &mut found.best] {
@@ -119,9 +118,10 @@ fn load_remarks(data: &Data) -> Vec<backdrive_diagnosis::verdict::Remark> {
             out.push(backdrive_diagnosis::verdict::Remark {
                 what: "load".to_string(),
                 place: joint.clone(),
-                message: "carries nearly the same load wherever it moves: whether its friction grows with the load cannot be told; record it in \
+                message:
+                    "carries nearly the same load wherever it moves: whether its friction grows with the load cannot be told; record it in \
                           another pose or with a payload"
-                    .to_string(),
+                        .to_string(),
                 weight: Weight::Caution,
             });
         }
@@ -133,7 +133,9 @@ fn next(found: &Search, planned: &excitation::Excitation, problem: &Problem) -> 
     let rivals = found.rivals.iter().flatten().filter(|(_, above)| *above < 6.0).count();
     let why = match rivals {
         0 => "determines the inertial parameters and friction best",
-        _ => "tells more of what these logs leave open; with a known payload at the tip a second time it separates torque constants from masses",
+        _ => {
+            "tells more of what these logs leave open; with a known payload at the tip a second time it separates torque constants from masses"
+        }
     };
     NextExperiment::Planned(Planned {
         file: EXPERIMENT_FILE.to_string(),

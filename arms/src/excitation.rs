@@ -57,8 +57,11 @@ pub fn plan(problem: &Problem) -> Result<Excitation, ArmError> {
     };
     let mut best: Option<(f64, Vec<Series>)> = None;
     for _ in 0..DRAWN {
-        let series: Vec<Series> =
-            problem.joints.iter().map(|_| (1..=HARMONICS).map(|h| [draw() / (h as f64).sqrt(), draw() / (h as f64).sqrt()]).collect()).collect();
+        let series: Vec<Series> = problem
+            .joints
+            .iter()
+            .map(|_| (1..=HARMONICS).map(|h| [draw() / (h as f64).sqrt(), draw() / (h as f64).sqrt()]).collect())
+            .collect();
         let condition = condition(problem, &bases, &motion(problem, &series, LOOKED_AT))?;
         if best.as_ref().is_none_or(|(c, _)| condition < *c) {
             best = Some((condition, series));

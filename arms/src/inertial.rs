@@ -47,10 +47,22 @@ pub fn of_point(place: &Vector3<f64>) -> Parameters {
 pub fn pseudo_inertia(p: &Parameters) -> Matrix4<f64> {
     let half = 0.5 * (p[4] + p[7] + p[9]);
     Matrix4::new(
-        half - p[4], -p[5], -p[6], p[1], //
-        -p[5], half - p[7], -p[8], p[2], //
-        -p[6], -p[8], half - p[9], p[3], //
-        p[1], p[2], p[3], p[0],
+        half - p[4],
+        -p[5],
+        -p[6],
+        p[1], //
+        -p[5],
+        half - p[7],
+        -p[8],
+        p[2], //
+        -p[6],
+        -p[8],
+        half - p[9],
+        p[3], //
+        p[1],
+        p[2],
+        p[3],
+        p[0],
     )
 }
 

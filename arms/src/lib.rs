@@ -10,13 +10,13 @@
 // Printing panics where the other end is full or gone.
 #![cfg_attr(not(test), warn(clippy::print_stdout, clippy::print_stderr))]
 
+pub mod audit;
 pub mod base;
 pub mod consistent;
 pub mod diagnose;
-pub mod audit;
 pub mod error;
-pub mod filter;
 pub mod excitation;
+pub mod filter;
 pub mod inertial;
 pub mod judge;
 pub mod log;

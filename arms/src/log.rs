@@ -47,7 +47,13 @@ pub fn joints_of(set: &mut RecordingSet, coordinates: &[Coordinate], first: &str
         let pick = |what: &[&str]| {
             let mut tried = Vec::new();
             for w in what {
-                tried.extend([format!("{name}.{w}"), format!("{name}_{w}"), format!("{w}_{name}"), format!("{w}{number}"), format!("{w}_{number}")]);
+                tried.extend([
+                    format!("{name}.{w}"),
+                    format!("{name}_{w}"),
+                    format!("{w}_{name}"),
+                    format!("{w}{number}"),
+                    format!("{w}_{number}"),
+                ]);
             }
             tried.into_iter().find(|t| plain.contains(&t.as_str()))
         };

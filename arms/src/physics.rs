@@ -92,7 +92,9 @@ impl Physics {
             Physics::Stribeck => facts("stribeck", "dry friction that falls with speed", Family::Friction, true, 2),
             Physics::LoadFriction => facts("load_friction", "dry friction that grows with the load", Family::Friction, true, 1),
             Physics::Presliding => facts("dahl", "dry friction with presliding", Family::Friction, true, 2),
-            Physics::AsymmetricDamper => facts("asymmetric_damper", "viscous friction that differs by direction", Family::Damping, false, 1),
+            Physics::AsymmetricDamper => {
+                facts("asymmetric_damper", "viscous friction that differs by direction", Family::Damping, false, 1)
+            }
             Physics::QuadraticDrag => facts("quadratic_drag", "drag with the square of speed", Family::Damping, true, 1),
             Physics::Bias => facts("bias", "a constant torque", Family::Bias, false, 1),
             Physics::Spring => facts("spring", "a spring to ground", Family::Stiffness, true, 2),
@@ -214,9 +216,7 @@ impl Sight<'_> {
         match term.physics {
             Physics::Damper => one(v.clone()),
             Physics::Coulomb => one(self.direction(j)),
-            Physics::Stribeck => {
-                one(self.direction(j).iter().zip(v).map(|(s, v)| s * (-(v / shape(0)).powi(2)).exp()).collect())
-            }
+            Physics::Stribeck => one(self.direction(j).iter().zip(v).map(|(s, v)| s * (-(v / shape(0)).powi(2)).exp()).collect()),
             Physics::LoadFriction => one(self.direction(j).iter().zip(&self.load[j]).map(|(s, l)| s * l.abs()).collect()),
             Physics::Presliding => one(direction(q.iter().copied(), shape(0))),
             Physics::AsymmetricDamper => one(v.iter().map(|v| v.abs()).collect()),

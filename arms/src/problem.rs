@@ -74,7 +74,13 @@ impl Problem {
     ///
     /// # Errors
     /// Where the model has no robot, or nothing is to be fitted.
-    pub fn new(model: Model, model_file: PathBuf, columns: Vec<JointColumns>, fit: Vec<Log>, held_out: Vec<Log>) -> Result<Problem, ArmError> {
+    pub fn new(
+        model: Model,
+        model_file: PathBuf,
+        columns: Vec<JointColumns>,
+        fit: Vec<Log>,
+        held_out: Vec<Log>,
+    ) -> Result<Problem, ArmError> {
         let Some(arm) = model.arm.clone() else { return Err(ArmError::NoRobot(model_file.display().to_string())) };
         if fit.is_empty() {
             return Err(ArmError::NoLogs);

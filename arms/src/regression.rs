@@ -115,7 +115,8 @@ impl<'a> Data<'a> {
             let count = rates.rows(&vec![0.0; motion.len()]).len();
             if count < 12 {
                 let seconds = motion.len() as f64 * rates.period();
-                let message = format!("is {seconds:.2} s long, too short for a regression below {:.1} Hz; record some seconds more", rates.corner);
+                let message =
+                    format!("is {seconds:.2} s long, too short for a regression below {:.1} Hz; record some seconds more", rates.corner);
                 return Err(ArmError::Log { log: log.name.clone(), message });
             }
             layout.motions.push((layout.rows, count));
@@ -275,10 +276,8 @@ impl<'a> Data<'a> {
     pub fn first_slip(&self, joint: usize) -> f64 {
         let logs = self.problem.fit.iter();
         let wide = crate::physics::range(logs.clone().flat_map(|l| l.position[joint].iter().copied()));
-        let step = logs
-            .flat_map(|l| l.position[joint].windows(2).map(|w| (w[1] - w[0]).abs()))
-            .filter(|d| *d > 0.0)
-            .fold(f64::INFINITY, f64::min);
+        let step =
+            logs.flat_map(|l| l.position[joint].windows(2).map(|w| (w[1] - w[0]).abs())).filter(|d| *d > 0.0).fold(f64::INFINITY, f64::min);
         let resolved = if step.is_finite() { 2.0 * step } else { 0.0 };
         resolved.clamp(2e-4 * wide.max(1e-9), 2e-2 * wide.max(1e-9))
     }
@@ -383,7 +382,19 @@ impl Data<'_> {
         let (errors, numbers, covariance) = system.errors(&values, &of_folds, structure)?;
         let occam = system.occam(&values, self.inertial.len())?;
         let of_folds = of_folds.into_iter().flatten().collect();
-        let mut fit = Fit { structure: structure.clone(), values: values.iter().copied().collect(), errors, places, residual, unseen, numbers, score: 0.0, occam, covariance, of_folds };
+        let mut fit = Fit {
+            structure: structure.clone(),
+            values: values.iter().copied().collect(),
+            errors,
+            places,
+            residual,
+            unseen,
+            numbers,
+            score: 0.0,
+            occam,
+            covariance,
+            of_folds,
+        };
         fit.score = self.score(&fit, weights);
         Some(fit)
     }
@@ -440,7 +451,8 @@ impl Data<'_> {
         let joints = 0..self.layout.joints;
         let floor = |j: usize| 1e-9 + 1e-6 * self.mean_square(&self.torque, j, false).sqrt();
         let sd = joints.clone().map(|j| self.mean_square(residual, j, false).sqrt().max(floor(j))).collect();
-        let time = joints.map(|j| (0..self.fit_count).map(|m| correlation_time(&residual[self.layout.of(m, j)])).fold(1.0, f64::max)).collect();
+        let time =
+            joints.map(|j| (0..self.fit_count).map(|m| correlation_time(&residual[self.layout.of(m, j)])).fold(1.0, f64::max)).collect();
         Weights { sd, time }
     }
 
@@ -472,7 +484,7 @@ impl Data<'_> {
         }
         let cross = whole.view((0, n), (n, rest)).into_owned();
         let others = whole.view((n, n), (rest, rest)).into_owned();
-        let solved = others.cholesky()?.solve(&cross.transpose());
+        let solved = scaled_solve(&others, &cross.transpose())?;
         Some((own - cross * solved, at))
     }
 
@@ -487,7 +499,7 @@ impl Data<'_> {
             let whole = &system.total + DMatrix::from_diagonal(&system.prior);
             let right = (&system.total_right - &whole * &values).rows(n, rest).into_owned();
             let others = whole.view((n, n), (rest, rest)).into_owned();
-            let solved = others.cholesky()?.solve(&right);
+            let solved = scaled_solve(&others, &DMatrix::from_column_slice(rest, 1, right.as_slice()))?;
             values.rows_mut(n, rest).copy_from(&solved);
         }
         let mut out = fit.clone();
@@ -506,6 +518,16 @@ impl Data<'_> {
         let values = system.solve(None)?;
         Some((system, values))
     }
+}
+
+/// Solves a positive definite system whose unknowns have very different sizes.
+fn scaled_solve(matrix: &DMatrix<f64>, right: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    let n = matrix.nrows();
+    let scale = DVector::from_fn(n, |i, _| 1.0 / matrix[(i, i)].max(1e-300).sqrt());
+    let scaled = DMatrix::from_fn(n, n, |i, j| matrix[(i, j)] * scale[i] * scale[j]);
+    let right = DMatrix::from_fn(n, right.ncols(), |i, j| right[(i, j)] * scale[i]);
+    let solved = scaled.cholesky()?.solve(&right);
+    Some(DMatrix::from_fn(n, solved.ncols(), |i, j| solved[(i, j)] * scale[i]))
 }
 
 /// Weighted rows for fitting, and normal equations with the prior of the inertial parameters.
@@ -618,7 +640,12 @@ impl System {
     }
 
     /// Standard errors, and how many numbers the data determine.
-    fn errors(&self, values: &DVector<f64>, of_folds: &[Option<DVector<f64>>], structure: &Structure) -> Option<(Vec<f64>, f64, DMatrix<f64>)> {
+    fn errors(
+        &self,
+        values: &DVector<f64>,
+        of_folds: &[Option<DVector<f64>>],
+        structure: &Structure,
+    ) -> Option<(Vec<f64>, f64, DMatrix<f64>)> {
         let n = values.len();
         let mut covariance = DMatrix::zeros(n, n);
         self.factor.cholesky.as_ref()?;

@@ -83,7 +83,8 @@ pub fn search(data: &mut Data, without: &[String]) -> Result<Search, ArmError> {
     let refit = refitted(data, &nominal, &best.structure.slip, &weights).ok_or_else(failed)?;
     let as_given = data.fit(&Structure { slip: best.structure.slip.clone(), ..nominal }, &weights).ok_or_else(failed)?;
     let added: Vec<usize> = added(&best.structure);
-    let gains = added.iter().map(|i| without_term(data, &best, *i, &weights).and_then(|less| compare(data, &less, &best, &weights))).collect();
+    let gains =
+        added.iter().map(|i| without_term(data, &best, *i, &weights).and_then(|less| compare(data, &less, &best, &weights))).collect();
     let rivals = added.iter().map(|i| rivals(data, &pool, &best, *i, &weights)).collect();
     Ok(Search { as_given, refit, best, weights, tried, gains, rivals })
 }
@@ -236,9 +237,8 @@ fn shaped(data: &Data, fit: Fit, index: usize, weights: &Weights) -> Fit {
 fn slipped(data: &Data, fit: Fit, weights: &Weights) -> Fit {
     let mut best = fit;
     for joint in 0..data.problem.joints.len() {
-        let turns = |t: &Term| {
-            t.at.joint() == Some(joint) && matches!(t.physics, Physics::Coulomb | Physics::Stribeck | Physics::LoadFriction)
-        };
+        let turns =
+            |t: &Term| t.at.joint() == Some(joint) && matches!(t.physics, Physics::Coulomb | Physics::Stribeck | Physics::LoadFriction);
         if !best.structure.terms.iter().any(turns) {
             continue;
         }
@@ -363,7 +363,8 @@ fn exchange(data: &Data, pool: &[Term], best: &mut Fit, weights: &Weights) {
                 for offer in offers {
                     let now = better.as_ref().unwrap_or(best);
                     let simpler = offer.numbers < now.numbers - 0.5 && is_as_good(data, &offer, now, weights);
-                    let clearly = offer.score < now.score - 2.0 && !(now.numbers < offer.numbers - 0.5 && is_as_good(data, now, &offer, weights));
+                    let clearly =
+                        offer.score < now.score - 2.0 && !(now.numbers < offer.numbers - 0.5 && is_as_good(data, now, &offer, weights));
                     if simpler || clearly {
                         better = Some(offer);
                     }
@@ -393,10 +394,12 @@ fn shrink(data: &Data, best: &mut Fit, weights: &Weights) {
             let Some(less) = data.fit(&without(&best.structure, index), weights) else { continue };
             let worth = less.score - best.score;
             let sure = compare(data, &less, best, weights).is_some_and(|g| g.is_sure());
-            let interval = best.places.get(index).is_some_and(|place| {
-                place.clone().any(|i| best.values[i].abs() > 1.96 * best.errors[i])
-            });
-            let keep = worth > WORTH && sure && interval && torque_share(data, best, index) >= LEAST_TORQUE && largest_share(data, &less, best) >= LEAST_SHARE;
+            let interval = best.places.get(index).is_some_and(|place| place.clone().any(|i| best.values[i].abs() > 1.96 * best.errors[i]));
+            let keep = worth > WORTH
+                && sure
+                && interval
+                && torque_share(data, best, index) >= LEAST_TORQUE
+                && largest_share(data, &less, best) >= LEAST_SHARE;
             if !keep && worst.as_ref().is_none_or(|(w, _)| worth < *w) {
                 worst = Some((worth, less));
             }

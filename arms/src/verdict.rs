@@ -9,8 +9,8 @@ use crate::written::gravity_of;
 use backdrive_diagnosis::hypothesis::Place;
 use backdrive_diagnosis::predictive::gain;
 use backdrive_diagnosis::verdict::{
-    Alternative, ArmJoint, ArmPart, Estimate, Estimates, Finding, HeldOut, MODEL_FILE, Moved, NextExperiment, Parameter, RecordErrors, Remaining, Remark,
-    SCHEMA, Verdict, Word,
+    Alternative, ArmJoint, ArmPart, Estimate, Estimates, Finding, HeldOut, MODEL_FILE, Moved, NextExperiment, Parameter, RecordErrors,
+    Remaining, Remark, SCHEMA, Verdict, Word,
 };
 use std::collections::BTreeMap;
 
@@ -57,9 +57,10 @@ pub fn verdict(parts: Parts) -> Result<Verdict, ArmError> {
     let findings = findings(data, search);
     let held = search.best.residual.len() > 0 && data.fit_count < data.motions.len();
     let moved = moved(data, search);
-    let refit_helps = gain(&by_block(data, shown(&search.as_given), &search.weights, held), &by_block(data, shown(&search.refit), &search.weights, held))
-        .is_some_and(|g| g.is_sure())
-        && share_taken(data, &search.as_given, &search.refit, held) > LEAST_SHARE;
+    let refit_helps =
+        gain(&by_block(data, shown(&search.as_given), &search.weights, held), &by_block(data, shown(&search.refit), &search.weights, held))
+            .is_some_and(|g| g.is_sure())
+            && share_taken(data, &search.as_given, &search.refit, held) > LEAST_SHARE;
     let alike = findings.first().is_some_and(|f| f.confidence < 0.6);
     let word = match (findings.is_empty(), alike) {
         (false, true) => Word::Ambiguous,
@@ -119,7 +120,8 @@ fn findings(data: &Data, search: &Search) -> Vec<Finding> {
         if term.physics == Physics::Coulomb && richer.iter().any(|p| there(*p)) {
             continue;
         }
-        let rivals: Vec<&(Term, f64)> = search.rivals.get(order).map_or(Vec::new(), |r| r.iter().filter(|(_, above)| *above < ALIKE).collect());
+        let rivals: Vec<&(Term, f64)> =
+            search.rivals.get(order).map_or(Vec::new(), |r| r.iter().filter(|(_, above)| *above < ALIKE).collect());
         let weights: Vec<f64> = rivals.iter().map(|(_, above)| (-0.5 * above.max(0.0)).exp()).collect();
         let total = 1.0 + weights.iter().sum::<f64>();
         let alternatives: Vec<Alternative> = rivals
@@ -130,7 +132,8 @@ fn findings(data: &Data, search: &Search) -> Vec<Finding> {
         let found = search.gains.get(order).copied().flatten();
         let sure = found.map_or(0.5, |g| normal(g.in_errors()));
         let facts = term.physics.facts();
-        let kin: f64 = rivals.iter().zip(&weights).filter(|((t, _), _)| t.physics.facts().family == facts.family).map(|(_, w)| w / total).sum();
+        let kin: f64 =
+            rivals.iter().zip(&weights).filter(|((t, _), _)| t.physics.facts().family == facts.family).map(|(_, w)| w / total).sum();
         let confidence = sure / total;
         let replaces = replaced(data, term);
         let finding = Finding {
@@ -383,7 +386,8 @@ fn remaining(arm: &ArmPart) -> Remaining {
 }
 
 fn sentence(word: Word, findings: &[Finding], arm: &ArmPart, held: bool) -> String {
-    let named: Vec<String> = findings.iter().map(|f| format!("{} {}", words(&f.physics), backdrive_diagnosis::words::place(&f.place))).collect();
+    let named: Vec<String> =
+        findings.iter().map(|f| format!("{} {}", words(&f.physics), backdrive_diagnosis::words::place(&f.place))).collect();
     let unseen = if held { "held-out" } else { "fitted" };
     let left: Vec<String> = arm.joints.iter().map(|j| format!("{:.1} %", 100.0 * j.diagnosed)).collect();
     let before: Vec<String> = arm.joints.iter().map(|j| format!("{:.1} %", 100.0 * j.refit)).collect();
@@ -392,8 +396,14 @@ fn sentence(word: Word, findings: &[Finding], arm: &ArmPart, held: bool) -> Stri
         Word::Missing => format!("The model leaves out {}; {tail} ({} without).", named.join(", "), before.join(", ")),
         Word::Ambiguous => {
             let other = findings.first().and_then(|f| f.alternatives.first());
-            let other = other.map_or(String::new(), |a| format!(", or in place of the first {} {}", words(&a.physics), backdrive_diagnosis::words::place(&a.place)));
-            format!("The model leaves out {}{other}, which these logs do not tell apart; {tail} ({} without).", named.join(", "), before.join(", "))
+            let other = other.map_or(String::new(), |a| {
+                format!(", or in place of the first {} {}", words(&a.physics), backdrive_diagnosis::words::place(&a.place))
+            });
+            format!(
+                "The model leaves out {}{other}, which these logs do not tell apart; {tail} ({} without).",
+                named.join(", "),
+                before.join(", ")
+            )
         }
         Word::Parameters => format!("No physics is missing; the model's parameters are off, and refitted {tail}."),
         _ => format!("Nothing that these logs would show is missing; {tail}."),

@@ -93,7 +93,10 @@ pub fn model_of(data: &Data, fit: &Fit) -> Result<(Model, Vec<String>), ArmError
     let xml = match (keeps_text, shifted) {
         (true, _) => arm.xml.clone(),
         (false, true) => {
-            notes.push("the robot file has joints whose reference is not 0, which a URDF cannot say: its inertias are written as they were".to_string());
+            notes.push(
+                "the robot file has joints whose reference is not 0, which a URDF cannot say: its inertias are written as they were"
+                    .to_string(),
+            );
             robot = problem.robot.clone();
             robot.gravity = gravity_of(data, fit);
             arm.xml.clone()
@@ -121,7 +124,8 @@ fn elements(data: &Data, fit: &Fit, reading: &Reading, model: &mut Model, notes:
         let second = |physics| at_joint(fit, reading, joint, physics).map(|f| fit.values[fit.places[f.2].start + 1] / reading.gain[joint]);
         let shape = |physics| at_joint(fit, reading, joint, physics).and_then(|f| f.1.shape.first().copied());
         // What the regression knows is written anew: elements of the nominal file that are the same physics give way.
-        let known: Vec<usize> = problem.given.iter().filter(|g| g.joint == joint && !parts_of(&g.law).is_empty()).map(|g| g.element).collect();
+        let known: Vec<usize> =
+            problem.given.iter().filter(|g| g.joint == joint && !parts_of(&g.law).is_empty()).map(|g| g.element).collect();
         let names: Vec<String> = known.iter().filter_map(|i| problem.model.elements.get(*i)).map(|e| e.name.clone()).collect();
         model.elements.retain(|e| !names.contains(&e.name));
         let body = model.arm.as_ref().and_then(|arm| arm.bodies.get(joint).copied()).unwrap_or(joint);
@@ -142,7 +146,10 @@ fn elements(data: &Data, fit: &Fit, reading: &Reading, model: &mut Model, notes:
             laws.push(("friction", Law::Coulomb(Coulomb { force: level })));
         }
         if value(Physics::LoadFriction).is_some_and(|c| c > 0.0) && value(Physics::Stribeck).is_some() {
-            notes.push(format!("friction of joint {} is written without its excess at rest: no element has load and speed at once", problem.joints[joint]));
+            notes.push(format!(
+                "friction of joint {} is written without its excess at rest: no element has load and speed at once",
+                problem.joints[joint]
+            ));
         }
         let (even, odd) = (value(Physics::Damper), value(Physics::AsymmetricDamper));
         match (even, odd) {

@@ -225,7 +225,20 @@ fn read(mut top: Table, folder: PathBuf) -> Result<RecordingSet, FileError> {
     let mixed_rates = top.boolean("mixed_rates")?.unwrap_or_default();
     top.finish()?;
     let model = model.map(|name| folder.join(name));
-    Ok(RecordingSet { model, folder, fit, held_out, initial, unknown: unknown_inputs, columns, joints, files, sessions, ignore, mixed_rates })
+    Ok(RecordingSet {
+        model,
+        folder,
+        fit,
+        held_out,
+        initial,
+        unknown: unknown_inputs,
+        columns,
+        joints,
+        files,
+        sessions,
+        ignore,
+        mixed_rates,
+    })
 }
 
 /// The inputs that nobody measured.
