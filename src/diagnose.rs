@@ -25,7 +25,7 @@ pub const REPORT: &str = "report.html";
 pub fn diagnose(options: &cli::Diagnose) -> Result<u8, Failure> {
     let began = Instant::now();
     if let Some((set, model)) = arm::asked(options)? {
-        return arm::diagnose(options, &set, &model, began);
+        return arm::diagnose(options, &set, &model, began).map(exit_code);
     }
     let stop = interrupt::heard()?;
 

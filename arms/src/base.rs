@@ -4,10 +4,11 @@
 //! 8(4), 1991): a parameter whose column depends on those before it is identifiable only together with them.
 
 use crate::error::ArmError;
+use crate::fit::Fit;
 use crate::inertial::{COUNT, NAMES, Parameters};
 use crate::motion::Motion;
 use crate::problem::Problem;
-use crate::regression::{Data, Fit};
+use crate::regression::Data;
 use crate::rigid::regressor;
 use backdrive_diagnosis::verdict::BaseParameter;
 use nalgebra::{DMatrix, DVector};

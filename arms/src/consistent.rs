@@ -5,8 +5,9 @@
 //! log-determinant divergence of Lee, Wensing & Park (Geometric robot dynamic identification, T-RO 36(2), 2020), with a weight so small that it
 //! holds only where the quadratic leaves the cone or does not say.
 
+use crate::fit::{Fit, Weights};
 use crate::inertial::{COUNT, Parameters, pseudo_inertia};
-use crate::regression::{Data, Fit, Weights};
+use crate::regression::Data;
 use nalgebra::{DMatrix, DVector, Matrix4};
 
 /// Weight of the barrier, in the units of the weighted squared residual: far below one independent row.
@@ -16,7 +17,7 @@ const STEPS: usize = 100;
 
 /// The fit with inertial parameters that bodies can have; all else is fitted again beside them. The fit itself where it has them already.
 pub fn consistent(data: &Data, fit: &Fit, weights: &Weights) -> Option<Fit> {
-    let parameters = crate::search::parameters(data, fit);
+    let parameters = data.parameters(fit);
     if parameters.iter().all(is_body) {
         return Some(fit.clone());
     }

@@ -4,10 +4,11 @@ use crate::audit::audit;
 use crate::consistent::consistent;
 use crate::error::ArmError;
 use crate::excitation;
+use crate::fit::Fit;
 use crate::judge::judge;
 use crate::physics::Physics;
 use crate::problem::Problem;
-use crate::regression::{Data, Fit};
+use crate::regression::Data;
 use crate::search::{Search, added, search};
 use crate::verdict::{Parts, verdict};
 use crate::written::{Reading, model_of};
@@ -56,7 +57,7 @@ pub fn diagnose(problem: &Problem, settings: &Settings) -> Result<Found, ArmErro
         *fit = consistent(&data, fit, &found.weights)
             .ok_or_else(|| ArmError::Robot("no inertial parameters that bodies can have were found near the regression's".to_string()))?;
     }
-    whole.see(&crate::search::parameters(&data, &found.best))?;
+    whole.see(&data.parameters(&found.best))?;
     for fit in [&mut found.as_given, &mut found.refit, &mut found.best] {
         slip_of_whole(&whole, fit);
     }

@@ -17,8 +17,10 @@ pub mod diagnose;
 pub mod error;
 pub mod excitation;
 pub mod filter;
+pub mod fit;
 pub mod inertial;
 pub mod judge;
+pub mod layout;
 pub mod log;
 pub mod motion;
 pub mod physics;
@@ -26,6 +28,7 @@ pub mod problem;
 pub mod regression;
 pub mod rigid;
 pub mod search;
+pub mod system;
 pub mod verdict;
 pub mod written;
 

@@ -1,11 +1,14 @@
 //! The regression of the measured torque: rows, columns, weights, and a structure fitted to them.
 
 use crate::error::ArmError;
+use crate::fit::{Fit, Structure, Weights};
 use crate::inertial::{COUNT, Parameters};
+use crate::layout::{Block, Layout, blocks};
 use crate::motion::{Motion, Rates};
 use crate::physics::{At, Physics, Sight, Term};
 use crate::problem::Problem;
 use crate::rigid::{Signals, across, difference, regressor, torques, tree_of};
+use crate::system::{Column, System, scaled_solve};
 use backdrive_plant::elements::Law;
 use nalgebra::{DMatrix, DVector};
 use std::cell::RefCell;
@@ -13,63 +16,8 @@ use std::collections::HashMap;
 use std::ops::Range;
 use std::rc::Rc;
 
-/// Standard deviation that an inertial parameter may have about the file's, in the size of the body: as it stands, as drawn by
-/// somebody careful, as guessed, free.
-pub const TOLERANCES: [f64; 4] = [0.003, 0.02, 0.15, 1.0];
-/// Folds of the blocks: so many times a part of the logs is left out of a fit and predicted.
-const FOLDS: usize = 8;
-/// Blocks in which predictions are compared, at most, over all logs.
-const BLOCKS: usize = 48;
 /// Step of a numerical derivative by a joint's zero, rad or m.
 const STEP: f64 = 1e-4;
-
-/// What a fit has free.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Structure {
-    /// Which of [`TOLERANCES`] the inertial parameters have.
-    pub tolerance: usize,
-    /// Terms of the nominal model, then those that a search has added.
-    pub terms: Vec<Term>,
-    /// Displacement over which friction turns, by joint, rad or m.
-    pub slip: Vec<f64>,
-}
-
-/// Rows of a motion and a joint are neighbours; this says where.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Layout {
-    /// First row and number of rows of a joint, of each motion.
-    motions: Vec<(usize, usize)>,
-    joints: usize,
-    /// Rows in all.
-    pub rows: usize,
-}
-
-impl Layout {
-    /// Rows of a joint in a motion.
-    pub fn of(&self, motion: usize, joint: usize) -> Range<usize> {
-        let (first, count) = self.motions[motion];
-        first + joint * count..first + (joint + 1) * count
-    }
-
-    /// Number of rows that a joint has in a motion.
-    pub fn count(&self, motion: usize) -> usize {
-        self.motions[motion].1
-    }
-}
-
-/// A stretch of a log: the motion, its rows (of every joint), and the fold that it is left out in.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Block {
-    /// Index of the motion.
-    pub motion: usize,
-    /// Rows within a joint.
-    pub rows: Range<usize>,
-    /// The fold; of held-out logs none.
-    pub fold: Option<usize>,
-}
-
-/// A column over all rows.
-pub type Column = Rc<Vec<f64>>;
 
 /// Rows of the regression and everything that its columns are made of.
 pub struct Data<'a> {
@@ -110,7 +58,7 @@ impl<'a> Data<'a> {
         let rates = Rates::of(&logs, corner);
         let motions: Vec<Motion> = logs.iter().map(|log| Motion::of(log, &rates)).collect();
         let joints = problem.joints.len();
-        let mut layout = Layout { motions: Vec::new(), joints, rows: 0 };
+        let mut layout = Layout::new(joints);
         for (motion, log) in motions.iter().zip(&logs) {
             let count = rates.rows(&vec![0.0; motion.len()]).len();
             if count < 12 {
@@ -119,8 +67,7 @@ impl<'a> Data<'a> {
                     format!("is {seconds:.2} s long, too short for a regression below {:.1} Hz; record some seconds more", rates.corner);
                 return Err(ArmError::Log { log: log.name.clone(), message });
             }
-            layout.motions.push((layout.rows, count));
-            layout.rows += count * joints;
+            layout.push(count);
         }
         let fit_count = problem.fit.len();
         let blocks = blocks(&layout, fit_count, rates.row_period());
@@ -304,66 +251,11 @@ pub fn parts_of(law: &Law) -> Vec<(Physics, Vec<f64>)> {
     }
 }
 
-fn blocks(layout: &Layout, fit_count: usize, row_period: f64) -> Vec<Block> {
-    let all: usize = (0..fit_count).map(|m| layout.count(m)).sum();
-    // Not shorter than what a filter smears, and long beside what one reversal is.
-    let least = (1.0 / row_period).ceil() as usize;
-    let length = (all / BLOCKS).max(least).max(4);
-    let mut out = Vec::new();
-    for m in 0..layout.motions.len() {
-        let count = layout.count(m);
-        let pieces = (count / length).max(1);
-        for p in 0..pieces {
-            out.push(Block { motion: m, rows: p * count / pieces..(p + 1) * count / pieces, fold: None });
-        }
-    }
-    let of_fit = out.iter().filter(|b| b.motion < fit_count).count();
-    let folds = FOLDS.min(of_fit);
-    for (i, block) in out.iter_mut().filter(|b| b.motion < fit_count).enumerate() {
-        block.fold = Some(i * folds / of_fit);
-    }
-    out
-}
-
-/// How much each row counts, and how many rows count as one.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Weights {
-    /// Standard deviation of the residual of each joint, N m or N.
-    pub sd: Vec<f64>,
-    /// Correlation time of the residual of each joint, rows, at least 1.
-    pub time: Vec<f64>,
-}
-
-/// A structure fitted to the logs for fitting.
-#[derive(Debug, Clone)]
-pub struct Fit {
-    /// What was free.
-    pub structure: Structure,
-    /// Changes of the inertial parameters in their sizes, then the numbers of the terms in their order.
-    pub values: Vec<f64>,
-    /// Standard errors of the same: the larger one of that of the fit and that of the folds (jackknife).
-    pub errors: Vec<f64>,
-    /// Where each term's numbers are in the values.
-    pub places: Vec<Range<usize>>,
-    /// Residuals of all rows.
-    pub residual: Vec<f64>,
-    /// Residuals of the rows for fitting, each by a fit that has not seen it; of held-out rows as `residual`.
-    pub unseen: Vec<f64>,
-    /// How many numbers the data have determined.
-    pub numbers: f64,
-    /// Twice the negative logarithm of the evidence, but for a constant; smaller is better.
-    pub score: f64,
-    /// What of that the inertial parameters cost: how far they are from the file's, and how much the data narrow them down.
-    occam: f64,
-    covariance: DMatrix<f64>,
-    of_folds: Vec<DVector<f64>>,
-}
-
 impl Data<'_> {
     /// Fits a structure with these weights.
     pub fn fit(&self, structure: &Structure, weights: &Weights) -> Option<Fit> {
         let (columns, places) = self.all_columns(structure);
-        let system = System::new(self, &columns, structure, weights, self.inertial.len());
+        let system = self.system_of(&columns, structure, weights);
         let values = system.solve(None)?;
         let of_folds: Vec<Option<DVector<f64>>> = (0..system.folds.len()).map(|f| system.solve(Some(f))).collect();
         let predicted = |values: &DVector<f64>, row: usize| columns.iter().zip(values.iter()).map(|(c, x)| c[row] * x).sum::<f64>();
@@ -404,6 +296,20 @@ impl Data<'_> {
         let (columns, _) = self.all_columns(&fit.structure);
         let predicted = |row: usize| columns.iter().zip(&fit.values).map(|(c, x)| c[row] * x).sum::<f64>();
         (0..self.layout.rows).map(|row| self.torque[row] - self.nominal[row] - predicted(row)).collect()
+    }
+
+    fn system_of(&self, columns: &[Column], structure: &Structure, weights: &Weights) -> System {
+        let left: Vec<f64> = self.torque.iter().zip(&self.nominal).map(|(t, n)| t - n).collect();
+        System::new(&self.layout, &self.blocks, &left, columns, structure.tolerance, weights, self.inertial.len())
+    }
+
+    /// Inertial parameters of a fit, by body.
+    pub fn parameters(&self, fit: &Fit) -> Vec<Parameters> {
+        let bodies = &self.problem.bodies;
+        let of = |(k, (nominal, scale)): (usize, (&Parameters, &Parameters))| {
+            std::array::from_fn(|i| nominal[i] + scale[i] * fit.values[k * COUNT + i])
+        };
+        bodies.nominal.iter().zip(&bodies.scale).enumerate().map(of).collect()
     }
 
     fn all_columns(&self, structure: &Structure) -> (Vec<Column>, Vec<Range<usize>>) {
@@ -491,7 +397,7 @@ impl Data<'_> {
     /// A fit whose inertial parameters are set, in their sizes; all other numbers are fitted again. Standard errors stay those of the fit.
     pub fn fit_beside(&self, fit: &Fit, inertial: &[f64], weights: &Weights) -> Option<Fit> {
         let (columns, _) = self.all_columns(&fit.structure);
-        let system = System::new(self, &columns, &fit.structure, weights, self.inertial.len());
+        let system = self.system_of(&columns, &fit.structure, weights);
         let n = self.inertial.len();
         let rest = columns.len() - n;
         let mut values = DVector::from_iterator(columns.len(), inertial.iter().copied().chain(std::iter::repeat_n(0.0, rest)));
@@ -514,167 +420,9 @@ impl Data<'_> {
     /// The system of a structure, for [`Data::promise`].
     pub fn system(&self, structure: &Structure, weights: &Weights) -> Option<(System, DVector<f64>)> {
         let (columns, _) = self.all_columns(structure);
-        let system = System::new(self, &columns, structure, weights, self.inertial.len());
+        let system = self.system_of(&columns, structure, weights);
         let values = system.solve(None)?;
         Some((system, values))
-    }
-}
-
-/// Solves a positive definite system whose unknowns have very different sizes.
-fn scaled_solve(matrix: &DMatrix<f64>, right: &DMatrix<f64>) -> Option<DMatrix<f64>> {
-    let n = matrix.nrows();
-    let scale = DVector::from_fn(n, |i, _| 1.0 / matrix[(i, i)].max(1e-300).sqrt());
-    let scaled = DMatrix::from_fn(n, n, |i, j| matrix[(i, j)] * scale[i] * scale[j]);
-    let right = DMatrix::from_fn(n, right.ncols(), |i, j| right[(i, j)] * scale[i]);
-    let solved = scaled.cholesky()?.solve(&right);
-    Some(DMatrix::from_fn(n, solved.ncols(), |i, j| solved[(i, j)] * scale[i]))
-}
-
-/// Weighted rows for fitting, and normal equations with the prior of the inertial parameters.
-pub struct System {
-    matrix: DMatrix<f64>,
-    right: DVector<f64>,
-    rows: Vec<(usize, f64)>,
-    prior: DVector<f64>,
-    scale: DVector<f64>,
-    total: DMatrix<f64>,
-    total_right: DVector<f64>,
-    folds: Vec<(DMatrix<f64>, DVector<f64>)>,
-    factor: Factor,
-}
-
-/// A factored matrix in scaled unknowns.
-struct Factor {
-    cholesky: Option<nalgebra::Cholesky<f64, nalgebra::Dyn>>,
-    scale: DVector<f64>,
-}
-
-impl Factor {
-    fn new(matrix: &DMatrix<f64>, scale: &DVector<f64>) -> Factor {
-        let scaled = DMatrix::from_fn(matrix.nrows(), matrix.ncols(), |i, j| matrix[(i, j)] * scale[i] * scale[j]);
-        Factor { cholesky: scaled.cholesky(), scale: scale.clone() }
-    }
-
-    fn solve(&self, right: &DVector<f64>) -> DVector<f64> {
-        let scaled = right.component_mul(&self.scale);
-        match &self.cholesky {
-            Some(c) => c.solve(&scaled).component_mul(&self.scale),
-            None => DVector::zeros(right.len()),
-        }
-    }
-}
-
-impl System {
-    fn new(data: &Data, columns: &[Column], structure: &Structure, weights: &Weights, inertial: usize) -> System {
-        let joints = data.layout.joints;
-        let weight: Vec<f64> = (0..joints).map(|j| 1.0 / (weights.sd[j] * weights.time[j].sqrt())).collect();
-        let mut rows = Vec::new();
-        let mut of_fold: Vec<Vec<usize>> = Vec::new();
-        for block in data.blocks.iter() {
-            let Some(fold) = block.fold else { continue };
-            of_fold.resize(of_fold.len().max(fold + 1), Vec::new());
-            for (joint, w) in weight.iter().enumerate() {
-                let first = data.layout.of(block.motion, joint).start;
-                for row in first + block.rows.start..first + block.rows.end {
-                    of_fold[fold].push(rows.len());
-                    rows.push((row, *w));
-                }
-            }
-        }
-        let matrix = DMatrix::from_fn(rows.len(), columns.len(), |i, j| columns[j][rows[i].0] * rows[i].1);
-        let right = DVector::from_fn(rows.len(), |i, _| (data.torque[rows[i].0] - data.nominal[rows[i].0]) * rows[i].1);
-        let mut first = 0;
-        let mut folds = Vec::new();
-        for fold in &of_fold {
-            // Rows of a fold are neighbours.
-            let part = matrix.rows(first, fold.len());
-            folds.push((part.tr_mul(&part), part.tr_mul(&right.rows(first, fold.len()))));
-            first += fold.len();
-        }
-        let n = columns.len();
-        let mut total = DMatrix::zeros(n, n);
-        let mut total_right = DVector::zeros(n);
-        for (m, r) in &folds {
-            total += m;
-            total_right += r;
-        }
-        let tolerance = TOLERANCES.get(structure.tolerance).copied().unwrap_or(1.0);
-        let prior = DVector::from_fn(n, |i, _| if i < inertial { 1.0 / (tolerance * tolerance) } else { 1e-9 * total[(i, i)] + 1e-300 });
-        let scale = DVector::from_fn(n, |i, _| 1.0 / (total[(i, i)] + prior[i]).max(1e-300).sqrt());
-        let factor = Factor::new(&(&total + DMatrix::from_diagonal(&prior)), &scale);
-        System { matrix, right, rows, prior, scale, total, total_right, folds, factor }
-    }
-
-    fn solve(&self, without: Option<usize>) -> Option<DVector<f64>> {
-        let Some((matrix, right)) = without.and_then(|f| self.folds.get(f)) else {
-            self.factor.cholesky.as_ref()?;
-            return Some(self.factor.solve(&self.total_right));
-        };
-        let factor = Factor::new(&(&self.total - matrix + DMatrix::from_diagonal(&self.prior)), &self.scale);
-        factor.cholesky.as_ref()?;
-        Some(factor.solve(&(&self.total_right - right)))
-    }
-
-    fn weighted(&self, column: &Column) -> DVector<f64> {
-        DVector::from_fn(self.rows.len(), |i, _| column[self.rows[i].0] * self.rows[i].1)
-    }
-
-    fn residual(&self, values: &DVector<f64>) -> DVector<f64> {
-        &self.right - &self.matrix * values
-    }
-
-    /// `δᵀ P δ + ln det(H) - ln det(P)` of the inertial parameters, the first `n`, with H their own curvature where all else follows.
-    fn occam(&self, values: &DVector<f64>, n: usize) -> Option<f64> {
-        let log_det = |from: usize| -> Option<f64> {
-            let count = values.len() - from;
-            let whole = &self.total + DMatrix::from_diagonal(&self.prior);
-            let part = DMatrix::from_fn(count, count, |i, j| whole[(from + i, from + j)] * self.scale[from + i] * self.scale[from + j]);
-            let scales: f64 = (from..values.len()).map(|i| self.scale[i].ln()).sum();
-            if count == 0 {
-                return Some(0.0);
-            }
-            Some(2.0 * part.cholesky()?.l().diagonal().iter().map(|d| d.ln()).sum::<f64>() - 2.0 * scales)
-        };
-        let prior: f64 = (0..n).map(|i| values[i] * values[i] * self.prior[i] - self.prior[i].ln()).sum();
-        Some(prior + log_det(0)? - log_det(n)?)
-    }
-
-    /// Standard errors, and how many numbers the data determine.
-    fn errors(
-        &self,
-        values: &DVector<f64>,
-        of_folds: &[Option<DVector<f64>>],
-        structure: &Structure,
-    ) -> Option<(Vec<f64>, f64, DMatrix<f64>)> {
-        let n = values.len();
-        let mut covariance = DMatrix::zeros(n, n);
-        self.factor.cholesky.as_ref()?;
-        let mut errors = Vec::with_capacity(n);
-        let mut numbers = 0.0;
-        let folds: Vec<&DVector<f64>> = of_folds.iter().flatten().collect();
-        for i in 0..n {
-            let mut unit = DVector::zeros(n);
-            unit[i] = 1.0;
-            let variance = self.factor.solve(&unit);
-            covariance.set_column(i, &variance);
-            // Of the trace of (G + P)⁻¹ G: what the data say beside what was known before.
-            numbers += 1.0 - variance[i] * self.prior[i];
-            let mean = folds.iter().map(|f| f[i]).sum::<f64>() / folds.len().max(1) as f64;
-            let k = folds.len() as f64;
-            let jackknife = folds.iter().map(|f| (f[i] - mean).powi(2)).sum::<f64>() * (k - 1.0).max(0.0) / k.max(1.0);
-            errors.push(variance[i].max(jackknife).max(0.0).sqrt());
-        }
-        // Numbers of a shape were searched, and are no columns.
-        let searched: usize = structure.terms.iter().filter(|t| t.given.is_none()).map(|t| shape_numbers(t)).sum();
-        Some((errors, numbers + searched as f64, covariance))
-    }
-}
-
-/// Numbers of a term in which the torque is not linear, where they are searched.
-fn shape_numbers(term: &Term) -> usize {
-    match term.physics {
-        Physics::Stribeck | Physics::Presliding | Physics::Cogging => 1,
-        _ => 0,
     }
 }
 
@@ -694,16 +442,4 @@ fn correlation_time(part: &[f64]) -> f64 {
         sum += correlation;
     }
     1.0 + 2.0 * sum
-}
-
-impl Fit {
-    /// Standard error of a sum of values, each with its factor.
-    pub fn spread(&self, factors: &[(usize, f64)]) -> f64 {
-        let own: f64 = factors.iter().map(|(i, f)| factors.iter().map(|(j, g)| f * g * self.covariance[(*i, *j)]).sum::<f64>()).sum();
-        let folds: Vec<f64> = self.of_folds.iter().map(|v| factors.iter().map(|(i, f)| f * v[*i]).sum()).collect();
-        let k = folds.len() as f64;
-        let mean = folds.iter().sum::<f64>() / k.max(1.0);
-        let jackknife = folds.iter().map(|x| (x - mean).powi(2)).sum::<f64>() * (k - 1.0).max(0.0) / k.max(1.0);
-        own.max(jackknife).max(0.0).sqrt()
-    }
 }

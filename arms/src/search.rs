@@ -2,9 +2,9 @@
 
 use crate::consistent::consistent;
 use crate::error::ArmError;
-use crate::inertial::{COUNT, Parameters};
+use crate::fit::{Fit, Structure, TOLERANCES, Weights};
 use crate::physics::{Physics, Term, candidates};
-use crate::regression::{Data, Fit, Structure, TOLERANCES, Weights};
+use crate::regression::Data;
 use backdrive_diagnosis::predictive::{Gain, gain};
 
 /// Physics that are added at most.
@@ -73,7 +73,7 @@ pub fn search(data: &mut Data, without: &[String]) -> Result<Search, ArmError> {
         grow(data, &pool, &mut best, &weights, &mut tried);
         if round == 0 {
             let bodies = consistent(data, &best, &weights).ok_or_else(failed)?;
-            data.see(&parameters(data, &bodies))?;
+            data.see(&data.parameters(&bodies))?;
             best = data.fit(&best.structure, &weights).ok_or_else(failed)?;
             weights = data.weights(&best.residual);
         }
@@ -92,18 +92,6 @@ pub fn search(data: &mut Data, without: &[String]) -> Result<Search, ArmError> {
 /// Terms that a search has added, by index.
 pub fn added(structure: &Structure) -> Vec<usize> {
     (0..structure.terms.len()).filter(|i| structure.terms[*i].given.is_none()).collect()
-}
-
-/// Inertial parameters of a fit, by body.
-pub fn parameters(data: &Data, fit: &Fit) -> Vec<Parameters> {
-    let bodies = &data.problem.bodies;
-    bodies
-        .nominal
-        .iter()
-        .zip(&bodies.scale)
-        .enumerate()
-        .map(|(k, (nominal, scale))| std::array::from_fn(|i| nominal[i] + scale[i] * fit.values[k * COUNT + i]))
-        .collect()
 }
 
 /// Residuals of a structure that has plain friction and armature at every joint and free inertial parameters: what scatters beside them.
@@ -132,7 +120,7 @@ fn first_weights(data: &Data, nominal: &Structure) -> Option<Weights> {
 /// Mean squared unseen residuals by block, weighted over the joints, in lists of neighbours.
 pub fn by_block(data: &Data, residual: &[f64], weights: &Weights, held_out: bool) -> Vec<Vec<f64>> {
     let motions = if held_out { data.fit_count..data.motions.len() } else { 0..data.fit_count };
-    let of_block = |block: &crate::regression::Block| -> f64 {
+    let of_block = |block: &crate::layout::Block| -> f64 {
         (0..data.problem.joints.len())
             .map(|j| {
                 let first = data.layout.of(block.motion, j).start;

@@ -2,9 +2,10 @@
 
 use crate::base;
 use crate::error::ArmError;
+use crate::fit::Fit;
 use crate::physics::{At, Physics, Term};
-use crate::regression::{Data, Fit};
-use crate::search::{LEAST_SHARE, Search, added, by_block, parameters};
+use crate::regression::Data;
+use crate::search::{LEAST_SHARE, Search, added, by_block};
 use crate::written::gravity_of;
 use backdrive_diagnosis::hypothesis::Place;
 use backdrive_diagnosis::predictive::gain;
@@ -271,7 +272,7 @@ fn moved(data: &Data, search: &Search) -> BTreeMap<String, Moved> {
         }
     }
     if best.structure.tolerance > 0 {
-        for (k, (found, nominal)) in parameters(data, best).iter().zip(&data.problem.bodies.nominal).enumerate() {
+        for (k, (found, nominal)) in data.parameters(best).iter().zip(&data.problem.bodies.nominal).enumerate() {
             for (i, name) in crate::inertial::NAMES.iter().enumerate() {
                 let index = k * crate::inertial::COUNT + i;
                 let error = best.errors[index] * data.problem.bodies.scale[k][i];
@@ -327,7 +328,7 @@ fn arm_part(
             }
         })
         .collect();
-    let base_parameters = base::of_fit(data, &search.best, &parameters(data, &search.best))?;
+    let base_parameters = base::of_fit(data, &search.best, &data.parameters(&search.best))?;
     Ok(ArmPart { corner_hz: data.rates.corner, joints, base_parameters })
 }
 

@@ -1,10 +1,10 @@
 //! The model with what was found: links, joint networks and pose, as a model that simulates and exports as any other.
 
 use crate::error::ArmError;
+use crate::fit::Fit;
 use crate::physics::{At, Physics, Term};
-use crate::regression::{Data, Fit, parts_of};
+use crate::regression::{Data, parts_of};
 use crate::rigid::across;
-use crate::search::parameters;
 use backdrive_plant::elements::{
     AsymmetricDamper, Bias, Cogging, Coulomb, Dahl, Damper, Law, LoadFriction, QuadraticDrag, Spring, Stribeck,
 };
@@ -73,7 +73,7 @@ pub fn model_of(data: &Data, fit: &Fit) -> Result<(Model, Vec<String>), ArmError
     let mut notes = Vec::new();
     let Some(arm) = model.arm.take() else { return Err(ArmError::NoRobot(problem.model_file.display().to_string())) };
     let reading = Reading::of(data, fit);
-    let mut inertial = parameters(data, fit);
+    let mut inertial = data.parameters(fit);
     for (term, place) in fit.structure.terms.iter().zip(&fit.places).filter(|(t, _)| t.physics == Physics::Payload) {
         let Some(last) = inertial.last_mut() else { continue };
         let added = match data.problem.bodies.tip.filter(|_| term.shape.is_empty()) {

@@ -1,7 +1,6 @@
 //! `backdrive diagnose` of a model with a robot: logs of position and torque of every joint.
 
 use crate::cli;
-use crate::diagnose::exit_code;
 use crate::failure::Failure;
 use crate::output;
 use crate::recordings;
@@ -9,7 +8,7 @@ use backdrive_arms::diagnose::{EXPERIMENT_FILE, Found, Settings, diagnose as dia
 use backdrive_arms::problem::Problem;
 use backdrive_arms::verdict::words;
 use backdrive_diagnosis::audit::Weight;
-use backdrive_diagnosis::verdict::{Estimate, Finding, MODEL_FILE, Parameter, VERDICT_FILE};
+use backdrive_diagnosis::verdict::{Estimate, Finding, MODEL_FILE, Parameter, VERDICT_FILE, Word};
 use backdrive_diagnosis::words as said;
 use backdrive_plant::model::Model;
 use backdrive_plant::set::RecordingSet;
@@ -33,7 +32,7 @@ pub fn asked(options: &cli::Diagnose) -> Result<Option<(RecordingSet, PathBuf)>,
 }
 
 /// Diagnoses an arm, writes, and says what was found.
-pub fn diagnose(options: &cli::Diagnose, set: &RecordingSet, model: &Path, began: Instant) -> Result<u8, Failure> {
+pub fn diagnose(options: &cli::Diagnose, set: &RecordingSet, model: &Path, began: Instant) -> Result<Word, Failure> {
     let files: Vec<PathBuf> =
         std::iter::once(model.to_path_buf()).chain(set.fit.iter().chain(&set.held_out).map(|f| set.path_of(f))).collect();
     for name in [MODEL_FILE, EXPERIMENT_FILE] {
@@ -57,7 +56,7 @@ pub fn diagnose(options: &cli::Diagnose, set: &RecordingSet, model: &Path, began
         let names = [VERDICT_FILE, MODEL_FILE, EXPERIMENT_FILE].join(", ");
         output::line(format_args!("wrote     {}: {names} ({seconds:.1} s)", options.out.display()))?;
     }
-    Ok(exit_code(found.verdict.word))
+    Ok(found.verdict.word)
 }
 
 /// What was found, for a terminal.

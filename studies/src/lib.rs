@@ -24,7 +24,6 @@ mod silverbox;
 pub mod steering;
 mod tue_bilateral;
 
-pub use backdrive_arms::filter;
 pub use error::StudyError;
 pub use study::{Context, Study};
 
