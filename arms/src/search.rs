@@ -17,6 +17,8 @@ const WORTH: f64 = 10.0;
 pub const LEAST_SHARE: f64 = 0.03;
 /// The least share of the rms torque of a joint, that where it shows most, that a physics has to be.
 pub const LEAST_TORQUE: f64 = 0.005;
+/// The least mass of a payload, as a share of the last body's own: a lighter one is as likely that body's mass, which nobody knows better.
+pub const LEAST_PAYLOAD: f64 = 0.15;
 /// Rounds in which the friction's displacement is sought.
 const SLIP_STEPS: usize = 12;
 
@@ -154,12 +156,18 @@ fn torque_share(data: &Data, fit: &Fit, index: usize) -> f64 {
     (0..data.problem.joints.len()).map(share).fold(0.0, f64::max)
 }
 
-/// Whether what must not be negative is not.
-fn is_possible(fit: &Fit) -> bool {
+/// Whether what must not be negative is not, and a payload is one.
+fn is_possible(data: &Data, fit: &Fit) -> bool {
+    let last = data.problem.bodies.nominal.last().map_or(0.0, |p| p[0]);
     fit.structure.terms.iter().zip(&fit.places).all(|(term, place)| {
         let (value, error) = (fit.values[place.start], fit.errors[place.start]);
-        // What the file states may be nothing, what is added is something.
-        !term.physics.facts().positive || value > if term.given.is_some() { -3.0 * error } else { 0.0 }
+        let least = match (term.given, term.physics) {
+            // What the file states may be nothing, what is added is something.
+            (Some(_), _) => -3.0 * error,
+            (None, Physics::Payload) => LEAST_PAYLOAD * last,
+            (None, _) => 0.0,
+        };
+        !term.physics.facts().positive || value > least
     })
 }
 
@@ -208,7 +216,7 @@ fn shaped(data: &Data, fit: Fit, index: usize, weights: &Weights) -> Fit {
         for factor in [step, 1.0 / step] {
             let mut structure = best.structure.clone();
             structure.terms[index].shape[0] *= factor;
-            if let Some(other) = data.fit(&structure, weights).filter(|f| f.score < best.score && is_possible(f)) {
+            if let Some(other) = data.fit(&structure, weights).filter(|f| f.score < best.score && is_possible(data, f)) {
                 best = other;
                 moved = true;
                 break;
@@ -273,7 +281,7 @@ fn grow(data: &Data, pool: &[Term], best: &mut Fit, weights: &Weights, tried: &m
             let fit = shaped(data, fit, index, weights);
             // Beside some physics the file's inertial parameters are better, beside others worse than alone.
             let fit = tolerated(data, fit, weights);
-            if is_possible(&fit) && torque_share(data, &fit, index) >= LEAST_TORQUE {
+            if is_possible(data, &fit) && torque_share(data, &fit, index) >= LEAST_TORQUE {
                 offers.push(fit);
             }
         }
@@ -346,7 +354,7 @@ fn exchange(data: &Data, pool: &[Term], best: &mut Fit, weights: &Weights) {
                     let last = fit.structure.terms.len() - 1;
                     offers.push(shaped(data, fit, last, weights));
                 }
-                offers.retain(is_possible);
+                offers.retain(|offer| is_possible(data, offer));
                 offers.sort_by(|a, b| a.score.total_cmp(&b.score));
                 for offer in offers {
                     let now = better.as_ref().unwrap_or(best);
@@ -414,7 +422,7 @@ fn rivals(data: &Data, pool: &[Term], best: &Fit, index: usize, weights: &Weight
         let Some(fit) = data.fit(&with(&less, &term), weights) else { continue };
         let last = fit.structure.terms.len() - 1;
         let fit = shaped(data, fit, last, weights);
-        if is_possible(&fit) {
+        if is_possible(data, &fit) {
             out.push((term, fit.score - best.score));
         }
     }
