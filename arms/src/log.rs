@@ -76,11 +76,10 @@ pub fn joints_of(set: &mut RecordingSet, coordinates: &[Coordinate], first: &str
         }
     }
     set.columns.extend(columns);
-    if !set.columns.iter().any(|c| c.0 == "t") && !plain.contains(&"t") {
-        if let Some(time) = plain.iter().find(|h| ["time", "time_s", "timestamp"].contains(h)) {
-            let rule = backdrive_plant::recording::ColumnRule::of(backdrive_plant::recording::Source::Column((*time).to_string()));
-            set.columns.push(("t".to_string(), rule));
-        }
+    let usual = plain.iter().find(|h| ["time", "time_s", "timestamp"].contains(h));
+    if let Some(time) = usual.filter(|_| !set.columns.iter().any(|c| c.0 == "t") && !plain.contains(&"t")) {
+        let rule = backdrive_plant::recording::ColumnRule::of(backdrive_plant::recording::Source::Column((*time).to_string()));
+        set.columns.push(("t".to_string(), rule));
     }
     Ok(found)
 }

@@ -158,6 +158,9 @@ impl Term {
     }
 }
 
+/// A signal at each joint where it shows.
+pub type AtJoints = Vec<(usize, Vec<f64>)>;
+
 /// What columns are made of: a motion, and what is known of its torques.
 pub struct Sight<'a> {
     /// The arm.
@@ -199,7 +202,7 @@ impl Sight<'_> {
     }
 
     /// Columns of a term: for each of its linear numbers the signals at the joints where it shows, before any filter.
-    pub fn columns(&self, term: &Term) -> Vec<Vec<(usize, Vec<f64>)>> {
+    pub fn columns(&self, term: &Term) -> Vec<AtJoints> {
         let motion = self.motion;
         let shape = |i: usize| term.shape.get(i).copied().unwrap_or(1.0);
         let (j, other) = match term.at {
@@ -210,7 +213,7 @@ impl Sight<'_> {
         let v = &motion.velocity[j];
         let q = &motion.position[j];
         let one = |signal: Vec<f64>| vec![vec![(j, signal)]];
-        let all = |signals: &Signals, factor: f64| -> Vec<(usize, Vec<f64>)> {
+        let all = |signals: &Signals, factor: f64| -> AtJoints {
             signals.iter().enumerate().map(|(k, s)| (k, s.iter().map(|x| factor * x).collect())).collect()
         };
         match term.physics {

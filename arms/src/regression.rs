@@ -5,7 +5,7 @@ use crate::fit::{Fit, Structure, Weights};
 use crate::inertial::{COUNT, Parameters};
 use crate::layout::{Block, Layout, blocks};
 use crate::motion::{Motion, Rates};
-use crate::physics::{At, Physics, Sight, Term};
+use crate::physics::{At, AtJoints, Physics, Sight, Term};
 use crate::problem::Problem;
 use crate::rigid::{Signals, across, difference, regressor, torques, tree_of};
 use crate::system::{Column, System, scaled_solve};
@@ -171,7 +171,7 @@ impl<'a> Data<'a> {
         if let Some(found) = self.cache.borrow().get(&key) {
             return found.clone();
         }
-        let parts: Vec<Vec<Vec<(usize, Vec<f64>)>>> = (0..self.motions.len())
+        let parts: Vec<Vec<AtJoints>> = (0..self.motions.len())
             .map(|m| {
                 let sight = Sight {
                     problem: self.problem,

@@ -163,7 +163,7 @@ impl System {
             errors.push(variance[i].max(jackknife).max(0.0).sqrt());
         }
         // Numbers of a shape were searched, and are no columns.
-        let searched: usize = structure.terms.iter().filter(|t| t.given.is_none()).map(|t| shape_numbers(t)).sum();
+        let searched: usize = structure.terms.iter().filter(|t| t.given.is_none()).map(shape_numbers).sum();
         Some((errors, numbers + searched as f64, covariance))
     }
 }

@@ -56,7 +56,7 @@ pub fn place(data: &Data, term: &Term) -> Place {
 pub fn verdict(parts: Parts) -> Result<Verdict, ArmError> {
     let Parts { data, whole, search, audit, loops, next } = parts;
     let findings = findings(data, search);
-    let held = search.best.residual.len() > 0 && data.fit_count < data.motions.len();
+    let held = data.fit_count < data.motions.len();
     let moved = moved(data, search);
     let refit_helps =
         gain(&by_block(data, shown(&search.as_given), &search.weights, held), &by_block(data, shown(&search.refit), &search.weights, held))
