@@ -140,7 +140,7 @@ pub struct Term {
     /// Where.
     pub at: At,
     /// Stribeck: speed, rad/s or m/s. Presliding: displacement to full slip, rad or m. Cogging: period, rad or m. Coupled friction: ratio.
-    /// Payload: 1 where its place is free.
+    /// Payload: 1 where its place is free. Offset and direction of gravity: their values of the fit before, for what is of second order.
     pub shape: Vec<f64>,
     /// The element of the nominal model that it is; `None` for what a search has added.
     pub given: Option<usize>,
@@ -173,7 +173,9 @@ pub struct Sight<'a> {
     pub load: &'a Signals,
     /// Of each joint's zero: derivative of all rigid torques by it.
     pub by_position: &'a [Signals],
-    /// Rigid torques per rad of tilt of gravity, in two directions.
+    /// The same, second derivative.
+    pub curved: &'a [Signals],
+    /// Rigid torques per rad of tilt of gravity, in two directions, and those of gravity itself.
     pub by_tilt: &'a [Signals],
     /// Torque per unit of each inertial parameter of the last body.
     pub by_payload: &'a [Signals],
@@ -232,7 +234,11 @@ impl Sight<'_> {
             }
             Physics::Inertia => one(motion.acceleration[j].clone()),
             Physics::Gain => one(self.load[j].clone()),
-            Physics::Offset => vec![all(&self.by_position[j], -1.0)],
+            Physics::Offset => {
+                // τ(q - o) - τ(q) = -o τ' + o²/2 τ'', with o of the square from the fit before.
+                let half = 0.5 * term.shape.first().copied().unwrap_or(0.0);
+                vec![plus(all(&self.by_position[j], -1.0), &self.curved[j], half)]
+            }
             Physics::Payload => match self.problem.bodies.tip.filter(|_| term.shape.is_empty()) {
                 Some(tip) => {
                     let p = crate::inertial::of_point(&tip);
@@ -246,7 +252,12 @@ impl Sight<'_> {
                 }
                 None => self.by_payload.iter().take(4).map(|s| all(s, 1.0)).collect(),
             },
-            Physics::GravityDirection => self.by_tilt.iter().map(|s| all(s, 1.0)).collect(),
+            Physics::GravityDirection => {
+                // A direction keeps its length: what is tilted sideways by a and b pulls (a² + b²)/2 less downwards.
+                let Some((down, sideways)) = self.by_tilt.split_last() else { return Vec::new() };
+                let before = |i: usize| term.shape.get(i).copied().unwrap_or(0.0);
+                sideways.iter().enumerate().map(|(i, s)| plus(all(s, 1.0), down, -0.5 * before(i))).collect()
+            }
             // As it was measured: the motor carries the other joint's friction too.
             Physics::Coupling => one(motion.torque[other].clone()),
             Physics::CoupledFriction => {
@@ -262,6 +273,13 @@ impl Sight<'_> {
             }
         }
     }
+}
+
+fn plus(mut signals: AtJoints, other: &Signals, factor: f64) -> AtJoints {
+    for ((_, signal), other) in signals.iter_mut().zip(other) {
+        signal.iter_mut().zip(other).for_each(|(s, o)| *s += factor * o);
+    }
+    signals
 }
 
 /// Every physics at every place, with the shapes that a search tries first.

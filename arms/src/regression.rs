@@ -18,6 +18,8 @@ use std::rc::Rc;
 
 /// Step of a numerical derivative by a joint's zero, rad or m.
 const STEP: f64 = 1e-4;
+/// The same for a second derivative.
+const WIDE: f64 = 1e-2;
 
 /// Rows of the regression and everything that its columns are made of.
 pub struct Data<'a> {
@@ -41,6 +43,7 @@ pub struct Data<'a> {
     pub blocks: Vec<Block>,
     load: Vec<Signals>,
     by_position: Vec<Vec<Signals>>,
+    curved: Vec<Vec<Signals>>,
     by_tilt: Vec<Vec<Signals>>,
     by_payload: Vec<Vec<Signals>>,
     cache: RefCell<HashMap<String, Vec<Column>>>,
@@ -83,6 +86,7 @@ impl<'a> Data<'a> {
             blocks,
             load: Vec::new(),
             by_position: Vec::new(),
+            curved: Vec::new(),
             by_tilt: Vec::new(),
             by_payload: Vec::new(),
             cache: RefCell::new(HashMap::new()),
@@ -117,25 +121,28 @@ impl<'a> Data<'a> {
             other.gravity += direction * robot.gravity.norm();
             other
         });
-        let tilted = [tree_of(&tilted[0])?, tree_of(&tilted[1])?];
+        let mut weightless = robot.clone();
+        weightless.gravity.fill(0.0);
+        let (tilted, weightless) = ([tree_of(&tilted[0])?, tree_of(&tilted[1])?], tree_of(&weightless)?);
         self.load = self.motions.iter().map(|m| torques(&tree, m, &[])).collect();
-        self.by_position = self
-            .motions
-            .iter()
-            .map(|motion| {
-                let by = |j: usize| {
-                    let moved = |step: f64| {
-                        let mut offsets = vec![0.0; joints];
-                        offsets[j] = -step;
-                        torques(&tree, motion, &offsets)
-                    };
-                    difference(&moved(STEP), &moved(-STEP), 0.5 / STEP)
-                };
-                (0..joints).map(by).collect()
-            })
-            .collect();
+        let moved = |motion: &Motion, j: usize, step: f64| {
+            let mut offsets = vec![0.0; joints];
+            offsets[j] = -step;
+            torques(&tree, motion, &offsets)
+        };
+        let slope = |motion: &Motion, j| difference(&moved(motion, j, STEP), &moved(motion, j, -STEP), 0.5 / STEP);
+        self.by_position = self.motions.iter().map(|motion| (0..joints).map(|j| slope(motion, j)).collect()).collect();
+        let curve = |m: usize, j| {
+            let (up, down) = (moved(&self.motions[m], j, WIDE), moved(&self.motions[m], j, -WIDE));
+            let half = |a: &Signals| difference(a, &self.load[m], 1.0 / (WIDE * WIDE));
+            half(&up).into_iter().zip(half(&down)).map(|(a, b)| a.iter().zip(&b).map(|(x, y)| x + y).collect()).collect()
+        };
+        self.curved = (0..self.motions.len()).map(|m| (0..joints).map(|j| curve(m, j)).collect()).collect();
         let load = &self.load;
-        let by_tilt = |(m, motion): (usize, &Motion)| tilted.iter().map(|t| difference(&torques(t, motion, &[]), &load[m], 1.0)).collect();
+        let by_tilt = |(m, motion): (usize, &Motion)| -> Vec<Signals> {
+            let of_tilt = tilted.iter().map(|t| difference(&torques(t, motion, &[]), &load[m], 1.0));
+            of_tilt.chain(std::iter::once(difference(&load[m], &torques(&weightless, motion, &[]), 1.0))).collect()
+        };
         self.by_tilt = self.motions.iter().enumerate().map(by_tilt).collect();
         self.cache.borrow_mut().clear();
         Ok(())
@@ -179,6 +186,7 @@ impl<'a> Data<'a> {
                     rates: &self.rates,
                     load: &self.load[m],
                     by_position: &self.by_position[m],
+                    curved: &self.curved[m],
                     by_tilt: &self.by_tilt[m],
                     by_payload: &self.by_payload[m],
                     slip,

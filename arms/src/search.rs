@@ -16,7 +16,7 @@ const WORTH: f64 = 10.0;
 /// The least share of the mean squared residual of unseen stretches, at the joint where it shows most, that a physics has to take.
 pub const LEAST_SHARE: f64 = 0.03;
 /// The least share of the rms torque of a joint, that where it shows most, that a physics has to be.
-pub const LEAST_TORQUE: f64 = 0.005;
+pub const LEAST_TORQUE: f64 = 0.01;
 /// The least mass of a payload, as a share of the last body's own: a lighter one is as likely that body's mass, which nobody knows better.
 pub const LEAST_PAYLOAD: f64 = 0.15;
 /// Rounds in which the friction's displacement is sought.
@@ -193,7 +193,10 @@ fn ranked(data: &Data, pool: &[Term], structure: &Structure, weights: &Weights) 
     let mut out: Vec<(Term, f64)> = Vec::new();
     for term in pool.iter().filter(|t| !structure.terms.iter().any(|there| there.is_like(t))) {
         let promise = data.promise(&system, &values, &data.columns(term, &structure.slip)) - 8.0 * term.physics.facts().numbers as f64;
-        match out.iter_mut().find(|(other, _)| other.is_like(term) && other.shape.is_empty() == term.shape.is_empty()) {
+        match out
+            .iter_mut()
+            .find(|(other, _)| other.is_like(term) && (term.physics != Physics::Payload || other.shape.is_empty() == term.shape.is_empty()))
+        {
             Some(there) if there.1 < promise => *there = (term.clone(), promise),
             Some(_) => {}
             None => out.push((term.clone(), promise)),
@@ -207,6 +210,18 @@ fn ranked(data: &Data, pool: &[Term], structure: &Structure, weights: &Weights) 
 fn shaped(data: &Data, fit: Fit, index: usize, weights: &Weights) -> Fit {
     let mut best = fit;
     let Some(term) = best.structure.terms.get(index).cloned() else { return best };
+    if matches!(term.physics, Physics::Offset | Physics::GravityDirection) {
+        // What is of second order follows from the value itself.
+        for _ in 0..3 {
+            let mut structure = best.structure.clone();
+            structure.terms[index].shape = best.values[best.places[index].clone()].to_vec();
+            match data.fit(&structure, weights) {
+                Some(other) => best = other,
+                None => break,
+            }
+        }
+        return best;
+    }
     if term.shape.is_empty() || matches!(term.physics, Physics::CoupledFriction | Physics::Payload) {
         return best;
     }
@@ -278,9 +293,9 @@ fn grow(data: &Data, pool: &[Term], best: &mut Fit, weights: &Weights, tried: &m
         for (term, _) in ranked(data, pool, &best.structure, weights).into_iter().filter(|(_, promise)| *promise > 0.0).take(FITTED) {
             let Some(fit) = data.fit(&with(&best.structure, &term), weights) else { continue };
             let index = fit.structure.terms.len() - 1;
-            let fit = shaped(data, fit, index, weights);
             // Beside some physics the file's inertial parameters are better, beside others worse than alone.
-            let fit = tolerated(data, fit, weights);
+            let fit = tolerated(data, shaped(data, fit, index, weights), weights);
+            let fit = tolerated(data, shaped(data, fit, index, weights), weights);
             if is_possible(data, &fit) && torque_share(data, &fit, index) >= LEAST_TORQUE {
                 offers.push(fit);
             }

@@ -252,6 +252,8 @@ def case(rng, folder, truth_file, number, kinds):
     # First without what is hidden, for its size.
     t, q, plain = simulate(mujoco.MjModel.from_xml_string(mjcf(true, gravity, None, springs)), true, [], paths[0], rate)
     tau = plain
+    if not np.isfinite(q).all() or abs(q - paths[0][1]).max() > 0.5:
+        raise ValueError("the arm ran away")
     for h in hidden:
         size(h, tau, paths[0][2], paths[0][1], paths[0][3], true)
     payload = None
