@@ -44,6 +44,7 @@ def main():
         verdicts[case.name] = json.loads(file.read_text()) if file.exists() else None
         if verdicts[case.name] is None:
             print(f"{case.name}: no verdict: {done.stderr.strip()[:200]}")
+    (out / "seconds.json").write_text(json.dumps(dict(zip(verdicts, seconds))))
     effects = detected = joint = physics = beside = nulls = alarms = 0
     arms = found_arms = 0
     for case in cases:
