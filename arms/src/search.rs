@@ -19,6 +19,8 @@ pub const LEAST_SHARE: f64 = 0.03;
 pub const LEAST_TORQUE: f64 = 0.01;
 /// The least mass of a payload, as a share of the last body's own: a lighter one is as likely that body's mass, which nobody knows better.
 pub const LEAST_PAYLOAD: f64 = 0.15;
+/// The least displacement of presliding, in times what the sensor resolves.
+pub const PRESLIDING: f64 = 8.0;
 /// Rounds in which the friction's displacement is sought.
 const SLIP_STEPS: usize = 12;
 
@@ -167,7 +169,11 @@ fn is_possible(data: &Data, fit: &Fit) -> bool {
             (None, Physics::Payload) => LEAST_PAYLOAD * last,
             (None, _) => 0.0,
         };
-        !term.physics.facts().positive || value > least
+        // Presliding over less is a direction that turns at once, for all that the sensor can tell.
+        let is_sharp = term.physics == Physics::Presliding
+            && term.given.is_none()
+            && term.at.joint().is_some_and(|j| term.shape.first().is_some_and(|d| *d < PRESLIDING * data.first_slip(j)));
+        !is_sharp && (!term.physics.facts().positive || value > least)
     })
 }
 
@@ -295,7 +301,11 @@ fn grow(data: &Data, pool: &[Term], best: &mut Fit, weights: &Weights, tried: &m
             let index = fit.structure.terms.len() - 1;
             // Beside some physics the file's inertial parameters are better, beside others worse than alone.
             let fit = tolerated(data, shaped(data, fit, index, weights), weights);
-            let fit = tolerated(data, shaped(data, fit, index, weights), weights);
+            let mut fit = tolerated(data, shaped(data, fit, index, weights), weights);
+            if term.physics == Physics::Coulomb {
+                // Over which displacement it turns is no physics of its own.
+                fit = slipped(data, fit, weights);
+            }
             if is_possible(data, &fit) && torque_share(data, &fit, index) >= LEAST_TORQUE {
                 offers.push(fit);
             }
@@ -367,7 +377,8 @@ fn exchange(data: &Data, pool: &[Term], best: &mut Fit, weights: &Weights) {
                 for (term, _) in ranked(data, pool, &less, weights).into_iter().take(3) {
                     let Some(fit) = data.fit(&with(&less, &term), weights) else { continue };
                     let last = fit.structure.terms.len() - 1;
-                    offers.push(shaped(data, fit, last, weights));
+                    let fit = shaped(data, fit, last, weights);
+                    offers.push(if term.physics == Physics::Coulomb { slipped(data, fit, weights) } else { fit });
                 }
                 offers.retain(|offer| is_possible(data, offer));
                 offers.sort_by(|a, b| a.score.total_cmp(&b.score));
