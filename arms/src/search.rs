@@ -103,7 +103,7 @@ fn first_weights(data: &Data, nominal: &Structure) -> Option<Weights> {
     use crate::physics::At;
     let mut rich = Structure { tolerance: TOLERANCES.len() - 1, ..nominal.clone() };
     for joint in 0..data.problem.joints.len() {
-        for physics in [Physics::Damper, Physics::Coulomb, Physics::LoadFriction, Physics::Bias] {
+        for physics in [Physics::Damper, Physics::Coulomb, Physics::LoadFriction, Physics::Spring] {
             let term = Term::new(physics, At::Joint(joint), Vec::new());
             if !rich.terms.iter().any(|t| t.is_like(&term)) {
                 rich.terms.push(term);
@@ -198,7 +198,7 @@ fn ranked(data: &Data, pool: &[Term], structure: &Structure, weights: &Weights) 
     let Some((system, values)) = data.system(structure, weights) else { return Vec::new() };
     let mut out: Vec<(Term, f64)> = Vec::new();
     for term in pool.iter().filter(|t| !structure.terms.iter().any(|there| there.is_like(t))) {
-        let promise = data.promise(&system, &values, &data.columns(term, &structure.slip)) - 8.0 * term.physics.facts().numbers as f64;
+        let promise = data.promise(&system, &values, &data.columns(term, &structure.slip)) - 2.0 * term.physics.facts().numbers as f64;
         match out
             .iter_mut()
             .find(|(other, _)| other.is_like(term) && (term.physics != Physics::Payload || other.shape.is_empty() == term.shape.is_empty()))
