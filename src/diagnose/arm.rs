@@ -115,14 +115,14 @@ fn finding_text(finding: &Finding) -> String {
     let numbers: Vec<String> = finding
         .parameters
         .iter()
-        .filter_map(|(name, value)| match value {
+        .map(|(name, value)| match value {
             Parameter::One(Estimate { value, ci95: [Some(low), Some(high)], unit, .. }) => {
-                Some(format!("{} {} (95 %: {} to {})", name.replace('_', " "), si(*value, unit), si(*low, unit), si(*high, unit)))
+                format!("{} {} (95 %: {} to {})", name.replace('_', " "), si(*value, unit), si(*low, unit), si(*high, unit))
             }
-            Parameter::One(Estimate { value, unit, .. }) => Some(format!("{} {}", name.replace('_', " "), si(*value, unit))),
+            Parameter::One(Estimate { value, unit, .. }) => format!("{} {}", name.replace('_', " "), si(*value, unit)),
             Parameter::List(list) => {
                 let all: Vec<String> = list.value.iter().map(|x| number(*x)).collect();
-                Some(format!("{} ({}) {}", name.replace('_', " "), all.join(", "), list.unit))
+                format!("{} ({}) {}", name.replace('_', " "), all.join(", "), list.unit)
             }
         })
         .collect();
