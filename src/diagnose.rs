@@ -16,12 +16,17 @@ use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
+mod arm;
+
 /// Name of the report, where no other is asked for.
 pub const REPORT: &str = "report.html";
 
 /// Diagnoses, writes, and says what was found.
 pub fn diagnose(options: &cli::Diagnose) -> Result<u8, Failure> {
     let began = Instant::now();
+    if let Some((set, model)) = arm::asked(options)? {
+        return arm::diagnose(options, &set, &model, began).map(exit_code);
+    }
     let stop = interrupt::heard()?;
 
     let open = || recordings::open(&options.set, options.model.as_deref(), options.grip.as_deref(), &options.ignore_signal);

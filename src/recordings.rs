@@ -31,41 +31,14 @@ pub struct Opened {
 pub fn open(paths: &[PathBuf], model: Option<&Path>, grip: Option<&Path>, ignored: &[String]) -> Result<Opened, Failure> {
     let grip = grip.filter(|g| *g != Path::new("none"));
     let mut notes = Vec::new();
-    let (mut set, told) = match paths {
-        [one] if is_recording(one) => (of_files(paths)?, false),
-        [one] => {
-            if !one.exists() {
-                return Err(Failure::input(format!("{}: there is no such file or folder", one.display())));
-            }
-            let told = !one.is_dir() || one.join("set.toml").exists();
-            (RecordingSet::open(one)?, told)
-        }
-        _ => (of_files(paths)?, false),
-    };
+    let (mut set, told) = set_of(paths)?;
     if model.is_none() && set.model.is_none() {
         let first = paths.first().map_or(String::new(), |p| p.display().to_string());
         return Err(Failure::input(format!(
             "{first}: no model is named; give one with --model MODEL.toml, or a set.toml that says model = \"...\""
         )));
     }
-    if set.held_out.is_empty() {
-        match set.fit.len() {
-            // Who says in a set.toml what is fitted means it.
-            _ if told => notes.push(
-                "no recording is held out: the improvement is shown on those that were fitted; name some in set.toml under held_out"
-                    .to_string(),
-            ),
-            0 | 1 => notes.push(
-                "one recording: it is fitted and judged alike; a second one, held out, would show whether the result holds".to_string(),
-            ),
-            _ => {
-                if let Some(last) = set.fit.pop() {
-                    notes.push(format!("{} is held out: no fit sees it", file_name(&last)));
-                    set.held_out.push(last);
-                }
-            }
-        }
-    }
+    hold_out(&mut set, told, &mut notes);
     notes.extend(set_checks::repeated(&set)?);
     notes.extend(set.fit.iter().chain(&set.held_out).filter_map(|file| unfinished(&set.path_of(file))));
     let problem = match grip {
@@ -87,6 +60,46 @@ pub fn open(paths: &[PathBuf], model: Option<&Path>, grip: Option<&Path>, ignore
     let files = inputs.into_iter().flatten().chain(set.fit.iter().chain(&set.held_out).map(|f| set.path_of(f))).collect();
     let name = paths.first().map_or(String::new(), |p| p.file_name().map_or(p.display().to_string(), |n| n.to_string_lossy().into_owned()));
     Ok(Opened { problem, name, notes, files })
+}
+
+/// The set that paths name, and whether it says itself what is fitted.
+///
+/// # Errors
+/// When a file or folder is not there, or the set cannot be read.
+pub fn set_of(paths: &[PathBuf]) -> Result<(RecordingSet, bool), Failure> {
+    match paths {
+        [one] if is_recording(one) => Ok((of_files(paths)?, false)),
+        [one] => {
+            if !one.exists() {
+                return Err(Failure::input(format!("{}: there is no such file or folder", one.display())));
+            }
+            let told = !one.is_dir() || one.join("set.toml").exists();
+            Ok((RecordingSet::open(one)?, told))
+        }
+        _ => Ok((of_files(paths)?, false)),
+    }
+}
+
+/// Holds the last of several recordings out where the set does not say what is.
+pub fn hold_out(set: &mut RecordingSet, told: bool, notes: &mut Vec<String>) {
+    if set.held_out.is_empty() {
+        match set.fit.len() {
+            // Who says in a set.toml what is fitted means it.
+            _ if told => notes.push(
+                "no recording is held out: the improvement is shown on those that were fitted; name some in set.toml under held_out"
+                    .to_string(),
+            ),
+            0 | 1 => notes.push(
+                "one recording: it is fitted and judged alike; a second one, held out, would show whether the result holds".to_string(),
+            ),
+            _ => {
+                if let Some(last) = set.fit.pop() {
+                    notes.push(format!("{} is held out: no fit sees it", file_name(&last)));
+                    set.held_out.push(last);
+                }
+            }
+        }
+    }
 }
 
 /// The text of a model with a grip on its axes.

@@ -1,7 +1,7 @@
 //! Recording sets: a folder of recordings, with `set.toml` saying which may be fitted and which may not be seen.
 
 use crate::elements::Range;
-use crate::recording::{Cell, Columns, Piece, Recording, read_columns, read_csv};
+use crate::recording::{Cell, Columns, JointColumns, Piece, Recording, read_columns, read_csv, read_joints};
 use crate::tomlfile::{FileError, Table, unknown};
 use std::path::{Path, PathBuf};
 
@@ -54,6 +54,8 @@ pub struct RecordingSet {
     pub unknown: Vec<(String, f64)>,
     /// Names and units in the files.
     pub columns: Columns,
+    /// Of an arm: where each joint's position, velocity and torque stand; empty where the set does not say.
+    pub joints: Vec<JointColumns>,
     /// What is particular to a file, by its name in `fit` or `held_out`; what a session shares stands at each of its files.
     pub files: Vec<(String, FileRules)>,
     /// Names of the sessions, in their order, and the paths that each of them has a condition for.
@@ -95,6 +97,7 @@ impl RecordingSet {
             initial: Initial::Rest,
             unknown: Vec::new(),
             columns: Columns::new(),
+            joints: Vec::new(),
             files: Vec::new(),
             sessions: Vec::new(),
             ignore: Vec::new(),
@@ -204,7 +207,8 @@ fn read(mut top: Table, folder: PathBuf) -> Result<RecordingSet, FileError> {
     }
     let initial = top.one_of("initial", &[("rest", Initial::Rest), ("free", Initial::Free)])?.unwrap_or_default();
     let unknown_inputs = top.table("unknown")?.map(read_unknown).transpose()?.unwrap_or_default();
-    let columns = top.table("columns")?.map(read_columns).transpose()?.unwrap_or_default();
+    let mut columns = top.table("columns")?.map(read_columns).transpose()?.unwrap_or_default();
+    let joints = top.table("joints")?.map(|table| read_joints(table, &mut columns)).transpose()?.unwrap_or_default();
     if let Some(table) = &files_table {
         for (name, _) in &files {
             let all = fit.iter().chain(&held_out).map(String::as_str);
@@ -221,7 +225,20 @@ fn read(mut top: Table, folder: PathBuf) -> Result<RecordingSet, FileError> {
     let mixed_rates = top.boolean("mixed_rates")?.unwrap_or_default();
     top.finish()?;
     let model = model.map(|name| folder.join(name));
-    Ok(RecordingSet { model, folder, fit, held_out, initial, unknown: unknown_inputs, columns, files, sessions, ignore, mixed_rates })
+    Ok(RecordingSet {
+        model,
+        folder,
+        fit,
+        held_out,
+        initial,
+        unknown: unknown_inputs,
+        columns,
+        joints,
+        files,
+        sessions,
+        ignore,
+        mixed_rates,
+    })
 }
 
 /// The inputs that nobody measured.

@@ -11,6 +11,7 @@ pub const HELP: &str = "Examples:
   backdrive diagnose out/identify --model plant/models/impulse-engine-linear.toml --grip plant/grips/normal.toml --out out/diagnosis
   backdrive diagnose session.csv held-out.csv --model model.toml --out out/diagnosis --effort 3 --explain
   backdrive diagnose set/ --without coulomb --out out/diagnosis
+  backdrive diagnose studies/dfki_double_pendulum/set-arm.toml --out out/arm      (a model with [robot]: logs of every joint, docs/arms.md)
 
 Writes verdict.json, model.diagnosed.toml, report.html and time.txt. Ctrl-C ends the search and writes what was found until then.
 

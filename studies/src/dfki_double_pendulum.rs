@@ -3,10 +3,10 @@
 //!
 //! The library's models are chains of one axis whose inertia does not depend on where they stand, so a joint cannot have the arm in its model.
 
-use crate::filter::{LowPass, derivative};
 use crate::run::{Ask, LIKELY, diagnose, diagnosed_model, errors_of, findings, instead, parameter, percent, read, said, total, write};
 use crate::table::Report;
 use crate::{Context, Study, StudyError, csv_columns};
+use backdrive_arms::filter::{LowPass, derivative};
 use backdrive_diagnosis::problem::Problem;
 use backdrive_diagnosis::verdict::{MODEL_FILE, Verdict};
 

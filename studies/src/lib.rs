@@ -5,7 +5,6 @@
 
 pub mod csv_columns;
 pub mod data;
-pub mod filter;
 pub mod run;
 pub mod table;
 

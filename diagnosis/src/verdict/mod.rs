@@ -107,6 +107,7 @@ pub fn verdict(
         detectable: best.structure.added.is_empty().then(|| detectable(search)),
         searched: Some(Searched { steps: search.work, exhausted: search.exhausted, cut_short: search.cut }),
         findings: decision.findings,
+        arm: None,
     };
     Ok((verdict, Files { model, rivals, experiment }))
 }

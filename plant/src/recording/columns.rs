@@ -84,19 +84,27 @@ impl Cell {
 pub fn read_columns(mut table: Table) -> Result<Columns, FileError> {
     let mut columns = Columns::new();
     for name in table.keys() {
-        let rule = match table.is_string(&name) {
-            true => ColumnRule::of(Source::Column(table.need_string(&name)?)),
-            false => match table.is_table(&name) {
-                true => read_rule(&mut table, &name)?,
-                false => {
-                    return Err(table.error_at(&name, "expected the heading of a column, or a table with column, or with topic and field"));
-                }
-            },
-        };
+        let Some(rule) = read_one(&mut table, &name)? else { continue };
         columns.push((name, rule));
     }
     table.finish()?;
     Ok(columns)
+}
+
+/// The rule at a key: a heading, or a table; `None` where the key is not there.
+pub(crate) fn read_one(table: &mut Table, key: &str) -> Result<Option<ColumnRule>, FileError> {
+    if !table.contains(key) {
+        // Known from now on: a misspelling is told with its name.
+        table.skip(key);
+        return Ok(None);
+    }
+    if table.is_string(key) {
+        return Ok(Some(ColumnRule::of(Source::Column(table.need_string(key)?))));
+    }
+    match table.is_table(key) {
+        true => read_rule(table, key).map(Some),
+        false => Err(table.error_at(key, "expected the heading of a column, or a table with column, or with topic and field")),
+    }
 }
 
 fn read_rule(columns: &mut Table, name: &str) -> Result<ColumnRule, FileError> {

@@ -3,10 +3,13 @@
 mod columns;
 mod csv_file;
 mod hold;
+mod joints;
 mod record;
 pub mod units;
 
 pub use columns::{Cell, ColumnRule, Columns, Piece, Source, read_columns};
 pub use csv_file::{read_csv, read_headings, read_signals_of, write_csv};
 pub use hold::{resample, segments};
+pub use joints::JointColumns;
+pub(crate) use joints::read_joints;
 pub use record::{Gap, Jitter, Recording, RecordingError, signals_of};

@@ -3,8 +3,8 @@
 //! A position is differentiated twice on its way to a force, so that its noise needs a low-pass; that blurs the kink that dry friction makes at
 //! a reversal, over some milliseconds, and a diagnosis would find that blur. So strokes are cut where it ends.
 
-use crate::filter::LowPass;
 use crate::{StudyError, csv_columns};
+use backdrive_arms::filter::LowPass;
 use std::path::Path;
 
 /// Sample rate of the records, Hz.

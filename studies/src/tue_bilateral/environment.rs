@@ -1,8 +1,8 @@
 //! What the slave meets: a spring and a damper that begin at a place and only push.
 
 use super::record::{ENDS, Record, mean};
-use crate::filter::derivative;
 use crate::run::solved;
+use backdrive_arms::filter::derivative;
 
 /// A contact: it pushes back once the slave is beyond its place.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -1,9 +1,11 @@
 //! The verdict file as a value: what a diagnosis says, in SI units. Reading takes files of earlier versions, which lack newer keys.
 
+mod arm;
 mod finding;
 mod next_experiment;
 mod place;
 
+pub use arm::{ArmJoint, ArmPart, BaseParameter};
 pub use finding::{Alternative, Detectable, Estimate, Estimates, Finding, Interval, Moved, Parameter};
 pub use next_experiment::{NextExperiment, Planned, Refused, Sensor};
 
@@ -68,6 +70,9 @@ pub struct Verdict {
     /// How far the search went; null in files of versions that did not say.
     #[serde(default)]
     pub searched: Option<Searched>,
+    /// What only a diagnosis of an arm says; not in other files.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub arm: Option<Box<ArmPart>>,
 }
 
 /// How far a search went. It computes the same on every machine, unless it is cut short.

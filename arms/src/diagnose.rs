@@ -1,0 +1,158 @@
+//! One call from logs of an arm to a verdict and its files.
+
+use crate::audit::audit;
+use crate::consistent::consistent;
+use crate::error::ArmError;
+use crate::excitation;
+use crate::fit::Fit;
+use crate::judge::judge;
+use crate::physics::Physics;
+use crate::problem::Problem;
+use crate::regression::Data;
+use crate::search::{Search, added, search};
+use crate::verdict::{Parts, verdict};
+use crate::written::{Reading, model_of};
+use backdrive_diagnosis::audit::Weight;
+use backdrive_diagnosis::verdict::{NextExperiment, Planned, Verdict};
+
+/// Name of the file of the next experiment.
+pub const EXPERIMENT_FILE: &str = "next-motion.csv";
+
+/// What may be asked.
+#[derive(Debug, Clone, Default)]
+pub struct Settings {
+    /// Physics that are not considered, by name.
+    pub without: Vec<String>,
+    /// Corner of the regression's filter, Hz, where the motion shall not say it.
+    pub corner_hz: Option<f64>,
+}
+
+/// What was found, as a file and as texts of files.
+#[derive(Debug, Clone)]
+pub struct Found {
+    /// The verdict.
+    pub verdict: Verdict,
+    /// The diagnosed model.
+    pub model: String,
+    /// The motion to record next, as CSV.
+    pub experiment: String,
+    /// What a reader should know besides.
+    pub notes: Vec<String>,
+}
+
+/// Diagnoses an arm.
+///
+/// # Errors
+/// Where a log is of no use, or the robot cannot be computed.
+pub fn diagnose(problem: &Problem, settings: &Settings) -> Result<Found, ArmError> {
+    let mut data = Data::new(problem, settings.corner_hz, false)?;
+    let mut remarks = audit(problem, &data);
+    if let Some(bad) = remarks.iter().find(|r| r.weight == Weight::Unusable) {
+        return Err(ArmError::Log { log: bad.place.clone(), message: bad.message.clone() });
+    }
+    let mut found = search(&mut data, &settings.without)?;
+    remarks.extend(load_remarks(&data));
+    let mut whole = Data::new(problem, settings.corner_hz, true)?;
+    for fit in [&mut found.as_given, &mut found.refit, &mut found.best] {
+        *fit = consistent(&data, fit, &found.weights)
+            .ok_or_else(|| ArmError::Robot("no inertial parameters that bodies can have were found near the regression's".to_string()))?;
+    }
+    whole.see(&data.parameters(&found.best))?;
+    for fit in [&mut found.as_given, &mut found.refit, &mut found.best] {
+        slip_of_whole(&whole, fit);
+    }
+    let (model, mut notes) = model_of(&data, &found.best)?;
+    let (nominal, _) = model_of(&data, &found.refit)?;
+    notes.extend(problem.notes.iter().cloned());
+    let loops = [judge(&data, &nominal, &Reading::of(&data, &found.refit)), judge(&data, &model, &Reading::of(&data, &found.best))];
+    if let [Some(before), Some(after)] = &loops
+        && !added(&found.best.structure).is_empty()
+    {
+        for (j, (b, a)) in before.iter().zip(after).enumerate() {
+            if *a > 1.2 * b && *a > 0.02 {
+                notes.push(format!(
+                    "in closed loop the diagnosed model does worse at {} than without what was found ({:.1} % of the torque, {:.1} % without): \
+                     take its findings with care",
+                    problem.joints[j],
+                    100.0 * a,
+                    100.0 * b
+                ));
+            }
+        }
+    }
+    let planned = excitation::plan(problem)?;
+    let next = next(&found, &planned, problem);
+    let verdict = verdict(Parts { data: &data, whole: &whole, search: &found, audit: remarks, loops, next: Some(next) })?;
+    Ok(Found { verdict, model: model.to_toml(), experiment: planned.csv, notes })
+}
+
+/// The displacement over which friction turns, of rows at rest too: there it shows.
+fn slip_of_whole(whole: &Data, fit: &mut Fit) {
+    for joint in 0..whole.problem.joints.len() {
+        let left = |fit: &Fit| whole.mean_square(&whole.residual_of(fit), joint, false);
+        let first = whole.first_slip(joint);
+        let mut best = (left(fit), fit.structure.slip[joint]);
+        for step in -4..=5 {
+            let slip = first * 2f64.powi(step);
+            let mut other = fit.clone();
+            other.structure.slip[joint] = slip;
+            let there = left(&other);
+            if there < best.0 {
+                best = (there, slip);
+            }
+        }
+        fit.structure.slip[joint] = best.1;
+    }
+}
+
+/// Joints whose load hardly changes: friction that grows with it cannot be told from friction that does not.
+fn load_remarks(data: &Data) -> Vec<backdrive_diagnosis::verdict::Remark> {
+    use crate::physics::{At, Term};
+    let slip: Vec<f64> = (0..data.problem.joints.len()).map(|j| data.first_slip(j)).collect();
+    let mut out = Vec::new();
+    for (j, joint) in data.problem.joints.iter().enumerate() {
+        let column = |physics| data.columns(&Term::new(physics, At::Joint(j), Vec::new()), &slip)[0].clone();
+        let (plain, loaded) = (column(Physics::Coulomb), column(Physics::LoadFriction));
+        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>();
+        let alike = dot(&plain, &loaded) / (dot(&plain, &plain) * dot(&loaded, &loaded)).sqrt().max(f64::MIN_POSITIVE);
+        if alike > 0.985 {
+            out.push(backdrive_diagnosis::verdict::Remark {
+                what: "load".to_string(),
+                place: joint.clone(),
+                message:
+                    "carries nearly the same load wherever it moves: whether its friction grows with the load cannot be told; record it in \
+                          another pose or with a payload"
+                        .to_string(),
+                weight: Weight::Caution,
+            });
+        }
+    }
+    out
+}
+
+fn next(found: &Search, planned: &excitation::Excitation, problem: &Problem) -> NextExperiment {
+    let rivals = found.rivals.iter().flatten().filter(|(_, above)| *above < 6.0).count();
+    let why = match rivals {
+        0 => "determines the inertial parameters and friction best",
+        _ => {
+            "tells more of what these logs leave open; with a known payload at the tip a second time it separates torque constants from masses"
+        }
+    };
+    NextExperiment::Planned(Planned {
+        file: EXPERIMENT_FILE.to_string(),
+        input: "all joints".to_string(),
+        excitation: format!("Fourier series of 5 harmonics, {} s a period, within the joints' limits", planned.seconds),
+        sentence: format!(
+            "Track {EXPERIMENT_FILE}, repeated three times, and hold one of them out: of the motions that were drawn it {why} (condition of the regressor {:.0}).",
+            planned.condition
+        ),
+        between: problem.joints.clone(),
+        separation_sd: None,
+        level_floors: None,
+        output: "torque of every joint".to_string(),
+        repeats: 3,
+        duration_s: Some(planned.seconds),
+        rate_hz: 100.0,
+        sensor: None,
+    })
+}

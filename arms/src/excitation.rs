@@ -1,0 +1,135 @@
+//! The next experiment: a motion of all joints within their limits that shows the inertial parameters well.
+//!
+//! A Fourier series for each joint (Swevers, Ganseman, Tükel, De Schutter & Van Brussel, Optimal robot excitation and identification, T-RO 13(5), 1997),
+//! the best of many drawn ones by the condition of the regressor of the base parameters.
+
+use crate::base::{Base, base};
+use crate::error::ArmError;
+use crate::inertial::COUNT;
+use crate::motion::Motion;
+use crate::problem::Problem;
+use crate::rigid::regressor;
+use nalgebra::DMatrix;
+use std::fmt::Write as _;
+
+/// Harmonics of the series.
+const HARMONICS: usize = 5;
+/// Length of a period, s.
+const PERIOD: f64 = 12.0;
+/// Series that are drawn.
+const DRAWN: usize = 40;
+/// Samples of a period at which they are looked at, and in the file.
+const LOOKED_AT: usize = 60;
+/// Rate of the file, Hz.
+const RATE: f64 = 100.0;
+/// Share of the joint's range that is used, and where the file has no limits, rad or m to either side.
+const USED: f64 = 0.8;
+/// See [`USED`].
+const REACH: f64 = 1.5;
+
+/// Coefficients of a joint: cosine and sine of each harmonic.
+type Series = Vec<[f64; 2]>;
+
+/// An excitation.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Excitation {
+    /// `t`, then position of each joint, as CSV.
+    pub csv: String,
+    /// Condition number of the regressor, each column in the size of its body.
+    pub condition: f64,
+    /// Length of a period, s.
+    pub seconds: f64,
+}
+
+/// Plans one.
+///
+/// # Errors
+/// Where the robot cannot be computed.
+pub fn plan(problem: &Problem) -> Result<Excitation, ArmError> {
+    let bases = base(problem)?;
+    let mut random = 1u64;
+    let mut draw = || {
+        // xorshift64*: the same series on every machine.
+        random ^= random >> 12;
+        random ^= random << 25;
+        random ^= random >> 27;
+        (random.wrapping_mul(0x2545_F491_4F6C_DD1D) >> 11) as f64 / (1u64 << 53) as f64 - 0.5
+    };
+    let mut best: Option<(f64, Vec<Series>)> = None;
+    for _ in 0..DRAWN {
+        let series: Vec<Series> = problem
+            .joints
+            .iter()
+            .map(|_| (1..=HARMONICS).map(|h| [draw() / (h as f64).sqrt(), draw() / (h as f64).sqrt()]).collect())
+            .collect();
+        let condition = condition(problem, &bases, &motion(problem, &series, LOOKED_AT))?;
+        if best.as_ref().is_none_or(|(c, _)| condition < *c) {
+            best = Some((condition, series));
+        }
+    }
+    let Some((condition, series)) = best else { return Err(ArmError::Robot("the robot has no joints".to_string())) };
+    let count = (PERIOD * RATE) as usize;
+    let motion = motion(problem, &series, count);
+    let mut csv = format!("t,{}\n", problem.joints.iter().map(|j| format!("{j}.position")).collect::<Vec<_>>().join(","));
+    for i in 0..count {
+        let row: Vec<String> = motion.position.iter().map(|q| format!("{:.6}", q[i])).collect();
+        // Writing to a String cannot fail.
+        let _ = writeln!(csv, "{:.3},{}", i as f64 / RATE, row.join(","));
+    }
+    Ok(Excitation { csv, condition, seconds: PERIOD })
+}
+
+/// The motion of a series, scaled into the joints' ranges.
+fn motion(problem: &Problem, series: &[Series], count: usize) -> Motion {
+    let mut out = Motion {
+        name: String::new(),
+        position: Vec::new(),
+        velocity: Vec::new(),
+        acceleration: Vec::new(),
+        torque: Vec::new(),
+        told: Vec::new(),
+        moves: Vec::new(),
+    };
+    for (j, coefficients) in series.iter().enumerate() {
+        let limits = problem.tree.coordinates().get(j).and_then(|c| problem.robot.joints.get(c.joint)).map(|joint| joint.limits);
+        let [low, high] = limits.and_then(|l| l.range).unwrap_or([-REACH, REACH]);
+        let (low, high) = (low.max(-2.0 * REACH), high.min(2.0 * REACH));
+        let (mut q, mut v, mut a) = (vec![0.0; count], vec![0.0; count], vec![0.0; count]);
+        for i in 0..count {
+            let t = i as f64 * PERIOD / count as f64;
+            for (h, [c, s]) in coefficients.iter().enumerate() {
+                let w = std::f64::consts::TAU * (h + 1) as f64 / PERIOD;
+                let (sin, cos) = (w * t).sin_cos();
+                q[i] += c * cos + s * sin;
+                v[i] += w * (s * cos - c * sin);
+                a[i] -= w * w * (c * cos + s * sin);
+            }
+        }
+        let (least, most) = q.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, m), x| (l.min(*x), m.max(*x)));
+        let fastest = v.iter().fold(0.0f64, |m, x| m.max(x.abs()));
+        let by_speed = limits.and_then(|l| l.velocity).map_or(f64::INFINITY, |l| 0.8 * l / fastest.max(1e-9));
+        let scale = (USED * (high - low) / (most - least).max(1e-9)).min(by_speed);
+        let shift = 0.5 * (high + low) - 0.5 * scale * (most + least);
+        q.iter_mut().for_each(|x| *x = scale * *x + shift);
+        v.iter_mut().chain(a.iter_mut()).for_each(|x| *x *= scale);
+        out.position.push(q);
+        out.velocity.push(v);
+        out.acceleration.push(a);
+    }
+    out
+}
+
+fn condition(problem: &Problem, bases: &[Base], motion: &Motion) -> Result<f64, ArmError> {
+    let columns = regressor(&problem.robot, &problem.bodies, motion, &[])?;
+    let rows = motion.len() * problem.joints.len();
+    let flat: Vec<Vec<f64>> = bases
+        .iter()
+        .map(|b| {
+            let scale = problem.bodies.scale[b.of / COUNT][b.of % COUNT];
+            columns[b.of].iter().flatten().map(|x| x * scale).collect()
+        })
+        .collect();
+    let matrix = DMatrix::from_fn(rows, flat.len(), |i, j| flat[j][i]);
+    let values = matrix.singular_values();
+    Ok(values.max() / values.min().max(f64::MIN_POSITIVE))
+}

@@ -1,0 +1,98 @@
+//! The judge: the arm simulated in closed loop along logs.
+//!
+//! The model is fed the measured torque, and a loop adds what it takes to keep the measured motion. What the loop adds is what the model lacks, with
+//! friction as exact as the stepper has it, sticking too.
+
+use crate::regression::Data;
+use crate::written::Reading;
+use backdrive_plant::model::{Hold, Input, InputKind, Model};
+use backdrive_plant::robot::Arm;
+use backdrive_plant::stepper::{Options, Plant, Segment};
+use nalgebra::DMatrix;
+use std::f64::consts::TAU;
+
+/// Natural frequency of the loop, Hz, critically damped.
+const LOOP_HZ: f64 = 4.0;
+/// Time that the loop is given to settle, s.
+const SETTLING: f64 = 0.5;
+
+/// Root mean square of the loop's torque at each joint over the held-out logs (or all, where none is held out), as a share of the rms of the measured
+/// torque; `None` where the model cannot be simulated.
+pub fn judge(data: &Data, model: &Model, reading: &Reading) -> Option<Vec<f64>> {
+    let joints = data.problem.joints.len();
+    let held_out = data.fit_count..data.motions.len();
+    let motions = if held_out.is_empty() { 0..data.fit_count } else { held_out };
+    let mut driven = model.clone();
+    driven.outputs.clear();
+    driven.axes.clear();
+    driven.inputs.clear();
+    let arm = model.arm.as_ref()?;
+    for (j, body) in arm.bodies.iter().enumerate() {
+        // Behind a rotor the motor acts on that.
+        let rotor = format!("{}.rotor", data.problem.joints[j]);
+        let on = driven.bodies.iter().position(|b| b.name == rotor).unwrap_or(*body);
+        driven.inputs.push(Input::ideal(&format!("loop_{j}"), InputKind::Force, on, Hold::Linear));
+    }
+    let period = data.rates.period();
+    let w = (TAU * LOOP_HZ).min(0.2 / period);
+    // By what a joint weighs while the others are free, in the pose where that is least: a loop that is stable there is so everywhere.
+    let weight = least_inertia(arm, &driven);
+    let gains: Vec<[f64; 2]> = weight.iter().map(|own| [own * w * w, 2.0 * own * w]).collect();
+    let (mut added, mut torque, mut count) = (vec![0.0; joints], vec![0.0; joints], 0usize);
+    for m in motions {
+        let motion = &data.motions[m];
+        let mut plant = Plant::new(&driven, period, &Options::default()).ok()?;
+        let at = |j: usize, i: usize| motion.position[j][i] - arm.pose[j] - reading.offset[j];
+        for (j, body) in arm.bodies.iter().enumerate() {
+            plant.set_motion(*body, at(j, 0), motion.velocity[j][0]);
+            let rotor = driven.inputs[j].on;
+            plant.set_motion(rotor, at(j, 0), motion.velocity[j][0]);
+        }
+        let fed = |i: usize| {
+            let mut read: Vec<f64> = (0..joints).map(|j| motion.torque[j][i]).collect();
+            reading.undo(&mut read);
+            read
+        };
+        for i in 0..motion.len().saturating_sub(1) {
+            let (now, next) = (fed(i), fed(i + 1));
+            let mut segments = Vec::with_capacity(joints);
+            for j in 0..joints {
+                let body = arm.bodies[j];
+                let more = gains[j][0] * (at(j, i) - plant.position(body)) + gains[j][1] * (motion.velocity[j][i] - plant.velocity(body));
+                segments.push(Segment::line(now[j] + more, next[j] + more, period));
+                if i as f64 * period > SETTLING {
+                    added[j] += more * more;
+                    torque[j] += now[j] * now[j];
+                }
+            }
+            count += 1;
+            plant.step(&segments);
+            if !plant.is_finite() {
+                return None;
+            }
+        }
+    }
+    if count == 0 {
+        return None;
+    }
+    Some(added.iter().zip(&torque).map(|(a, t)| (a / t.max(f64::MIN_POSITIVE)).sqrt()).collect())
+}
+
+/// Of each joint the least inertia over the arm's poses that it moves against while all others are free.
+fn least_inertia(arm: &Arm, model: &Model) -> Vec<f64> {
+    let count = arm.tree.len();
+    let mut work = arm.tree.workspace();
+    let mut out = vec![f64::INFINITY; count];
+    for pose in arm.poses() {
+        let mut mass = DMatrix::zeros(count, count);
+        arm.tree.mass_matrix(&pose, &mut work, &mut mass);
+        for (j, body) in arm.bodies.iter().enumerate() {
+            mass[(j, j)] += model.bodies.get(*body).map_or(0.0, |b| b.inertia);
+        }
+        let Some(inverse) = mass.try_inverse() else { continue };
+        for (j, least) in out.iter_mut().enumerate() {
+            *least = least.min(1.0 / inverse[(j, j)].max(1e-300));
+        }
+    }
+    out
+}

@@ -1,0 +1,35 @@
+//! Which joint of an arm does what its model leaves out, from logs of position, velocity and torque of every joint.
+//!
+//! [`problem::Problem`] is a model with a robot and its logs. [`diagnose::diagnose`] regresses the measured torque on the torque that the measured motion
+//! takes ([`regression`]: inertial parameters, friction and the rest, all through the same filter), searches for the physics that predicts stretches of the
+//! logs that its fit has not seen ([`search`]), simulates the arm in closed loop with and without it ([`judge`]), and says what follows in the same
+//! verdict file as a diagnosis of one axis ([`verdict`]).
+//!
+//! How it works and where it should not be trusted: docs/arms.md, "Diagnosis of an arm".
+
+// Printing panics where the other end is full or gone.
+#![cfg_attr(not(test), warn(clippy::print_stdout, clippy::print_stderr))]
+
+pub mod audit;
+pub mod base;
+pub mod consistent;
+pub mod diagnose;
+pub mod error;
+pub mod excitation;
+pub mod filter;
+pub mod fit;
+pub mod inertial;
+pub mod judge;
+pub mod layout;
+pub mod log;
+pub mod motion;
+pub mod physics;
+pub mod problem;
+pub mod regression;
+pub mod rigid;
+pub mod search;
+pub mod system;
+pub mod verdict;
+pub mod written;
+
+pub use error::ArmError;

@@ -1,0 +1,139 @@
+//! Logs: position, perhaps velocity, and torque of every joint, at the times that were logged.
+
+use crate::error::ArmError;
+use backdrive_plant::recording::units::{Kind, split};
+use backdrive_plant::recording::{Columns, JointColumns, Piece, Recording, read_csv, read_headings};
+use backdrive_plant::robot::{Coordinate, JointKind};
+use backdrive_plant::set::RecordingSet;
+
+/// A log in SI units, joints in the order of the robot's coordinates.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Log {
+    /// The file, as the set names it.
+    pub name: String,
+    /// Times of the samples as they were logged, s; rising.
+    pub t: Vec<f64>,
+    /// Coordinates, rad or m.
+    pub position: Vec<Vec<f64>>,
+    /// Rates as the drive told them, rad/s or m/s; `None` where they were not logged.
+    pub velocity: Vec<Option<Vec<f64>>>,
+    /// Torques or forces of the motors seen at the joints, N m or N.
+    pub torque: Vec<Vec<f64>>,
+}
+
+/// Where each joint stands in the files: as the set says, else by headings that are usual.
+///
+/// # Errors
+/// Where the set names a joint that the robot does not have, leaves one out, or no usual heading is there.
+pub fn joints_of(set: &mut RecordingSet, coordinates: &[Coordinate], first: &str) -> Result<Vec<JointColumns>, ArmError> {
+    let names: Vec<&str> = coordinates.iter().map(|c| c.name.as_str()).collect();
+    if !set.joints.is_empty() {
+        let fault = |message: String| ArmError::Log { log: set.folder.join("set.toml").display().to_string(), message };
+        if let Some(extra) = set.joints.iter().find(|j| !names.contains(&j.name.as_str())) {
+            return Err(fault(format!("[joints.{}]: the robot has no such moving joint; it has {}", extra.name, names.join(", "))));
+        }
+        let of = |name: &&str| set.joints.iter().find(|j| j.name == **name).cloned();
+        return names
+            .iter()
+            .map(|n| of(n).ok_or_else(|| fault(format!("says nothing of joint \"{n}\": add [joints.{n}] with position and torque"))))
+            .collect();
+    }
+    let headings = read_headings(&set.path_of(first))?;
+    let plain: Vec<&str> = headings.iter().map(|h| split(h).0).collect();
+    let mut found = Vec::new();
+    let mut columns = Columns::new();
+    for (index, name) in names.iter().enumerate() {
+        let number = index + 1;
+        let pick = |what: &[&str]| {
+            let mut tried = Vec::new();
+            for w in what {
+                tried.extend([
+                    format!("{name}.{w}"),
+                    format!("{name}_{w}"),
+                    format!("{w}_{name}"),
+                    format!("{w}{number}"),
+                    format!("{w}_{number}"),
+                ]);
+            }
+            tried.into_iter().find(|t| plain.contains(&t.as_str()))
+        };
+        let position = pick(&["position", "pos", "q"]);
+        let torque = pick(&["torque", "tau", "effort", "force"]);
+        let velocity = pick(&["velocity", "vel", "dq", "qd"]);
+        match (position, torque) {
+            (Some(p), Some(t)) => found.push(JointColumns::of_headings(name, &p, velocity.as_deref(), &t, &mut columns)),
+            (p, _) => {
+                let what = if p.is_none() { "position" } else { "torque" };
+                return Err(ArmError::Log {
+                    log: first.to_string(),
+                    message: format!(
+                        "no column looks like the {what} of joint \"{name}\" (such as \"{name}.{what}\"); it has {}; say which in set.toml: \
+                         [joints.{name}] position = \"...\", torque = \"...\"",
+                        headings.join(", ")
+                    ),
+                });
+            }
+        }
+    }
+    set.columns.extend(columns);
+    let usual = plain.iter().find(|h| ["time", "time_s", "timestamp"].contains(h));
+    if let Some(time) = usual.filter(|_| !set.columns.iter().any(|c| c.0 == "t") && !plain.contains(&"t")) {
+        let rule = backdrive_plant::recording::ColumnRule::of(backdrive_plant::recording::Source::Column((*time).to_string()));
+        set.columns.push(("t".to_string(), rule));
+    }
+    Ok(found)
+}
+
+/// Reads a log of a set.
+///
+/// # Errors
+/// Where the file cannot be read, a column is missing, or a unit is none that the joint can have.
+pub fn read_log(set: &RecordingSet, file: &str, joints: &[JointColumns], coordinates: &[Coordinate]) -> Result<Log, ArmError> {
+    if !file.to_lowercase().ends_with(".csv") && set.rules_of(file).of.is_none() {
+        let message = "logs of an arm are read from CSV files; export the bag with `backdrive bag export`".to_string();
+        return Err(ArmError::Log { log: file.to_string(), message });
+    }
+    let mut wanted: Vec<String> = Vec::new();
+    for joint in joints {
+        wanted.extend([joint.position(), joint.torque()]);
+        if joint.has_velocity {
+            wanted.push(joint.velocity());
+        }
+    }
+    let names: Vec<&str> = wanted.iter().map(String::as_str).collect();
+    let piece: Piece = set.rules_of(file).piece;
+    let recording = read_csv(&set.path_of(file), Some(&names), &set.columns, &piece)?;
+    check_units(file, &recording, joints, coordinates)?;
+    let column = |name: String| recording.need_signal(&name).map(<[f64]>::to_vec);
+    let (mut position, mut velocity, mut torque) = (Vec::new(), Vec::new(), Vec::new());
+    for joint in joints {
+        position.push(column(joint.position())?);
+        torque.push(column(joint.torque())?);
+        velocity.push(if joint.has_velocity { Some(column(joint.velocity())?) } else { None });
+    }
+    Ok(Log { name: file.to_string(), t: recording.t.clone(), position, velocity, torque })
+}
+
+fn check_units(file: &str, recording: &Recording, joints: &[JointColumns], coordinates: &[Coordinate]) -> Result<(), ArmError> {
+    for (joint, coordinate) in joints.iter().zip(coordinates) {
+        let slides = coordinate.kind == JointKind::Prismatic;
+        let pick = |turning: Kind, sliding: Kind| if slides { sliding } else { turning };
+        let expected = [
+            (joint.position(), pick(Kind::Angle, Kind::Length)),
+            (joint.velocity(), pick(Kind::AngularSpeed, Kind::Speed)),
+            (joint.torque(), pick(Kind::Torque, Kind::Force)),
+        ];
+        for (signal, kind) in expected {
+            let Some((_, unit)) = recording.units.iter().find(|(name, unit)| *name == signal && unit.kind != kind) else { continue };
+            let message = format!(
+                "\"{signal}\" is in {}, {}; expected {}: name another column or unit, or say scale in [joints.{}]",
+                unit.name,
+                unit.kind.text(),
+                kind.text(),
+                joint.name
+            );
+            return Err(ArmError::Log { log: file.to_string(), message });
+        }
+    }
+    Ok(())
+}

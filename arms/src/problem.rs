@@ -1,0 +1,120 @@
+//! A model with a robot, and the logs that it is held against.
+
+use crate::error::ArmError;
+use crate::inertial::Bodies;
+use crate::log::{Log, joints_of, read_log};
+use backdrive_plant::elements::Law;
+use backdrive_plant::model::Model;
+use backdrive_plant::recording::JointColumns;
+use backdrive_plant::robot::{Robot, Tree};
+use backdrive_plant::set::RecordingSet;
+use std::path::{Path, PathBuf};
+
+/// An element of the nominal model that acts on one joint against ground.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Given {
+    /// Its name in the model.
+    pub name: String,
+    /// Index in the model's elements.
+    pub element: usize,
+    /// The coordinate that it acts on.
+    pub joint: usize,
+    /// Its law.
+    pub law: Law,
+}
+
+/// A model with a robot and its logs.
+#[derive(Debug, Clone)]
+pub struct Problem {
+    /// The nominal model.
+    pub model: Model,
+    /// Its file.
+    pub model_file: PathBuf,
+    /// The robot.
+    pub robot: Robot,
+    /// The same ready for computing, without armatures.
+    pub tree: Tree,
+    /// Its moving bodies.
+    pub bodies: Bodies,
+    /// Names of the joints, in the order of the coordinates.
+    pub joints: Vec<String>,
+    /// Inertia that turns with each joint alone, kg m² or kg: armature, and bodies of its network.
+    pub armature: Vec<f64>,
+    /// Elements between a joint (or a body of its network) and ground.
+    pub given: Vec<Given>,
+    /// What of the model the regression takes as rigid or leaves aside, in sentences.
+    pub notes: Vec<String>,
+    /// Where the joints stand in the files.
+    pub columns: Vec<JointColumns>,
+    /// Logs that a fit may see.
+    pub fit: Vec<Log>,
+    /// Logs that no fit may see.
+    pub held_out: Vec<Log>,
+}
+
+impl Problem {
+    /// Opens the logs of a set with its model, or another one.
+    ///
+    /// # Errors
+    /// Where a file cannot be read, the model has no robot, or a log is of no use.
+    pub fn open(set: &RecordingSet, model: Option<&Path>) -> Result<Problem, ArmError> {
+        let mut set = set.clone();
+        let model_file = model.map(Path::to_path_buf).or_else(|| set.model.clone()).unwrap_or_default();
+        let model = Model::load(&model_file)?;
+        let Some(arm) = model.arm.clone() else { return Err(ArmError::NoRobot(model_file.display().to_string())) };
+        let first = set.fit.first().or(set.held_out.first()).cloned().ok_or(ArmError::NoLogs)?;
+        let coordinates = arm.tree.coordinates();
+        let columns = joints_of(&mut set, coordinates, &first)?;
+        let read = |names: &[String]| names.iter().map(|name| read_log(&set, name, &columns, coordinates)).collect::<Result<Vec<_>, _>>();
+        let (fit, held_out) = (read(&set.fit)?, read(&set.held_out)?);
+        Problem::new(model, model_file, columns, fit, held_out)
+    }
+
+    /// From a model and its logs.
+    ///
+    /// # Errors
+    /// Where the model has no robot, or nothing is to be fitted.
+    pub fn new(
+        model: Model,
+        model_file: PathBuf,
+        columns: Vec<JointColumns>,
+        fit: Vec<Log>,
+        held_out: Vec<Log>,
+    ) -> Result<Problem, ArmError> {
+        let Some(arm) = model.arm.clone() else { return Err(ArmError::NoRobot(model_file.display().to_string())) };
+        if fit.is_empty() {
+            return Err(ArmError::NoLogs);
+        }
+        let joints: Vec<String> = arm.tree.coordinates().iter().map(|c| c.name.clone()).collect();
+        let bodies = Bodies::of(&arm.robot, &arm.tree);
+        // What hangs on a joint is named after it: "elbow.rotor".
+        let of_body = |body: usize| {
+            let name = &model.bodies.get(body)?.name;
+            joints.iter().position(|j| name == j || name.strip_prefix(j.as_str()).is_some_and(|rest| rest.starts_with('.')))
+        };
+        let mut armature = vec![0.0; joints.len()];
+        let mut notes = Vec::new();
+        for (index, body) in model.bodies.iter().enumerate() {
+            match of_body(index) {
+                Some(joint) => armature[joint] += body.inertia,
+                None => notes.push(format!("body \"{}\" hangs on no joint and is left aside by the regression", body.name)),
+            }
+        }
+        let mut given = Vec::new();
+        for (index, element) in model.elements.iter().enumerate() {
+            match element.between {
+                [Some(body), None] | [None, Some(body)] => {
+                    if let Some(joint) = of_body(body) {
+                        given.push(Given { name: element.name.clone(), element: index, joint, law: element.law.clone() });
+                    }
+                }
+                [Some(a), Some(b)] if of_body(a) == of_body(b) => {
+                    notes.push(format!("the regression takes \"{}\" as rigid; the simulation has it", element.name));
+                }
+                _ => notes.push(format!("the regression leaves \"{}\" aside, which joins two joints; the simulation has it", element.name)),
+            }
+        }
+        let (robot, tree) = (arm.robot.clone(), arm.tree.clone());
+        Ok(Problem { model, model_file, robot, tree, bodies, joints, armature, given, notes, columns, fit, held_out })
+    }
+}

@@ -1,0 +1,457 @@
+//! The search: what has to be added to the nominal model, one physics after the other, each judged by stretches of the logs that its fit has not seen.
+
+use crate::consistent::consistent;
+use crate::error::ArmError;
+use crate::fit::{Fit, Structure, TOLERANCES, Weights};
+use crate::physics::{Physics, Term, candidates};
+use crate::regression::Data;
+use backdrive_diagnosis::predictive::{Gain, gain};
+
+/// Physics that are added at most.
+pub const MOST: usize = 8;
+/// Candidates that are fitted in full in each round, those that promise most.
+const FITTED: usize = 10;
+/// By how much the information criterion has to fall for a physics to be taken up. A Bayes factor of 150 ("very strong", Kass & Raftery 1995) is 10.
+const WORTH: f64 = 10.0;
+/// The least share of the mean squared residual of unseen stretches, at the joint where it shows most, that a physics has to take.
+pub const LEAST_SHARE: f64 = 0.03;
+/// The least share of the rms torque of a joint, that where it shows most, that a physics has to be.
+pub const LEAST_TORQUE: f64 = 0.01;
+/// The least mass of a payload, as a share of the last body's own: a lighter one is as likely that body's mass, which nobody knows better.
+pub const LEAST_PAYLOAD: f64 = 0.15;
+/// The least displacement of presliding, in times what the sensor resolves.
+pub const PRESLIDING: f64 = 8.0;
+/// Rounds in which the friction's displacement is sought.
+const SLIP_STEPS: usize = 12;
+
+/// A candidate that was fitted in full.
+#[derive(Debug, Clone)]
+pub struct Tried {
+    /// What it was.
+    pub term: Term,
+    /// By how much it lowered the information criterion.
+    pub worth: f64,
+    /// How much better it predicts what its fit has not seen.
+    pub gain: Option<Gain>,
+    /// Whether it was taken up in that round.
+    pub taken: bool,
+}
+
+/// What a search found.
+pub struct Search {
+    /// The nominal model's terms with the file's inertial parameters.
+    pub as_given: Fit,
+    /// The nominal model's terms, numbers refitted.
+    pub refit: Fit,
+    /// The structure that was found.
+    pub best: Fit,
+    /// Weights of the last fits.
+    pub weights: Weights,
+    /// What was tried, in order.
+    pub tried: Vec<Tried>,
+    /// Of each added term of the best structure: how much better the model with it predicts unseen stretches than one without it.
+    pub gains: Vec<Option<Gain>>,
+    /// Of each added term: what could stand in its place, with the score of that structure above the best one's.
+    pub rivals: Vec<Vec<(Term, f64)>>,
+}
+
+/// Looks for what is missing. `without`: names of physics that are not considered.
+///
+/// # Errors
+/// Where a fit cannot be computed at all.
+pub fn search(data: &mut Data, without: &[String]) -> Result<Search, ArmError> {
+    let failed = || ArmError::Robot("the regression has no solution; are all joints logged in motion?".to_string());
+    let pool: Vec<Term> = candidates(data.problem, &data.motions[..data.fit_count])
+        .into_iter()
+        .filter(|t| !without.iter().any(|w| w == t.physics.facts().name))
+        .collect();
+    let nominal = data.nominal_structure();
+    let mut weights = first_weights(data, &nominal).ok_or_else(failed)?;
+    let as_given = data.fit(&nominal, &weights).ok_or_else(failed)?;
+    let mut tried = Vec::new();
+    let mut best = as_given.clone();
+    // Twice: what was found is the better view of what the joints pass on, and of how much their residuals scatter.
+    for round in 0..2 {
+        best = data.fit(&Structure { ..best.structure.clone() }, &weights).ok_or_else(failed)?;
+        best = slipped(data, best, &weights);
+        grow(data, &pool, &mut best, &weights, &mut tried);
+        if round == 0 {
+            let bodies = consistent(data, &best, &weights).ok_or_else(failed)?;
+            data.see(&data.parameters(&bodies))?;
+            best = data.fit(&best.structure, &weights).ok_or_else(failed)?;
+            weights = data.weights(&best.residual);
+        }
+    }
+    best = data.fit(&best.structure, &weights).ok_or_else(failed)?;
+    shrink(data, &mut best, &weights);
+    let refit = refitted(data, &nominal, &best.structure.slip, &weights).ok_or_else(failed)?;
+    let as_given = data.fit(&Structure { slip: best.structure.slip.clone(), ..nominal }, &weights).ok_or_else(failed)?;
+    let added: Vec<usize> = added(&best.structure);
+    let gains =
+        added.iter().map(|i| without_term(data, &best, *i, &weights).and_then(|less| compare(data, &less, &best, &weights))).collect();
+    let rivals = added.iter().map(|i| rivals(data, &pool, &best, *i, &weights)).collect();
+    Ok(Search { as_given, refit, best, weights, tried, gains, rivals })
+}
+
+/// Terms that a search has added, by index.
+pub fn added(structure: &Structure) -> Vec<usize> {
+    (0..structure.terms.len()).filter(|i| structure.terms[*i].given.is_none()).collect()
+}
+
+/// Residuals of a structure that has plain friction and armature at every joint and free inertial parameters: what scatters beside them.
+fn first_weights(data: &Data, nominal: &Structure) -> Option<Weights> {
+    use crate::physics::At;
+    let mut rich = Structure { tolerance: TOLERANCES.len() - 1, ..nominal.clone() };
+    for joint in 0..data.problem.joints.len() {
+        for physics in [Physics::Damper, Physics::Coulomb, Physics::LoadFriction, Physics::Spring] {
+            let term = Term::new(physics, At::Joint(joint), Vec::new());
+            if !rich.terms.iter().any(|t| t.is_like(&term)) {
+                rich.terms.push(term);
+            }
+        }
+    }
+    let start = Weights {
+        sd: (0..data.problem.joints.len()).map(|j| (0.1 * data.mean_square(&data.torque, j, false).sqrt()).max(1e-9)).collect(),
+        time: vec![1.0; data.problem.joints.len()],
+    };
+    let mut weights = start;
+    for _ in 0..3 {
+        weights = data.weights(&data.fit(&rich, &weights)?.residual);
+    }
+    Some(weights)
+}
+
+/// Mean squared unseen residuals by block, weighted over the joints, in lists of neighbours.
+pub fn by_block(data: &Data, residual: &[f64], weights: &Weights, held_out: bool) -> Vec<Vec<f64>> {
+    let motions = if held_out { data.fit_count..data.motions.len() } else { 0..data.fit_count };
+    let of_block = |block: &crate::layout::Block| -> f64 {
+        (0..data.problem.joints.len())
+            .map(|j| {
+                let first = data.layout.of(block.motion, j).start;
+                let rows = &residual[first + block.rows.start..first + block.rows.end];
+                rows.iter().map(|x| x * x).sum::<f64>() / rows.len().max(1) as f64 / weights.sd[j].powi(2)
+            })
+            .sum()
+    };
+    motions.map(|m| data.blocks.iter().filter(|b| b.motion == m).map(of_block).collect()).collect()
+}
+
+/// How much better one fit predicts stretches that it has not seen than another.
+pub fn compare(data: &Data, base: &Fit, better: &Fit, weights: &Weights) -> Option<Gain> {
+    gain(&by_block(data, &base.unseen, weights, false), &by_block(data, &better.unseen, weights, false))
+}
+
+/// The largest share of the mean squared unseen residual of a joint that one fit takes off another.
+pub fn largest_share(data: &Data, base: &Fit, better: &Fit) -> f64 {
+    (0..data.problem.joints.len())
+        .map(|j| 1.0 - data.mean_square(&better.unseen, j, false) / data.mean_square(&base.unseen, j, false).max(f64::MIN_POSITIVE))
+        .fold(f64::NEG_INFINITY, f64::max)
+}
+
+/// The torque of a term as a share of the rms torque of the joint where that is most.
+fn torque_share(data: &Data, fit: &Fit, index: usize) -> f64 {
+    let Some(term) = fit.structure.terms.get(index) else { return 0.0 };
+    let columns = data.columns(term, &fit.structure.slip);
+    let values = &fit.values[fit.places[index].clone()];
+    let torque: Vec<f64> = (0..data.layout.rows).map(|row| columns.iter().zip(values).map(|(c, x)| c[row] * x).sum()).collect();
+    let share = |j: usize| (data.mean_square(&torque, j, false) / data.mean_square(&data.torque, j, false).max(f64::MIN_POSITIVE)).sqrt();
+    (0..data.problem.joints.len()).map(share).fold(0.0, f64::max)
+}
+
+/// Whether what must not be negative is not, and a payload is one.
+fn is_possible(data: &Data, fit: &Fit) -> bool {
+    let last = data.problem.bodies.nominal.last().map_or(0.0, |p| p[0]);
+    fit.structure.terms.iter().zip(&fit.places).all(|(term, place)| {
+        let (value, error) = (fit.values[place.start], fit.errors[place.start]);
+        let least = match (term.given, term.physics) {
+            // What the file states may be nothing, what is added is something.
+            (Some(_), _) => -3.0 * error,
+            (None, Physics::Payload) => LEAST_PAYLOAD * last,
+            (None, _) => 0.0,
+        };
+        // Presliding over less is a direction that turns at once, for all that the sensor can tell.
+        let is_sharp = term.physics == Physics::Presliding
+            && term.given.is_none()
+            && term.at.joint().is_some_and(|j| term.shape.first().is_some_and(|d| *d < PRESLIDING * data.first_slip(j)));
+        !is_sharp && (!term.physics.facts().positive || value > least)
+    })
+}
+
+fn with(structure: &Structure, term: &Term) -> Structure {
+    let mut out = structure.clone();
+    out.terms.push(term.clone());
+    out
+}
+
+fn without(structure: &Structure, index: usize) -> Structure {
+    let mut out = structure.clone();
+    out.terms.remove(index);
+    out
+}
+
+fn without_term(data: &Data, fit: &Fit, index: usize, weights: &Weights) -> Option<Fit> {
+    data.fit(&without(&fit.structure, index), weights)
+}
+
+/// Candidates by what they promise beside a structure, each physics and place once, with the best of its shapes.
+fn ranked(data: &Data, pool: &[Term], structure: &Structure, weights: &Weights) -> Vec<(Term, f64)> {
+    let Some((system, values)) = data.system(structure, weights) else { return Vec::new() };
+    let mut out: Vec<(Term, f64)> = Vec::new();
+    for term in pool.iter().filter(|t| !structure.terms.iter().any(|there| there.is_like(t))) {
+        let promise = data.promise(&system, &values, &data.columns(term, &structure.slip)) - 2.0 * term.physics.facts().numbers as f64;
+        match out
+            .iter_mut()
+            .find(|(other, _)| other.is_like(term) && (term.physics != Physics::Payload || other.shape.is_empty() == term.shape.is_empty()))
+        {
+            Some(there) if there.1 < promise => *there = (term.clone(), promise),
+            Some(_) => {}
+            None => out.push((term.clone(), promise)),
+        }
+    }
+    out.sort_by(|a, b| b.1.total_cmp(&a.1));
+    out
+}
+
+/// A fit whose last term has the shape that fits best, near the one that it has.
+fn shaped(data: &Data, fit: Fit, index: usize, weights: &Weights) -> Fit {
+    let mut best = fit;
+    let Some(term) = best.structure.terms.get(index).cloned() else { return best };
+    if matches!(term.physics, Physics::Offset | Physics::GravityDirection) {
+        // What is of second order follows from the value itself.
+        for _ in 0..3 {
+            let mut structure = best.structure.clone();
+            structure.terms[index].shape = best.values[best.places[index].clone()].to_vec();
+            match data.fit(&structure, weights) {
+                Some(other) => best = other,
+                None => break,
+            }
+        }
+        return best;
+    }
+    if term.shape.is_empty() || matches!(term.physics, Physics::CoupledFriction | Physics::Payload) {
+        return best;
+    }
+    let mut step: f64 = if term.physics == Physics::Cogging { 1.01 } else { 1.4 };
+    for _ in 0..6 {
+        let mut moved = false;
+        for factor in [step, 1.0 / step] {
+            let mut structure = best.structure.clone();
+            structure.terms[index].shape[0] *= factor;
+            if let Some(other) = data.fit(&structure, weights).filter(|f| f.score < best.score && is_possible(data, f)) {
+                best = other;
+                moved = true;
+                break;
+            }
+        }
+        if !moved {
+            step = step.sqrt();
+        }
+    }
+    best
+}
+
+/// A fit in which friction turns over the displacement that fits best, joint by joint.
+fn slipped(data: &Data, fit: Fit, weights: &Weights) -> Fit {
+    let mut best = fit;
+    for joint in 0..data.problem.joints.len() {
+        let turns =
+            |t: &Term| t.at.joint() == Some(joint) && matches!(t.physics, Physics::Coulomb | Physics::Stribeck | Physics::LoadFriction);
+        if !best.structure.terms.iter().any(turns) {
+            continue;
+        }
+        // The sensor's own step is the least that makes sense, a hundredth of the range is presliding and no longer a sharp turn.
+        let first = data.first_slip(joint);
+        for factor in [2.0, 0.5] {
+            for _ in 0..SLIP_STEPS {
+                let mut structure = best.structure.clone();
+                structure.slip[joint] *= factor;
+                if !(0.1 * first..=64.0 * first).contains(&structure.slip[joint]) {
+                    break;
+                }
+                match data.fit(&structure, weights).filter(|f| f.score < best.score) {
+                    Some(other) => best = other,
+                    None => break,
+                }
+            }
+        }
+    }
+    best
+}
+
+/// The tolerance of the inertial parameters that is worth its numbers.
+fn tolerated(data: &Data, fit: Fit, weights: &Weights) -> Fit {
+    let others = (0..TOLERANCES.len()).filter_map(|tolerance| data.fit(&Structure { tolerance, ..fit.structure.clone() }, weights));
+    others.fold(fit.clone(), |best, other| if other.score < best.score - 1e-9 { other } else { best })
+}
+
+/// Adds what is worth it.
+fn grow(data: &Data, pool: &[Term], best: &mut Fit, weights: &Weights, tried: &mut Vec<Tried>) {
+    // Adding and exchanging can take turns: what was there once ends it.
+    let mut seen: Vec<Vec<(Physics, crate::physics::At)>> = Vec::new();
+    while added(&best.structure).len() < MOST {
+        let mut now: Vec<_> = best.structure.terms.iter().map(|t| (t.physics, t.at)).collect();
+        now.sort();
+        if seen.iter().filter(|s| **s == now).count() > 1 {
+            return;
+        }
+        seen.push(now);
+        let mut offers: Vec<Fit> = Vec::new();
+        for (term, _) in ranked(data, pool, &best.structure, weights).into_iter().filter(|(_, promise)| *promise > 0.0).take(FITTED) {
+            let Some(fit) = data.fit(&with(&best.structure, &term), weights) else { continue };
+            let index = fit.structure.terms.len() - 1;
+            // Beside some physics the file's inertial parameters are better, beside others worse than alone.
+            let fit = tolerated(data, shaped(data, fit, index, weights), weights);
+            let mut fit = tolerated(data, shaped(data, fit, index, weights), weights);
+            if term.physics == Physics::Coulomb {
+                // Over which displacement it turns is no physics of its own.
+                fit = slipped(data, fit, weights);
+            }
+            if is_possible(data, &fit) && torque_share(data, &fit, index) >= LEAST_TORQUE {
+                offers.push(fit);
+            }
+        }
+        let freer = tolerated(data, best.clone(), weights);
+        offers.sort_by(|a, b| a.score.total_cmp(&b.score));
+        simplest_first(data, &mut offers, weights);
+        let mut taken = false;
+        for offer in offers {
+            let worth = best.score - offer.score;
+            let found = compare(data, best, &offer, weights);
+            let sure = worth > WORTH && found.is_some_and(|g| g.is_sure()) && largest_share(data, best, &offer) >= LEAST_SHARE;
+            let better_than_freer = offer.score <= freer.score;
+            let take = sure && better_than_freer && !taken;
+            if let Some(term) = offer.structure.terms.last() {
+                tried.push(Tried { term: term.clone(), worth, gain: found, taken: take });
+            }
+            if take {
+                *best = slipped(data, offer, weights);
+                taken = true;
+                break;
+            }
+        }
+        if !taken && freer.score < best.score - WORTH {
+            *best = slipped(data, freer, weights);
+            taken = true;
+        }
+        if !taken {
+            return;
+        }
+        exchange(data, pool, best, weights);
+    }
+}
+
+/// Of fits with one more term each, the best first: brings to the front the one with the fewest numbers that unseen stretches do not surely set back.
+fn simplest_first(data: &Data, offers: &mut [Fit], weights: &Weights) {
+    let Some(best) = offers.first().cloned() else { return };
+    let numbers = |f: &Fit| f.structure.terms.last().map_or(0, |t| t.physics.facts().numbers);
+    let mut order: Vec<usize> = (1..offers.len()).filter(|i| numbers(&offers[*i]) < numbers(&best)).collect();
+    order.sort_by_key(|i| numbers(&offers[*i]));
+    if let Some(at) = order.into_iter().find(|i| is_as_good(data, &offers[*i], &best, weights)) {
+        offers[..=at].rotate_right(1);
+    }
+}
+
+/// Whether a fit with fewer numbers predicts unseen stretches as well as another one, for all that they say.
+fn is_as_good(data: &Data, simple: &Fit, other: &Fit, weights: &Weights) -> bool {
+    let sure = compare(data, simple, other, weights).is_some_and(|g| g.is_sure());
+    largest_share(data, simple, other) < LEAST_SHARE || (!sure && simple.score < other.score + WORTH)
+}
+
+/// Puts another physics in the place of one that was added, where that is better.
+fn exchange(data: &Data, pool: &[Term], best: &mut Fit, weights: &Weights) {
+    for _ in 0..2 {
+        let mut changed = false;
+        let mut index = 0;
+        while index < best.structure.terms.len() {
+            if best.structure.terms[index].given.is_some() {
+                index += 1;
+                continue;
+            }
+            let less = without(&best.structure, index);
+            let mut better: Option<Fit> = None;
+            let there = best.structure.tolerance;
+            for tolerance in there.saturating_sub(1)..(there + 2).min(TOLERANCES.len()) {
+                let less = Structure { tolerance, ..less.clone() };
+                // Without it at all, where another tolerance makes it needless.
+                let mut offers: Vec<Fit> = data.fit(&less, weights).into_iter().collect();
+                for (term, _) in ranked(data, pool, &less, weights).into_iter().take(3) {
+                    let Some(fit) = data.fit(&with(&less, &term), weights) else { continue };
+                    let last = fit.structure.terms.len() - 1;
+                    let fit = shaped(data, fit, last, weights);
+                    offers.push(if term.physics == Physics::Coulomb { slipped(data, fit, weights) } else { fit });
+                }
+                offers.retain(|offer| is_possible(data, offer));
+                offers.sort_by(|a, b| a.score.total_cmp(&b.score));
+                for offer in offers {
+                    let now = better.as_ref().unwrap_or(best);
+                    let simpler = offer.numbers < now.numbers - 0.5 && is_as_good(data, &offer, now, weights);
+                    let clearly =
+                        offer.score < now.score - 2.0 && !(now.numbers < offer.numbers - 0.5 && is_as_good(data, now, &offer, weights));
+                    if simpler || clearly {
+                        better = Some(offer);
+                    }
+                }
+            }
+            if let Some(offer) = better {
+                *best = offer;
+                changed = true;
+            }
+            // One exchange a place and round: two that are as good as each other would take turns for ever.
+            index += 1;
+            if index >= best.structure.terms.len() {
+                break;
+            }
+        }
+        if !changed {
+            return;
+        }
+    }
+}
+
+/// Takes off again what is not worth it.
+fn shrink(data: &Data, best: &mut Fit, weights: &Weights) {
+    loop {
+        let mut worst: Option<(f64, Fit)> = None;
+        for index in added(&best.structure) {
+            let Some(less) = data.fit(&without(&best.structure, index), weights) else { continue };
+            let worth = less.score - best.score;
+            let sure = compare(data, &less, best, weights).is_some_and(|g| g.is_sure());
+            let interval = best.places.get(index).is_some_and(|place| place.clone().any(|i| best.values[i].abs() > 1.96 * best.errors[i]));
+            let keep = worth > WORTH
+                && sure
+                && interval
+                && torque_share(data, best, index) >= LEAST_TORQUE
+                && largest_share(data, &less, best) >= LEAST_SHARE;
+            if !keep && worst.as_ref().is_none_or(|(w, _)| worth < *w) {
+                worst = Some((worth, less));
+            }
+        }
+        match worst {
+            Some((_, less)) => *best = tolerated(data, less, weights),
+            None => return,
+        }
+    }
+}
+
+/// The nominal structure with its numbers refitted, inertial parameters as free as is worth it.
+fn refitted(data: &Data, nominal: &Structure, slip: &[f64], weights: &Weights) -> Option<Fit> {
+    let fit = data.fit(&Structure { slip: slip.to_vec(), ..nominal.clone() }, weights)?;
+    Some(tolerated(data, fit, weights))
+}
+
+/// What could stand in the place of an added term, with the score above the best one's.
+fn rivals(data: &Data, pool: &[Term], best: &Fit, index: usize, weights: &Weights) -> Vec<(Term, f64)> {
+    let less = without(&best.structure, index);
+    let pool: Vec<Term> = pool.iter().filter(|t| !t.is_like(&best.structure.terms[index])).cloned().collect();
+    let mut out = Vec::new();
+    for (term, _) in ranked(data, &pool, &less, weights).into_iter().take(5) {
+        let Some(fit) = data.fit(&with(&less, &term), weights) else { continue };
+        let last = fit.structure.terms.len() - 1;
+        let fit = shaped(data, fit, last, weights);
+        if is_possible(data, &fit) {
+            out.push((term, fit.score - best.score));
+        }
+    }
+    out.sort_by(|a, b| a.1.total_cmp(&b.1));
+    out
+}

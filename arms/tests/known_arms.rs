@@ -1,0 +1,69 @@
+//! Arms whose torque is known: what is in their logs is found, at its joint, with its size; nothing is found where nothing is.
+
+mod common;
+
+use backdrive_arms::diagnose::{Found, Settings, diagnose};
+use backdrive_arms::problem::Problem;
+use backdrive_diagnosis::hypothesis::Place;
+use backdrive_diagnosis::verdict::{Finding, Parameter, Word};
+use backdrive_plant::model::Model;
+use backdrive_plant::set::RecordingSet;
+use common::{AS_STATED, Beside, set};
+
+fn found(beside: &Beside) -> Found {
+    let folder = tempfile::tempdir().unwrap();
+    set(folder.path(), beside, "", |_| {});
+    let problem = Problem::open(&RecordingSet::open(folder.path()).unwrap(), None).unwrap();
+    diagnose(&problem, &Settings::default()).unwrap()
+}
+
+fn number(finding: &Finding, key: &str) -> (f64, f64, f64) {
+    match &finding.parameters[key] {
+        Parameter::One(e) => (e.value, e.ci95[0].unwrap(), e.ci95[1].unwrap()),
+        Parameter::List(_) => panic!("{key} is a list"),
+    }
+}
+
+#[test]
+fn where_nothing_is_missing_nothing_is_found() {
+    let found = found(&AS_STATED);
+    assert!(found.verdict.findings.is_empty() && found.verdict.word.is_structure_right(), "{:?}", found.verdict);
+    // The file of the diagnosed model reads, and has its robot.
+    assert!(Model::from_toml(&found.model, "diagnosed").unwrap().arm.is_some());
+}
+
+#[test]
+fn dry_friction_is_named_at_its_joint() {
+    let found = found(&Beside { dry: [0.2, 0.3], ..AS_STATED });
+    let [finding] = found.verdict.findings.as_slice() else { panic!("{:?}", found.verdict.findings) };
+    assert_eq!((found.verdict.word, finding.physics.as_str()), (Word::Missing, "coulomb"));
+    assert_eq!(finding.place, Place::Between("elbow".to_string(), "ground".to_string()));
+    let (value, low, high) = number(finding, "force");
+    assert!((value - 0.3).abs() < 0.01 && low < 0.3 && 0.3 < high + 0.003, "{value} {low} {high}");
+    // In closed loop, with sticking as it is, it helps too, and the file that is written has it.
+    let arm = found.verdict.arm.as_ref().unwrap();
+    let elbow = &arm.joints[1];
+    assert!(elbow.loop_diagnosed.unwrap() < 0.5 * elbow.loop_refit.unwrap(), "{elbow:?}");
+    let model = Model::from_toml(&found.model, "diagnosed").unwrap();
+    assert!(model.elements.iter().any(|e| e.law.kind().name == "coulomb" && model.place_name(e.between[0]) == "elbow"));
+}
+
+#[test]
+fn friction_that_grows_with_the_load_is_told_from_one_that_does_not() {
+    let found = found(&Beside { by_load: [0.15, 0.0], ..AS_STATED });
+    let finding = &found.verdict.findings[0];
+    assert_eq!(finding.physics, "load_friction");
+    assert_eq!(finding.place, Place::Between("shoulder".to_string(), "ground".to_string()));
+    assert!((number(finding, "coefficient").0 - 0.15).abs() < 0.01);
+    assert!((number(finding, "force").0 - 0.2).abs() < 0.05);
+    let model = Model::from_toml(&found.model, "diagnosed").unwrap();
+    assert!(model.elements.iter().any(|e| e.law.kind().name == "load_friction"), "{}", found.model);
+}
+
+#[test]
+fn a_wrong_torque_constant_is_named_at_its_signal() {
+    let found = found(&Beside { gain: [1.0, 1.2], ..AS_STATED });
+    let finding = &found.verdict.findings[0];
+    assert_eq!((finding.physics.as_str(), &finding.place), ("gain", &Place::Signal("elbow.torque".to_string())));
+    assert!((number(finding, "gain").0 - 1.2).abs() < 0.01);
+}

@@ -1,0 +1,53 @@
+//! What a verdict says of an arm alone.
+
+use super::finding::Interval;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// What only a diagnosis of an arm says.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ArmPart {
+    /// Corner of the filter that measured torque and every regressor went through, Hz.
+    pub corner_hz: f64,
+    /// Each joint, from the base outwards.
+    pub joints: Vec<ArmJoint>,
+    /// The combinations of inertial parameters that the motion of this arm can show (Gautier 1991).
+    #[serde(default)]
+    pub base_parameters: Vec<BaseParameter>,
+}
+
+/// What is left of the torque of a joint on held-out logs (of a set that holds none out, on those that were fitted), as a share of its rms, both through
+/// the filter of the regression.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ArmJoint {
+    /// Its name in the robot file.
+    pub joint: String,
+    /// Root mean square of the measured torque, N m or N.
+    pub torque_rms: f64,
+    /// By the nominal model as it was given.
+    pub as_given: f64,
+    /// With its parameters refitted.
+    pub refit: f64,
+    /// By the diagnosed model.
+    pub diagnosed: f64,
+    /// Of a simulation in closed loop that is fed the measured torque: the torque that the loop had to add to keep the measured motion, as a share of the
+    /// rms torque, by the refitted nominal model; null where it cannot be simulated.
+    pub loop_refit: Option<f64>,
+    /// The same by the diagnosed model.
+    pub loop_diagnosed: Option<f64>,
+}
+
+/// A combination of inertial parameters: one of them and what always goes with it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct BaseParameter {
+    /// Such as `Iyy2 + 0.09 m3`: `m`, `mx`, `Ixx`, ... with the number of the joint; of mass times centre and inertia about the joint's frame.
+    pub name: String,
+    /// As fitted, in `unit`.
+    pub value: f64,
+    /// 95 % interval, in `unit`.
+    pub ci95: Interval,
+    /// As the nominal file has it, in `unit`.
+    pub nominal: f64,
+    /// `kg`, `kg m` or `kg m²`.
+    pub unit: String,
+}

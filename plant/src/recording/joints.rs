@@ -1,0 +1,81 @@
+//! Where a log of an arm keeps position, velocity and torque of each joint.
+
+use super::columns::{ColumnRule, Columns, Source, read_one};
+use crate::elements::Range;
+use crate::tomlfile::{FileError, Table};
+
+/// What a log has of a joint. Its columns are called `NAME.position`, `NAME.velocity` and `NAME.torque`, with a rule for each.
+#[derive(Debug, Clone, PartialEq)]
+pub struct JointColumns {
+    /// Name of the joint in the robot file.
+    pub name: String,
+    /// Whether its velocity was logged.
+    pub has_velocity: bool,
+    /// Torque per current that the set states, N m/A or N/A, where the current was logged in the place of the torque.
+    pub torque_constant: Option<f64>,
+}
+
+impl JointColumns {
+    /// Name of the signal of its position, rad or m.
+    pub fn position(&self) -> String {
+        format!("{}.position", self.name)
+    }
+
+    /// Name of the signal of its velocity, rad/s or m/s.
+    pub fn velocity(&self) -> String {
+        format!("{}.velocity", self.name)
+    }
+
+    /// Name of the signal of its torque or force, N m or N.
+    pub fn torque(&self) -> String {
+        format!("{}.torque", self.name)
+    }
+
+    /// Reads a column of each of these headings as it stands; without a heading for it, no velocity.
+    pub fn of_headings(name: &str, position: &str, velocity: Option<&str>, torque: &str, columns: &mut Columns) -> JointColumns {
+        let joint = JointColumns { name: name.to_string(), has_velocity: velocity.is_some(), torque_constant: None };
+        let mut add = |signal: String, heading: &str| columns.push((signal, ColumnRule::of(Source::Column(heading.to_string()))));
+        add(joint.position(), position);
+        add(joint.torque(), torque);
+        if let Some(heading) = velocity {
+            add(joint.velocity(), heading);
+        }
+        joint
+    }
+}
+
+/// Reads `[joints.NAME]` tables: `position`, `torque` or `current` with `torque_constant`, and perhaps `velocity`; each a heading or a table as in
+/// `[columns]`. The rules are added to `columns`.
+pub(crate) fn read_joints(mut table: Table, columns: &mut Columns) -> Result<Vec<JointColumns>, FileError> {
+    let mut joints = Vec::new();
+    for name in table.keys() {
+        let mut below = table.table(&name)?.ok_or_else(|| table.missing(&name))?;
+        let position = read_one(&mut below, "position")?.ok_or_else(|| below.missing("position"))?;
+        let velocity = read_one(&mut below, "velocity")?;
+        let (torque, current) = (read_one(&mut below, "torque")?, read_one(&mut below, "current")?);
+        let constant = below.number("torque_constant", Range::Any)?;
+        let torque = match (torque, current, constant) {
+            (Some(torque), None, None) => torque,
+            (None, Some(current), Some(constant)) if constant != 0.0 => {
+                ColumnRule { scale: Some(current.scale.unwrap_or(1.0) * constant), offset: current.offset * constant, ..current }
+            }
+            (None, Some(_), Some(_)) => return Err(below.error_at("torque_constant", "must not be 0")),
+            (None, Some(_), None) => return Err(below.missing("torque_constant")),
+            (Some(_), Some(_), _) => return Err(below.error("has both a torque and a current; keep one")),
+            (Some(_), None, Some(_)) => {
+                return Err(below.error_at("torque_constant", "goes with a current, and this joint has a torque; say scale at the torque"));
+            }
+            (None, None, _) => return Err(below.missing("torque")),
+        };
+        below.finish()?;
+        let joint = JointColumns { name, has_velocity: velocity.is_some(), torque_constant: constant };
+        columns.push((joint.position(), position));
+        columns.push((joint.torque(), torque));
+        if let Some(velocity) = velocity {
+            columns.push((joint.velocity(), velocity));
+        }
+        joints.push(joint);
+    }
+    table.finish()?;
+    Ok(joints)
+}
