@@ -101,7 +101,7 @@ pub fn model_of(data: &Data, fit: &Fit) -> Result<(Model, Vec<String>), ArmError
             robot.gravity = gravity_of(data, fit);
             arm.xml.clone()
         }
-        (false, false) => backdrive_export::urdf::of_robot(&robot).0,
+        (false, false) => backdrive_export::urdf::robot_as_urdf(&robot).0,
     };
     let mut new = Arm::new(xml, robot, 0).map_err(|e| ArmError::Robot(e.to_string()))?;
     new.bodies.clone_from(&arm.bodies);

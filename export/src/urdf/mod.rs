@@ -46,7 +46,7 @@ pub fn export(model: &Model) -> Result<Exported, ExportError> {
 }
 
 /// A robot's links and joints as a new URDF, without friction of its joints, and what it cannot say.
-pub fn of_robot(robot: &Robot) -> (String, Vec<String>) {
+pub fn robot_as_urdf(robot: &Robot) -> (String, Vec<String>) {
     let mut notes = Vec::new();
     let text = write::written(robot, &vec![None; robot.joints.len()], &mut notes);
     (text, notes)
