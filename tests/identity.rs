@@ -8,7 +8,7 @@ use std::path::Path;
 use system::{Ended, Place, file, graph_text, messages};
 
 /// Steps are few: bits that part do so at once, and the two-axis graph touches its first wall at 0.4 s.
-const SHORT: &str = "0.8";
+const SHORT: &str = "1.0";
 
 fn run(place: &Place, graph: &str, transport: &str, bag: &str, changes: &[&str]) {
     let mut arguments = vec!["run", graph, "--transport", transport, "--bag", bag, "--duration", SHORT, "--json"];
@@ -35,13 +35,13 @@ fn assert_same(place: &Place, a: &str, b: &str, least: u64) {
 fn one_answer(place: &Place, graph: &str, changes: &[&str]) {
     run(place, graph, "inproc", "here.mcap", changes);
     run(place, graph, "iceoryx2", "apart.mcap", changes);
-    assert_same(place, "here.mcap", "apart.mcap", 9 * 4000);
+    assert_same(place, "here.mcap", "apart.mcap", 9 * 5000);
     let contact = system::samples(&place.path("apart.mcap"), "/slave/measured_js");
     assert!(contact.iter().any(|s| s.effort[0] < -0.1), "nothing was touched: the comparison says little");
     for bag in ["here.mcap", "apart.mcap"] {
         let replayed = place.backdrive(&["replay", bag, "--bag", "again.mcap", "--overwrite"]);
         assert!(matches!(replayed.code, Some(0 | 1 | 7)), "{replayed:?}");
-        assert_same(place, bag, "again.mcap", 9 * 4000);
+        assert_same(place, bag, "again.mcap", 9 * 5000);
     }
 }
 
@@ -102,7 +102,7 @@ fn one_bit_of_one_sample_is_found() {
     let place = Place::new();
     run(&place, &file("launch/contact.toml"), "inproc", "a.mcap", &[]);
     copy_with(&place.path("a.mcap"), &place.path("copy.mcap"), |_, _| {});
-    assert_same(&place, "a.mcap", "copy.mcap", 9 * 4000);
+    assert_same(&place, "a.mcap", "copy.mcap", 9 * 5000);
 
     copy_with(&place.path("a.mcap"), &place.path("b.mcap"), |topic, message| {
         if let Message::Sample(sample) = message
