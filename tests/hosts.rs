@@ -131,7 +131,13 @@ fn the_contact_task_in_real_time_loses_nothing_on_a_clean_link() {
         let Some(hosts) = Hosts::joined() else { return };
         let folder = tempfile::tempdir().unwrap();
         let is_full = std::env::var("BACKDRIVE_FULL").as_deref() == Ok("1");
-        let seconds = if is_full { "60" } else if is_long() { "20" } else { "5" };
+        let seconds = if is_full {
+            "60"
+        } else if is_long() {
+            "20"
+        } else {
+            "5"
+        };
         // Found by address, for a sample that goes to the group is heard by every node of both hosts, wanted or not: that is
         // three quarters of two processors instead of a third.
         without_multicast(&hosts);

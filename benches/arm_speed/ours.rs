@@ -124,8 +124,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         }
         let angles: Vec<&String> = model.outputs.iter().map(|o| &o.name).collect();
         let inputs: Vec<&String> = model.inputs.iter().map(|i| &i.name).collect();
-        arms.push(json!({ "name": name, "joints": joints, "soft": soft, "hold": HOLD_S, "inputs": inputs, "drives": drives, "outputs": angles,
-            "converged": converged, "mujoco_us": MUJOCO_US, "steps": steps }));
+        arms.push(
+            json!({ "name": name, "joints": joints, "soft": soft, "hold": HOLD_S, "inputs": inputs, "drives": drives, "outputs": angles,
+            "converged": converged, "mujoco_us": MUJOCO_US, "steps": steps }),
+        );
     }
     std::fs::write(folder.join("arms.json"), serde_json::to_string(&arms)?)?;
     println!("{}", folder.join("arms.json").display());
