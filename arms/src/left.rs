@@ -15,7 +15,7 @@ use std::ops::Range;
 pub const MUCH: f64 = 0.05;
 /// Multiple of what the noise explains from which on what remains is more than that. The noise is estimated to within some tens of percent.
 pub const ABOVE_NOISE: f64 = 2.0;
-/// Multiple of the filter's own correlation time from which on what remains is no white noise that passed it.
+/// Multiple of the filter's own correlation time from which on what remains is called slow.
 const SLOW: f64 = 2.0;
 /// Share of what remains that has to follow a state of the arm for this to be told.
 const FOLLOWS: f64 = 0.25;
@@ -31,7 +31,7 @@ pub struct Left {
     pub share: f64,
     /// What noise of the sensors would leave, as a share of the same.
     pub noise: f64,
-    /// Where it shows; `None` where it is little, or what the noise explains, or looks like white noise.
+    /// Where it shows; `None` where it is little, or what the noise explains.
     pub shows: Option<Where>,
 }
 
@@ -124,17 +124,13 @@ fn inertia(data: &Data, motions: Range<usize>) -> DMatrix<f64> {
     sum
 }
 
-/// When, at which frequencies and in which state it shows; `None` where it looks like white noise through the filter and follows nothing.
+/// When, at which frequencies and in which state it shows; `None` without rows.
 fn shows(data: &Data, fit: &Fit, joint: usize, motions: Range<usize>) -> Option<Where> {
     let rows = |m: usize| &fit.residual[data.layout.of(m, joint)];
-    let time = motions.clone().map(|m| correlation_time(rows(m))).fold(1.0, f64::max);
-    let state = state(data, fit, joint, motions.clone(), time);
+    let correlation = motions.clone().map(|m| correlation_time(rows(m))).fold(1.0, f64::max);
+    let state = state(data, fit, joint, motions.clone(), correlation);
     // White noise below the corner has a correlation time of 1 / (2 corner).
     let own = (0.5 / data.rates.corner / data.rates.row_period()).max(1.0);
-    let is_slow = time > SLOW * own;
-    if state.is_none() && !is_slow {
-        return None;
-    }
     let rate = 1.0 / data.rates.row_period();
     let longest = motions.clone().max_by_key(|m| data.layout.count(*m))?;
     let band_hz = [0.1, 0.9].map(|share| power_below(rows(longest), rate, share));
@@ -144,7 +140,10 @@ fn shows(data: &Data, fit: &Fit, joint: usize, motions: Range<usize>) -> Option<
     };
     let worst = data.blocks.iter().filter(|b| b.motion == longest).max_by(|a, b| square(a).total_cmp(&square(b)))?;
     let time = vec![[worst.rows.start, worst.rows.end].map(|row| data.rates.time_of(row))];
-    let state = state.unwrap_or_else(|| "slow, and follows no position, velocity, acceleration or torque of a joint".to_string());
+    let state = state.unwrap_or_else(|| {
+        let pace = if correlation > SLOW * own { "slow" } else { "as fast as noise that is filtered, such as by the drive" };
+        format!("{pace}, and follows no position, velocity, acceleration or torque of a joint")
+    });
     Some(Where { time, band_hz, state: Some(state), class: None })
 }
 

@@ -120,7 +120,9 @@ fn text(problem: &Problem, found: &Found) -> String {
             );
         }
     }
-    for joint in verdict.arm.iter().flat_map(|arm| &arm.joints) {
+    // Where nothing else is claimed the sentence says it.
+    let beside = verdict.arm.iter().filter(|_| verdict.word != Word::Unexplained);
+    for joint in beside.flat_map(|arm| &arm.joints) {
         if let Some(open) = unexplained(joint) {
             line("remains", open);
         }

@@ -104,7 +104,7 @@ fn to_do(verdict: &Verdict) -> Vec<(String, Option<String>)> {
     let use_it = || Some(format!("backdrive export {MODEL_FILE} --to urdf --out arm.diagnosed.urdf"));
     match verdict.word {
         Word::Missing | Word::Parameters => items.push((
-            format!("Use {MODEL_FILE}, beside this page, such as in a feed-forward or a simulation; `export` writes it for other programs."),
+            format!("Use {MODEL_FILE}, beside this page, such as in a feed-forward or a simulation; this writes it for other programs:"),
             use_it(),
         )),
         Word::Ambiguous => items.push((
