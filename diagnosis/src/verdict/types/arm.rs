@@ -1,7 +1,7 @@
 //! What a verdict says of an arm alone.
 
-use super::Where;
 use super::finding::Interval;
+use super::shown::Where;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
