@@ -18,9 +18,9 @@ pub const ABOVE_NOISE: f64 = 2.0;
 /// Multiple of the filter's own correlation time from which on what remains is called slow.
 const SLOW: f64 = 2.0;
 /// Share of what remains that has to follow a state of the arm for this to be told.
-const FOLLOWS: f64 = 0.25;
+const FOLLOWS: f64 = 0.4;
 /// Classes of a state, within each of which the mean is taken.
-const CLASSES: usize = 12;
+const CLASSES: usize = 6;
 /// Poses in which the inertia is looked at.
 const POSES: usize = 10;
 
@@ -128,7 +128,11 @@ fn inertia(data: &Data, motions: Range<usize>) -> DMatrix<f64> {
 fn shows(data: &Data, fit: &Fit, joint: usize, motions: Range<usize>) -> Option<Where> {
     let rows = |m: usize| &fit.residual[data.layout.of(m, joint)];
     let correlation = motions.clone().map(|m| correlation_time(rows(m))).fold(1.0, f64::max);
-    let state = state(data, fit, joint, motions.clone(), correlation);
+    // Which state it follows is asked of all logs: of the held-out ones alone few turns are independent.
+    let everywhere = 0..data.motions.len();
+    let count: usize = everywhere.clone().map(|m| data.layout.count(m)).sum();
+    let independent = count as f64 / correlation;
+    let state = state(data, fit, joint, everywhere, independent);
     // White noise below the corner has a correlation time of 1 / (2 corner).
     let own = (0.5 / data.rates.corner / data.rates.row_period()).max(1.0);
     let rate = 1.0 / data.rates.row_period();
@@ -142,15 +146,17 @@ fn shows(data: &Data, fit: &Fit, joint: usize, motions: Range<usize>) -> Option<
     let time = vec![[worst.rows.start, worst.rows.end].map(|row| data.rates.time_of(row))];
     let state = state.unwrap_or_else(|| {
         let pace = if correlation > SLOW * own { "slow" } else { "as fast as noise that is filtered, such as by the drive" };
-        format!("{pace}, and follows no position, velocity, acceleration or torque of a joint")
+        match independent < 2.0 * CLASSES as f64 {
+            true => format!("{pace}; the logs are too short to tell what it follows"),
+            false => format!("{pace}, and follows no position, velocity, acceleration or torque of a joint"),
+        }
     });
     Some(Where { time, band_hz, state: Some(state), class: None })
 }
 
 /// The state that what remains follows most, in words.
-fn state(data: &Data, fit: &Fit, joint: usize, motions: Range<usize>, time: f64) -> Option<String> {
+fn state(data: &Data, fit: &Fit, joint: usize, motions: Range<usize>, independent: f64) -> Option<String> {
     let residual: Vec<f64> = motions.clone().flat_map(|m| fit.residual[data.layout.of(m, joint)].iter().copied()).collect();
-    let independent = residual.len() as f64 / time;
     let mut best: Option<(f64, String)> = None;
     for (k, name) in data.problem.joints.iter().enumerate() {
         for what in ["position", "velocity", "acceleration", "torque"] {
@@ -230,7 +236,7 @@ mod tests {
     fn what_follows_a_signal_is_told_from_what_does_not() {
         let signal = even(2000);
         let follows: Vec<f64> = signal.iter().map(|x| x * x - 0.33).collect();
-        assert!(explained(&follows, &signal, 2000.0) > 0.9);
+        assert!(explained(&follows, &signal, 2000.0) > 0.8);
         let other: Vec<f64> = even(2100).split_off(100);
         assert!(explained(&other, &signal, 2000.0).abs() < 0.02);
         // Of too few independent samples nothing is told.
