@@ -10,6 +10,7 @@ use crate::output;
 use crate::progress;
 use crate::recordings::{self, Opened};
 use backdrive_diagnosis::diagnose::{self, Diagnosis};
+use backdrive_diagnosis::physics::physics_named;
 use backdrive_diagnosis::search::Settings;
 use backdrive_diagnosis::verdict::{EXPERIMENT_FILE, MODEL_FILE, VERDICT_FILE, Word, rival_file};
 use std::path::Path;
@@ -17,6 +18,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 mod arm;
+mod arm_options;
 
 /// Name of the report, where no other is asked for.
 pub const REPORT: &str = "report.html";
@@ -24,8 +26,10 @@ pub const REPORT: &str = "report.html";
 /// Diagnoses, writes, and says what was found.
 pub fn diagnose(options: &cli::Diagnose) -> Result<u8, Failure> {
     let began = Instant::now();
+    let beside = options.out.join(REPORT);
+    let report = (!options.no_report).then_some(options.html.as_deref().unwrap_or(&beside));
     if let Some((set, model)) = arm::asked(options)? {
-        return arm::diagnose(options, &set, &model, began).map(exit_code);
+        return arm::diagnose(options, &set, &model, report, began).map(exit_code);
     }
     let stop = interrupt::heard()?;
 
@@ -37,14 +41,13 @@ pub fn diagnose(options: &cli::Diagnose) -> Result<u8, Failure> {
     for note in &opened.notes {
         output::note(format_args!("note: {note}"));
     }
+    let usual = Settings::default();
     let settings = Settings {
-        without: options.without.clone(),
-        effects: usize::from(options.effects),
-        effort: options.effort,
-        patience: Duration::from_secs_f64(options.patience),
+        without: of_one_axis(&options.without)?,
+        effects: options.effects.map_or(usual.effects, usize::from),
+        effort: options.effort.unwrap_or(usual.effort),
+        patience: options.patience.map_or(usual.patience, Duration::from_secs_f64),
     };
-    let beside = options.out.join(REPORT);
-    let report = (!options.no_report).then_some(options.html.as_deref().unwrap_or(&beside));
     let Diagnosed { found, written } = diagnose_into(opened, &settings, &options.out, report, &stop)?;
     let seconds = began.elapsed().as_secs_f64();
     let path = options.out.join("time.txt");
@@ -113,6 +116,17 @@ pub fn diagnose_into(
         written.push(if report == out.join(REPORT) { REPORT.to_string() } else { report.display().to_string() });
     }
     Ok(Diagnosed { found, written })
+}
+
+/// Physics to leave out that a device of one axis may have.
+fn of_one_axis(without: &[String]) -> Result<Vec<String>, Failure> {
+    match without.iter().find(|name| physics_named(name).is_none()) {
+        Some(name) => {
+            let message = format!("--without {name}: only arms have it, and this model has no [robot]; leave it out");
+            Err(Failure { code: code::USAGE, message })
+        }
+        None => Ok(without.to_vec()),
+    }
 }
 
 fn shown(folder: &Path) -> String {

@@ -2,6 +2,7 @@
 
 use crate::audit::audit;
 use crate::consistent::consistent;
+use crate::drawn::{Drawn, drawn};
 use crate::error::ArmError;
 use crate::excitation;
 use crate::fit::Fit;
@@ -9,22 +10,46 @@ use crate::judge::judge;
 use crate::physics::Physics;
 use crate::problem::Problem;
 use crate::regression::Data;
-use crate::search::{Search, added, search};
-use crate::verdict::{Parts, verdict};
+use crate::search::{MOST, Search, added, search};
+use crate::verdict::{Parts, place, verdict};
 use crate::written::{Reading, model_of};
 use backdrive_diagnosis::audit::Weight;
+use backdrive_diagnosis::hypothesis::Place;
 use backdrive_diagnosis::verdict::{NextExperiment, Planned, Verdict};
 
 /// Name of the file of the next experiment.
 pub const EXPERIMENT_FILE: &str = "next-motion.csv";
 
 /// What may be asked.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone)]
 pub struct Settings {
     /// Physics that are not considered, by name.
     pub without: Vec<String>,
+    /// How many physics may be missing at once, at most.
+    pub effects: usize,
     /// Corner of the regression's filter, Hz, where the motion shall not say it.
     pub corner_hz: Option<f64>,
+}
+
+impl Default for Settings {
+    fn default() -> Settings {
+        Settings { without: Vec::new(), effects: MOST, corner_hz: None }
+    }
+}
+
+/// A physics that was fitted in full in a round of the search.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Tried {
+    /// Its name.
+    pub physics: String,
+    /// Where.
+    pub place: Place,
+    /// By how much it raised twice the log evidence.
+    pub worth: f64,
+    /// By how much better it predicted stretches that its fit has not seen, in standard errors of that; `None` where that cannot be told.
+    pub unseen: Option<f64>,
+    /// Whether it was taken up in that round.
+    pub taken: bool,
 }
 
 /// What was found, as a file and as texts of files.
@@ -38,6 +63,10 @@ pub struct Found {
     pub experiment: String,
     /// What a reader should know besides.
     pub notes: Vec<String>,
+    /// What the search tried, in its order.
+    pub tried: Vec<Tried>,
+    /// Curves for a report.
+    pub drawn: Drawn,
 }
 
 /// Diagnoses an arm.
@@ -50,7 +79,7 @@ pub fn diagnose(problem: &Problem, settings: &Settings) -> Result<Found, ArmErro
     if let Some(bad) = remarks.iter().find(|r| r.weight == Weight::Unusable) {
         return Err(ArmError::Log { log: bad.place.clone(), message: bad.message.clone() });
     }
-    let mut found = search(&mut data, &settings.without)?;
+    let mut found = search(&mut data, &settings.without, settings.effects)?;
     remarks.extend(load_remarks(&data));
     let mut whole = Data::new(problem, settings.corner_hz, true)?;
     for fit in [&mut found.as_given, &mut found.refit, &mut found.best] {
@@ -80,10 +109,28 @@ pub fn diagnose(problem: &Problem, settings: &Settings) -> Result<Found, ArmErro
             }
         }
     }
+    if added(&found.best.structure).len() >= settings.effects {
+        notes.push(format!(
+            "the search ended at {} physics, as many as were allowed (--effects): what remains may be others",
+            settings.effects
+        ));
+    }
     let planned = excitation::plan(problem)?;
     let next = next(&found, &planned, problem);
+    let drawn = drawn(&data, &whole, &found, &planned);
+    let tried = found.tried.iter().map(|t| tried_of(&data, t)).collect();
     let verdict = verdict(Parts { data: &data, whole: &whole, search: &found, audit: remarks, loops, next: Some(next) })?;
-    Ok(Found { verdict, model: model.to_toml(), experiment: planned.csv, notes })
+    Ok(Found { verdict, model: model.to_toml(), experiment: planned.csv, notes, tried, drawn })
+}
+
+fn tried_of(data: &Data, tried: &crate::search::Tried) -> Tried {
+    Tried {
+        physics: tried.term.physics.facts().name.to_string(),
+        place: place(data, &tried.term),
+        worth: tried.worth,
+        unseen: tried.gain.map(|g| g.in_errors()),
+        taken: tried.taken,
+    }
 }
 
 /// The displacement over which friction turns, of rows at rest too: there it shows.

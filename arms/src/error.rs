@@ -12,6 +12,9 @@ pub enum ArmError {
     /// A log holds what no recording can.
     #[error("{0}")]
     Recording(#[from] RecordingError),
+    /// A bag cannot be read, or lacks a topic or a field.
+    #[error("{0}")]
+    Bag(String),
     /// The model has no robot.
     #[error("{0}: has no [robot], so it is no arm; a model of one axis is diagnosed from recordings of its inputs and outputs")]
     NoRobot(String),

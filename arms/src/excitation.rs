@@ -35,6 +35,10 @@ type Series = Vec<[f64; 2]>;
 pub struct Excitation {
     /// `t`, then position of each joint, as CSV.
     pub csv: String,
+    /// Times of its rows, s.
+    pub time: Vec<f64>,
+    /// Position of each joint there, rad or m.
+    pub position: Vec<Vec<f64>>,
     /// Condition number of the regressor, each column in the size of its body.
     pub condition: f64,
     /// Length of a period, s.
@@ -76,7 +80,8 @@ pub fn plan(problem: &Problem) -> Result<Excitation, ArmError> {
         // Writing to a String cannot fail.
         let _ = writeln!(csv, "{:.3},{}", i as f64 / RATE, row.join(","));
     }
-    Ok(Excitation { csv, condition, seconds: PERIOD })
+    let time = (0..count).map(|i| i as f64 / RATE).collect();
+    Ok(Excitation { csv, time, position: motion.position, condition, seconds: PERIOD })
 }
 
 /// The motion of a series, scaled into the joints' ranges.

@@ -1,10 +1,13 @@
 //! Logs: position, perhaps velocity, and torque of every joint, at the times that were logged.
 
 use crate::error::ArmError;
+use backdrive_bags::{BagError, Reader, recording, topic_of};
+use backdrive_plant::model::Hold;
 use backdrive_plant::recording::units::{Kind, split};
-use backdrive_plant::recording::{Columns, JointColumns, Piece, Recording, read_csv, read_headings};
+use backdrive_plant::recording::{Columns, JointColumns, Piece, Recording, Source, read_csv, read_headings};
 use backdrive_plant::robot::{Coordinate, JointKind};
 use backdrive_plant::set::RecordingSet;
+use std::path::Path;
 
 /// A log in SI units, joints in the order of the robot's coordinates.
 #[derive(Debug, Clone, PartialEq)]
@@ -37,6 +40,16 @@ pub fn joints_of(set: &mut RecordingSet, coordinates: &[Coordinate], first: &str
             .iter()
             .map(|n| of(n).ok_or_else(|| fault(format!("says nothing of joint \"{n}\": add [joints.{n}] with position and torque"))))
             .collect();
+    }
+    if is_bag(&set.path_of(first)) {
+        let (one, all) = (names.first().copied().unwrap_or("NAME"), names.join(", "));
+        return Err(ArmError::Log {
+            log: first.to_string(),
+            message: format!(
+                "is a bag: say in set.toml for each of {all} which topics hold it, such as [joints.{one}] position = {{ topic = \"/joint_states\", field = \
+                 \"position[0]\" }}, torque = {{ topic = \"/joint_states\", field = \"effort[0]\" }}"
+            ),
+        });
     }
     let headings = read_headings(&set.path_of(first))?;
     let plain: Vec<&str> = headings.iter().map(|h| split(h).0).collect();
@@ -78,7 +91,7 @@ pub fn joints_of(set: &mut RecordingSet, coordinates: &[Coordinate], first: &str
     set.columns.extend(columns);
     let usual = plain.iter().find(|h| ["time", "time_s", "timestamp"].contains(h));
     if let Some(time) = usual.filter(|_| !set.columns.iter().any(|c| c.0 == "t") && !plain.contains(&"t")) {
-        let rule = backdrive_plant::recording::ColumnRule::of(backdrive_plant::recording::Source::Column((*time).to_string()));
+        let rule = backdrive_plant::recording::ColumnRule::of(Source::Column((*time).to_string()));
         set.columns.push(("t".to_string(), rule));
     }
     Ok(found)
@@ -87,22 +100,9 @@ pub fn joints_of(set: &mut RecordingSet, coordinates: &[Coordinate], first: &str
 /// Reads a log of a set.
 ///
 /// # Errors
-/// Where the file cannot be read, a column is missing, or a unit is none that the joint can have.
+/// Where the file cannot be read, a column, topic or field is missing, or a unit is none that the joint can have.
 pub fn read_log(set: &RecordingSet, file: &str, joints: &[JointColumns], coordinates: &[Coordinate]) -> Result<Log, ArmError> {
-    if !file.to_lowercase().ends_with(".csv") && set.rules_of(file).of.is_none() {
-        let message = "logs of an arm are read from CSV files; export the bag with `backdrive bag export`".to_string();
-        return Err(ArmError::Log { log: file.to_string(), message });
-    }
-    let mut wanted: Vec<String> = Vec::new();
-    for joint in joints {
-        wanted.extend([joint.position(), joint.torque()]);
-        if joint.has_velocity {
-            wanted.push(joint.velocity());
-        }
-    }
-    let names: Vec<&str> = wanted.iter().map(String::as_str).collect();
-    let piece: Piece = set.rules_of(file).piece;
-    let recording = read_csv(&set.path_of(file), Some(&names), &set.columns, &piece)?;
+    let recording = read_signals(set, file, joints)?;
     check_units(file, &recording, joints, coordinates)?;
     let column = |name: String| recording.need_signal(&name).map(<[f64]>::to_vec);
     let (mut position, mut velocity, mut torque) = (Vec::new(), Vec::new(), Vec::new());
@@ -112,6 +112,61 @@ pub fn read_log(set: &RecordingSet, file: &str, joints: &[JointColumns], coordin
         velocity.push(if joint.has_velocity { Some(column(joint.velocity())?) } else { None });
     }
     Ok(Log { name: file.to_string(), t: recording.t.clone(), position, velocity, torque })
+}
+
+fn is_bag(path: &Path) -> bool {
+    path.extension().is_some_and(|e| e.eq_ignore_ascii_case("mcap"))
+}
+
+/// Reads the joints' signals of a file, CSV or bag; what is wrong is told with the joint's key in the set.
+fn read_signals(set: &RecordingSet, file: &str, joints: &[JointColumns]) -> Result<Recording, ArmError> {
+    let signals: Vec<(String, String)> = joints.iter().flat_map(keys_of).collect();
+    let names: Vec<&str> = signals.iter().map(|(signal, _)| signal.as_str()).collect();
+    let piece: Piece = set.rules_of(file).piece;
+    let path = set.path_of(file);
+    if !is_bag(&path) {
+        return Ok(read_csv(&path, Some(&names), &set.columns, &piece).map_err(|mut e| {
+            for (signal, key) in &signals {
+                e.key = e.key.replace(&format!("[columns] {signal}"), key);
+                e.message = e.message.replace(&format!("[columns] takes \"{signal}\""), &format!("{key} is taken"));
+            }
+            e
+        })?);
+    }
+    let reader = Reader::open(&path).map_err(|e| ArmError::Bag(e.to_string()))?;
+    recording(&reader, Some(&names), &set.columns, &piece, &|_| Hold::Linear).map_err(|e| {
+        let of = |wanted: &str, part: Option<&str>| {
+            let is_there = |signal: &str| {
+                let rule = set.columns.iter().find(|(name, _)| name == signal).map(|(_, rule)| &rule.source);
+                match rule {
+                    Some(Source::Topic { topic, field }) => topic == wanted && part.is_none_or(|p| p == field),
+                    Some(Source::Column(heading)) => topic_of(heading) == wanted,
+                    None => false,
+                }
+            };
+            signals.iter().find(|(signal, _)| is_there(signal)).map(|(_, key)| key.clone())
+        };
+        let key = match &e {
+            BagError::NoTopic { topic, .. } => of(topic, None),
+            BagError::Field { topic, field, .. } => of(topic, Some(field)),
+            _ => None,
+        };
+        match key {
+            Some(key) => ArmError::Log { log: file.to_string(), message: format!("{key}: {e}") },
+            None => ArmError::Bag(e.to_string()),
+        }
+    })
+}
+
+/// Names of a joint's signals, and the keys of the set that say where they stand.
+fn keys_of(joint: &JointColumns) -> Vec<(String, String)> {
+    let of_torque = if joint.torque_constant.is_some() { "current" } else { "torque" };
+    let key = |what: &str| format!("[joints.{}] {what}", joint.name);
+    let mut out = vec![(joint.position(), key("position")), (joint.torque(), key(of_torque))];
+    if joint.has_velocity {
+        out.push((joint.velocity(), key("velocity")));
+    }
+    out
 }
 
 fn check_units(file: &str, recording: &Recording, joints: &[JointColumns], coordinates: &[Coordinate]) -> Result<(), ArmError> {

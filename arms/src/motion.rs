@@ -11,7 +11,7 @@ use backdrive_plant::recording::resample;
 use realfft::RealFftPlanner;
 
 /// Order of the Butterworth filters; run both ways the order counts twice.
-const ORDER: usize = 4;
+pub(crate) const ORDER: usize = 4;
 /// The corner of the regression, in times the frequency below which this share of the power of the velocities lies.
 const ABOVE: f64 = 12.0;
 /// See [`ABOVE`].
@@ -66,6 +66,11 @@ impl Rates {
     /// Time between two rows, s.
     pub fn row_period(&self) -> f64 {
         self.period() * self.kept as f64
+    }
+
+    /// Time of a row of a motion, s from the log's first sample.
+    pub fn time_of(&self, row: usize) -> f64 {
+        self.ends() as f64 * self.period() + row as f64 * self.row_period()
     }
 
     /// Samples left out at either end, where the filter still sees its mirrored beginning.
@@ -171,6 +176,11 @@ fn median_step(t: &[f64]) -> f64 {
 
 /// The frequency below which [`SHARE`] of the power lies, Hz.
 fn frequency_below(samples: &[f64], rate: f64) -> f64 {
+    power_below(samples, rate, SHARE)
+}
+
+/// The frequency below which a share of the power about the mean lies, Hz; 0 of what is too short to tell.
+pub(crate) fn power_below(samples: &[f64], rate: f64, share: f64) -> f64 {
     if samples.len() < 16 {
         return 0.0;
     }
@@ -188,7 +198,7 @@ fn frequency_below(samples: &[f64], rate: f64) -> f64 {
     let mut sum = 0.0;
     for (i, p) in power.iter().enumerate() {
         sum += p;
-        if sum >= SHARE * total {
+        if sum >= share * total {
             return i as f64 * rate / samples.len() as f64;
         }
     }

@@ -435,7 +435,7 @@ impl Data<'_> {
 }
 
 /// Correlation time of residuals, rows, at least 1: the autocorrelation is summed up to the first lag at which it is that of noise.
-fn correlation_time(part: &[f64]) -> f64 {
+pub(crate) fn correlation_time(part: &[f64]) -> f64 {
     let energy: f64 = part.iter().map(|x| x * x).sum();
     if energy <= 0.0 || part.len() < 16 {
         return 1.0;

@@ -55,11 +55,11 @@ pub struct Search {
     pub rivals: Vec<Vec<(Term, f64)>>,
 }
 
-/// Looks for what is missing. `without`: names of physics that are not considered.
+/// Looks for what is missing. `without`: names of physics that are not considered; `most`: physics that are added at most.
 ///
 /// # Errors
 /// Where a fit cannot be computed at all.
-pub fn search(data: &mut Data, without: &[String]) -> Result<Search, ArmError> {
+pub fn search(data: &mut Data, without: &[String], most: usize) -> Result<Search, ArmError> {
     let failed = || ArmError::Robot("the regression has no solution; are all joints logged in motion?".to_string());
     let pool: Vec<Term> = candidates(data.problem, &data.motions[..data.fit_count])
         .into_iter()
@@ -74,7 +74,7 @@ pub fn search(data: &mut Data, without: &[String]) -> Result<Search, ArmError> {
     for round in 0..2 {
         best = data.fit(&Structure { ..best.structure.clone() }, &weights).ok_or_else(failed)?;
         best = slipped(data, best, &weights);
-        grow(data, &pool, &mut best, &weights, &mut tried);
+        grow(data, &pool, most, &mut best, &weights, &mut tried);
         if round == 0 {
             let bodies = consistent(data, &best, &weights).ok_or_else(failed)?;
             data.see(&data.parameters(&bodies))?;
@@ -285,10 +285,10 @@ fn tolerated(data: &Data, fit: Fit, weights: &Weights) -> Fit {
 }
 
 /// Adds what is worth it.
-fn grow(data: &Data, pool: &[Term], best: &mut Fit, weights: &Weights, tried: &mut Vec<Tried>) {
+fn grow(data: &Data, pool: &[Term], most: usize, best: &mut Fit, weights: &Weights, tried: &mut Vec<Tried>) {
     // Adding and exchanging can take turns: what was there once ends it.
     let mut seen: Vec<Vec<(Physics, crate::physics::At)>> = Vec::new();
-    while added(&best.structure).len() < MOST {
+    while added(&best.structure).len() < most {
         let mut now: Vec<_> = best.structure.terms.iter().map(|t| (t.physics, t.at)).collect();
         now.sort();
         if seen.iter().filter(|s| **s == now).count() > 1 {

@@ -3,15 +3,17 @@
 use crate::base;
 use crate::error::ArmError;
 use crate::fit::Fit;
+use crate::left::{Left, left};
 use crate::physics::{At, Physics, Term};
 use crate::regression::Data;
+use crate::said::{remaining, sentence};
 use crate::search::{LEAST_SHARE, Search, added, by_block};
 use crate::written::gravity_of;
 use backdrive_diagnosis::hypothesis::Place;
 use backdrive_diagnosis::predictive::gain;
 use backdrive_diagnosis::verdict::{
     Alternative, ArmJoint, ArmPart, Estimate, Estimates, Finding, HeldOut, MODEL_FILE, Moved, NextExperiment, Parameter, RecordErrors,
-    Remaining, Remark, SCHEMA, Verdict, Word,
+    Remark, SCHEMA, Verdict, Word,
 };
 use std::collections::BTreeMap;
 
@@ -63,14 +65,16 @@ pub fn verdict(parts: Parts) -> Result<Verdict, ArmError> {
             .is_some_and(|g| g.is_sure())
             && share_taken(data, &search.as_given, &search.refit, held) > LEAST_SHARE;
     let alike = findings.first().is_some_and(|f| f.confidence < 0.6);
+    let left = left(data, &search.best);
     let word = match (findings.is_empty(), alike) {
         (false, true) => Word::Ambiguous,
         (false, false) => Word::Missing,
+        (true, _) if left.iter().any(|l| l.shows.is_some()) => Word::Unexplained,
         (true, _) if refit_helps && !moved.is_empty() => Word::Parameters,
         (true, _) => Word::NothingMissing,
     };
     let residuals: Vec<Vec<f64>> = [&search.as_given, &search.refit, &search.best].map(|f| whole.residual_of(f)).to_vec();
-    let arm = arm_part(data, whole, search, &residuals, &loops)?;
+    let arm = arm_part(data, whole, search, &residuals, &loops, left)?;
     let held_out = held_out(whole, &residuals);
     let sentence = sentence(word, &findings, &arm, held);
     Ok(Verdict {
@@ -310,10 +314,13 @@ fn arm_part(
     search: &Search,
     residuals: &[Vec<f64>],
     loops: &[Option<Vec<f64>>; 2],
+    left: Vec<Left>,
 ) -> Result<ArmPart, ArmError> {
     let held = whole.fit_count < whole.motions.len();
-    let joints = (0..data.problem.joints.len())
-        .map(|j| {
+    let joints = left
+        .into_iter()
+        .enumerate()
+        .map(|(j, left)| {
             let torque_rms = whole.mean_square(&whole.torque, j, held).sqrt();
             let share = |k: usize| (whole.mean_square(&residuals[k], j, held)).sqrt() / torque_rms.max(f64::MIN_POSITIVE);
             let of_loop = |k: usize| loops[k].as_ref().and_then(|l: &Vec<f64>| l.get(j).copied());
@@ -325,6 +332,9 @@ fn arm_part(
                 diagnosed: share(2),
                 loop_refit: of_loop(0),
                 loop_diagnosed: of_loop(1),
+                moving: Some(left.share),
+                noise: Some(left.noise),
+                shows: left.shows,
             }
         })
         .collect();
@@ -377,41 +387,4 @@ fn held_out(whole: &Data, residuals: &[Vec<f64>]) -> HeldOut {
         pooled_floor: None,
         per_record,
     }
-}
-
-fn remaining(arm: &ArmPart) -> Remaining {
-    let of = |f: fn(&ArmJoint) -> f64| arm.joints.iter().map(|j| f(j).powi(2)).sum::<f64>().sqrt();
-    let refit = of(|j| j.refit);
-    let share = (refit > 0.0).then(|| of(|j| j.diagnosed) / refit);
-    Remaining { share, floor_share: None, noise_sd: None, not_repeated: None, shows: None, looks_like: None }
-}
-
-fn sentence(word: Word, findings: &[Finding], arm: &ArmPart, held: bool) -> String {
-    let named: Vec<String> =
-        findings.iter().map(|f| format!("{} {}", words(&f.physics), backdrive_diagnosis::words::place(&f.place))).collect();
-    let unseen = if held { "held-out" } else { "fitted" };
-    let left: Vec<String> = arm.joints.iter().map(|j| format!("{:.1} %", 100.0 * j.diagnosed)).collect();
-    let before: Vec<String> = arm.joints.iter().map(|j| format!("{:.1} %", 100.0 * j.refit)).collect();
-    let tail = format!("of the {unseen} torque {} remain, joint by joint", left.join(", "));
-    match word {
-        Word::Missing => format!("The model leaves out {}; {tail} ({} without).", named.join(", "), before.join(", ")),
-        Word::Ambiguous => {
-            let other = findings.first().and_then(|f| f.alternatives.first());
-            let other = other.map_or(String::new(), |a| {
-                format!(", or in place of the first {} {}", words(&a.physics), backdrive_diagnosis::words::place(&a.place))
-            });
-            format!(
-                "The model leaves out {}{other}, which these logs do not tell apart; {tail} ({} without).",
-                named.join(", "),
-                before.join(", ")
-            )
-        }
-        Word::Parameters => format!("No physics is missing; the model's parameters are off, and refitted {tail}."),
-        _ => format!("Nothing that these logs would show is missing; {tail}."),
-    }
-}
-
-/// A physics of an arm in words.
-pub fn words(name: &str) -> String {
-    crate::physics::ALL.iter().map(|p| p.facts()).find(|f| f.name == name).map_or_else(|| name.replace('_', " "), |f| f.words.to_string())
 }

@@ -1,6 +1,7 @@
 //! Options of `backdrive diagnose`.
 
-use super::values::{patience, positive};
+use super::values::positive;
+use backdrive_arms::physics::ALL as OF_ARMS;
 use backdrive_diagnosis::physics::{PHYSICS, physics_named};
 use clap::Args;
 use std::path::PathBuf;
@@ -40,16 +41,16 @@ pub struct Diagnose {
     /// A physics that is not to be considered, and with it all that contain it as a special case; may be given several times.
     #[arg(long, value_name = "KIND", value_parser = physics)]
     pub without: Vec<String>,
-    /// How many physics may be missing at once, at most; more take more time.
-    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u8).range(1..=8))]
-    pub effects: u8,
-    /// How much to search, as a multiple of the default, which takes up to about 20 s on two cores. The verdict depends on this alone, and is the same on
-    /// every machine.
-    #[arg(long, value_name = "FACTOR", value_parser = positive, default_value_t = 1.0, allow_negative_numbers = true)]
-    pub effort: f64,
-    /// A limit on the clock. Where it cuts the search off, the verdict may depend on the machine, and says so.
-    #[arg(long, value_name = "SECONDS", value_parser = positive, default_value_t = patience(), allow_negative_numbers = true)]
-    pub patience: f64,
+    /// How many physics may be missing at once, at most; more take more time. Without this 3, of an arm 8.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=8))]
+    pub effects: Option<u8>,
+    /// How much to search, as a multiple of the default (1), which takes up to about 20 s on two cores. The verdict depends on this alone, and is the same
+    /// on every machine. Of an arm everything is tried whatever this says.
+    #[arg(long, value_name = "FACTOR", value_parser = positive, allow_negative_numbers = true)]
+    pub effort: Option<f64>,
+    /// A limit on the clock; without this 600 s. Where it cuts the search off, the verdict may depend on the machine, and says so. Not for an arm.
+    #[arg(long, value_name = "SECONDS", value_parser = positive, allow_negative_numbers = true)]
+    pub patience: Option<f64>,
     /// Print what the search tried, what it cost and why it lost.
     #[arg(long, conflicts_with = "json")]
     pub explain: bool,
@@ -65,6 +66,14 @@ pub struct Diagnose {
 }
 
 fn physics(name: &str) -> Result<String, String> {
-    let known = || PHYSICS.iter().map(|p| p.name).collect::<Vec<_>>().join(", ");
-    physics_named(name).map(|p| p.name.to_string()).ok_or_else(|| format!("no such physics; there are {}", known()))
+    if let Some(known) = physics_named(name) {
+        return Ok(known.name.to_string());
+    }
+    let of_arms = || OF_ARMS.iter().map(|p| p.facts().name);
+    if of_arms().any(|known| known == name) {
+        return Ok(name.to_string());
+    }
+    let known = PHYSICS.iter().map(|p| p.name).collect::<Vec<_>>();
+    let more: Vec<&str> = of_arms().filter(|n| !known.contains(n)).collect();
+    Err(format!("no such physics; there are {}; of arms also {}", known.join(", "), more.join(", ")))
 }

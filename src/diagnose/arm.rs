@@ -1,12 +1,15 @@
 //! `backdrive diagnose` of a model with a robot: logs of position and torque of every joint.
 
+use super::arm_options;
 use crate::cli;
+use crate::diagnose_page::arm::{Shown, page};
 use crate::failure::Failure;
 use crate::output;
+use crate::progress;
 use crate::recordings;
-use backdrive_arms::diagnose::{EXPERIMENT_FILE, Found, Settings, diagnose as diagnosed};
+use backdrive_arms::diagnose::{EXPERIMENT_FILE, Found, Settings, Tried, diagnose as diagnosed};
 use backdrive_arms::problem::Problem;
-use backdrive_arms::verdict::words;
+use backdrive_arms::said::{unexplained, words};
 use backdrive_diagnosis::audit::Weight;
 use backdrive_diagnosis::verdict::{Estimate, Finding, MODEL_FILE, Parameter, VERDICT_FILE, Word};
 use backdrive_diagnosis::words as said;
@@ -31,30 +34,45 @@ pub fn asked(options: &cli::Diagnose) -> Result<Option<(RecordingSet, PathBuf)>,
     Ok(Some((set, model)))
 }
 
-/// Diagnoses an arm, writes, and says what was found.
-pub fn diagnose(options: &cli::Diagnose, set: &RecordingSet, model: &Path, began: Instant) -> Result<Word, Failure> {
+/// Diagnoses an arm, writes, and says what was found. `report`: where the page goes, where one is wanted.
+pub fn diagnose(options: &cli::Diagnose, set: &RecordingSet, model: &Path, report: Option<&Path>, began: Instant) -> Result<Word, Failure> {
     let files: Vec<PathBuf> =
         std::iter::once(model.to_path_buf()).chain(set.fit.iter().chain(&set.held_out).map(|f| set.path_of(f))).collect();
     for name in [MODEL_FILE, EXPERIMENT_FILE] {
         recordings::not_onto(&options.out.join(name), &files, false)?;
     }
+    let mut notes = arm_options::notes(options, set)?;
+    notes.iter().for_each(|note| output::note(format_args!("note: {note}")));
+    // What cannot be written is told before the work, not after it.
     output::folder(&options.out)?;
+    report.map_or(Ok(()), output::writable)?;
     let problem = Problem::open(set, Some(model)).map_err(Failure::input)?;
-    let settings = Settings { without: options.without.clone(), ..Settings::default() };
-    let found = diagnosed(&problem, &settings).map_err(Failure::input)?;
+    let usual = Settings::default();
+    let effects = options.effects.map_or(usual.effects, usize::from);
+    let settings = Settings { without: arm_options::without(options), effects, ..usual };
+    let found = progress::busy("diagnosing the arm", || diagnosed(&problem, &settings)).map_err(Failure::input)?;
+    notes.extend(found.notes.iter().cloned());
     let write = |name: &str, text: &str| output::file(&options.out.join(name), text);
     let json = serde_json::to_string_pretty(&found.verdict).map_err(Failure::input)?;
     write(VERDICT_FILE, &format!("{json}\n"))?;
     write(MODEL_FILE, &found.model)?;
     write(EXPERIMENT_FILE, &found.experiment)?;
+    let mut written = [VERDICT_FILE, MODEL_FILE, EXPERIMENT_FILE].map(str::to_string).to_vec();
+    if let Some(report) = report {
+        let name = options.set.first().and_then(|p| p.file_name()).map_or(String::new(), |n| n.to_string_lossy().into_owned());
+        output::file(report, page(&Shown { problem: &problem, found: &found, name: &name, notes: &notes }).html())?;
+        written.push(report.strip_prefix(&options.out).unwrap_or(report).display().to_string());
+    }
     let seconds = began.elapsed().as_secs_f64();
     write("time.txt", &format!("{seconds:.2}\n"))?;
     if options.json {
         output::json(&found.verdict)?;
     } else {
         output::line(text(&problem, &found))?;
-        let names = [VERDICT_FILE, MODEL_FILE, EXPERIMENT_FILE].join(", ");
-        output::line(format_args!("wrote     {}: {names} ({seconds:.1} s)", options.out.display()))?;
+        if options.explain {
+            output::line(format_args!("\n{}\n", explained(&found.tried)))?;
+        }
+        output::line(format_args!("wrote     {}: {} ({seconds:.1} s)", options.out.display(), written.join(", ")))?;
     }
     Ok(found.verdict.word)
 }
@@ -102,6 +120,13 @@ fn text(problem: &Problem, found: &Found) -> String {
             );
         }
     }
+    // Where nothing else is claimed the sentence says it.
+    let beside = verdict.arm.iter().filter(|_| verdict.word != Word::Unexplained);
+    for joint in beside.flat_map(|arm| &arm.joints) {
+        if let Some(open) = unexplained(joint) {
+            line("remains", open);
+        }
+    }
     if let Some(next) = &verdict.next_experiment {
         line("next", next.sentence().to_string());
     }
@@ -133,4 +158,16 @@ fn finding_text(finding: &Finding) -> String {
         numbers.join(", "),
         said::share(finding.confidence)
     )
+}
+
+/// What the search fitted in full, round by round.
+fn explained(tried: &[Tried]) -> String {
+    let mut out = format!("{:<64} {:>12} {:>12}  taken up", "fitted", "worth", "unseen, sd");
+    for one in tried {
+        let name = format!("{} {}", words(&one.physics), said::place(&one.place));
+        let unseen = one.unseen.map_or("-".to_string(), |u| format!("{u:.1}"));
+        let _ = write!(out, "\n{name:<64} {:>12.1} {unseen:>12}  {}", one.worth, if one.taken { "yes" } else { "no" });
+    }
+    out += "\nworth: rise of twice the log evidence, more than 10 is claimed; unseen: how much better it predicts stretches that its fit has not seen";
+    out
 }

@@ -1,5 +1,8 @@
 //! The report of `backdrive diagnose`: pictures first, the numbers beside them.
 
+pub mod arm;
+mod arm_figures;
+mod arm_tables;
 mod force;
 mod held_out;
 mod phrases;
@@ -12,7 +15,7 @@ use backdrive_diagnosis::diagnose::Diagnosis;
 use backdrive_diagnosis::verdict::{MODEL_FILE, Verdict, Word, chosen};
 use backdrive_diagnosis::words;
 use backdrive_report::{Cell, Page, Table, Tone, percent};
-use phrases::{adds, capital};
+use phrases::{adds, capital, tone};
 
 /// What a report shows.
 pub struct Shown<'a> {
@@ -125,16 +128,6 @@ fn to_do(found: &Diagnosis) -> Vec<(String, Option<String>)> {
         items.push((more.to_string(), Some(command())));
     }
     items
-}
-
-fn tone(word: Word) -> Tone {
-    match word {
-        Word::NothingMissing => Tone::Good,
-        Word::Parameters => Tone::Limited,
-        Word::Missing => Tone::Warning,
-        Word::Ambiguous | Word::CannotTell => Tone::Unsure,
-        Word::Unexplained => Tone::Bad,
-    }
 }
 
 /// How far it is explained, and where it shows.

@@ -1,6 +1,7 @@
 //! What a verdict says of an arm alone.
 
 use super::finding::Interval;
+use super::shown::Where;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -35,6 +36,15 @@ pub struct ArmJoint {
     pub loop_refit: Option<f64>,
     /// The same by the diagnosed model.
     pub loop_diagnosed: Option<f64>,
+    /// What remains by the diagnosed model while the joint moves, as a share of its rms torque. Not in other files.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub moving: Option<f64>,
+    /// What noise of the torque sensor, and noise and steps of the position sensors in the accelerations, would leave of that. Not in other files.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub noise: Option<f64>,
+    /// Where what remains shows; only where it is much more than the noise explains.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub shows: Option<Where>,
 }
 
 /// A combination of inertial parameters: one of them and what always goes with it.
