@@ -14,6 +14,7 @@ use backdrive_diagnosis::audit::Weight;
 use backdrive_diagnosis::verdict::{Estimate, Finding, MODEL_FILE, Parameter, VERDICT_FILE, Word};
 use backdrive_diagnosis::words as said;
 use backdrive_plant::model::Model;
+use backdrive_plant::robot::JointKind;
 use backdrive_plant::set::RecordingSet;
 use backdrive_report::{number, si};
 use std::fmt::Write as _;
@@ -85,7 +86,7 @@ fn text(problem: &Problem, found: &Found) -> String {
     };
     let verdict = &found.verdict;
     let all = problem.fit.len() + problem.held_out.len();
-    line("logs", format!("{all} of {} joints ({} held out)", problem.joints.len(), problem.held_out.len()));
+    line("logs", format!("{all}, {} of them held out; {} joints", problem.held_out.len(), problem.joints.len()));
     for remark in verdict.audit.iter().filter(|r| r.weight > Weight::Note) {
         line("", format!("{}: {}", remark.place, remark.message));
     }
@@ -103,7 +104,8 @@ fn text(problem: &Problem, found: &Found) -> String {
         }
     }
     if let Some(arm) = &verdict.arm {
-        for joint in &arm.joints {
+        for (joint, coordinate) in arm.joints.iter().zip(problem.tree.coordinates()) {
+            let unit = if coordinate.kind == JointKind::Revolute { "N m" } else { "N" };
             let in_loop = match (joint.loop_refit, joint.loop_diagnosed) {
                 (Some(before), Some(after)) => format!("; in closed loop {} and {}", said::share(before), said::share(after)),
                 _ => String::new(),
@@ -111,7 +113,7 @@ fn text(problem: &Problem, found: &Found) -> String {
             line(
                 &joint.joint,
                 format!(
-                    "of its torque (rms {}) remain {:.1} % as given, {:.1} % refitted, {:.1} % diagnosed{in_loop}",
+                    "of its torque (rms {} {unit}) remain {:.1} % as given, {:.1} % refitted, {:.1} % diagnosed{in_loop}",
                     number(joint.torque_rms),
                     100.0 * joint.as_given,
                     100.0 * joint.refit,
