@@ -213,7 +213,7 @@ mod tests {
     #[test]
     fn noise_is_told_beside_a_motion_that_jumps() {
         let noise = even(4000);
-        let wave = |i: usize| 40.0 * (i as f64 * 0.01).sin() + if (i / 500) % 2 == 0 { 5.0 } else { -5.0 };
+        let wave = |i: usize| 40.0 * (i as f64 * 0.01).sin() + if (i / 500).is_multiple_of(2) { 5.0 } else { -5.0 };
         let samples: Vec<f64> = noise.iter().enumerate().map(|(i, x)| wave(i) + x).collect();
         let told = white(&samples) * 3f64.sqrt();
         assert!((told - 1.0).abs() < 0.1, "{told}");
