@@ -16,6 +16,7 @@ use backdrive_diagnosis::problem::Problem;
 use backdrive_diagnosis::search::{Search, Settings, search};
 use backdrive_diagnosis::structure::{FreeParameter, Role, Structure};
 use backdrive_diagnosis::work::{Budget, Limit};
+use backdrive_plant::model::Model;
 use backdrive_report::{number, percent};
 use serde_json::json;
 use std::fmt::Write as _;
@@ -39,6 +40,12 @@ struct Fitted {
 
 /// Fits, writes, and says how sure the numbers are.
 pub fn fit(options: &cli::Fit) -> Result<u8, Failure> {
+    if Model::load(&options.model)?.arm.is_some() {
+        let model = options.model.display();
+        return Err(Failure::input(format!(
+            "{model}: [robot]: fit takes models of one axis; the numbers of an arm are refitted by `backdrive diagnose`"
+        )));
+    }
     let stop = interrupt::heard()?;
     let open = || recordings::open(&options.set, Some(&options.model), options.grip.as_deref(), &options.ignore_signal);
     let opened = progress::busy("reading the recordings", open)?;

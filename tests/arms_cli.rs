@@ -117,4 +117,11 @@ fn wrong_input_is_told_with_joint_file_and_key() {
     let unknown = "model = 'arm.toml'\nfit = ['a.csv']\n[unknown.hand]\nbandwidth_hz = 5.0\n";
     place.write("unknown.toml", unknown);
     failed(&["diagnose", "unknown.toml", "--out", "out"], 3, &["unknown.hand", "every joint"]);
+    place.write("no-robot.toml", "name = 'arm'\n[robot]\nfile = 'none.urdf'\n");
+    failed(
+        &["diagnose", ".", "--model", "no-robot.toml", "--out", "out"],
+        3,
+        &["no-robot.toml:3: robot.file", "none.urdf", "no such file"],
+    );
+    failed(&["fit", "arm.toml", "."], 3, &["arm.toml: [robot]", "backdrive diagnose"]);
 }

@@ -15,6 +15,7 @@ use backdrive_diagnosis::verdict::{
     Alternative, ArmJoint, ArmPart, Estimate, Estimates, Finding, HeldOut, MODEL_FILE, Moved, NextExperiment, Parameter, RecordErrors,
     Remark, SCHEMA, Verdict, Word,
 };
+use statrs::distribution::{ContinuousCDF, Normal};
 use std::collections::BTreeMap;
 
 /// Score above that of the best structure up to which a rival counts as alike.
@@ -135,7 +136,7 @@ fn findings(data: &Data, search: &Search) -> Vec<Finding> {
             .map(|((t, _), w)| Alternative { physics: t.physics.facts().name.to_string(), place: place(data, t), confidence: w / total })
             .collect();
         let found = search.gains.get(order).copied().flatten();
-        let sure = found.map_or(0.5, |g| normal(g.in_errors()));
+        let sure = found.map_or(0.5, |g| Normal::standard().cdf(g.in_errors()));
         let facts = term.physics.facts();
         let kin: f64 =
             rivals.iter().zip(&weights).filter(|((t, _), _)| t.physics.facts().family == facts.family).map(|(_, w)| w / total).sum();
@@ -164,12 +165,6 @@ fn replaced(data: &Data, term: &Term) -> Vec<String> {
     }
     let plain = |law: &backdrive_plant::elements::Law| law.kind().name == "coulomb";
     data.problem.given.iter().filter(|g| Some(g.joint) == term.at.joint() && plain(&g.law)).map(|g| g.name.clone()).collect()
-}
-
-/// Distribution of a normal variable.
-fn normal(x: f64) -> f64 {
-    // Logistic approximation of the normal distribution (Bowling et al. 2009), within 2e-4.
-    1.0 / (1.0 + (-(0.07056 * x.powi(3) + 1.5976 * x)).exp())
 }
 
 fn numbers(data: &Data, fit: &Fit, index: usize) -> BTreeMap<String, Parameter> {

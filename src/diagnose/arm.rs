@@ -21,13 +21,12 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-/// The set and the model, where the model has a robot; `None` for a device of one axis, and where something is wrong that is told there.
+/// The set and the model, where the model has a robot; `None` for a device of one axis, and where the set is wrong, which is told there.
 pub fn asked(options: &cli::Diagnose) -> Result<Option<(RecordingSet, PathBuf)>, Failure> {
     let Ok((mut set, told)) = recordings::set_of(&options.set) else { return Ok(None) };
     let Some(model) = options.model.clone().or_else(|| set.model.clone()) else { return Ok(None) };
-    match Model::load(&model) {
-        Ok(read) if read.arm.is_some() => {}
-        _ => return Ok(None),
+    if Model::load(&model)?.arm.is_none() {
+        return Ok(None);
     }
     let mut notes = Vec::new();
     recordings::hold_out(&mut set, told, &mut notes);
