@@ -5,14 +5,14 @@ use crate::failure::{Failure, code};
 use crate::output;
 use crate::progress::busy;
 use backdrive_bags::{
-    ColumnMap, DiffOptions, ImportOptions, Quantity, Reader, check_target, diff, export_csv, import_csv, info, merge, recover,
+    ColumnMap, DiffOptions, ImportOptions, Quantity, Reader, check, check_target, diff, export_csv, import_csv, info, merge, recover,
 };
 use std::path::Path;
 
 /// Does what `backdrive bag` is asked.
 pub fn bag(command: &cli::Bag) -> Result<u8, Failure> {
     match command {
-        cli::Bag::Info { bag, json } => show(bag, *json),
+        cli::Bag::Info { bag, json, check } => show(bag, *json, *check),
         cli::Bag::Import { csv, bag, overwrite, map } => import(csv, bag, *overwrite, map),
         cli::Bag::Export { bag, csv, overwrite, topic } => export(bag, csv, *overwrite, topic),
         cli::Bag::Recover { damaged, bag, overwrite } => save(damaged, bag, *overwrite),
@@ -22,8 +22,9 @@ pub fn bag(command: &cli::Bag) -> Result<u8, Failure> {
     }
 }
 
-fn show(bag: &Path, json: bool) -> Result<u8, Failure> {
-    let info = busy(&format!("reading {}", bag.display()), || info(bag)).map_err(Failure::input)?;
+fn show(bag: &Path, json: bool, whole: bool) -> Result<u8, Failure> {
+    let look = if whole { check } else { info };
+    let info = busy(&format!("reading {}", bag.display()), || look(bag)).map_err(Failure::input)?;
     if json {
         output::json(&info)?;
     } else {

@@ -278,7 +278,7 @@ fn bags() {
     let told = place.backdrive(&["bag", "info", "cut.mcap"]);
     assert_eq!(told.code, Some(4), "{told:?}");
     assert!(told.stdout.contains("the file was not closed; `backdrive bag recover`"), "{}", told.stdout);
-    let told = place.backdrive(&["bag", "info", "damaged.mcap"]);
+    let told = place.backdrive(&["bag", "info", "damaged.mcap", "--check"]);
     assert!(told.code == Some(4) && told.stdout.contains("damaged") && told.stdout.contains("byte"), "{told:?}");
     let told = place.backdrive(&["replay", "cut.mcap", "--json"]);
     assert_eq!(told.code, Some(7), "{told:?}");

@@ -1,11 +1,13 @@
 //! A bag in one look.
 
 use crate::completeness::Tracker;
+use crate::reader::TopicRef;
 use crate::{BagError, Reader};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fmt;
 use std::path::Path;
+use std::sync::Arc;
 
 /// What a bag holds. Fields that only backdrive writes are empty for other people's bags.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -48,6 +50,8 @@ pub struct BagInfo {
     pub ended_cleanly: bool,
     /// The first damage, if there is any; what stands behind it is not counted.
     pub damage: Option<String>,
+    /// Whether every message and its checksum was read; otherwise all this is what stands at the end of the file.
+    pub read_whole: bool,
 }
 
 /// A topic of a bag.
@@ -69,10 +73,39 @@ pub struct TopicSummary {
     pub lost: Option<u64>,
 }
 
+/// Sums a bag up from what stands at its end, without reading its messages: in the same time whatever its size. Damage among the
+/// messages is not seen, for which see [`check`].
+///
+/// A bag that was not closed, or that others wrote without statistics or indices, is read whole, as by [`check`].
+/// Errors: it cannot be read or is no MCAP file.
+pub fn info(path: &Path) -> Result<BagInfo, BagError> {
+    let Some((reader, spans)) = Reader::of_summary(path)? else { return check(path) };
+    let by_topic = |topic: &Arc<TopicRef>| spans.0.get(&topic.channel).copied();
+    let heard = Heard {
+        spans: reader.topics().iter().map(by_topic).collect(),
+        counts: reader.counts().to_vec(),
+        lost: vec![None; reader.topics().len()],
+        damage: reader.damage().first().cloned(),
+        whole: false,
+    };
+    Ok(sum_up(&reader, heard))
+}
+
+/// What of a bag's messages is told, by topic.
+struct Heard {
+    /// First and last log time, ns.
+    spans: Vec<Option<(u64, u64)>>,
+    counts: Vec<u64>,
+    /// By the sequence numbers, for bags without the recorder's verdict.
+    lost: Vec<Option<u64>>,
+    damage: Option<String>,
+    whole: bool,
+}
+
 /// Reads a whole bag, checksums included, and sums it up.
 ///
 /// Errors: it cannot be read or is no MCAP file. Damage inside is reported in the result.
-pub fn info(path: &Path) -> Result<BagInfo, BagError> {
+pub fn check(path: &Path) -> Result<BagInfo, BagError> {
     let reader = Reader::open(path)?;
     let count = reader.topics().len();
     let (mut spans, mut counts) = (vec![None::<(u64, u64)>; count], vec![0_u64; count]);
@@ -102,9 +135,15 @@ pub fn info(path: &Path) -> Result<BagInfo, BagError> {
             }
         }
     }
+    let lost = ours.iter().zip(&trackers).map(|(ours, tracker)| ours.then_some(tracker.found.lost)).collect();
+    Ok(sum_up(&reader, Heard { spans, counts, lost, damage, whole: true }))
+}
+
+fn sum_up(reader: &Reader, heard: Heard) -> BagInfo {
+    let Heard { spans, counts, lost, damage, whole } = heard;
     let lost = |index: usize, name: &str| match reader.completeness() {
         Some(verdict) => verdict.topics.iter().find(|topic| topic.topic == name).map(|topic| topic.lost),
-        None => ours[index].then_some(trackers[index].found.lost),
+        None => lost[index],
     };
     let topics: Vec<TopicSummary> = reader
         .topics()
@@ -137,8 +176,8 @@ pub fn info(path: &Path) -> Result<BagInfo, BagError> {
     };
     let header = reader.header().cloned();
     let told = header.as_ref();
-    Ok(BagInfo {
-        path: path.display().to_string(),
+    BagInfo {
+        path: reader.path().display().to_string(),
         bytes: reader.bytes(),
         profile: reader.profile().to_owned(),
         library: reader.library().to_owned(),
@@ -155,9 +194,10 @@ pub fn info(path: &Path) -> Result<BagInfo, BagError> {
         lost,
         ended_cleanly: reader.ended_cleanly(),
         damage,
+        read_whole: whole,
         versions: header.as_ref().map(|header| header.versions.clone()).unwrap_or_default(),
         seeds: header.map(|header| header.seeds).unwrap_or_default(),
-    })
+    }
 }
 
 impl fmt::Display for BagInfo {
@@ -196,6 +236,9 @@ impl fmt::Display for BagInfo {
         }
         if let Some(damage) = &self.damage {
             writeln!(f, "  DAMAGED: {damage}")?;
+        }
+        if !self.read_whole {
+            writeln!(f, "  from what stands at its end; `backdrive bag info --check` reads every message and its checksum")?;
         }
         Ok(())
     }

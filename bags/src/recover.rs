@@ -4,9 +4,11 @@ use crate::claim::{claim, not_itself};
 use crate::completeness::{COMPLETENESS, Completeness, Tracker};
 use crate::framing::{Frame, Frames};
 use crate::header::{BagHeader, RUN};
+use crate::index::{COMPACT_INDEX, Index, decode as decode_index};
 use crate::reader::channels::Channels;
 use crate::reader::entry::decode;
 use crate::reader::records::{parse, records, salvage};
+use crate::span::SPANS;
 use crate::steps::Said;
 use crate::writer::{completeness_record, options, reason};
 use crate::{BagError, Reader};
@@ -54,7 +56,7 @@ pub struct RecoverReport {
     pub completeness: Option<Completeness>,
 }
 
-/// Copies everything that is whole into a clean bag.
+/// Copies everything that is whole into a clean bag, which has all of MCAP's indices: so this is the way to a bag in which a player can jump, too.
 ///
 /// Of a bag that was cut off the chunk that was open is lost, and of it the messages that had not reached the file. Of a damaged
 /// chunk those messages are saved that can still be read, stand where the chunk's index says, and hold what their type says.
@@ -162,9 +164,6 @@ fn copy(from: &Path, frames: &mut Frames, to: &Path, file: File) -> Result<Recov
     Ok(report)
 }
 
-/// Of a chunk: the log time of a message by channel and place in the chunk.
-type Index = BTreeMap<u16, Vec<u64>>;
-
 /// What the index of a chunk promises of a channel.
 #[derive(Default)]
 struct Due {
@@ -199,10 +198,13 @@ impl Due {
 fn index_behind(from: &Path, frames: &mut Frames) -> Result<(Index, Option<Frame>), BagError> {
     let mut index = Index::new();
     while let Some(frame) = frames.next()? {
-        if frame.opcode != op::MESSAGE_INDEX || frame.cut {
+        if !matches!(frame.opcode, op::MESSAGE_INDEX | COMPACT_INDEX) || frame.cut {
             return Ok((index, Some(frame)));
         }
         let body = frames.body(&frame)?;
+        if frame.opcode == COMPACT_INDEX {
+            return Ok((decode_index(&body).unwrap_or_default(), None));
+        }
         if let Ok(Record::MessageIndex(found)) = parse(from, &frame, &body) {
             index.entry(found.channel_id).or_default().extend(found.records.iter().map(|entry| entry.log_time));
         }
@@ -381,7 +383,8 @@ impl Copy<'_> {
                 self.begun.writer("", "")?.attach(&mcap::Attachment { log_time, create_time, name, media_type, data })?;
                 self.report.attachments += 1;
             }
-            Record::Metadata(metadata) if metadata.name == COMPLETENESS => {}
+            // The copy has indices, which tell the times.
+            Record::Metadata(metadata) if metadata.name == COMPLETENESS || metadata.name == SPANS => {}
             Record::Metadata(metadata) => {
                 if metadata.name == RUN {
                     // Metadata has no checksum: what cannot be read must not be handed on as if it were whole.

@@ -2,6 +2,8 @@
 
 use crate::completeness::{COMPLETENESS, Completeness};
 use crate::header::{BagHeader, Clock, RUN};
+use crate::index::{self, COMPACT_INDEX, Index};
+use crate::span::Spans;
 use crate::steps::{Expected, STEPS_TOPIC};
 use backdrive_msgs::Message;
 use backdrive_msgs::ros::{self, RosError};
@@ -39,7 +41,7 @@ pub(crate) fn reason(error: &mcap::McapError) -> String {
     }
 }
 
-/// The format options that all bags of ours share: lz4, because its worst stall is 0.3 ms where that of zstd is 60 ms. Chunks end where
+/// The format options that all bags of ours share, of MCAP's indices all: lz4, because its worst stall is 0.3 ms where that of zstd is 60 ms. Chunks end where
 /// the caller says: no limit of size may part a sample from what is said of it.
 pub(crate) fn options() -> mcap::WriteOptions {
     mcap::WriteOptions::new()
@@ -90,6 +92,9 @@ pub(crate) struct BagWriter {
     /// Channel of what samples have no field for, and messages on it.
     steps: (u16, u32),
     payload: Vec<u8>,
+    /// Log times of the chunk at hand, and first and last of the bag.
+    index: Index,
+    spans: Spans,
     /// Size at which a chunk ends, and of the one at hand, bytes before compression.
     chunk_bytes: u64,
     in_chunk: u64,
@@ -110,7 +115,9 @@ impl BagWriter {
     /// Writes everything that comes before the first message, so that a bag that is cut off later has it.
     pub(crate) fn new(store: Box<dyn Store>, header: &BagHeader, chunk_bytes: u64, size: Arc<AtomicU64>) -> Result<BagWriter, WriteError> {
         let sink = BufWriter::with_capacity(1 << 17, Counted { store, position: 0, size });
-        let mut mcap = options().create(sink)?;
+        // A chunk index without message indices would be worse than none: `@mcap/core`, which Foxglove reads with, then finds no message,
+        // where without both it reads the file from its beginning, as the other readers do.
+        let mut mcap = options().emit_message_indexes(false).emit_chunk_indexes(false).create(sink)?;
         let mut channels = Vec::with_capacity(header.topics.len());
         for info in &header.topics {
             let (name, text) = ros::schema(info.topic.kind);
@@ -132,7 +139,9 @@ impl BagWriter {
             })?;
         }
         mcap.flush()?;
-        Ok(BagWriter { mcap, clock: header.clock, channels, steps, payload: Vec::with_capacity(1024), chunk_bytes, in_chunk: 0 })
+        let payload = Vec::with_capacity(1024);
+        let (index, spans) = (Index::new(), Spans::default());
+        Ok(BagWriter { mcap, clock: header.clock, channels, steps, payload, index, spans, chunk_bytes, in_chunk: 0 })
     }
 
     /// Writes one message. An index beyond the header's topics is ignored: the recorder has refused it before.
@@ -150,12 +159,15 @@ impl BagWriter {
             let (channel_id, sequence) = self.steps;
             self.mcap.write_to_known_channel(&MessageHeader { channel_id, sequence, log_time, publish_time: stamp }, &self.payload)?;
             self.steps.1 = sequence.wrapping_add(1);
+            self.index.entry(channel_id).or_default().push(log_time);
             self.in_chunk += RECORD_BYTES + self.payload.len() as u64;
         }
         ros::encode(message, &channel.axes, &mut self.payload)?;
         let header = MessageHeader { channel_id: channel.id, sequence: message.sequence() as u32, log_time, publish_time: stamp };
         self.mcap.write_to_known_channel(&header, &self.payload)?;
         channel.written += 1;
+        self.index.entry(channel.id).or_default().push(log_time);
+        self.spans.see(channel.id, log_time);
         self.in_chunk += RECORD_BYTES + self.payload.len() as u64;
         if self.in_chunk > self.chunk_bytes {
             self.flush()?;
@@ -165,9 +177,19 @@ impl BagWriter {
 
     /// Ends the chunk at hand and hands everything to the operating system: what is flushed survives the death of the process.
     pub(crate) fn flush(&mut self) -> Result<(), WriteError> {
+        self.end_chunk()?;
         self.mcap.flush()?;
         self.in_chunk = 0;
         self.channels.iter_mut().for_each(|channel| channel.expected.forget());
+        Ok(())
+    }
+
+    /// Ends the chunk at hand, and says what it holds.
+    fn end_chunk(&mut self) -> Result<(), WriteError> {
+        if self.in_chunk > 0 {
+            self.mcap.write_private_record(COMPACT_INDEX, &index::encode(&self.index), Default::default())?;
+            self.index.values_mut().for_each(Vec::clear);
+        }
         Ok(())
     }
 
@@ -178,6 +200,8 @@ impl BagWriter {
 
     /// Writes the verdict and the summary.
     pub(crate) fn finish(&mut self, completeness: &Completeness) -> Result<(), WriteError> {
+        self.end_chunk()?;
+        self.mcap.write_metadata(&self.spans.to_metadata())?;
         self.mcap.write_metadata(&completeness_record(completeness)?)?;
         self.mcap.finish()?;
         Ok(())

@@ -2,7 +2,7 @@
 
 mod common;
 
-use backdrive_bags::{Reader, info, recover};
+use backdrive_bags::{Reader, check, info, recover};
 use common::Random;
 use std::path::Path;
 
@@ -108,7 +108,7 @@ fn a_damaged_chunk_is_saved_as_far_as_it_can_be_read_and_told_with_its_place() {
     std::fs::write(&path, &bytes).expect("it writes");
     let error = Reader::open(&path).expect("it opens").messages().expect("it reads").find_map(Result::err).expect("damage is an error");
     assert!(error.to_string().contains(&format!("byte {from}")), "{error}");
-    assert!(info(&path).expect("it is summed up").damage.is_some());
+    assert!(check(&path).expect("it is read").damage.is_some());
     let report = recover(&path, &saved, false).expect("the rest is saved");
     assert_eq!(report.damaged.len(), 1);
     let whole = info(&path).is_ok().then(|| Reader::open(&path).expect("it opens").counts().iter().sum::<u64>());

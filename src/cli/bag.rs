@@ -6,13 +6,16 @@ use std::path::PathBuf;
 /// `backdrive bag`
 #[derive(Debug, Subcommand)]
 pub enum Bag {
-    /// What is in a bag, and whether it is complete.
+    /// What is in a bag, and whether it is complete, as its end tells without reading the messages; of a bag that was not closed all is read.
     #[command(
-        after_help = "Example:\n  backdrive bag info contact.mcap\n\nExit codes: 0 whole, 2 usage, 3 cannot be read, 4 damaged, cut off or with losses."
+        after_help = "Example:\n  backdrive bag info contact.mcap\n  backdrive bag info contact.mcap --check\n\nExit codes: 0 whole, 2 usage, 3 cannot be read, 4 damaged, cut off or with losses."
     )]
     Info {
         /// The bag; any MCAP file.
         bag: PathBuf,
+        /// Read every message and every checksum; damage among the messages shows only so.
+        #[arg(long)]
+        check: bool,
         /// Print it as JSON.
         #[arg(long)]
         json: bool,

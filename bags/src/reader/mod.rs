@@ -4,6 +4,7 @@ pub(crate) mod channels;
 pub(crate) mod entry;
 mod messages;
 pub(crate) mod records;
+mod summary;
 
 pub use entry::{Entry, TopicRef};
 pub use messages::Messages;
@@ -12,6 +13,7 @@ use crate::BagError;
 use crate::completeness::{COMPLETENESS, Completeness};
 use crate::framing::Frames;
 use crate::header::{BagHeader, RUN};
+use crate::span::Spans;
 use crate::steps::Said;
 use channels::Channels;
 use mcap::records::{Metadata, Record, op};
@@ -19,6 +21,7 @@ use records::{parse, records};
 use std::collections::{HashMap, VecDeque};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use summary::Summary;
 
 /// A bag that is open for reading.
 #[derive(Debug, Clone)]
@@ -80,12 +83,7 @@ impl Reader {
             }
         }
         let closed = frames.closed;
-        let header = last(&metadata, RUN)
-            .map(|record| BagHeader::from_metadata(path, &record.metadata, |name| attachments.get(name).cloned()))
-            .and_then(|header| header.map_err(|error| damage.push(error.to_string())).ok());
-        let completeness = last(&metadata, COMPLETENESS)
-            .map(|record| verdict(path, record))
-            .and_then(|verdict| verdict.map_err(|error| damage.push(error.to_string())).ok());
+        let (header, completeness) = described(path, &metadata, &attachments, &mut damage);
         let mut counts = HashMap::new();
         if closed && summary_has_channels && statistics.is_some() {
             counts.extend(statistics.into_iter().flat_map(|statistics| statistics.channel_message_counts));
@@ -120,6 +118,23 @@ impl Reader {
             closed,
             bytes,
         })
+    }
+
+    /// Opens a bag by what stands at its end, and tells from when to when its topics speak: in the same time whatever its size.
+    /// `None` where that does not tell all: it was not closed, or others wrote it without statistics or indices.
+    pub(crate) fn of_summary(path: &Path) -> Result<Option<(Reader, Spans)>, BagError> {
+        let (Some(summary), bytes) = summary::of_file(path).map_err(BagError::io(path))? else { return Ok(None) };
+        let Summary { profile, library, found, metadata, attachments, statistics: Some(statistics), spans: Some(spans) } = summary else {
+            return Ok(None);
+        };
+        let mut damage = Vec::new();
+        let (header, completeness) = described(path, &metadata, &attachments, &mut damage);
+        let steps = found.steps();
+        let topics = found.topics(header.as_ref());
+        let counts = topics.iter().map(|topic| statistics.channel_message_counts.get(&topic.channel).copied().unwrap_or(0)).collect();
+        let path = path.to_owned();
+        let reader = Reader { path, profile, library, topics, steps, counts, header, completeness, damage, closed: true, bytes };
+        Ok(Some((reader, spans)))
     }
 
     /// The file.
@@ -201,6 +216,22 @@ impl Reader {
             done: false,
         })
     }
+}
+
+/// What backdrive wrote of the run; what of it cannot be read goes to `damage`.
+fn described(
+    path: &Path,
+    metadata: &[Metadata],
+    attachments: &HashMap<String, String>,
+    damage: &mut Vec<String>,
+) -> (Option<BagHeader>, Option<Completeness>) {
+    let header = last(metadata, RUN)
+        .map(|record| BagHeader::from_metadata(path, &record.metadata, |name| attachments.get(name).cloned()))
+        .and_then(|header| header.map_err(|error| damage.push(error.to_string())).ok());
+    let completeness = last(metadata, COMPLETENESS)
+        .map(|record| verdict(path, record))
+        .and_then(|verdict| verdict.map_err(|error| damage.push(error.to_string())).ok());
+    (header, completeness)
 }
 
 fn last<'a>(metadata: &'a [Metadata], name: &str) -> Option<&'a Metadata> {
