@@ -140,6 +140,7 @@ impl Collector {
                 notes: Vec::new(),
                 sensors: Vec::new(),
                 cut_short: None,
+                elsewhere: None,
                 bridged_s: graph.stale_after_s,
             },
             planned: graph.timing.steps.unwrap_or(0) as usize,

@@ -3,6 +3,7 @@
 // Printing panics where the other end is full or gone.
 #![cfg_attr(not(test), warn(clippy::print_stdout, clippy::print_stderr))]
 
+mod bag_rows;
 pub mod collect;
 pub mod compare;
 pub mod coupling;
@@ -10,6 +11,7 @@ pub mod energy;
 pub mod frequency;
 pub mod from_bag;
 mod grid;
+mod long_bag;
 mod master_run;
 mod model_check;
 pub mod moving;

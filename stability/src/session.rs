@@ -1,5 +1,6 @@
 //! The signals of a recorded loop, one value per step: what every answer is drawn from.
 
+use crate::outcome::Outcome;
 use crate::sensors::SensorFault;
 use crate::unjudged::Unjudged;
 
@@ -25,6 +26,8 @@ pub struct Session {
     pub sensors: Vec<SensorFault>,
     /// Whether its end is missing: then nothing in it proves that a loop is stable.
     pub cut_short: Option<Unjudged>,
+    /// Of a recording that is longer than what is judged at once, and of which this is a piece: the worst that all of it did.
+    pub elsewhere: Option<Outcome>,
     /// Longest gap that the loop bridges by holding its last force, s.
     pub bridged_s: f64,
 }

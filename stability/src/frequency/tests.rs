@@ -177,6 +177,7 @@ impl Setup {
             notes: Vec::new(),
             sensors: Vec::new(),
             cut_short: None,
+            elsewhere: None,
             bridged_s: crate::unjudged::BRIDGED_S,
         }
     }
@@ -484,6 +485,7 @@ fn coupled_axes_have_the_edge_of_their_closed_loop() {
         notes: Vec::new(),
         sensors: Vec::new(),
         cut_short: None,
+        elsewhere: None,
         bridged_s: crate::unjudged::BRIDGED_S,
     };
     let found = analyse(&session, &Options { draws: 100, ..Options::default() }).unwrap();

@@ -115,6 +115,7 @@ impl Session {
             notes,
             sensors,
             cut_short,
+            elsewhere: None,
             bridged_s: BRIDGED_S,
         };
         settle_gains(&mut session, roles);

@@ -8,7 +8,8 @@ use crate::unjudged::Gaps;
 
 /// What the recording itself did: the same function as for a live run. What is missing in a recording is no run-away.
 pub fn recorded_outcome(session: &Session) -> Option<Outcome> {
-    Outcome::worst(recorded_traces(session).iter().map(|trace| judge(trace).held_back(session.cut_short)))
+    let here = recorded_traces(session).into_iter().map(|trace| judge(&trace));
+    Outcome::worst(here.chain(session.elsewhere).map(|outcome| outcome.held_back(session.cut_short)))
 }
 
 /// What a verdict on a recording is drawn from, per axis.
