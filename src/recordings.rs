@@ -4,7 +4,7 @@ use crate::failure::Failure;
 use crate::set_checks;
 use backdrive_bags::Reader;
 use backdrive_diagnosis::audit;
-use backdrive_diagnosis::problem::{Problem, ProblemError};
+use backdrive_diagnosis::problem::{MOST_OF_A_BAG, Problem, ProblemError};
 use backdrive_plant::model::{Fragment, Model};
 use backdrive_plant::recording::RecordingError;
 use backdrive_plant::set::RecordingSet;
@@ -41,6 +41,7 @@ pub fn open(paths: &[PathBuf], model: Option<&Path>, grip: Option<&Path>, ignore
     hold_out(&mut set, told, &mut notes);
     notes.extend(set_checks::repeated(&set)?);
     notes.extend(set.fit.iter().chain(&set.held_out).filter_map(|file| unfinished(&set.path_of(file))));
+    notes.extend(set.fit.iter().chain(&set.held_out).filter_map(|file| begun(&set, file)));
     let problem = match grip {
         None => Problem::of_set(&set, model),
         Some(grip) => {
@@ -127,6 +128,19 @@ fn unfinished(path: &Path) -> Option<String> {
         None if !reader.ended_cleanly() => Some(format!("{name} was not closed: {recover}")),
         None => None,
     }
+}
+
+/// What to know of a bag that is longer than what is read of it.
+fn begun(set: &RecordingSet, file: &str) -> Option<String> {
+    let path = set.path_of(file);
+    if !path.extension().is_some_and(|e| e.eq_ignore_ascii_case("mcap")) || set.rules_of(file).piece.rows.is_some() {
+        return None;
+    }
+    let longest = Reader::open(&path).ok()?.counts().iter().max().copied().unwrap_or(0);
+    (longest > MOST_OF_A_BAG as u64).then(|| {
+        let of = format!("{}: of {longest} samples of a signal the first {MOST_OF_A_BAG} are read", path.display());
+        format!("{of}; rows = [FROM, TO] in set.toml takes another piece of it")
+    })
 }
 
 /// Refuses to write onto a file that was read.

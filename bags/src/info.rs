@@ -233,6 +233,7 @@ impl fmt::Display for BagInfo {
         writeln!(f, "  {verdict}")?;
         if !self.ended_cleanly {
             writeln!(f, "  the file was not closed; `backdrive bag recover` makes a clean copy")?;
+            writeln!(f, "  it has no end that tells, so all of it was read")?;
         }
         if let Some(damage) = &self.damage {
             writeln!(f, "  DAMAGED: {damage}")?;

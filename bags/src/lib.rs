@@ -47,7 +47,7 @@ pub use merge::{MergeReport, merge};
 pub use play::{PlayOptions, PlayReport, Sink, play};
 pub use reader::{Entry, Messages, Reader, TopicRef};
 pub use recorder::{Health, Recorder, RecorderOptions, WhenFull};
-pub use recording::recording;
+pub use recording::{recording, recording_up_to};
 pub use recover::{RecoverReport, recover};
 pub use signals::{Alignment, Signal, Signals, signals};
 pub use table::{ColumnMap, ImportOptions, ImportReport, Quantity, columns_of, export_csv, import_csv, topic_of};

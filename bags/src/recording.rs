@@ -1,6 +1,6 @@
 //! A model's signals out of a bag.
 
-use crate::signals::{Signal, signals};
+use crate::signals::{Signal, gather};
 use crate::{BagError, Reader};
 use backdrive_plant::model::Hold;
 use backdrive_plant::recording::{Columns, Piece, Recording, Source};
@@ -19,6 +19,20 @@ pub fn recording(
     piece: &Piece,
     hold: &dyn Fn(&str) -> Hold,
 ) -> Result<Recording, BagError> {
+    recording_up_to(reader, names, columns, piece, hold, usize::MAX)
+}
+
+/// As [`recording`], no further than where the first signal has `most` samples, or as many as the piece asks for: so memory does not
+/// grow with the bag.
+pub fn recording_up_to(
+    reader: &Reader,
+    names: Option<&[&str]>,
+    columns: &Columns,
+    piece: &Piece,
+    hold: &dyn Fn(&str) -> Hold,
+    most: usize,
+) -> Result<Recording, BagError> {
+    let most = most.max(piece.rows.map_or(0, |[_, to]| to));
     if let Some((column, _)) = piece.keep.first() {
         return Err(BagError::Usage(format!("{}: rows can be chosen by the value of {column:?} in a table only", reader.path().display())));
     }
@@ -39,7 +53,7 @@ pub fn recording(
     if rule("t").is_some_and(|rule| matches!(rule.source, Source::Topic { .. })) {
         wanted.push(signal("t"));
     }
-    let table = signals(reader, &wanted)?;
+    let table = gather(reader, &wanted, true, most)?;
     for (signal, missing) in wanted.iter().zip(&table.alignment.missing) {
         if *missing == table.t.len() as u64 {
             let what = if table.t.is_empty() { "has no time in common with the other signals" } else { "was never measured" };

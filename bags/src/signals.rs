@@ -83,11 +83,11 @@ struct Series {
 ///
 /// Errors: a topic or field that is not there, a damaged bag, no message at all.
 pub fn signals(reader: &Reader, wanted: &[Signal]) -> Result<Signals, BagError> {
-    gather(reader, wanted, true)
+    gather(reader, wanted, true, usize::MAX)
 }
 
-/// As [`signals`]; without `trim` over all steps that any signal has.
-pub(crate) fn gather(reader: &Reader, wanted: &[Signal], trim: bool) -> Result<Signals, BagError> {
+/// As [`signals`]; without `trim` over all steps that any signal has, and no further than where the first signal has `most` samples.
+pub(crate) fn gather(reader: &Reader, wanted: &[Signal], trim: bool, most: usize) -> Result<Signals, BagError> {
     let mut plans: HashMap<u16, Plan> = HashMap::new();
     let mut sparse = vec![false; wanted.len()];
     let imported = reader.header().is_some_and(|header| header.clock == Clock::Imported);
@@ -109,7 +109,7 @@ pub(crate) fn gather(reader: &Reader, wanted: &[Signal], trim: bool) -> Result<S
         }
     }
     let mut series: Vec<Series> = wanted.iter().chain(&clock).map(|_| Series::default()).collect();
-    let mut begin = None;
+    let (mut begin, mut full) = (None, false);
     for entry in reader.messages()? {
         let entry = entry?;
         let Some(plan) = plans.get(&entry.topic.channel) else { continue };
@@ -130,6 +130,10 @@ pub(crate) fn gather(reader: &Reader, wanted: &[Signal], trim: bool) -> Result<S
             series.steps.push(step.unwrap_or(0));
             series.times.push(time);
             series.values.push(value.unwrap_or(f64::NAN));
+            full |= series.times.len() >= most;
+        }
+        if full {
+            break;
         }
     }
     let clock = clock.and_then(|_| series.pop());

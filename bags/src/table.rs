@@ -25,7 +25,7 @@ pub fn export_csv(reader: &Reader, out: &Path, topics: Option<&[String]>) -> Res
     if wanted.is_empty() {
         return Err(BagError::Usage(format!("{} has no numbers to export", reader.path().display())));
     }
-    let table = gather(reader, &wanted, false)?;
+    let table = gather(reader, &wanted, false, usize::MAX)?;
     let file = std::fs::File::create_new(out).map_err(BagError::io(out))?;
     let mut csv = csv::Writer::from_writer(std::io::BufWriter::new(file));
     let failed = |error: csv::Error| BagError::Write { name: out.display().to_string(), what: error.to_string() };

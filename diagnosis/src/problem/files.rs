@@ -3,11 +3,14 @@
 use super::error::ProblemError;
 use super::record::Record;
 use crate::unknown::Unknown;
-use backdrive_bags::{Reader, recording as bag_recording, topic_of};
+use backdrive_bags::{Reader, recording_up_to, topic_of};
 use backdrive_plant::model::{Hold, Model};
 use backdrive_plant::recording::{Columns, Recording, signals_of};
 use backdrive_plant::set::RecordingSet;
 use std::path::Path;
+
+/// Samples of a signal that are read of a bag of which no rows are named: the first. A search is given far fewer, and memory is not to grow with a bag.
+pub const MOST_OF_A_BAG: usize = 1_000_000;
 
 /// The inputs that a set says nobody measured.
 pub(super) fn unknown_of(set: &RecordingSet, model: &Model) -> Result<Vec<Unknown>, ProblemError> {
@@ -54,7 +57,7 @@ fn from_bag(path: &Path, model: &Model, columns: &Columns, piece: &backdrive_pla
         return Err(ProblemError::Set(format!("{}: say in [columns] of set.toml which topics hold {asked}", path.display())));
     }
     let hold = |name: &str| model.inputs.iter().find(|i| i.name == name).map_or(Hold::Linear, |i| i.hold);
-    Ok(bag_recording(&reader, Some(&wanted), columns, piece, &hold)?)
+    Ok(recording_up_to(&reader, Some(&wanted), columns, piece, &hold, MOST_OF_A_BAG)?)
 }
 
 pub(super) fn names<'a>(all: impl Iterator<Item = &'a str>) -> String {

@@ -10,6 +10,7 @@ mod stated;
 mod substeps;
 
 pub use error::ProblemError;
+pub use files::MOST_OF_A_BAG;
 pub use logged::Logged;
 pub use outliers::Outliers;
 pub use record::Record;
