@@ -11,8 +11,8 @@ use backdrive_msgs::Message;
 use backdrive_nodes::graph::Graph;
 use std::collections::BTreeMap;
 
-/// Steps of one axis that are judged at once: ten minutes at 1 kHz, about 300 MB with all that is computed from them.
-pub const MOST_ROWS: usize = 600_000;
+/// Steps of one axis that are judged at once: 500 s at 1 kHz, with all that is computed from them below 500 MB.
+pub const MOST_ROWS: usize = 500_000;
 
 /// Pieces overlap by so much, so that a hold at the end of one is whole in the next, s. To be judged a hold needs less than half a second.
 const OVERLAP_S: f64 = 5.0;
