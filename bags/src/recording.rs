@@ -11,7 +11,7 @@ use backdrive_plant::recording::{Columns, Piece, Recording, Source};
 /// puts it; `names` of `None` takes every number in the bag. `hold` tells how a signal runs between its samples
 /// where they have no steps in common. Rows in which a signal is missing are left out and show as gaps of the recording.
 ///
-/// Errors: as of [`signals`]; a signal that was never measured; fewer than two rows; a `where` that is not for bags.
+/// Errors: as of [`crate::signals()`]; a signal that was never measured; fewer than two rows; a `where` that is not for bags.
 pub fn recording(
     reader: &Reader,
     names: Option<&[&str]>,

@@ -1,7 +1,7 @@
 //! The rows of a session from the messages of a bag.
 
-use crate::from_bag::{SessionError, SignalRole, cut_short, required};
 use crate::session::{AxisSignals, Session};
+use crate::signal_role::{SessionError, SignalRole, cut_short, required};
 use backdrive_bags::{Entry, Reader};
 use backdrive_control::core::{Core, Events, Port, Tick};
 use backdrive_control::scaling::Backward;

@@ -24,6 +24,7 @@ pub mod roles;
 mod rosbag;
 pub mod sensors;
 pub mod session;
+mod signal_role;
 pub mod spectra;
 pub mod transparency;
 pub mod unjudged;

@@ -1,9 +1,9 @@
 //! A bag of ours that is longer than what is judged at once: read in pieces, so that memory does not grow with its length.
 
 use crate::bag_rows::{Place, Rows, check_steps};
-use crate::from_bag::{SessionError, cut_short};
 use crate::outcome::Outcome;
 use crate::session::Session;
+use crate::signal_role::{SessionError, cut_short};
 use crate::unjudged::Unjudged;
 use crate::verdict::recorded_outcome;
 use backdrive_bags::Reader;

@@ -1,6 +1,6 @@
 //! Which MCAP files a path stands for: one file, or a rosbag2 folder with one or several.
 
-use crate::from_bag::SessionError;
+use crate::signal_role::SessionError;
 use std::path::{Path, PathBuf};
 
 /// The MCAP files of a recording in the order in which they were written.

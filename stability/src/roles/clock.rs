@@ -1,8 +1,8 @@
 //! Signals of different clocks and rates on one row of times.
 
 use super::file::Located;
-use crate::from_bag::SignalRole;
 use crate::grid::{Grid, Ordered, Resampled, Series, even_period};
+use crate::signal_role::SignalRole;
 use crate::unjudged::Unjudged;
 
 /// Clocks that differ by more than this are not one clock, ns.

@@ -2,9 +2,9 @@
 
 use super::file::{Located, Roles, key_of};
 use super::table::Named;
-use crate::from_bag::SignalRole;
 use crate::grid::Series;
 use crate::sensors::{Column, SensorFault, Twin, faults};
+use crate::signal_role::SignalRole;
 
 /// The faults of the signals with a role, of the further sensors, and of all other columns of a table.
 pub(super) fn faulty(roles: &Roles, wanted: &[(SignalRole, &Located)], series: &[Series], others: &Named) -> Vec<SensorFault> {

@@ -1,6 +1,6 @@
 //! The roles file: which field of which topic, or which column of a table, is which signal.
 
-use crate::from_bag::{SessionError, SignalRole};
+use crate::signal_role::{SessionError, SignalRole};
 use backdrive_bags::Signal;
 use backdrive_plant::elements::Range;
 use backdrive_plant::model::Hold;

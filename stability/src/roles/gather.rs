@@ -1,9 +1,9 @@
 //! The wanted signals, read from the bags in one pass.
 
 use super::file::{Located, Roles, is_required};
-use crate::from_bag::{SessionError, SignalRole};
 use crate::grid::Series;
 use crate::rosbag::mcap_files;
+use crate::signal_role::{SessionError, SignalRole};
 use backdrive_bags::{FieldPath, Reader, Schema};
 use backdrive_plant::tomlfile::unknown;
 use std::collections::HashMap;

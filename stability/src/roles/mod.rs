@@ -33,9 +33,9 @@ mod table;
 
 pub use file::{AxisRoles, Roles};
 
-use crate::from_bag::{SessionError, SignalRole};
 use crate::grid::{Grid, Ordered, step_of};
 use crate::session::{AxisSignals, Session};
+use crate::signal_role::{SessionError, SignalRole};
 use crate::unjudged::{BRIDGED_S, Unjudged};
 use clock::{ends_apart, note_resampled, on_one_clock};
 use faulty::faulty;

@@ -1,8 +1,8 @@
 //! The wanted signals from a table (CSV): columns in the place of topics.
 
 use super::file::{Located, Roles};
-use crate::from_bag::{SessionError, SignalRole};
 use crate::grid::Series;
+use crate::signal_role::{SessionError, SignalRole};
 use backdrive_plant::recording::{ColumnRule, Columns, Piece, Recording, Source, read_csv, read_headings};
 use backdrive_plant::tomlfile::unknown;
 use std::path::Path;
