@@ -238,6 +238,9 @@ impl fmt::Display for BagInfo {
         if let Some(damage) = &self.damage {
             writeln!(f, "  DAMAGED: {damage}")?;
         }
+        if self.read_whole && self.ended_cleanly {
+            writeln!(f, "  every message was read, with its checksum where there is one")?;
+        }
         if !self.read_whole {
             writeln!(f, "  from what stands at its end; `backdrive bag info --check` reads every message and its checksum")?;
         }
