@@ -22,7 +22,7 @@ pub fn recording(
     recording_up_to(reader, names, columns, piece, hold, usize::MAX)
 }
 
-/// As [`recording`], no further than where the first signal has `most` samples, or as many as the piece asks for: so memory does not
+/// As [`recording`], no further than where the first signal has more than `most` samples, or as many as the piece asks for: so memory does not
 /// grow with the bag.
 pub fn recording_up_to(
     reader: &Reader,

@@ -86,7 +86,7 @@ pub fn signals(reader: &Reader, wanted: &[Signal]) -> Result<Signals, BagError> 
     gather(reader, wanted, true, usize::MAX)
 }
 
-/// As [`signals`]; without `trim` over all steps that any signal has, and no further than where the first signal has `most` samples.
+/// As [`signals`]; without `trim` over all steps that any signal has, and no further than where the first signal has more than `most` samples.
 pub(crate) fn gather(reader: &Reader, wanted: &[Signal], trim: bool, most: usize) -> Result<Signals, BagError> {
     let mut plans: HashMap<u16, Plan> = HashMap::new();
     let mut sparse = vec![false; wanted.len()];
@@ -130,7 +130,7 @@ pub(crate) fn gather(reader: &Reader, wanted: &[Signal], trim: bool, most: usize
             series.steps.push(step.unwrap_or(0));
             series.times.push(time);
             series.values.push(value.unwrap_or(f64::NAN));
-            full |= series.times.len() >= most;
+            full |= series.times.len() > most;
         }
         if full {
             break;

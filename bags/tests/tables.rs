@@ -3,7 +3,8 @@
 mod common;
 
 use backdrive_bags::{
-    BagError, ColumnMap, ImportOptions, Quantity, Reader, Recorder, RecorderOptions, Signal, export_csv, import_csv, recording, signals,
+    BagError, ColumnMap, ImportOptions, Quantity, Reader, Recorder, RecorderOptions, Signal, export_csv, import_csv, recording,
+    recording_up_to, signals,
 };
 use backdrive_plant::model::Hold;
 use backdrive_plant::recording::{ColumnRule, Piece, Source};
@@ -198,4 +199,27 @@ fn a_bad_table_is_told_with_its_line() {
         assert!(error.contains(says), "{error}");
         assert!(!bag.exists(), "no bag is begun");
     }
+}
+
+#[test]
+fn a_recording_is_read_no_further_than_asked_for_and_is_the_same_up_to_there() {
+    let dir = tempfile::tempdir().expect("a directory");
+    let (csv, path) = (dir.path().join("x.csv"), dir.path().join("x.mcap"));
+    let rows: String = (0..2_000).map(|k| format!("{},{},{}\n", k as f64 * 1e-3, (k as f64 * 0.01).sin(), k % 7)).collect();
+    write(&csv, &format!("t,a,b\n{rows}"));
+    import_csv(&csv, &path, &ImportOptions::default()).expect("it imports");
+    let reader = Reader::open(&path).expect("it opens");
+    let up_to =
+        |piece: &Piece, most| recording_up_to(&reader, Some(&["a", "b"]), &Vec::new(), piece, &|_| Hold::Linear, most).expect("it reads");
+    let whole = recording(&reader, Some(&["a", "b"]), &Vec::new(), &Piece::default(), &|_| Hold::Linear).expect("it reads");
+    let part = up_to(&Piece::default(), 300);
+    assert!((300..=301).contains(&part.t.len()), "{}", part.t.len());
+    assert_eq!(part.t, whole.t[..part.t.len()]);
+    for ((_, some), (_, all)) in part.signals.iter().zip(&whole.signals) {
+        assert_eq!(*some, all[..some.len()]);
+    }
+    assert!(up_to(&Piece::default(), 2_000).signals == whole.signals, "a recording that is no longer is whole");
+    // A piece that is asked for by its rows is read though it lies behind.
+    let piece = Piece { rows: Some([1_000, 1_500]), ..Piece::default() };
+    assert!(up_to(&piece, 300).signals[0].1 == whole.signals[0].1[1_000..1_500]);
 }
