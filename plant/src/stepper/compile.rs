@@ -423,7 +423,7 @@ fn plant(model: &Model, period: f64, options: &Options) -> Result<Plant, Compile
         constant: network.constant,
     };
     let exact = if linear { Propagator::new(&fixed, &drives, substep) } else { None };
-    let sense = Sense::new(model, &fixed.slots, substep, options);
+    let sense = Sense::new(model, &fixed.slots, &fixed.elements, substep, options);
     let mut plant = Plant {
         fixed,
         period,

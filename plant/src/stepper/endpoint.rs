@@ -122,6 +122,22 @@ impl Plant {
         }
     }
 
+    /// Force of an element that needs no accelerations, N: one along a path, a linear one that is no inerter. `None` of all others.
+    #[inline]
+    pub(super) fn force_without_balance(&self, element: usize) -> Option<f64> {
+        let across = |q: &Slots, first: usize, second: usize| q[first] - q[second];
+        match self.fixed.elements.get(element)? {
+            Share::Path(path) => self.paths.get(*path).map(|path| {
+                let (x, v) = (across(&self.x, path.first, path.second), across(&self.v, path.first, path.second));
+                path.law.force(&path.memory, x, v)
+            }),
+            Share::Linear(linear, a, b) if linear.inertance == 0.0 => {
+                Some(linear.force + linear.stiffness * across(&self.x, *a, *b) + linear.damping * across(&self.v, *a, *b))
+            }
+            Share::Linear(..) | Share::Friction(_) => None,
+        }
+    }
+
     /// Force of an element, N; not a number when there is no such element.
     pub(super) fn force_at(&self, element: usize, now: &Endpoint) -> f64 {
         match self.fixed.elements.get(element) {
