@@ -95,8 +95,7 @@ impl Plant {
         for drive in &mut self.drives {
             let slot = drive.slot;
             if drive.moves {
-                let (x0, v0, _) = drive.motion(from);
-                let (x1, v1, a1) = drive.motion(to);
+                let ((x0, v0), (x1, v1, a1)) = drive.motion_over(from, to);
                 (self.x[slot], motion.end[slot], motion.end_velocity[slot]) = (x0, x1, v1);
                 self.prescribed_acceleration[slot] = a1;
                 // Mean of the cubic through both ends.
@@ -249,7 +248,10 @@ impl Plant {
 
     #[inline(always)]
     fn count_energy(&mut self, motion: &Motion) {
-        let bias = if self.energy.is_some() { self.bias_over(motion) } else { [0.0; SLOTS] };
+        if self.energy.is_none() {
+            return;
+        }
+        let bias = self.bias_over(motion);
         if let Some(account) = &mut self.energy {
             let done = Done {
                 velocity: &self.v,
@@ -295,13 +297,11 @@ impl Plant {
 
     /// Forces of the inputs at `s` of this period, seen from before.
     pub(super) fn note_pushes(&mut self, s: f64) {
-        for drive in &self.drives {
+        for drive in self.drives.iter().filter(|drive| !drive.moves) {
             self.pushed[drive.slot] = 0.0;
         }
-        for drive in &self.drives {
-            if !drive.moves {
-                self.pushed[drive.slot] += drive.force_before(s);
-            }
+        for drive in self.drives.iter().filter(|drive| !drive.moves) {
+            self.pushed[drive.slot] += drive.force_before(s);
         }
     }
 }

@@ -32,6 +32,7 @@ impl Plant {
         for (mine, theirs) in self.frictions.iter_mut().zip(&mut other.frictions) {
             std::mem::swap(&mut mine.law, &mut theirs.law);
             std::mem::swap(&mut mine.joint, &mut theirs.joint);
+            std::mem::swap(&mut mine.constant, &mut theirs.constant);
         }
         true
     }
