@@ -150,18 +150,18 @@ impl Plant {
         let mut change = [0.0; SLOTS];
         for j in 0..n {
             let (f, x, v) = (motion.force[j], self.x[j], self.v[j]);
-            let (by_force, by_position, by_velocity) = (&fixed.from_force[j], &fixed.from_position[j], &fixed.from_velocity[j]);
+            let (by_force, by_position, by_velocity) = (&fixed.from_force[j][..n], &fixed.from_position[j][..n], &fixed.from_velocity[j][..n]);
             for i in 0..n {
                 change[i] += by_force[i] * f + by_position[i] * x + by_velocity[i] * v;
             }
         }
-        for p in 0..fixed.prescribed {
+        for (p, by) in fixed.from_prescribed.iter().enumerate() {
             let slot = prescribed_slot(p);
             let acceleration = (motion.end_velocity[slot] - self.v[slot]) / h;
             let (x, v) = (motion.middle[slot], motion.mean_velocity[slot]);
-            let [by_position, by_velocity, by_acceleration] = &fixed.from_prescribed;
+            let [by_position, by_velocity, by_acceleration] = by;
             for i in 0..n {
-                change[i] += by_position[p][i] * x + by_velocity[p][i] * v + by_acceleration[p][i] * acceleration;
+                change[i] += by_position[i] * x + by_velocity[i] * v + by_acceleration[i] * acceleration;
             }
         }
         for i in 0..n {

@@ -41,6 +41,7 @@ mod simulate;
 mod slots;
 mod spline;
 mod state;
+mod sticking;
 mod swap;
 mod tangents;
 
