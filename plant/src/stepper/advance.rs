@@ -13,6 +13,9 @@ use super::state::Plant;
 /// Stands for a number of free bodies that is not known when the code is compiled.
 const ANY: usize = 0;
 
+/// Constraints beyond which a large network answers all their forces at once.
+const FEW: usize = 4;
+
 impl Plant {
     /// One period by substeps, whatever the model, with somebody who follows them.
     pub(super) fn step_followed<F: Follow>(&mut self, inputs: &[Segment], follower: &mut F) {
@@ -147,14 +150,20 @@ impl Plant {
     fn move_freely(&self, n: usize, motion: &mut Motion) {
         let (h, fixed) = (self.substep, &self.fixed);
         // Half the velocity change.
-        let mut change = [0.0; SLOTS];
-        for j in 0..n {
-            let (f, x, v) = (motion.force[j], self.x[j], self.v[j]);
-            let (by_force, by_position, by_velocity) = (&fixed.from_force[j][..n], &fixed.from_position[j][..n], &fixed.from_velocity[j][..n]);
-            for i in 0..n {
-                change[i] += by_force[i] * f + by_position[i] * x + by_velocity[i] * v;
+        let mut change = if let Some(sparse) = &fixed.sparse {
+            sparse.change(&motion.force, &self.x, &self.v)
+        } else {
+            let mut change = [0.0; SLOTS];
+            for j in 0..n {
+                let (f, x, v) = (motion.force[j], self.x[j], self.v[j]);
+                let (by_force, by_position, by_velocity) =
+                    (&fixed.from_force[j][..n], &fixed.from_position[j][..n], &fixed.from_velocity[j][..n]);
+                for i in 0..n {
+                    change[i] += by_force[i] * f + by_position[i] * x + by_velocity[i] * v;
+                }
             }
-        }
+            change
+        };
         for (p, by) in fixed.from_prescribed.iter().enumerate() {
             let slot = prescribed_slot(p);
             let acceleration = (motion.end_velocity[slot] - self.v[slot]) / h;
@@ -176,7 +185,21 @@ impl Plant {
         self.constraint_forces(n, motion);
         let (h, fixed, work) = (self.substep, &self.fixed, &mut *self.work);
         let Motion { mean_velocity, end_velocity, .. } = motion;
-        for c in 0..fixed.constraints.len() {
+        let at_once = if fixed.constraints.len() > FEW { fixed.sparse.as_ref() } else { None };
+        if let Some(sparse) = at_once {
+            let mut taken = [0.0; SLOTS];
+            for c in 0..fixed.constraints.len() {
+                let (first, second) = fixed.constraints.ends(c);
+                taken[first] += work.force[c];
+                taken[second] -= work.force[c];
+            }
+            sparse.solve(&mut taken);
+            for i in 0..n {
+                mean_velocity[i] -= taken[i];
+                end_velocity[i] -= 2.0 * taken[i];
+            }
+        }
+        for c in if at_once.is_some() { 0..0 } else { 0..fixed.constraints.len() } {
             let (f, response) = (work.force[c], &fixed.constraints.response[c]);
             for i in 0..n {
                 mean_velocity[i] -= response[i] * f;

@@ -15,6 +15,7 @@ use super::points::Points;
 use super::propagator::Propagator;
 use super::sensor::Sense;
 use super::slots::{Columns, GROUND, MAX_BODIES, MAX_ELEMENTS, SLOTS, Slots, Square, prescribed_slot};
+use super::sparse::Sparse;
 use super::state::Plant;
 use crate::elements::{Range, Role};
 use crate::load;
@@ -380,7 +381,7 @@ fn plant(model: &Model, period: f64, options: &Options) -> Result<Plant, Compile
     let delayed = model.outputs.iter().any(|output| output.delay > 0.0);
     let substeps = match options.substeps {
         Some(n) => n,
-        None if linear && !delayed => 1,
+        None if linear && !delayed && Propagator::holds(free, &model.inputs) => 1,
         None => choose_substeps(&network, model, &poses, period),
     };
     let substep = period / substeps as f64;
@@ -404,7 +405,9 @@ fn plant(model: &Model, period: f64, options: &Options) -> Result<Plant, Compile
         }
     }
     let constraints = Constraints::new(&from_forces, free, substep, &frictions, &mut paths);
+    let sparse = links.is_none().then(|| Sparse::new(&system(&poses[0].mass), &network.stiffness, &network.damping, substep)).flatten();
     let fixed = Compiled {
+        sparse,
         free,
         prescribed: network.prescribed,
         points: network.points,

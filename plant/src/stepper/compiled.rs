@@ -2,6 +2,7 @@
 
 use super::constraints::Constraints;
 use super::points::Points;
+use super::sparse::Sparse;
 use super::slots::{Columns, Slots, Square};
 use crate::elements::Linear;
 
@@ -38,6 +39,8 @@ pub(super) struct Compiled {
     pub(super) from_force: Columns,
     pub(super) from_position: Columns,
     pub(super) from_velocity: Columns,
+    /// The same equations where the network is large.
+    pub(super) sparse: Option<Sparse>,
     /// The same from mean position, mean velocity and mean acceleration of each prescribed body.
     pub(super) from_prescribed: Vec<[Slots; 3]>,
     pub(super) elements: Vec<Share>,

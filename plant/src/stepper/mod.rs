@@ -39,6 +39,7 @@ mod sense;
 mod sensor;
 mod simulate;
 mod slots;
+mod sparse;
 mod spline;
 mod state;
 mod sticking;
