@@ -64,18 +64,22 @@ impl Plant {
 
     /// Notes the values of delayed outputs.
     pub(super) fn note_outputs(&mut self) {
-        let now = self.sense.delayed_balance.then(|| self.endpoint());
+        let now = if self.sense.delayed_balance { self.instant.take() } else { None }.map(|mut now| {
+            self.balance(&mut now);
+            now
+        });
         let noted = self.sense.noted;
         for index in 0..self.sense.sensors.len() {
             let sensor = &self.sense.sensors[index];
             if sensor.delay > 0.0 {
-                let value = self.reading(sensor, now.as_ref());
+                let value = self.reading(sensor, now.as_deref());
                 let past = &mut self.sense.sensors[index].past;
                 let len = past.len();
                 past[noted % len] = value;
             }
         }
         self.sense.noted += 1;
+        self.instant = now.or(self.instant.take());
     }
 
     pub(super) fn restart_sense(&mut self) {

@@ -7,20 +7,24 @@
 use super::constraints::{Constraints, Work};
 use super::contact::Bounds;
 
-/// Changes of the set at most; then Gauss-Seidel goes on from there.
+/// Changes of the set at most; then Gauss-Seidel begins at the start.
 const CHANGES: usize = 8;
 /// A pivot below this share of its diagonal: a contact that depends on others.
 const DEPENDS: f64 = 1e-10;
 
-/// The contacts that stick, and the Cholesky factor of the compliance between them.
+/// The contacts that stick, and the Cholesky factor of the compliance between them. Its space is of a fixed size.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Sticking {
+    /// The first `count` of these.
     set: Vec<usize>,
+    count: usize,
     /// Row by row, as wide as there are contacts.
     factor: Vec<f64>,
     /// Of each in the set, whether it does not depend on those before.
     kept: Vec<bool>,
     right: Vec<f64>,
+    /// Forces to begin with.
+    start: Vec<f64>,
     /// Whether the factor is that of `set`, and of how often the compliance had changed.
     factored: Option<u64>,
     width: usize,
@@ -30,10 +34,12 @@ impl Sticking {
     /// Space for so many contacts.
     pub(super) fn new(contacts: usize) -> Sticking {
         Sticking {
-            set: Vec::with_capacity(contacts),
+            set: vec![0; contacts],
+            count: 0,
             factor: vec![0.0; contacts * contacts],
             kept: vec![true; contacts],
             right: vec![0.0; contacts],
+            start: vec![0.0; contacts],
             factored: None,
             width: contacts,
         }
@@ -43,24 +49,23 @@ impl Sticking {
     fn gather(&mut self, contacts: impl Iterator<Item = usize>) {
         let mut count = 0;
         for c in contacts {
-            if self.set.get(count) != Some(&c) {
-                self.set.truncate(count);
-                self.set.push(c);
+            if count >= self.count || self.set[count] != c {
+                self.set[count] = c;
                 self.factored = None;
             }
             count += 1;
         }
-        if self.set.len() > count {
-            self.set.truncate(count);
+        if self.count != count {
             self.factored = None;
         }
+        self.count = count;
     }
 
     fn factorise(&mut self, constraints: &Constraints) {
         if self.factored == Some(constraints.changes) {
             return;
         }
-        let (count, width) = (self.set.len(), self.width);
+        let (count, width) = (self.count, self.width);
         for j in 0..count {
             let (row_j, own) = (j * width, constraints.own_compliance(self.set[j]));
             let mut pivot = own;
@@ -85,7 +90,7 @@ impl Sticking {
 
     /// `right` becomes what to add to the forces of the set to take these velocities away.
     fn solve(&mut self) {
-        let (count, width) = (self.set.len(), self.width);
+        let (count, width) = (self.count, self.width);
         for i in (0..count).filter(|i| self.kept[*i]) {
             let mut sum = self.right[i];
             for k in (0..i).filter(|k| self.kept[*k]) {
@@ -107,11 +112,11 @@ impl Constraints {
     /// Adds to the forces of the set what takes away the velocities across its contacts. Twice: the second time what rounding left.
     fn hold(&self, work: &mut Work, sticking: &mut Sticking) {
         for _ in 0..2 {
-            for (right, c) in sticking.right.iter_mut().zip(&sticking.set) {
+            for (right, c) in sticking.right.iter_mut().zip(&sticking.set[..sticking.count]) {
                 *right = self.velocity(*c, work);
             }
             sticking.solve();
-            for ((c, more), kept) in sticking.set.iter().zip(&sticking.right).zip(&sticking.kept) {
+            for ((c, more), kept) in sticking.set[..sticking.count].iter().zip(&sticking.right).zip(&sticking.kept) {
                 if *kept {
                     work.force[*c] += more;
                 }
@@ -123,7 +128,15 @@ impl Constraints {
     /// does not settle.
     pub(super) fn solve_contacts(&self, work: &mut Work) -> bool {
         let mut sticking = std::mem::take(&mut work.sticking);
+        for c in 0..self.frictions {
+            // Bounds may have changed since.
+            work.force[c] = work.force[c].min(work.bounds[c].high).max(work.bounds[c].low);
+            sticking.start[c] = work.force[c];
+        }
         let settled = self.settle_set(work, &mut sticking);
+        if !settled {
+            work.force[..self.frictions].copy_from_slice(&sticking.start);
+        }
         work.sticking = sticking;
         settled
     }
@@ -133,13 +146,13 @@ impl Constraints {
         sticking.gather((0..self.frictions).filter(|c| inside(work, *c)));
         for _ in 0..CHANGES {
             sticking.factorise(self);
-            if sticking.kept[..sticking.set.len()].iter().any(|kept| !kept) {
+            if sticking.kept[..sticking.count].iter().any(|kept| !kept) {
                 return false;
             }
             let mut agreed = true;
-            if !sticking.set.is_empty() {
+            if sticking.count > 0 {
                 self.hold(work, sticking);
-                for c in &sticking.set {
+                for c in &sticking.set[..sticking.count] {
                     let Bounds { low, high } = work.bounds[*c];
                     let held = work.force[*c];
                     if !(held > low && held < high) {
@@ -184,11 +197,11 @@ impl Constraints {
         let mut sticking = std::mem::take(&mut work.sticking);
         sticking.gather((0..self.frictions).filter(|c| work.force[*c] > work.bounds[*c].low && work.force[*c] < work.bounds[*c].high));
         sticking.factorise(self);
-        for (right, c) in sticking.right.iter_mut().zip(&sticking.set) {
+        for (right, c) in sticking.right.iter_mut().zip(&sticking.set[..sticking.count]) {
             *right = self.velocity(*c, work);
         }
         sticking.solve();
-        for ((c, more), _) in sticking.set.iter().zip(&sticking.right).zip(&sticking.kept).filter(|(_, kept)| **kept) {
+        for ((c, more), _) in sticking.set[..sticking.count].iter().zip(&sticking.right).zip(&sticking.kept).filter(|(_, kept)| **kept) {
             let Bounds { low, high } = work.bounds[*c];
             work.force[*c] = (work.force[*c] + more).min(high).max(low);
         }
