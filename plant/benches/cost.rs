@@ -28,7 +28,8 @@ fn chain(bodies: usize, contacts: usize) -> Option<Model> {
     text += "[[elements]]\nkind = 'cubic_spring'\nbetween = ['b0', 'ground']\nstiffness = 2000\ncubic = 1e6\n";
     for i in 1..bodies {
         let ends = format!("between = ['b{}', 'b{i}']", i - 1);
-        writeln!(text, "[[elements]]\nkind = 'spring'\n{ends}\nstiffness = 2000\n[[elements]]\nkind = 'damper'\n{ends}\ndamping = 0.3").unwrap();
+        writeln!(text, "[[elements]]\nkind = 'spring'\n{ends}\nstiffness = 2000\n[[elements]]\nkind = 'damper'\n{ends}\ndamping = 0.3")
+            .unwrap();
     }
     for c in 0..contacts {
         let body = c * bodies / contacts;
@@ -81,14 +82,20 @@ fn drawn(curves: &[(usize, Vec<(f64, f64)>)]) -> String {
     );
     for bodies in [2, 4, 8, 16, 32, 64] {
         let at = x(f64::from(bodies));
-        writeln!(svg, "<path d=\"M{at:.1} 40V350\" stroke=\"#ddd\"/><text x=\"{at:.1}\" y=\"370\" text-anchor=\"middle\">{bodies}</text>").unwrap();
+        writeln!(svg, "<path d=\"M{at:.1} 40V350\" stroke=\"#ddd\"/><text x=\"{at:.1}\" y=\"370\" text-anchor=\"middle\">{bodies}</text>")
+            .unwrap();
     }
     for decade in low as i32..=high as i32 {
         for factor in [1.0, 2.0, 5.0] {
             let cost = factor * 10f64.powi(decade);
             if cost <= 10f64.powf(high) {
                 let at = y(cost);
-                writeln!(svg, "<path d=\"M70 {at:.1}H570\" stroke=\"#ddd\"/><text x=\"62\" y=\"{:.1}\" text-anchor=\"end\">{cost}</text>", at + 4.0).unwrap();
+                writeln!(
+                    svg,
+                    "<path d=\"M70 {at:.1}H570\" stroke=\"#ddd\"/><text x=\"62\" y=\"{:.1}\" text-anchor=\"end\">{cost}</text>",
+                    at + 4.0
+                )
+                .unwrap();
             }
         }
     }
@@ -97,7 +104,12 @@ fn drawn(curves: &[(usize, Vec<(f64, f64)>)]) -> String {
         let line: Vec<String> = points.iter().map(|(n, cost)| format!("{:.1},{:.1}", x(*n), y(*cost))).collect();
         writeln!(svg, "<polyline points=\"{}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"2\"/>", line.join(" ")).unwrap();
         let at = 58 + 20 * index;
-        writeln!(svg, "<path d=\"M585 {at}h24\" stroke=\"{colour}\" stroke-width=\"2\"/><text x=\"617\" y=\"{}\">{contacts}</text>", at + 4).unwrap();
+        writeln!(
+            svg,
+            "<path d=\"M585 {at}h24\" stroke=\"{colour}\" stroke-width=\"2\"/><text x=\"617\" y=\"{}\">{contacts}</text>",
+            at + 4
+        )
+        .unwrap();
     }
     svg + "</svg>\n"
 }
@@ -107,15 +119,17 @@ fn main() {
     println!("contacts  {}   exponent from 8 bodies on", BODIES.map(|n| format!("{n:>7}")).concat());
     let mut curves = Vec::new();
     for contacts in CONTACTS {
-        let points: Vec<(f64, f64)> =
-            BODIES.iter().filter_map(|n| chain(*n, contacts).map(|model| (*n as f64, cost(&model)))).collect();
+        let points: Vec<(f64, f64)> = BODIES.iter().filter_map(|n| chain(*n, contacts).map(|model| (*n as f64, cost(&model)))).collect();
         let costs: String = points.iter().map(|(_, cost)| format!("{cost:>7.3}")).collect();
         let large: Vec<(f64, f64)> = points.iter().copied().filter(|(n, _)| *n >= 8.0).collect();
         println!("{contacts:>8}  {costs:>70}   {:.2}", exponent(&large));
         curves.push((contacts, points));
     }
-    let widest: Vec<(f64, f64)> =
-        curves.iter().filter(|(contacts, _)| *contacts >= 2).filter_map(|(contacts, points)| points.last().map(|p| (*contacts as f64, p.1))).collect();
+    let widest: Vec<(f64, f64)> = curves
+        .iter()
+        .filter(|(contacts, _)| *contacts >= 2)
+        .filter_map(|(contacts, points)| points.last().map(|p| (*contacts as f64, p.1)))
+        .collect();
     println!("exponent over contacts from 2 on, with 64 bodies: {:.2}", exponent(&widest));
     if let Some(file) = file {
         // Cargo runs a bench in the folder of its package.

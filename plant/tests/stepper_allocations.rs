@@ -55,8 +55,12 @@ fn chain(bodies: usize, contacts: usize) -> Model {
         writeln!(text, "[[elements]]\nkind = 'spring'\nbetween = ['b{}', 'b{i}']\nstiffness = 2000", i - 1).unwrap();
     }
     for c in 0..contacts {
-        writeln!(text, "[[elements]]\nkind = 'stribeck'\nbetween = ['b{}', 'ground']\ncoulomb = 0.05\nstatic = 0.08\nvelocity = 0.1", c * bodies / contacts)
-            .unwrap();
+        writeln!(
+            text,
+            "[[elements]]\nkind = 'stribeck'\nbetween = ['b{}', 'ground']\ncoulomb = 0.05\nstatic = 0.08\nvelocity = 0.1",
+            c * bodies / contacts
+        )
+        .unwrap();
     }
     writeln!(text, "[[inputs]]\nname = 'push'\nkind = 'force'\non = 'b{}'\nhold = 'linear'", bodies - 1).unwrap();
     writeln!(text, "[[outputs]]\nname = 'end'\nkind = 'acceleration'\nof = 'b0'\n").unwrap();

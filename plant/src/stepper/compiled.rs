@@ -2,8 +2,8 @@
 
 use super::constraints::Constraints;
 use super::points::Points;
-use super::sparse::Sparse;
 use super::slots::{Columns, Slots, Square};
+use super::sparse::Sparse;
 use crate::elements::Linear;
 
 /// What an element has become.

@@ -77,8 +77,12 @@ impl Points {
     #[inline]
     pub(super) fn carry(&self, velocity: &mut Slots) {
         for (row, point) in self.rows.iter().zip(self.places()) {
-            velocity[point] =
-                self.joints().into_iter().flat_map(|joints| row[joints.clone()].iter().zip(&velocity[joints])).map(|(share, v)| share * v).sum();
+            velocity[point] = self
+                .joints()
+                .into_iter()
+                .flat_map(|joints| row[joints.clone()].iter().zip(&velocity[joints]))
+                .map(|(share, v)| share * v)
+                .sum();
         }
     }
 
