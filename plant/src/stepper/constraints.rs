@@ -3,7 +3,7 @@
 //! Each constraint is a scalar law between its force f and the mean relative velocity of its ends, `u = w - Σ P f`,
 //! with w the velocity that the rest would give and P = G A⁻¹ Gᵀ the compliance between constraints. Block
 //! Gauss-Seidel solves one law at a time exactly. Where friction contacts share their load so closely that it
-//! converges slowly, those that stick are solved directly; where there are friction contacts alone that comes first (`sticking.rs`).
+//! converges slowly, those that stick are solved directly; where there are friction contacts alone that comes first (`at_once.rs`).
 
 use super::contact::{Bounds, FrictionContact};
 use super::path::PathElement;

@@ -15,6 +15,7 @@
 mod account;
 mod advance;
 mod ahead;
+mod at_once;
 mod carry;
 mod compile;
 mod compiled;
