@@ -58,6 +58,7 @@ impl Events {
     }
 
     /// Takes all of them out.
+    #[inline]
     pub fn drain(&mut self) -> impl Iterator<Item = (&'static str, f64, u32)> + '_ {
         let len = std::mem::take(&mut self.len);
         self.list[..len].iter().copied()

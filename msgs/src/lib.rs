@@ -86,6 +86,7 @@ impl Sample {
     }
 
     /// Number of valid axes, as an index bound.
+    #[inline]
     pub fn len(&self) -> usize {
         (self.axes as usize).min(MAX_AXES)
     }

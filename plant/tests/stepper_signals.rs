@@ -170,7 +170,7 @@ fn what_cannot_be_stepped_is_named() {
     assert!(matches!(Plant::new(&reaction, PERIOD, &Options::default()), Err(CompileError::NoReaction { .. })));
     let dangling = model(&[0.1], vec![spring([at(0), at(3)], 1.0)], vec![], vec![]);
     assert!(matches!(Plant::new(&dangling, PERIOD, &Options::default()), Err(CompileError::Dangling(_))));
-    let crowd = model(&[0.1; 40], vec![], vec![], vec![]);
+    let crowd = model(&[0.1; 65], vec![], vec![], vec![]);
     assert!(matches!(Plant::new(&crowd, PERIOD, &Options::default()), Err(CompileError::TooMany { .. })));
     assert!(matches!(
         Plant::new(&model(&[f64::NAN], vec![], vec![], vec![]), PERIOD, &Options::default()),

@@ -41,6 +41,10 @@ impl FrictionLaw for AsymmetricCoulomb {
         }
     }
 
+    fn is_constant(&self) -> bool {
+        true
+    }
+
     fn linearised(&self, at: &Sine) -> Linear {
         harmonic::of_friction(self, at)
     }

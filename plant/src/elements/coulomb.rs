@@ -33,6 +33,10 @@ impl FrictionLaw for Coulomb {
         self.force
     }
 
+    fn is_constant(&self) -> bool {
+        true
+    }
+
     fn linearised(&self, at: &Sine) -> Linear {
         harmonic::of_friction(self, at)
     }

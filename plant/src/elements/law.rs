@@ -77,6 +77,11 @@ pub trait FrictionLaw {
     /// Level, N, at least 0.
     fn level(&self, at: &Rubbing) -> f64;
 
+    /// Whether its levels are always the same, whatever the speed, the load and the memory.
+    fn is_constant(&self) -> bool {
+        false
+    }
+
     /// Length of its memory, numbers.
     fn memory_len(&self) -> usize {
         0

@@ -96,6 +96,11 @@ macro_rules! register {
                 match self { $(Law::$law(_law) => where_it_is!(friction, $role, _law.level(at), 0.0)),* }
             }
 
+            /// Whether the levels of dry friction are always the same.
+            pub(crate) fn is_constant(&self) -> bool {
+                match self { $(Law::$law(_law) => where_it_is!(friction, $role, _law.is_constant(), false)),* }
+            }
+
             /// Carries dry friction's memory on over `dt` seconds in which it took `work`, J.
             pub fn rubbed(&self, memory: &mut [f64], work: f64, dt: f64) {
                 match self { $(Law::$law(_law) => where_it_is!(friction, $role, _law.rubbed(memory, work, dt), {})),* }

@@ -13,6 +13,9 @@ use super::state::Plant;
 /// Stands for a number of free bodies that is not known when the code is compiled.
 const ANY: usize = 0;
 
+/// Constraints beyond which a large network answers all their forces at once.
+const FEW: usize = 4;
+
 impl Plant {
     /// One period by substeps, whatever the model, with somebody who follows them.
     pub(super) fn step_followed<F: Follow>(&mut self, inputs: &[Segment], follower: &mut F) {
@@ -95,8 +98,7 @@ impl Plant {
         for drive in &mut self.drives {
             let slot = drive.slot;
             if drive.moves {
-                let (x0, v0, _) = drive.motion(from);
-                let (x1, v1, a1) = drive.motion(to);
+                let ((x0, v0), (x1, v1, a1)) = drive.motion_over(from, to);
                 (self.x[slot], motion.end[slot], motion.end_velocity[slot]) = (x0, x1, v1);
                 self.prescribed_acceleration[slot] = a1;
                 // Mean of the cubic through both ends.
@@ -148,21 +150,27 @@ impl Plant {
     fn move_freely(&self, n: usize, motion: &mut Motion) {
         let (h, fixed) = (self.substep, &self.fixed);
         // Half the velocity change.
-        let mut change = [0.0; SLOTS];
-        for j in 0..n {
-            let (f, x, v) = (motion.force[j], self.x[j], self.v[j]);
-            let (by_force, by_position, by_velocity) = (&fixed.from_force[j], &fixed.from_position[j], &fixed.from_velocity[j]);
-            for i in 0..n {
-                change[i] += by_force[i] * f + by_position[i] * x + by_velocity[i] * v;
+        let mut change = if let Some(sparse) = &fixed.sparse {
+            sparse.change(&motion.force, &self.x, &self.v)
+        } else {
+            let mut change = [0.0; SLOTS];
+            for j in 0..n {
+                let (f, x, v) = (motion.force[j], self.x[j], self.v[j]);
+                let (by_force, by_position, by_velocity) =
+                    (&fixed.from_force[j][..n], &fixed.from_position[j][..n], &fixed.from_velocity[j][..n]);
+                for i in 0..n {
+                    change[i] += by_force[i] * f + by_position[i] * x + by_velocity[i] * v;
+                }
             }
-        }
-        for p in 0..fixed.prescribed {
+            change
+        };
+        for (p, by) in fixed.from_prescribed.iter().enumerate() {
             let slot = prescribed_slot(p);
             let acceleration = (motion.end_velocity[slot] - self.v[slot]) / h;
             let (x, v) = (motion.middle[slot], motion.mean_velocity[slot]);
-            let [by_position, by_velocity, by_acceleration] = &fixed.from_prescribed;
+            let [by_position, by_velocity, by_acceleration] = by;
             for i in 0..n {
-                change[i] += by_position[p][i] * x + by_velocity[p][i] * v + by_acceleration[p][i] * acceleration;
+                change[i] += by_position[i] * x + by_velocity[i] * v + by_acceleration[i] * acceleration;
             }
         }
         for i in 0..n {
@@ -177,7 +185,21 @@ impl Plant {
         self.constraint_forces(n, motion);
         let (h, fixed, work) = (self.substep, &self.fixed, &mut *self.work);
         let Motion { mean_velocity, end_velocity, .. } = motion;
-        for c in 0..fixed.constraints.len() {
+        let at_once = if fixed.constraints.len() > FEW { fixed.sparse.as_ref() } else { None };
+        if let Some(sparse) = at_once {
+            let mut taken = [0.0; SLOTS];
+            for c in 0..fixed.constraints.len() {
+                let (first, second) = fixed.constraints.ends(c);
+                taken[first] += work.force[c];
+                taken[second] -= work.force[c];
+            }
+            sparse.solve(&mut taken);
+            for i in 0..n {
+                mean_velocity[i] -= taken[i];
+                end_velocity[i] -= 2.0 * taken[i];
+            }
+        }
+        for c in if at_once.is_some() { 0..0 } else { 0..fixed.constraints.len() } {
             let (f, response) = (work.force[c], &fixed.constraints.response[c]);
             for i in 0..n {
                 mean_velocity[i] -= response[i] * f;
@@ -249,7 +271,10 @@ impl Plant {
 
     #[inline(always)]
     fn count_energy(&mut self, motion: &Motion) {
-        let bias = if self.energy.is_some() { self.bias_over(motion) } else { [0.0; SLOTS] };
+        if self.energy.is_none() {
+            return;
+        }
+        let bias = self.bias_over(motion);
         if let Some(account) = &mut self.energy {
             let done = Done {
                 velocity: &self.v,
@@ -295,13 +320,11 @@ impl Plant {
 
     /// Forces of the inputs at `s` of this period, seen from before.
     pub(super) fn note_pushes(&mut self, s: f64) {
-        for drive in &self.drives {
+        for drive in self.drives.iter().filter(|drive| !drive.moves) {
             self.pushed[drive.slot] = 0.0;
         }
-        for drive in &self.drives {
-            if !drive.moves {
-                self.pushed[drive.slot] += drive.force_before(s);
-            }
+        for drive in self.drives.iter().filter(|drive| !drive.moves) {
+            self.pushed[drive.slot] += drive.force_before(s);
         }
     }
 }

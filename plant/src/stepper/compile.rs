@@ -15,6 +15,7 @@ use super::points::Points;
 use super::propagator::Propagator;
 use super::sensor::Sense;
 use super::slots::{Columns, GROUND, MAX_BODIES, MAX_ELEMENTS, SLOTS, Slots, Square, prescribed_slot};
+use super::sparse::Sparse;
 use super::state::Plant;
 use crate::elements::{Range, Role};
 use crate::load;
@@ -63,7 +64,7 @@ fn block(matrix: &Square, free: usize) -> DMatrix<f64> {
 }
 
 fn columns(matrix: &DMatrix<f64>) -> Columns {
-    let mut columns = [[0.0; SLOTS]; SLOTS];
+    let mut columns = Columns::new(matrix.ncols());
     for j in 0..matrix.ncols() {
         for i in 0..matrix.nrows() {
             columns[j][i] = matrix[(i, j)];
@@ -208,7 +209,7 @@ fn assemble(model: &Model) -> Result<Network, CompileError> {
     for (index, point) in points.iter().enumerate() {
         slots[point.body] = free_bodies.len() + index;
     }
-    let points = Points::new(free_bodies.len(), points.len());
+    let points = Points::new(free_bodies.len(), points.len(), prescribed);
     let mut network =
         Network { slots, free_bodies, points, prescribed, mass: square(), damping: square(), stiffness: square(), constant: [0.0; SLOTS] };
     for (body, slot) in model.bodies.iter().zip(&network.slots) {
@@ -349,7 +350,7 @@ fn plant(model: &Model, period: f64, options: &Options) -> Result<Plant, Compile
     check(model)?;
     let mut network = assemble(model)?;
     let free = network.free_bodies.len();
-    let mut links = model.arm.as_ref().map(|arm| Box::new(Links::new(arm, &network.slots, network.mass.clone())));
+    let mut links = model.arm.as_ref().map(|arm| Box::new(Links::new(arm, &network.slots, free, network.mass.clone())));
     // In other poses the links may weigh less on their joints, and their points move otherwise.
     let mut others: Vec<(Square, Points)> = Vec::new();
     if let (Some(arm), Some(links)) = (&model.arm, &mut links) {
@@ -380,7 +381,7 @@ fn plant(model: &Model, period: f64, options: &Options) -> Result<Plant, Compile
     let delayed = model.outputs.iter().any(|output| output.delay > 0.0);
     let substeps = match options.substeps {
         Some(n) => n,
-        None if linear && !delayed => 1,
+        None if linear && !delayed && Propagator::holds(free, &model.inputs) => 1,
         None => choose_substeps(&network, model, &poses, period),
     };
     let substep = period / substeps as f64;
@@ -395,16 +396,18 @@ fn plant(model: &Model, period: f64, options: &Options) -> Result<Plant, Compile
     let from_force = dense::inverse(&system(&poses[0].mass)).ok_or(CompileError::Singular)?;
     let answer = |pose: &Pose| dense::inverse(&system(&pose.mass)).map(|inverse| (columns(&inverse), pose.points.clone()));
     let from_forces: Vec<(Columns, Points)> = poses.iter().filter_map(answer).collect();
-    let mut from_prescribed = [[[0.0; SLOTS]; SLOTS]; 3];
-    for (matrix, weights) in [&network.stiffness, &network.damping, &network.mass].into_iter().zip(&mut from_prescribed) {
-        for (p, weights) in weights.iter_mut().enumerate().take(network.prescribed) {
+    let mut from_prescribed = vec![[[0.0; SLOTS]; 3]; network.prescribed];
+    for (p, weights) in from_prescribed.iter_mut().enumerate() {
+        for (matrix, weights) in [&network.stiffness, &network.damping, &network.mass].into_iter().zip(weights) {
             for (i, weight) in weights.iter_mut().enumerate().take(free) {
                 *weight = -(0..free).map(|j| from_force[(i, j)] * matrix[j][prescribed_slot(p)]).sum::<f64>();
             }
         }
     }
     let constraints = Constraints::new(&from_forces, free, substep, &frictions, &mut paths);
+    let sparse = links.is_none().then(|| Sparse::new(&system(&poses[0].mass), &network.stiffness, &network.damping, substep)).flatten();
     let fixed = Compiled {
+        sparse,
         free,
         prescribed: network.prescribed,
         points: network.points,
@@ -422,8 +425,9 @@ fn plant(model: &Model, period: f64, options: &Options) -> Result<Plant, Compile
         stiffness: network.stiffness,
         constant: network.constant,
     };
+    let work = Box::new(Work::new(frictions.len()));
     let exact = if linear { Propagator::new(&fixed, &drives, substep) } else { None };
-    let sense = Sense::new(model, &fixed.slots, substep, options);
+    let sense = Sense::new(model, &fixed.slots, &fixed.elements, substep, options);
     let mut plant = Plant {
         fixed,
         period,
@@ -437,7 +441,7 @@ fn plant(model: &Model, period: f64, options: &Options) -> Result<Plant, Compile
         drives,
         frictions,
         paths,
-        work: Box::new(Work::new()),
+        work,
         motion: Some(Box::new(Motion::new())),
         instant: Some(Box::new(Endpoint::new())),
         sense,

@@ -2,7 +2,8 @@
 
 use super::constraints::Constraints;
 use super::points::Points;
-use super::slots::{Columns, SLOTS, Slots, Square};
+use super::slots::{Columns, Slots, Square};
+use super::sparse::Sparse;
 use crate::elements::Linear;
 
 /// What an element has become.
@@ -38,8 +39,10 @@ pub(super) struct Compiled {
     pub(super) from_force: Columns,
     pub(super) from_position: Columns,
     pub(super) from_velocity: Columns,
-    /// The same from mean position, mean velocity and mean acceleration of the prescribed bodies.
-    pub(super) from_prescribed: [[Slots; SLOTS]; 3],
+    /// The same equations where the network is large.
+    pub(super) sparse: Option<Sparse>,
+    /// The same from mean position, mean velocity and mean acceleration of each prescribed body.
+    pub(super) from_prescribed: Vec<[Slots; 3]>,
     pub(super) elements: Vec<Share>,
     pub(super) constraints: Constraints,
 }

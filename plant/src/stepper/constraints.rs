@@ -3,12 +3,13 @@
 //! Each constraint is a scalar law between its force f and the mean relative velocity of its ends, `u = w - Σ P f`,
 //! with w the velocity that the rest would give and P = G A⁻¹ Gᵀ the compliance between constraints. Block
 //! Gauss-Seidel solves one law at a time exactly. Where friction contacts share their load so closely that it
-//! converges slowly, those that stick are solved directly.
+//! converges slowly, those that stick are solved directly; where there are friction contacts alone that comes first (`at_once.rs`).
 
 use super::contact::{Bounds, FrictionContact};
 use super::path::PathElement;
 use super::points::Points;
 use super::slots::{Columns, MAX_ELEMENTS, SLOTS, Slots};
+use super::sticking::Sticking;
 
 /// Sweeps before the sticking contacts are solved directly.
 const SWEEPS: usize = 25;
@@ -42,11 +43,13 @@ pub(super) struct Constraints {
     /// Index among the path elements, of those that are no friction contacts.
     paths: Vec<usize>,
     /// How many are friction contacts.
-    frictions: usize,
+    pub(super) frictions: usize,
     /// Sweeps before the sticking contacts are solved directly.
     sweeps: usize,
     /// P, row by row, m/s per N.
     compliance: Vec<f64>,
+    /// How often it has changed.
+    pub(super) changes: u64,
     /// A⁻¹ Gᵀ: change of the mean velocity of each free body per unit of each force, m/s per N.
     pub(super) response: Vec<Slots>,
 }
@@ -67,10 +70,12 @@ pub(super) struct Work {
     /// Forces and bounds before it was known that they stop.
     pub(super) first_force: [f64; MAX_ELEMENTS],
     pub(super) first_bounds: [Bounds; MAX_ELEMENTS],
+    pub(super) sticking: Sticking,
 }
 
 impl Work {
-    pub(super) fn new() -> Work {
+    /// `frictions`: how many of the constraints are friction contacts.
+    pub(super) fn new(frictions: usize) -> Work {
         Work {
             base: [0.0; MAX_ELEMENTS],
             bounds: [Bounds::default(); MAX_ELEMENTS],
@@ -80,6 +85,7 @@ impl Work {
             shares: [(0.0, 0.0); MAX_ELEMENTS],
             first_force: [0.0; MAX_ELEMENTS],
             first_bounds: [Bounds::default(); MAX_ELEMENTS],
+            sticking: Sticking::new(frictions),
         }
     }
 }
@@ -129,6 +135,7 @@ impl Constraints {
         for (response, ends) in self.response.iter_mut().zip(&self.ends) {
             *response = respond(from_force, points, free, *ends);
         }
+        self.changes += 1;
         let count = self.ends.len();
         for (c, ends) in self.ends.iter().enumerate() {
             for (d, response) in self.response.iter().enumerate() {
@@ -211,6 +218,9 @@ impl Constraints {
             self.relax(0, work, paths);
             return;
         }
+        if count == self.frictions && self.solve_contacts(work) {
+            return;
+        }
         for _ in 0..ROUNDS {
             for _ in 0..self.sweeps {
                 let mut settled = true;
@@ -222,7 +232,7 @@ impl Constraints {
                     return;
                 }
             }
-            self.solve_sticking(work);
+            self.make_stick(work);
         }
     }
 
@@ -238,48 +248,6 @@ impl Constraints {
         }
         let unknown = self.paths.get(c - self.frictions).and_then(|p| paths.get(*p)).map_or(0.0, PathElement::rounding);
         TOLERANCE_OF_LAWS * (work.force[c].abs() + work.base[c].abs() / own) + 4.0 * unknown / own
-    }
-
-    /// Newton step for the contacts inside their bounds: makes all of them stick at once. Contacts that depend on
-    /// others (several in one place) keep their force.
-    fn solve_sticking(&self, work: &mut Work) {
-        let mut inside = [0usize; MAX_ELEMENTS];
-        let mut count = 0;
-        for c in 0..self.frictions {
-            if work.force[c] > work.bounds[c].low && work.force[c] < work.bounds[c].high {
-                inside[count] = c;
-                count += 1;
-            }
-        }
-        let p = |i: usize, j: usize| self.compliance[inside[i] * self.ends.len() + inside[j]];
-        let mut factor = [[0.0; MAX_ELEMENTS]; MAX_ELEMENTS];
-        let mut kept = [true; MAX_ELEMENTS];
-        let mut right = [0.0; MAX_ELEMENTS];
-        for i in 0..count {
-            right[i] = self.velocity(inside[i], work);
-        }
-        for j in 0..count {
-            let pivot = p(j, j) - (0..j).filter(|k| kept[*k]).map(|k| factor[j][k] * factor[j][k]).sum::<f64>();
-            kept[j] = pivot > 1e-10 * p(j, j);
-            if !kept[j] {
-                continue;
-            }
-            factor[j][j] = pivot.sqrt();
-            for i in j + 1..count {
-                let sum: f64 = (0..j).filter(|k| kept[*k]).map(|k| factor[i][k] * factor[j][k]).sum();
-                factor[i][j] = (p(i, j) - sum) / factor[j][j];
-            }
-        }
-        for i in (0..count).filter(|i| kept[*i]) {
-            let sum: f64 = (0..i).filter(|k| kept[*k]).map(|k| factor[i][k] * right[k]).sum();
-            right[i] = (right[i] - sum) / factor[i][i];
-        }
-        for i in (0..count).rev().filter(|i| kept[*i]) {
-            let sum: f64 = (i + 1..count).filter(|k| kept[*k]).map(|k| factor[k][i] * right[k]).sum();
-            right[i] = (right[i] - sum) / factor[i][i];
-            let Bounds { low, high } = work.bounds[inside[i]];
-            work.force[inside[i]] = (work.force[inside[i]] + right[i]).min(high).max(low);
-        }
     }
 }
 

@@ -19,6 +19,8 @@ pub(super) struct FrictionContact {
     pub(super) law: Law,
     pub(super) memory: Vec<f64>,
     pub(super) joint: Joint,
+    /// Between what its force may be, where that is always the same.
+    pub(super) constant: Option<Bounds>,
     /// 0 while it sticks, else the direction in which it slides.
     pub(super) mode: i8,
     /// Multiplier over the last substep, N.
@@ -52,16 +54,19 @@ impl Joint {
 impl FrictionContact {
     /// At rest between two places, without load.
     pub(super) fn new(first: usize, second: usize, law: &Law) -> FrictionContact {
-        FrictionContact {
+        let mut contact = FrictionContact {
             first,
             second,
             law: law.clone(),
             memory: vec![0.0; law.memory_len()],
             joint: Joint::default(),
+            constant: None,
             mode: 0,
             force: 0.0,
             velocity_before: 0.0,
-        }
+        };
+        contact.constant = law.is_constant().then(|| contact.bounds_at_rest(0.0));
+        contact
     }
 
     /// Back to rest.
@@ -87,6 +92,13 @@ impl FrictionContact {
     /// Between what its force may be over a substep that begins with relative velocity `v0` and has the bodies at `middle` in its middle.
     #[inline]
     pub(super) fn bounds(&self, v0: f64, middle: &Slots, paths: &[PathElement]) -> Bounds {
+        if let Some(bounds) = self.constant {
+            return bounds;
+        }
+        self.changing_bounds(v0, middle, paths)
+    }
+
+    fn changing_bounds(&self, v0: f64, middle: &Slots, paths: &[PathElement]) -> Bounds {
         let load = self.joint.load(middle, |path| paths[path].force);
         let mut bounds = self.bounds_at_rest(load);
         if self.mode != 0 {

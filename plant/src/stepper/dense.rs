@@ -53,7 +53,7 @@ pub(super) fn largest_ratio(l: &DMatrix<f64>, k: &DMatrix<f64>) -> f64 {
     symmetric.symmetric_eigenvalues().iter().fold(0.0, |largest: f64, e| largest.max(e.abs()))
 }
 
-/// Inverse of the leading `n` rows and columns of a matrix, in place of it (Gauss and Jordan, with the greatest pivot of each column). Nothing is allocated.
+/// Inverse of the leading `n` rows and columns of a matrix, `n` of [`SLOTS`] at most, in place of it (Gauss and Jordan, with the greatest pivot of each column). Nothing is allocated.
 /// `false` when it is singular; what is there then is no inverse.
 pub(super) fn invert(a: &mut Columns, n: usize) -> bool {
     let mut rows = [0usize; SLOTS];
@@ -67,17 +67,17 @@ pub(super) fn invert(a: &mut Columns, n: usize) -> bool {
         let by = 1.0 / a[j][j];
         a[j][j] = 1.0;
         a[j][..n].iter_mut().for_each(|value| *value *= by);
-        let row = a[j];
         for i in (0..n).filter(|i| *i != j) {
-            let factor = std::mem::take(&mut a[i][j]);
-            for (value, own) in a[i][..n].iter_mut().zip(&row) {
+            let (other, row) = a.with(i, j);
+            let factor = std::mem::take(&mut other[j]);
+            for (value, own) in other[..n].iter_mut().zip(&row[..n]) {
                 *value -= factor * own;
             }
         }
     }
     for j in (0..n).rev().filter(|j| rows[*j] != *j) {
-        for row in a[..n].iter_mut() {
-            row.swap(j, rows[j]);
+        for i in 0..n {
+            a[i].swap(j, rows[j]);
         }
     }
     true
@@ -90,14 +90,14 @@ mod tests {
     #[test]
     fn a_matrix_times_its_inverse_is_one() {
         for n in [1, 2, 5, SLOTS] {
-            let mut a = [[0.0; SLOTS]; SLOTS];
+            let mut a = Columns::new(n);
             for i in 0..n {
                 for j in 0..n {
                     // The first pivot is 0, so that rows are exchanged.
                     a[i][j] = ((3 * i + 7 * j) as f64 * 1.7).sin() + if i + 1 == n - j { 2.0 } else { 0.0 };
                 }
             }
-            let first = a;
+            let first = a.clone();
             assert!(invert(&mut a, n));
             for i in 0..n {
                 for j in 0..n {
@@ -106,6 +106,6 @@ mod tests {
                 }
             }
         }
-        assert!(!invert(&mut [[0.0; SLOTS]; SLOTS], 3));
+        assert!(!invert(&mut Columns::new(3), 3));
     }
 }

@@ -173,6 +173,21 @@ impl Drive {
         (self.gain * segment.value(s) + self.offset, self.gain * segment.slope(s), self.gain * segment.curvature(s))
     }
 
+    /// The motion at the start of a substep (position, velocity) and at its end (with the acceleration), as [`Drive::motion`] has them.
+    #[inline]
+    pub(super) fn motion_over(&self, from: f64, to: f64) -> ((f64, f64), (f64, f64, f64)) {
+        if self.delay_rest == 0.0 && self.delay_periods == 0 {
+            let Segment { c: [c0, c1, c2, c3] } = self.history[self.newest];
+            if c2 == 0.0 && c3 == 0.0 {
+                let at = |s: f64| self.gain * (c0 + s * c1) + self.offset;
+                let velocity = self.gain * c1;
+                return ((at(from), velocity), (at(to), velocity, 0.0));
+            }
+        }
+        let ((x0, v0, _), end) = (self.motion(from), self.motion(to));
+        ((x0, v0), end)
+    }
+
     /// Rate of the lag, rad/s, when there is one.
     pub(super) fn lag_rate(&self) -> Option<f64> {
         self.rate.is_finite().then_some(self.rate)

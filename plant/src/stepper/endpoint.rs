@@ -15,15 +15,16 @@ const SWEEPS: usize = 200;
 const NO_BIAS: Slots = [0.0; SLOTS];
 
 /// Inverse of the inertia of the free bodies; not numbers where there is none.
-fn inverted(mass: &Square, free: usize) -> Columns {
-    let mut inverse: Columns = [[0.0; SLOTS]; SLOTS];
+fn invert(inverse: &mut Columns, mass: &Square, free: usize) {
+    if inverse.size() != free {
+        *inverse = Columns::new(free);
+    }
     for i in 0..free {
-        inverse[i][..free].copy_from_slice(&mass[i][..free]);
+        inverse[i].copy_from_slice(&mass[i][..free]);
     }
-    if !dense::invert(&mut inverse, free) {
-        inverse = [[f64::NAN; SLOTS]; SLOTS];
+    if !dense::invert(inverse, free) {
+        inverse.fill(f64::NAN);
     }
-    inverse
 }
 
 impl Plant {
@@ -70,17 +71,17 @@ impl Plant {
             force[contact.first] -= *f;
             force[contact.second] += *f;
         }
-        let of_pose;
-        let inverse_mass = match &self.links {
-            None => &fixed.inverse_mass,
-            Some(_) => {
-                of_pose = inverted(&fixed.mass, fixed.free);
-                &of_pose
-            }
-        };
         fixed.points.pass_on(&mut force);
-        self.accelerate(inverse_mass, &force, &mut now.acceleration);
-        self.hold_sticking(inverse_mass, now);
+        if self.links.is_none() {
+            self.accelerate(&fixed.inverse_mass, &force, &mut now.acceleration);
+            self.hold_sticking(&fixed.inverse_mass, now);
+            return;
+        }
+        let mut of_pose = std::mem::take(&mut now.inverse);
+        invert(&mut of_pose, &fixed.mass, fixed.free);
+        self.accelerate(&of_pose, &force, &mut now.acceleration);
+        self.hold_sticking(&of_pose, now);
+        now.inverse = of_pose;
     }
 
     fn accelerate(&self, inverse_mass: &Columns, force: &Slots, acceleration: &mut Slots) {
@@ -119,6 +120,22 @@ impl Plant {
             if settled {
                 return;
             }
+        }
+    }
+
+    /// Force of an element that needs no accelerations, N: one along a path, a linear one that is no inerter. `None` of all others.
+    #[inline]
+    pub(super) fn force_without_balance(&self, element: usize) -> Option<f64> {
+        let across = |q: &Slots, first: usize, second: usize| q[first] - q[second];
+        match self.fixed.elements.get(element)? {
+            Share::Path(path) => self.paths.get(*path).map(|path| {
+                let (x, v) = (across(&self.x, path.first, path.second), across(&self.v, path.first, path.second));
+                path.law.force(&path.memory, x, v)
+            }),
+            Share::Linear(linear, a, b) if linear.inertance == 0.0 => {
+                Some(linear.force + linear.stiffness * across(&self.x, *a, *b) + linear.damping * across(&self.v, *a, *b))
+            }
+            Share::Linear(..) | Share::Friction(_) => None,
         }
     }
 

@@ -40,11 +40,13 @@ pub(super) struct Links {
     points: Vec<(Point, f64)>,
     columns: Vec<Twist>,
     row: Vec<f64>,
+    /// Space for the equations of a substep.
+    system: Columns,
 }
 
 impl Links {
-    /// `slots`: place of each body of the model; `own_mass`: inertia of the network without the links.
-    pub(super) fn new(arm: &Arm, slots: &[usize], own_mass: Square) -> Links {
+    /// `slots`: place of each body of the model; `free` of them are not on a motion input; `own_mass`: inertia of the network without the links.
+    pub(super) fn new(arm: &Arm, slots: &[usize], free: usize, own_mass: Square) -> Links {
         let (mut tree, count) = (arm.tree.clone(), arm.tree.len());
         if arm.gravity_compensated {
             tree.weightless();
@@ -58,6 +60,7 @@ impl Links {
             points: arm.points.iter().map(|point| (point.clone(), at_pose(point))).collect(),
             columns: vec![Twist::default(); count],
             row: vec![0.0; count],
+            system: Columns::new(free),
             slots: arm.bodies.iter().map(|body| slots[*body]).collect(),
             pose: arm.pose.clone(),
             own_mass,
@@ -149,12 +152,13 @@ impl Links {
     }
 
     /// What the bodies answer to forces in this substep.
-    fn answer(&self, fixed: &mut Compiled, substep: f64) {
-        let n = fixed.free;
-        let mut system: Columns = [[0.0; SLOTS]; SLOTS];
+    fn answer(&mut self, fixed: &mut Compiled, substep: f64) {
+        let (n, theta) = (fixed.free, fixed.theta);
+        let Compiled { mass, damping, stiffness, from_force, from_position, from_velocity, .. } = fixed;
+        let system = &mut self.system;
         for i in 0..n {
             for j in 0..n {
-                system[i][j] = 2.0 / substep * fixed.mass[i][j] + fixed.damping[i][j] + fixed.theta * 0.5 * substep * fixed.stiffness[i][j];
+                system[i][j] = 2.0 / substep * mass[i][j] + damping[i][j] + theta * 0.5 * substep * stiffness[i][j];
             }
         }
         for (i, a) in self.slots.iter().enumerate().filter(|(_, slot)| **slot < n) {
@@ -163,31 +167,32 @@ impl Links {
                 system[*a][*b] += 2.0 * self.coriolis[(i, j)];
             }
         }
-        if !dense::invert(&mut system, n) {
-            system = [[f64::NAN; SLOTS]; SLOTS];
+        if !dense::invert(system, n) {
+            system.fill(f64::NAN);
         }
         for j in 0..n {
             for i in 0..n {
-                fixed.from_force[j][i] = system[i][j];
+                from_force[j][i] = system[i][j];
             }
         }
         for j in 0..n {
-            let (mut by_position, mut by_velocity) = ([0.0; SLOTS], [0.0; SLOTS]);
+            let (by_position, by_velocity) = (&mut from_position[j], &mut from_velocity[j]);
+            by_position.fill(0.0);
+            by_velocity.fill(0.0);
             // Few bodies are tied to each other.
-            for k in (0..n).filter(|k| fixed.stiffness[*k][j] != 0.0 || fixed.damping[*k][j] != 0.0) {
-                let (stiffness, column) = (fixed.stiffness[k][j], &fixed.from_force[k]);
-                let damping = fixed.damping[k][j] + 0.5 * substep * stiffness;
+            for k in (0..n).filter(|k| stiffness[*k][j] != 0.0 || damping[*k][j] != 0.0) {
+                let (stiffness, column) = (stiffness[k][j], &from_force[k]);
+                let damping = damping[k][j] + 0.5 * substep * stiffness;
                 for i in 0..n {
                     by_position[i] -= column[i] * stiffness;
                     by_velocity[i] -= column[i] * damping;
                 }
             }
-            (fixed.from_position[j], fixed.from_velocity[j]) = (by_position, by_velocity);
         }
-        for p in 0..fixed.prescribed {
+        for (p, weights) in fixed.from_prescribed.iter_mut().enumerate() {
             let slot = prescribed_slot(p);
-            for (weights, matrix) in fixed.from_prescribed.iter_mut().zip([&fixed.stiffness, &fixed.damping, &fixed.mass]) {
-                for (i, weight) in weights[p].iter_mut().enumerate().take(n) {
+            for (weights, matrix) in weights.iter_mut().zip([&*stiffness, &*damping, &*mass]) {
+                for (i, weight) in weights.iter_mut().enumerate().take(n) {
                     *weight = -(0..n).map(|j| system[i][j] * matrix[j][slot]).sum::<f64>();
                 }
             }

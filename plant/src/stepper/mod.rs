@@ -15,6 +15,7 @@
 mod account;
 mod advance;
 mod ahead;
+mod at_once;
 mod carry;
 mod compile;
 mod compiled;
@@ -39,8 +40,10 @@ mod sense;
 mod sensor;
 mod simulate;
 mod slots;
+mod sparse;
 mod spline;
 mod state;
+mod sticking;
 mod swap;
 mod tangents;
 

@@ -5,13 +5,15 @@
 //! geometry, not the row times the joints': nothing drifts. Over a substep the row is that in its middle, so the work of a force on a point is that of
 //! its joint forces, and forwards and backwards in time are the same.
 
-use super::slots::{Columns, SLOTS, Slots};
+use super::slots::{Columns, GROUND, SLOTS, Slots};
 
 /// The points of a network; none without a robot.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Points {
     /// Place of the first.
     first: usize,
+    /// Place from which on bodies on motion inputs are.
+    moved: usize,
     /// J, a row for each: m/rad or 1, by place of the joints.
     pub(super) rows: Vec<Slots>,
     /// `J̇ v` at the instant that was looked at last, m/s².
@@ -19,9 +21,9 @@ pub(super) struct Points {
 }
 
 impl Points {
-    /// So many points, from this place on.
-    pub(super) fn new(first: usize, count: usize) -> Points {
-        Points { first, rows: vec![[0.0; SLOTS]; count], drift: vec![0.0; count] }
+    /// So many points, from this place on, and so many bodies on motion inputs.
+    pub(super) fn new(first: usize, count: usize, prescribed: usize) -> Points {
+        Points { first, moved: GROUND - prescribed, rows: vec![[0.0; SLOTS]; count], drift: vec![0.0; count] }
     }
 
     #[inline]
@@ -33,6 +35,12 @@ impl Points {
     #[inline]
     pub(super) fn places(&self) -> std::ops::Range<usize> {
         self.first..self.first + self.rows.len()
+    }
+
+    /// Where the joints may be: the free bodies, and those on motion inputs.
+    #[inline]
+    fn joints(&self) -> [std::ops::Range<usize>; 2] {
+        [0..self.first, self.moved..GROUND]
     }
 
     /// The row of a place that is a point.
@@ -56,8 +64,10 @@ impl Points {
         for (row, point) in self.rows.iter().zip(self.places()) {
             let pushed = force[point];
             if pushed != 0.0 {
-                for (slot, share) in row.iter().enumerate().filter(|(_, share)| **share != 0.0) {
-                    force[slot] += share * pushed;
+                for joints in self.joints() {
+                    for (force, share) in force[joints.clone()].iter_mut().zip(&row[joints]) {
+                        *force += share * pushed;
+                    }
                 }
             }
         }
@@ -67,7 +77,12 @@ impl Points {
     #[inline]
     pub(super) fn carry(&self, velocity: &mut Slots) {
         for (row, point) in self.rows.iter().zip(self.places()) {
-            velocity[point] = row.iter().zip(&*velocity).map(|(share, v)| share * v).sum();
+            velocity[point] = self
+                .joints()
+                .into_iter()
+                .flat_map(|joints| row[joints.clone()].iter().zip(&velocity[joints]))
+                .map(|(share, v)| share * v)
+                .sum();
         }
     }
 

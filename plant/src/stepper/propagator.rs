@@ -5,6 +5,7 @@
 
 use super::compiled::Compiled;
 use super::drive::Drive;
+use crate::model::{Input, InputKind};
 use nalgebra::DMatrix;
 
 /// Rows at most: positions, velocities, lags.
@@ -26,6 +27,12 @@ pub(super) struct Propagator {
 }
 
 impl Propagator {
+    /// Whether a network of so many free bodies is small enough.
+    pub(super) fn holds(free: usize, inputs: &[Input]) -> bool {
+        let lags = inputs.iter().filter(|input| input.kind == InputKind::Force && input.bandwidth.is_finite()).count();
+        2 * free + lags <= MAX_ROWS
+    }
+
     /// `None` when the model is larger than this holds or its exponential is not finite.
     pub(super) fn new(fixed: &Compiled, drives: &[Drive], substep: f64) -> Option<Propagator> {
         let n = fixed.free;

@@ -1,5 +1,6 @@
 //! A sensor at work: gain, delay, offset, noise, resolution.
 
+use super::compiled::Share;
 use super::options::Options;
 use super::slots::GROUND;
 use crate::model::{Model, OutputKind};
@@ -30,18 +31,32 @@ pub(super) struct Sense {
     pub(super) quantise: bool,
     pub(super) seed: Option<u64>,
     pub(super) random: Option<ChaCha8Rng>,
-    pub(super) needs_forces: bool,
+    /// Whether any reads a force or an acceleration.
+    pub(super) reads_forces: bool,
+    /// Whether any needs the balance of forces for it; whether a delayed one does.
+    pub(super) needs_balance: bool,
     pub(super) delayed: bool,
-    pub(super) delayed_forces: bool,
+    pub(super) delayed_balance: bool,
 }
 
-/// Whether a reading needs the balance of forces.
+/// Whether a reading needs the balance of forces: accelerations do, and with them inerters and what sticks.
+fn needs_balance(what: &OutputKind, elements: &[Share]) -> bool {
+    let free_of_it =
+        |share: Option<&Share>| matches!(share, Some(Share::Path(_))) || matches!(share, Some(Share::Linear(l, ..)) if l.inertance == 0.0);
+    match what {
+        OutputKind::Force(of) => !of.iter().all(|element| free_of_it(elements.get(*element))),
+        _ => is_force(what),
+    }
+}
+
+/// Whether a reading is a force or an acceleration, which may jump.
 fn is_force(what: &OutputKind) -> bool {
     matches!(what, OutputKind::Acceleration(_) | OutputKind::Force(_) | OutputKind::Reaction(_))
 }
 
 impl Sense {
-    pub(super) fn new(model: &Model, slots: &[usize], substep: f64, options: &Options) -> Sense {
+    pub(super) fn new(model: &Model, slots: &[usize], elements: &[Share], substep: f64, options: &Options) -> Sense {
+        let balance = |sensor: &Sensor| needs_balance(&sensor.what, elements);
         let sensors: Vec<Sensor> = model
             .outputs
             .iter()
@@ -71,9 +86,10 @@ impl Sense {
             quantise: options.quantise,
             seed: options.add_noise,
             random: None,
-            needs_forces: sensors.iter().any(|sensor| is_force(&sensor.what)),
+            reads_forces: sensors.iter().any(|sensor| is_force(&sensor.what)),
+            needs_balance: sensors.iter().any(balance),
             delayed: sensors.iter().any(|sensor| sensor.delay > 0.0),
-            delayed_forces: sensors.iter().any(|sensor| sensor.delay > 0.0 && is_force(&sensor.what)),
+            delayed_balance: sensors.iter().any(|sensor| sensor.delay > 0.0 && balance(sensor)),
             sensors,
         }
     }

@@ -19,6 +19,9 @@ impl Plant {
             return false;
         }
         std::mem::swap(&mut self.fixed, &mut other.fixed);
+        // What was factored was of the other's compliance.
+        (self.fixed.constraints.changes, other.fixed.constraints.changes) =
+            (other.fixed.constraints.changes.wrapping_add(1), self.fixed.constraints.changes.wrapping_add(1));
         std::mem::swap(&mut self.exact, &mut other.exact);
         std::mem::swap(&mut self.links, &mut other.links);
         self.links_here();
@@ -32,6 +35,7 @@ impl Plant {
         for (mine, theirs) in self.frictions.iter_mut().zip(&mut other.frictions) {
             std::mem::swap(&mut mine.law, &mut theirs.law);
             std::mem::swap(&mut mine.joint, &mut theirs.joint);
+            std::mem::swap(&mut mine.constant, &mut theirs.constant);
         }
         true
     }

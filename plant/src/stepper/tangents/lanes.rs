@@ -156,7 +156,7 @@ impl<const W: usize> Lanes<W> {
     }
 
     pub(super) fn outputs(&mut self, plant: &Plant, values: &[f64], derivatives: &mut [Vec<f64>]) {
-        let differenced = plant.sense.needs_forces || plant.sense.delayed;
+        let differenced = plant.sense.reads_forces || plant.sense.delayed;
         for (l, derivatives) in derivatives.iter_mut().enumerate().take(self.lanes.len()) {
             if differenced {
                 self.move_lane(plant, l);

@@ -1,0 +1,78 @@
+//! Work whose instructions are counted: `.ci/counts` runs each of these under callgrind and compares with benches/counts.toml.
+//!
+//!     cargo run --release --example counted -- step 20000
+//!
+//! Takes the name of a counter, and how often its unit is done. A new one is a line in `COUNTERS` and a table in benches/counts.toml.
+
+use backdrive_nodes::build::plan;
+use backdrive_nodes::graph::{Graph, NodeKind, Overrides};
+use backdrive_nodes::sequence::Sequence;
+use backdrive_plant::model::Model;
+use backdrive_plant::stepper::{Options, Plant, Segment, simulate};
+use std::fmt::Write;
+use std::path::Path;
+use std::process::ExitCode;
+
+type Work = fn(usize) -> f64;
+
+/// By name; each gives a number that depends on all of its work.
+const COUNTERS: &[(&str, Work)] = &[("step", step), ("chain", chain), ("simulate", simulated)];
+
+fn at(path: &str) -> std::path::PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join(path)
+}
+
+/// A step of the nonlinear loop of the contact task, in one thread with ideal sensors.
+fn step(count: usize) -> f64 {
+    let ideal = Overrides { sensors: Some("ideal".into()), ..Overrides::default() };
+    let graph = Graph::load(&at("launch/contact.toml"), &ideal).expect("the contact graph is part of the workspace");
+    let plans = graph.nodes.iter().filter(|n| n.kind != NodeKind::Recorder).map(|n| plan(&graph, &n.name).expect("builds")).collect();
+    let mut sequence = Sequence::new(plans, &graph.timing).expect("has no loop");
+    sequence.run(count as u64, None);
+    (0..sequence.topics().len()).filter_map(|t| sequence.sample(t)).map(|s| s.position[0]).filter(|x| x.is_finite()).sum()
+}
+
+/// A step of a chain of 64 bodies with 16 friction contacts.
+fn chain(count: usize) -> f64 {
+    let mut text = String::from("name = 'chain'\n[bodies]\n");
+    (0..64).for_each(|i| writeln!(text, "b{i} = 0.05").expect("a string"));
+    for i in 1..64 {
+        let ends = format!("between = ['b{}', 'b{i}']", i - 1);
+        writeln!(text, "[[elements]]\nkind = 'spring'\n{ends}\nstiffness = 2000\n[[elements]]\nkind = 'damper'\n{ends}\ndamping = 0.3")
+            .expect("a string");
+    }
+    (0..16).for_each(|c| {
+        writeln!(text, "[[elements]]\nkind = 'coulomb'\nbetween = ['b{}', 'ground']\nforce = 0.05", 4 * c).expect("a string")
+    });
+    text += "[[inputs]]\nname = 'push'\nkind = 'force'\non = 'b63'\nhold = 'linear'\n[[outputs]]\nname = 'end'\nkind = 'position'\nof = 'b63'\n";
+    let model = Model::from_toml(&text, "chain").expect("a model");
+    let mut plant = Plant::new(&model, 5e-4, &Options { substeps: Some(1), ..Options::default() }).expect("compiles");
+    let force = |i: usize| 2.0 * (7.5e-3 * i as f64).sin();
+    for i in 0..count {
+        plant.step(&[Segment::line(force(i), force(i + 1), 5e-4)]);
+    }
+    plant.position(63)
+}
+
+/// A sample of a simulation as diagnosis and fit make them: the ball screw at 1 kHz.
+fn simulated(count: usize) -> f64 {
+    let model = Model::load(&at("plant/models/ball-screw.toml")).expect("part of the workspace");
+    let column: Vec<f64> = (0..count + 1).map(|i| 1e-4 * (0.01 * i as f64).sin()).collect();
+    let outputs = simulate(&model, &vec![column; model.inputs.len()], 1e-3, &Options::default()).expect("runs");
+    outputs.iter().flatten().filter(|y| y.is_finite()).sum()
+}
+
+fn main() -> ExitCode {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let wanted = COUNTERS.iter().find(|(name, _)| Some(*name) == arguments.first().map(String::as_str));
+    match (wanted, arguments.get(1).and_then(|n| n.parse().ok())) {
+        (Some((_, work)), Some(count)) => {
+            println!("{:e}", work(count));
+            ExitCode::SUCCESS
+        }
+        _ => {
+            eprintln!("usage: counted {} COUNT", COUNTERS.iter().map(|c| c.0).collect::<Vec<_>>().join("|"));
+            ExitCode::from(2)
+        }
+    }
+}
