@@ -4,19 +4,24 @@
 //!
 //! Takes the name of a counter, and how often its unit is done. A new one is a line in `COUNTERS` and a table in benches/counts.toml.
 
+use backdrive_bags::{BagHeader, Recorder, RecorderOptions, TopicInfo, WhenFull};
+use backdrive_msgs::topic::{Kind, Topic};
+use backdrive_msgs::{Message, Sample};
 use backdrive_nodes::build::plan;
 use backdrive_nodes::graph::{Graph, NodeKind, Overrides};
 use backdrive_nodes::sequence::Sequence;
 use backdrive_plant::model::Model;
 use backdrive_plant::stepper::{Options, Plant, Segment, simulate};
 use std::fmt::Write;
+use std::io::Cursor;
 use std::path::Path;
 use std::process::ExitCode;
+use std::time::Duration;
 
 type Work = fn(usize) -> f64;
 
 /// By name; each gives a number that depends on all of its work.
-const COUNTERS: &[(&str, Work)] = &[("step", step), ("chain", chain), ("simulate", simulated)];
+const COUNTERS: &[(&str, Work)] = &[("step", step), ("chain", chain), ("simulate", simulated), ("record", record)];
 
 fn at(path: &str) -> std::path::PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join(path)
@@ -60,6 +65,27 @@ fn simulated(count: usize) -> f64 {
     let column: Vec<f64> = (0..count + 1).map(|i| 1e-4 * (0.01 * i as f64).sin()).collect();
     let outputs = simulate(&model, &vec![column; model.inputs.len()], 1e-3, &Options::default()).expect("runs");
     outputs.iter().flatten().filter(|y| y.is_finite()).sum()
+}
+
+/// Messages of one axis on five topics, recorded to memory; chunks end by size alone, so that their number does not depend on the clock.
+fn record(count: usize) -> f64 {
+    let info = |index| TopicInfo {
+        topic: Topic { name: format!("/topic{index}"), kind: Kind::Sample },
+        axes: vec!["forward".to_owned()],
+        publisher: "counted".to_owned(),
+    };
+    let header = BagHeader { rate_hz: 10_000.0, topics: (0..5).map(info).collect(), ..BagHeader::default() };
+    let options = RecorderOptions { when_full: WhenFull::Wait, flush: Duration::from_secs(3600), ..RecorderOptions::default() };
+    let mut recorder = Recorder::with_sink(Cursor::new(Vec::new()), "memory", &header, &options).expect("begins");
+    for message in 0..count {
+        let (step, mut sample) = ((message / 5) as u64, Sample::new(1));
+        (sample.step, sample.sequence, sample.stamp_ns) = (step, step, step as i64 * 100_000);
+        let phase = step as f64 * 1e-3;
+        (sample.position[0], sample.velocity[0], sample.effort[0]) = (phase.sin(), phase.cos(), (2.0 * phase).sin());
+        recorder.push(message % 5, Message::Sample(sample), step as i64 * 100_000).expect("writes");
+    }
+    let verdict = recorder.finish().expect("ends");
+    verdict.written() as f64 - verdict.lost() as f64
 }
 
 fn main() -> ExitCode {
