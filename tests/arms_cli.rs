@@ -17,9 +17,9 @@ fn verdict(place: &Place, folder: &str) -> Value {
 fn friction_that_was_left_out_is_told_in_text_and_page_and_from_bags_too() {
     let place = Place::new();
     set(&place.path(""), &Beside { dry: [0.2, 0.3], ..AS_STATED }, "", |_| {});
-    let done = place.backdrive(&["diagnose", ".", "--out", "out", "--effort", "2", "--without", "backlash", "--explain"]);
+    let done = place.backdrive(&["diagnose", ".", "--out", "out", "--effort", "2", "--without", "maxwell_slip", "--explain"]);
     assert_eq!(done.code, Some(1), "{done:?}");
-    for note in ["note: --effort does nothing for an arm", "note: --without backlash does nothing for an arm"] {
+    for note in ["note: --effort does nothing for an arm", "note: --without maxwell_slip does nothing for an arm"] {
         assert!(done.stderr.contains(note), "{done:?}");
     }
     for said in ["MISSING", "dry friction at the elbow", "worth", "out: verdict.json, model.diagnosed.toml, next-motion.csv, report.html"] {

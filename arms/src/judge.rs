@@ -57,7 +57,8 @@ pub fn judge(data: &Data, model: &Model, reading: &Reading) -> Option<Vec<f64>> 
             let (now, next) = (fed(i), fed(i + 1));
             let mut segments = Vec::with_capacity(joints);
             for j in 0..joints {
-                let body = arm.bodies[j];
+                // Where a gear gives way it is the motor's position that was logged.
+                let body = if reading.of_motor[j] { driven.inputs[j].on } else { arm.bodies[j] };
                 let more = gains[j][0] * (at(j, i) - plant.position(body)) + gains[j][1] * (motion.velocity[j][i] - plant.velocity(body));
                 segments.push(Segment::line(now[j] + more, next[j] + more, period));
                 if i as f64 * period > SETTLING {

@@ -31,6 +31,7 @@ pub mod regression;
 pub mod rigid;
 pub mod said;
 pub mod search;
+pub mod soft;
 pub mod system;
 pub mod verdict;
 pub mod written;

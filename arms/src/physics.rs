@@ -3,7 +3,9 @@
 use crate::motion::{Motion, Rates};
 use crate::problem::Problem;
 use crate::rigid::Signals;
+use crate::soft::{Gear, change};
 use backdrive_diagnosis::hypothesis::Family;
+use backdrive_plant::robot::Tree;
 
 /// A physics that a search can add to an arm.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -44,6 +46,10 @@ pub enum Physics {
     CoupledFriction,
     /// Torque that comes late.
     Delay,
+    /// A gear that gives way like a spring between motor and link.
+    Compliance,
+    /// Play of the gear.
+    Backlash,
 }
 
 /// Everything that is known of a physics.
@@ -61,7 +67,7 @@ pub struct Facts {
 }
 
 /// All of them, the simplest first.
-pub const ALL: [Physics; 18] = [
+pub const ALL: [Physics; 20] = [
     Physics::Damper,
     Physics::Coulomb,
     Physics::Inertia,
@@ -80,6 +86,8 @@ pub const ALL: [Physics; 18] = [
     Physics::QuadraticDrag,
     Physics::CoupledFriction,
     Physics::Delay,
+    Physics::Compliance,
+    Physics::Backlash,
 ];
 
 impl Physics {
@@ -107,6 +115,8 @@ impl Physics {
             Physics::Coupling => facts("coupling", "torque of another joint in this motor", Family::Scale, false, 1),
             Physics::CoupledFriction => facts("coupled_friction", "dry friction against another joint's motion", Family::Friction, true, 1),
             Physics::Delay => facts("delay", "a delay", Family::Lag, true, 1),
+            Physics::Compliance => facts("series_compliance", "a soft gear", Family::Compliance, true, 2),
+            Physics::Backlash => facts("backlash", "play of the gear", Family::Contact, true, 2),
         }
     }
 }
@@ -140,7 +150,7 @@ pub struct Term {
     /// Where.
     pub at: At,
     /// Stribeck: speed, rad/s or m/s. Presliding: displacement to full slip, rad or m. Cogging: period, rad or m. Coupled friction: ratio.
-    /// Payload: 1 where its place is free. Offset and direction of gravity: their values of the fit before, for what is of second order.
+    /// Compliance: stiffness, N m/rad or N/m. Backlash: gap, rad or m. Payload: 1 where its place is free. Offset and direction of gravity: their values of the fit before, for what is of second order.
     pub shape: Vec<f64>,
     /// The element of the nominal model that it is; `None` for what a search has added.
     pub given: Option<usize>,
@@ -169,8 +179,12 @@ pub struct Sight<'a> {
     pub motion: &'a Motion,
     /// Rates of its samples.
     pub rates: &'a Rates,
+    /// The links.
+    pub tree: &'a Tree,
     /// Torque that the rigid links take, which is what the joints pass on.
     pub load: &'a Signals,
+    /// Inertia of each joint about itself, the others held.
+    pub inertia: &'a Signals,
     /// Of each joint's zero: derivative of all rigid torques by it.
     pub by_position: &'a [Signals],
     /// The same, second derivative.
@@ -271,6 +285,14 @@ impl Sight<'_> {
                 let late = crate::filter::derivative(&self.load[j], self.rates.period());
                 one(late.iter().map(|x| -x).collect())
             }
+            // Per unit of what gives way, 1/k or the gap: where the shape is right, the number is that.
+            Physics::Compliance | Physics::Backlash => {
+                let (gear, unit) = match term.physics {
+                    Physics::Compliance => (Gear::Spring(shape(0)), shape(0)),
+                    _ => (Gear::Play(shape(0)), 1.0 / shape(0).max(f64::MIN_POSITIVE)),
+                };
+                vec![all(&change(self.tree, motion, j, self.load, &self.inertia[j], self.rates.period(), gear), unit)]
+            }
         }
     }
 }
@@ -318,11 +340,39 @@ pub fn candidates(problem: &Problem, motions: &[Motion]) -> Vec<Term> {
                     let wide = range(motions.iter().flat_map(|m| m.position[j].iter().copied())).max(1e-9);
                     out.extend(periods(wide, problem.tree.coordinates()[j].kind).into_iter().map(|p| Term::new(physics, at, vec![p])));
                 }
+                // What the file has behind a motor of its own is not sought again.
+                Physics::Compliance | Physics::Backlash if problem.geared[j] => {}
+                Physics::Compliance => {
+                    let inertia = usual_inertia(problem, motions, j);
+                    out.extend(RESONANCES.map(|f| Term::new(physics, at, vec![inertia * (std::f64::consts::TAU * f).powi(2)])));
+                }
+                Physics::Backlash => {
+                    let wide = range(motions.iter().flat_map(|m| m.position[j].iter().copied()));
+                    out.extend(GAPS.map(|s| Term::new(physics, at, vec![s * wide.max(1e-9)])));
+                }
                 _ => out.push(Term::new(physics, at, Vec::new())),
             }
         }
     }
     out
+}
+
+/// Resonances of the link on its gear that are tried first, Hz.
+const RESONANCES: [f64; 8] = [2.5, 3.5, 5.0, 7.0, 10.0, 14.0, 20.0, 30.0];
+/// Gaps that are tried first, as shares of the joint's range.
+const GAPS: [f64; 7] = [0.001, 0.002, 0.004, 0.008, 0.016, 0.032, 0.064];
+
+/// Inertia of a joint about itself in the middle of a log, kg m² or kg.
+fn usual_inertia(problem: &Problem, motions: &[Motion], joint: usize) -> f64 {
+    let mut work = problem.tree.workspace();
+    let count = problem.joints.len();
+    let mut matrix = nalgebra::DMatrix::zeros(count, count);
+    let middle: Vec<f64> = motions.first().map_or(Vec::new(), |m| m.position.iter().filter_map(|q| q.get(q.len() / 2).copied()).collect());
+    if middle.len() < count {
+        return 1.0;
+    }
+    problem.tree.mass_matrix(&middle, &mut work, &mut matrix);
+    matrix[(joint, joint)]
 }
 
 /// Periods of ripple that are tried: of a joint that turns whole fractions of a turn; of one that slides a geometric series.

@@ -40,6 +40,8 @@ pub struct Problem {
     pub joints: Vec<String>,
     /// Inertia that turns with each joint alone, kg m² or kg: armature, and bodies of its network.
     pub armature: Vec<f64>,
+    /// Whether the network of a joint has a motor behind a gear.
+    pub geared: Vec<bool>,
     /// Elements between a joint (or a body of its network) and ground.
     pub given: Vec<Given>,
     /// What of the model the regression takes as rigid or leaves aside, in sentences.
@@ -101,6 +103,7 @@ impl Problem {
             }
         }
         let mut given = Vec::new();
+        let mut geared = vec![false; joints.len()];
         for (index, element) in model.elements.iter().enumerate() {
             match element.between {
                 [Some(body), None] | [None, Some(body)] => {
@@ -109,12 +112,13 @@ impl Problem {
                     }
                 }
                 [Some(a), Some(b)] if of_body(a) == of_body(b) => {
+                    of_body(a).into_iter().for_each(|joint| geared[joint] = true);
                     notes.push(format!("the regression takes \"{}\" as rigid; the simulation has it", element.name));
                 }
                 _ => notes.push(format!("the regression leaves \"{}\" aside, which joins two joints; the simulation has it", element.name)),
             }
         }
         let (robot, tree) = (arm.robot.clone(), arm.tree.clone());
-        Ok(Problem { model, model_file, robot, tree, bodies, joints, armature, given, notes, columns, fit, held_out })
+        Ok(Problem { model, model_file, robot, tree, bodies, joints, armature, geared, given, notes, columns, fit, held_out })
     }
 }

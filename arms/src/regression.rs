@@ -8,8 +8,10 @@ use crate::motion::{Motion, Rates};
 use crate::physics::{At, AtJoints, Physics, Sight, Term};
 use crate::problem::Problem;
 use crate::rigid::{Signals, across, difference, regressor, torques, tree_of};
+use crate::soft::inertia;
 use crate::system::{Column, System, scaled_solve};
 use backdrive_plant::elements::Law;
+use backdrive_plant::robot::Tree;
 use nalgebra::{DMatrix, DVector};
 use std::cell::RefCell;
 use std::collections::HashMap;
@@ -41,7 +43,9 @@ pub struct Data<'a> {
     pub inertial: Vec<Vec<f64>>,
     /// Stretches of all logs.
     pub blocks: Vec<Block>,
+    tree: Tree,
     load: Vec<Signals>,
+    inertia: Vec<Signals>,
     by_position: Vec<Vec<Signals>>,
     curved: Vec<Vec<Signals>>,
     by_tilt: Vec<Vec<Signals>>,
@@ -84,7 +88,9 @@ impl<'a> Data<'a> {
             inertial: Vec::new(),
             layout,
             blocks,
+            tree: problem.tree.clone(),
             load: Vec::new(),
+            inertia: Vec::new(),
             by_position: Vec::new(),
             curved: Vec::new(),
             by_tilt: Vec::new(),
@@ -144,6 +150,8 @@ impl<'a> Data<'a> {
             of_tilt.chain(std::iter::once(difference(&load[m], &torques(&weightless, motion, &[]), 1.0))).collect()
         };
         self.by_tilt = self.motions.iter().enumerate().map(by_tilt).collect();
+        self.inertia = self.motions.iter().map(|m| inertia(&tree, m)).collect();
+        self.tree = tree;
         self.cache.borrow_mut().clear();
         Ok(())
     }
@@ -184,7 +192,9 @@ impl<'a> Data<'a> {
                     problem: self.problem,
                     motion: &self.motions[m],
                     rates: &self.rates,
+                    tree: &self.tree,
                     load: &self.load[m],
+                    inertia: &self.inertia[m],
                     by_position: &self.by_position[m],
                     curved: &self.curved[m],
                     by_tilt: &self.by_tilt[m],

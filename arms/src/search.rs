@@ -173,7 +173,13 @@ fn is_possible(data: &Data, fit: &Fit) -> bool {
         let is_sharp = term.physics == Physics::Presliding
             && term.given.is_none()
             && term.at.joint().is_some_and(|j| term.shape.first().is_some_and(|d| *d < PRESLIDING * data.first_slip(j)));
-        !is_sharp && (!term.physics.facts().positive || value > least)
+        // A gear whose number is not that of its shape is no gear.
+        let unit = match (term.physics, term.shape.first()) {
+            (Physics::Compliance, Some(k)) => k * value,
+            (Physics::Backlash, Some(gap)) => value / gap,
+            _ => 1.0,
+        };
+        !is_sharp && (0.5..2.0).contains(&unit) && (!term.physics.facts().positive || value > least)
     })
 }
 
@@ -230,6 +236,21 @@ fn shaped(data: &Data, fit: Fit, index: usize, weights: &Weights) -> Fit {
     }
     if term.shape.is_empty() || matches!(term.physics, Physics::CoupledFriction | Physics::Payload) {
         return best;
+    }
+    if matches!(term.physics, Physics::Compliance | Physics::Backlash) {
+        // The shape that the number says, as long as that is better.
+        for _ in 0..4 {
+            let mut structure = best.structure.clone();
+            let value = best.values[best.places[index].start];
+            if value <= 0.0 {
+                break;
+            }
+            structure.terms[index].shape = vec![if term.physics == Physics::Compliance { 1.0 / value } else { value }];
+            match data.fit(&structure, weights).filter(|f| f.score < best.score) {
+                Some(other) => best = other,
+                None => break,
+            }
+        }
     }
     let mut step: f64 = if term.physics == Physics::Cogging { 1.01 } else { 1.4 };
     for _ in 0..6 {

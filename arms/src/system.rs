@@ -171,7 +171,7 @@ impl System {
 /// Numbers of a term in which the torque is not linear, where they are searched.
 fn shape_numbers(term: &Term) -> usize {
     match term.physics {
-        Physics::Stribeck | Physics::Presliding | Physics::Cogging => 1,
+        Physics::Stribeck | Physics::Presliding | Physics::Cogging | Physics::Compliance | Physics::Backlash => 1,
         _ => 0,
     }
 }

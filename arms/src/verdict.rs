@@ -46,6 +46,7 @@ pub fn place(data: &Data, term: &Term) -> Place {
         (Physics::Offset, At::Joint(j)) => Place::Signal(format!("{}.position", joint(j))),
         (Physics::Payload, _) => Place::Between(joint(last), "ground".to_string()),
         (Physics::GravityDirection, _) => Place::Between("base".to_string(), "ground".to_string()),
+        (Physics::Compliance | Physics::Backlash, At::Joint(j)) => Place::Between(joint(j), format!("{}.rotor", joint(j))),
         (_, At::Joint(j)) => Place::Between(joint(j), "ground".to_string()),
         (_, At::Pair(j, k)) => Place::Between(joint(j), joint(k)),
         (_, At::Base) => Place::Between("base".to_string(), "ground".to_string()),
@@ -234,6 +235,13 @@ fn numbers(data: &Data, fit: &Fit, index: usize) -> BTreeMap<String, Parameter> 
         Physics::Offset => list(vec![("offset", estimate(value, error, unit("rad", "m")))]),
         Physics::Payload => list(vec![("mass", estimate(value, error, "kg"))]),
         Physics::Coupling => list(vec![("ratio", estimate(value, error, ""))]),
+        // Number and shape say the same twice: by how much they differ is what being linear costs.
+        Physics::Compliance => {
+            let stiffness = 1.0 / value.max(f64::MIN_POSITIVE);
+            let error = (error * stiffness * stiffness).hypot(stiffness - shape);
+            list(vec![("stiffness", estimate(stiffness, error, unit("N m/rad", "N/m")))])
+        }
+        Physics::Backlash => list(vec![("gap", estimate(value, error.hypot(value - shape), unit("rad", "m")))]),
         Physics::Delay => list(vec![("delay", estimate(value, error, "s"))]),
         Physics::GravityDirection => {
             let (b, of_b) = second();

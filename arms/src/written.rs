@@ -6,14 +6,16 @@ use crate::physics::{At, Physics, Term};
 use crate::regression::{Data, parts_of};
 use crate::rigid::across;
 use backdrive_plant::elements::{
-    AsymmetricDamper, Bias, Cogging, Coulomb, Dahl, Damper, Law, LoadFriction, QuadraticDrag, Spring, Stribeck,
+    AsymmetricDamper, Backlash, Bias, Cogging, Coulomb, Dahl, Damper, Law, LoadFriction, QuadraticDrag, Spring, Stribeck,
 };
-use backdrive_plant::model::{Body, Element, Model};
+use backdrive_plant::model::{Body, Element, Model, OutputKind};
 use backdrive_plant::robot::Arm;
 use nalgebra::Vector3;
 
 /// Resonance of the stiff joint that a friction which grows with the load is given, Hz: the load has to pass through something.
 const STIFF_HZ: f64 = 60.0;
+/// Damping of a soft gear, as a share of the critical one of its link.
+const SOFT_DAMPING: f64 = 0.1;
 
 /// How the measured torques relate to those of the joints: `measured = gain (own + Σ ratio other)`.
 #[derive(Debug, Clone, PartialEq)]
@@ -24,19 +26,22 @@ pub struct Reading {
     pub coupling: Vec<(usize, usize, f64)>,
     /// By joint, rad or m: what the sensor says too much.
     pub offset: Vec<f64>,
+    /// By joint: whether the position is that of a motor whose gear gives way.
+    pub of_motor: Vec<bool>,
 }
 
 impl Reading {
     /// That of a fit.
     pub fn of(data: &Data, fit: &Fit) -> Reading {
         let joints = data.problem.joints.len();
-        let mut out = Reading { gain: vec![1.0; joints], coupling: Vec::new(), offset: vec![0.0; joints] };
+        let mut out = Reading { gain: vec![1.0; joints], coupling: Vec::new(), offset: vec![0.0; joints], of_motor: vec![false; joints] };
         for (term, place) in fit.structure.terms.iter().zip(&fit.places) {
             let value = fit.values[place.start];
             match (term.physics, term.at) {
                 (Physics::Gain, At::Joint(j)) => out.gain[j] += value,
                 (Physics::Coupling, At::Pair(j, k)) => out.coupling.push((j, k, value)),
                 (Physics::Offset, At::Joint(j)) => out.offset[j] += value,
+                (Physics::Compliance | Physics::Backlash, At::Joint(j)) => out.of_motor[j] = true,
                 _ => {}
             }
         }
@@ -137,8 +142,24 @@ fn elements(data: &Data, fit: &Fit, reading: &Reading, model: &mut Model, notes:
         }
         let pose = model.arm.as_ref().and_then(|arm| arm.pose.get(joint).copied()).unwrap_or(0.0);
         let mut laws: Vec<(&str, Law)> = Vec::new();
+        // In torques of the joint a gear is as stiff as the torques are large.
+        let compliance = value(Physics::Compliance).map(|c| c * reading.gain[joint].powi(2)).filter(|c| *c > 0.0);
+        let gap = value(Physics::Backlash).map(|g| g * reading.gain[joint]).filter(|g| *g > 0.0);
+        let gives_way = compliance.is_some() || gap.is_some();
+        if gives_way {
+            on = rotor(model, joint, body, &problem.joints[joint], &Gear { compliance, gap }, notes);
+            // What the drive tells is its own position.
+            for output in &mut model.outputs {
+                match &mut output.kind {
+                    OutputKind::Position(of) | OutputKind::Velocity(of) if *of == body => *of = on,
+                    _ => {}
+                }
+            }
+        }
         if let Some(c) = value(Physics::LoadFriction).filter(|c| *c > 0.0) {
-            on = rotor(model, joint, body, &problem.joints[joint], notes);
+            if !gives_way {
+                on = rotor(model, joint, body, &problem.joints[joint], &Gear::default(), notes);
+            }
             laws.push(("friction", Law::LoadFriction(LoadFriction { force: level, coefficient: c * reading.gain[joint] })));
         } else if let (Some(excess), Some(velocity)) = (value(Physics::Stribeck).filter(|x| *x > 0.0), shape(Physics::Stribeck)) {
             laws.push(("friction", Law::Stribeck(Stribeck { coulomb: level, at_rest: level + excess, velocity })));
@@ -179,7 +200,7 @@ fn elements(data: &Data, fit: &Fit, reading: &Reading, model: &mut Model, notes:
         }
         for (what, law) in laws {
             let name = free_name(model, &format!("{}_{what}", problem.joints[joint]));
-            let end = if what == "friction" { on } else { body };
+            let end = if what == "friction" || gives_way { on } else { body };
             model.elements.push(Element { name, between: [Some(end), None], law });
         }
     }
@@ -213,22 +234,48 @@ fn set_armature(problem: &crate::problem::Problem, model: &mut Model, joint: usi
     }
 }
 
-/// A rotor before the joint, tied to it stiffly: what friction that grows with the load rubs on. Forces on the joint act on it from now on.
-fn rotor(model: &mut Model, joint: usize, body: usize, name: &str, notes: &mut Vec<String>) -> usize {
+/// How the gear of a joint gives way: N m/rad or N/m upside down, and rad or m. One that does neither is stiff.
+#[derive(Default)]
+struct Gear {
+    compliance: Option<f64>,
+    gap: Option<f64>,
+}
+
+/// A rotor before the joint, tied to it by its gear. Forces on the joint act on it from now on.
+fn rotor(model: &mut Model, joint: usize, body: usize, name: &str, gear: &Gear, notes: &mut Vec<String>) -> usize {
     let beside = model.arm.as_ref().map_or(1.0, |arm| arm.inertia_at_pose(model.bodies.len())[(body, body)]);
     let own = model.bodies[body].inertia;
     // All that turns with the joint alone is the rotor; where nothing does, so little that it does not matter.
     let inertia = if own > 0.0 { own } else { 0.02 * beside };
+    let links = (beside - own).max(0.1 * beside);
     model.bodies[body].inertia = 0.0;
     let at = model.bodies.len();
     model.bodies.push(Body { name: format!("{name}.rotor"), inertia });
-    let reduced = inertia * beside / (inertia + beside);
+    let reduced = inertia * links / (inertia + links);
     let w = std::f64::consts::TAU * STIFF_HZ;
-    let law = |name: &str, law: Law| Element { name: name.to_string(), between: [Some(at), Some(body)], law };
-    model.elements.push(law(&format!("{name}.gear"), Law::Spring(Spring { stiffness: reduced * w * w, rest: 0.0 })));
-    model.elements.push(law(&format!("{name}.gear_damping"), Law::Damper(Damper { damping: 0.2 * reduced * w })));
+    let stiffness = gear.compliance.map_or(reduced * w * w, |c| 1.0 / c);
+    // What soft gears are damped by is not found: as much as the regression supposes of its link.
+    let share = if gear.compliance.is_some() { SOFT_DAMPING } else { 0.2 };
+    let damping = 2.0 * share * (stiffness * if gear.compliance.is_some() { links } else { 0.25 * reduced }).sqrt();
+    let mut tie = |what: &str, law: Law| {
+        model.elements.push(Element { name: free_name(model, &format!("{name}_{what}")), between: [Some(at), Some(body)], law });
+    };
+    match gear.gap {
+        Some(gap) => tie("gear", Law::Backlash(Backlash { gap, stiffness, damping, rounding: 0.0 })),
+        None => {
+            tie("gear", Law::Spring(Spring { stiffness, rest: 0.0 }));
+            tie("gear_damping", Law::Damper(Damper { damping }));
+        }
+    }
     model.inputs.iter_mut().filter(|i| i.on == body && i.kind == backdrive_plant::model::InputKind::Force).for_each(|i| i.on = at);
-    notes.push(format!("joint {} has a stiff spring ({STIFF_HZ} Hz) before it, through which the load of its friction passes", joint + 1));
+    match (gear.compliance, gear.gap) {
+        (None, None) => {
+            notes.push(format!("joint {} has a stiff spring ({STIFF_HZ} Hz) before it, through which the load of its friction passes", joint + 1));
+        }
+        _ => notes.push(format!(
+            "in the diagnosed model the motor of joint {name} is the body \"{name}.rotor\": the logged position is taken for the motor's, as a sensor before the gear has it"
+        )),
+    }
     at
 }
 

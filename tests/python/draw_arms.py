@@ -2,7 +2,7 @@
 
     python tests/python/draw_arms.py OUT --seed 1 --count 48
 
-MuJoCo is the hidden plant for joint friction, damping, armature, springs, the direction of gravity, payloads and wrong masses; friction that depends on load
+MuJoCo is the hidden plant for joint friction, damping, armature, springs, soft gears and play, the direction of gravity, payloads and wrong masses; friction that depends on load
 or speed, cogging, sensor zeros, wrong torque constants and coupled motors are added here. Into OUT/cases/NN go a URDF, a model file, a set and its logs; into
 OUT/truth/NN.json what was hidden, which only score_arms.py opens, after every verdict is written.
 """
@@ -14,7 +14,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
-KINDS = ["coulomb", "damper", "inertia", "spring", "gravity_direction", "payload", "gain", "load_friction", "stribeck", "cogging", "offset", "coupling"]
+KINDS = ["coulomb", "damper", "inertia", "spring", "gravity_direction", "payload", "gain", "load_friction", "stribeck", "cogging", "offset", "coupling", "series_compliance", "backlash"]
 STEP = 5e-4      # s, of the hidden plant
 SECONDS = 12.0   # of a recording
 # Rotations about world or link axes, from the base outwards.
@@ -55,14 +55,25 @@ def perturbed(arm, rng, masses, frictions):
     return out
 
 
-def mjcf(arm, gravity, payload, springs):
+def mjcf(arm, gravity, payload, springs, gears=None):
+    # Of a soft or loose gear the motor turns on a body of its own, with hardly any inertia but its armature, and the link hinges on that.
+    gears = gears or {}
     axis = {"x": "1 0 0", "y": "0 1 0", "z": "0 0 1"}
     text, depth = "", 0
     for k, link in enumerate(arm["links"]):
         at = "0 0 0" if k == 0 else f"0 0 {-arm['links'][k - 1]['length']:.12g}"
         i = np.array(link["inertia"])
-        text += f'<body name="l{k}" pos="{at}"><joint name="j{k}" type="hinge" axis="{axis[arm["axes"][k]]}" armature="{arm["armature"][k]:.12g}" '
+        turns = f'type="hinge" axis="{axis[arm["axes"][k]]}"'
+        text += f'<body name="l{k}" pos="{at}"><joint name="j{k}" {turns} armature="{arm["armature"][k]:.12g}" '
         text += f'damping="{arm["damping"][k]:.12g}" frictionloss="{arm["friction"][k]:.12g}" stiffness="{springs[k][0]:.12g}" springref="{springs[k][1]:.12g}" solreffriction="0.002 1"/>'
+        if k in gears:
+            gear = gears[k]
+            text += '<inertial pos="0 0 0" mass="1e-5" diaginertia="1e-7 1e-7 1e-7"/>'
+            text += f'<body name="behind{k}"><joint name="gear{k}" {turns} damping="{gear["damping"]:.12g}" '
+            if "gap" in gear:
+                text += f'limited="true" range="{-gear["gap"] / 2:.12g} {gear["gap"] / 2:.12g}" solreflimit="0.004 1" solimplimit="0.95 0.99 0.0001"/>'
+            else:
+                text += f'stiffness="{gear["stiffness"]:.12g}"/>'
         c = link["com"]
         text += f'<inertial pos="{c[0]:.12g} {c[1]:.12g} {c[2]:.12g}" mass="{link["mass"]:.12g}" fullinertia="{i[0][0]:.12g} {i[1][1]:.12g} {i[2][2]:.12g} {i[0][1]:.12g} {i[0][2]:.12g} {i[1][2]:.12g}"/>'
         depth += 1
@@ -70,7 +81,7 @@ def mjcf(arm, gravity, payload, springs):
         p = payload["place"]
         small = payload["mass"] * 0.02**2
         text += f'<body name="load" pos="{p[0]:.12g} {p[1]:.12g} {p[2]:.12g}"><inertial pos="0 0 0" mass="{payload["mass"]:.12g}" diaginertia="{small} {small} {small}"/></body>'
-    text += "</body>" * depth
+    text += "</body>" * (depth + len(gears))
     g = " ".join(f"{x:.12g}" for x in gravity)
     return f'<mujoco><compiler angle="radian"/><option timestep="{STEP}" gravity="{g}" integrator="implicitfast" impratio="10"/><worldbody>{text}</worldbody></mujoco>'
 
@@ -112,11 +123,14 @@ def trajectory(rng, n, rate):
     return t, q, v, a
 
 
-def simulate(model, arm, hidden, path, rate):
+def simulate(model, arm, hidden, path, rate, rigid=None):
     """Motion of the hidden arm under computed torque with the paper's numbers and a stiff loop; position and motor torque at the samples."""
     t, qd, vd, ad = path
     n = arm["n"]
     data = mujoco.MjData(model)
+    # Coordinates of the motors; of a gear that gives way the controller knows the arm as a rigid one.
+    at = np.array([model.joint(f"j{j}").qposadr[0] for j in range(n)])
+    known = data if rigid is None else mujoco.MjData(rigid)
     per = round(1 / rate / STEP)
     q, tau = np.zeros((n, len(t))), np.zeros((n, len(t)))
     mass = np.zeros((n, n))
@@ -125,26 +139,31 @@ def simulate(model, arm, hidden, path, rate):
     gains = None
     for i in range(len(t)):
         mujoco.mj_forward(model, data)
-        mujoco.mj_fullM(model, data, mass)
+        if rigid is not None:
+            known.qpos[:], known.qvel[:] = data.qpos[at], data.qvel[at]
+            mujoco.mj_forward(rigid, known)
+        mujoco.mj_fullM(model if rigid is None else rigid, known, mass)
         if gains is None:
-            gains = (np.diag(mass) * (2 * math.pi * 8) ** 2, np.diag(mass) * 2 * (2 * math.pi * 8))
-        u = mass @ ad[:, i] + data.qfrc_bias + gains[0] * (qd[:, i] - data.qpos) + gains[1] * (vd[:, i] - data.qvel)
-        q[:, i], tau[:, i] = data.qpos, u
+            # A loop about a soft gear is a slower one: it would shake the link.
+            hz = 8 if rigid is None else 3
+            gains = (np.diag(mass) * (2 * math.pi * hz) ** 2, np.diag(mass) * 2 * (2 * math.pi * hz))
+        u = mass @ ad[:, i] + known.qfrc_bias + gains[0] * (qd[:, i] - data.qpos[at]) + gains[1] * (vd[:, i] - data.qvel[at])
+        q[:, i], tau[:, i] = data.qpos[at], u
         for _ in range(per):
-            v, x = data.qvel, data.qpos
+            v, x = data.qvel[at], data.qpos[at]
             extra = np.zeros(n)
             for e in hidden:
                 j = e.get("index", 0)
                 # Direction of friction, turned within a hundredth of a radian per second.
                 s = math.tanh(v[j] / 0.01)
                 if e["physics"] == "load_friction":
-                    load = mass[j] @ data.qacc + data.qfrc_bias[j]
+                    load = mass[j] @ data.qacc[at] + data.qfrc_bias[at[j]]
                     extra[j] -= e["coefficient"] * abs(load) * s
                 elif e["physics"] == "stribeck":
                     extra[j] -= e["excess"] * math.exp(-((v[j] / e["velocity"]) ** 2)) * s
                 elif e["physics"] == "cogging":
                     extra[j] -= e["amplitude"] * math.sin(e["number"] * x[j] + e["phase"])
-            data.qfrc_applied[:] = u + extra
+            data.qfrc_applied[at] = u + extra
             mujoco.mj_step(model, data)
     return t, q, tau
 
@@ -173,6 +192,11 @@ def draw_hidden(rng, arm, kind, taken):
         e.update(offset=float(rng.choice([-1, 1]) * rng.uniform(0.05, 0.2)))
     elif kind == "coupling":
         e.update(of=f"joint{j + 2}", ratio=float(rng.choice([-1, 1]) * rng.uniform(0.3, 1.0)))
+    elif kind == "series_compliance":
+        # Resonance of the link behind it, Hz, with the other links straight.
+        e.update(hz=float(rng.uniform(2.5, 6.0)))
+    elif kind == "backlash":
+        e.update(gap=float(rng.uniform(0.005, 0.04)))
     elif kind == "cogging":
         e.update(number=int(rng.integers(6, 40)), phase=float(rng.uniform(0, 6.28)))
     elif kind == "stribeck":
@@ -257,8 +281,19 @@ def case(rng, folder, truth_file, number, kinds):
     for h in hidden:
         size(h, tau, paths[0][2], paths[0][1], paths[0][3], true)
     payload = None
+    gears = {}
+    straight = mujoco.MjModel.from_xml_string(mjcf(dict(true, armature=[0.0] * n), gravity, None, springs))
+    at_rest, links = mujoco.MjData(straight), np.zeros((n, n))
+    mujoco.mj_forward(straight, at_rest)
+    mujoco.mj_fullM(straight, at_rest, links)
     for h in hidden:
         kind, j = h["physics"], h["index"]
+        own = links[j, j]
+        if kind == "series_compliance":
+            h["stiffness"] = own * (2 * math.pi * h["hz"]) ** 2
+            gears[j] = dict(stiffness=h["stiffness"], damping=2 * 0.05 * own * 2 * math.pi * h["hz"])
+        elif kind == "backlash":
+            gears[j] = dict(gap=h["gap"], damping=0.02 * own)
         if kind == "coulomb":
             true["friction"][j] = h["force"]
         elif kind == "damper":
@@ -272,13 +307,14 @@ def case(rng, folder, truth_file, number, kinds):
             gravity = 9.81 * np.array([s * math.cos(h["about"]), s * math.sin(h["about"]), -c])
         elif kind == "payload":
             payload = h
-    model = mujoco.MjModel.from_xml_string(mjcf(true, gravity, payload, springs))
+    model = mujoco.MjModel.from_xml_string(mjcf(true, gravity, payload, springs, gears))
+    rigid = mujoco.MjModel.from_xml_string(mjcf(true, gravity, payload, springs)) if gears else None
     folder.mkdir(parents=True)
     bits = int(rng.integers(14, 19))
     noise = rng.uniform(0.003, 0.015)
     names = []
     for k, path in enumerate(paths):
-        t, q, tau = simulate(model, true, hidden, path, rate)
+        t, q, tau = simulate(model, true, hidden, path, rate, rigid)
         if not np.isfinite(q).all() or abs(q - path[1]).max() > 0.5:
             raise ValueError("the hidden arm ran away")
         level = np.sqrt((tau**2).mean(axis=1, keepdims=True))
@@ -315,15 +351,19 @@ def main():
     parser.add_argument("out", type=Path)
     parser.add_argument("--seed", type=int, required=True)
     parser.add_argument("--count", type=int, default=48)
+    parser.add_argument("--only", default=",".join(KINDS), help="physics that may be hidden, with commas between them")
     options = parser.parse_args()
+    kinds = options.only.split(",")
+    if wrong := [k for k in kinds if k not in KINDS]:
+        parser.error(f"--only {wrong[0]}: known are {', '.join(KINDS)}")
     rng = np.random.default_rng(options.seed)
     truth = options.out / "truth"
     truth.mkdir(parents=True)
     nulls = max(options.count // 4, 1)
     plan = [["nothing"] if i % 2 else ["numbers"] for i in range(nulls)]
     for i in range(options.count - nulls):
-        first = KINDS[i % len(KINDS)]
-        second = [str(rng.choice([k for k in KINDS if k != first]))] if rng.random() < 0.25 else []
+        first = kinds[i % len(kinds)]
+        second = [str(rng.choice([k for k in KINDS if k != first]))] if rng.random() < 0.25 and options.only == parser.get_default("only") else []
         plan.append([first] + second)
     rng.shuffle(plan)
     for number, kinds in enumerate(plan):

@@ -24,10 +24,12 @@ pub struct Beside {
     pub dry: [f64; 2],
     pub by_load: [f64; 2],
     pub gain: [f64; 2],
+    /// Compliance of the gears, rad/(N m), behind which the links hang; positions are those of the motors.
+    pub soft: [f64; 2],
 }
 
 /// What the file states.
-pub const AS_STATED: Beside = Beside { damping: [0.1, 0.04], dry: [0.2, 0.0], by_load: [0.0; 2], gain: [1.0; 2] };
+pub const AS_STATED: Beside = Beside { damping: [0.1, 0.04], dry: [0.2, 0.0], by_load: [0.0; 2], gain: [1.0; 2], soft: [0.0; 2] };
 
 /// A log's columns: t, two positions, two velocities, two torques.
 pub fn log(seed: u64, beside: &Beside) -> [Vec<f64>; 7] {
@@ -44,7 +46,7 @@ pub fn log(seed: u64, beside: &Beside) -> [Vec<f64>; 7] {
         .collect();
     let (period, count) = (1.0 / 200.0, 2400);
     let mut out: [Vec<f64>; 7] = Default::default();
-    for i in 0..count {
+    let mut links = |i: i32| {
         let t = f64::from(i) * period;
         let (mut q, mut v, mut a) = ([0.0; 2], [0.0; 2], [0.0; 2]);
         for j in 0..2 {
@@ -58,8 +60,16 @@ pub fn log(seed: u64, beside: &Beside) -> [Vec<f64>; 7] {
         }
         let mut f = [0.0; 2];
         tree.inverse_dynamics(&q, &v, &a, &mut work, &mut f);
-        out[0].push(t);
+        (q, v, f)
+    };
+    let near: Vec<_> = (-1..=count).map(&mut links).collect();
+    for (i, three) in near.windows(3).enumerate() {
+        let (mut q, mut v, f) = three[1];
+        out[0].push(i as f64 * period);
         for j in 0..2 {
+            // A motor is ahead of its link by what its gear gives.
+            q[j] += beside.soft[j] * f[j];
+            v[j] += beside.soft[j] * (three[2].2[j] - three[0].2[j]) / (2.0 * period);
             let rubbing = (beside.dry[j] + beside.by_load[j] * f[j].abs()) * v[j].signum();
             let noise = 0.01 * random.random_range(-1.0..1.0);
             out[1 + j].push(q[j]);
