@@ -150,7 +150,7 @@ pub struct Term {
     /// Where.
     pub at: At,
     /// Stribeck: speed, rad/s or m/s. Presliding: displacement to full slip, rad or m. Cogging: period, rad or m. Coupled friction: ratio.
-    /// Compliance: stiffness, N m/rad or N/m. Backlash: gap, rad or m. Payload: 1 where its place is free. Offset and direction of gravity: their values of the fit before, for what is of second order.
+    /// Compliance: stiffness, N m/rad or N/m, and a second number where the link swings. Backlash: gap, rad or m. Payload: 1 where its place is free. Offset and direction of gravity: their values of the fit before, for what is of second order.
     pub shape: Vec<f64>,
     /// The element of the nominal model that it is; `None` for what a search has added.
     pub given: Option<usize>,
@@ -288,6 +288,7 @@ impl Sight<'_> {
             // Per unit of what gives way, 1/k or the gap: where the shape is right, the number is that.
             Physics::Compliance | Physics::Backlash => {
                 let (gear, unit) = match term.physics {
+                    Physics::Compliance if term.shape.len() > 1 => (Gear::Swinging(shape(0)), shape(0)),
                     Physics::Compliance => (Gear::Spring(shape(0)), shape(0)),
                     _ => (Gear::Play(shape(0)), 1.0 / shape(0).max(f64::MIN_POSITIVE)),
                 };
@@ -344,7 +345,9 @@ pub fn candidates(problem: &Problem, motions: &[Motion]) -> Vec<Term> {
                 Physics::Compliance | Physics::Backlash if problem.geared[j] => {}
                 Physics::Compliance => {
                     let inertia = usual_inertia(problem, motions, j);
-                    out.extend(RESONANCES.map(|f| Term::new(physics, at, vec![inertia * (std::f64::consts::TAU * f).powi(2)])));
+                    let stiffness = RESONANCES.map(|f| inertia * (std::f64::consts::TAU * f).powi(2));
+                    out.extend(stiffness.map(|k| Term::new(physics, at, vec![k])));
+                    out.extend(stiffness.map(|k| Term::new(physics, at, vec![k, 1.0])));
                 }
                 Physics::Backlash => {
                     let wide = range(motions.iter().flat_map(|m| m.position[j].iter().copied()));

@@ -205,10 +205,10 @@ fn ranked(data: &Data, pool: &[Term], structure: &Structure, weights: &Weights) 
     let mut out: Vec<(Term, f64)> = Vec::new();
     for term in pool.iter().filter(|t| !structure.terms.iter().any(|there| there.is_like(t))) {
         let promise = data.promise(&system, &values, &data.columns(term, &structure.slip)) - 2.0 * term.physics.facts().numbers as f64;
-        match out
-            .iter_mut()
-            .find(|(other, _)| other.is_like(term) && (term.physics != Physics::Payload || other.shape.is_empty() == term.shape.is_empty()))
-        {
+        match out.iter_mut().find(|(other, _)| {
+            other.is_like(term)
+                && (!matches!(term.physics, Physics::Payload | Physics::Compliance) || other.shape.len() == term.shape.len())
+        }) {
             Some(there) if there.1 < promise => *there = (term.clone(), promise),
             Some(_) => {}
             None => out.push((term.clone(), promise)),
@@ -245,7 +245,7 @@ fn shaped(data: &Data, fit: Fit, index: usize, weights: &Weights) -> Fit {
             if value <= 0.0 {
                 break;
             }
-            structure.terms[index].shape = vec![if term.physics == Physics::Compliance { 1.0 / value } else { value }];
+            structure.terms[index].shape[0] = if term.physics == Physics::Compliance { 1.0 / value } else { value };
             match data.fit(&structure, weights).filter(|f| f.score < best.score) {
                 Some(other) => best = other,
                 None => break,

@@ -9,8 +9,8 @@
 //! they were measured. f is k δ with a little damping, or 0 within the gap and that of a stiff stop beyond. What this changes in the torque of every joint
 //! is then read from the inverse dynamics of the arm in its altered motion.
 
-use crate::filter::derivative;
-use crate::motion::Motion;
+use crate::filter::{LowPass, derivative};
+use crate::motion::{Motion, ORDER};
 use crate::rigid::{Signals, difference};
 use backdrive_plant::robot::Tree;
 use std::f64::consts::TAU;
@@ -21,14 +21,20 @@ const DAMPING: f64 = 0.1;
 const STOP_HZ: f64 = 50.0;
 /// See [`STOP_HZ`].
 const STOP_DAMPING: f64 = 0.5;
+/// Up to which share of the link's resonance its lag is followed: nearer to it all depends on a damping that nobody knows.
+const BELOW: f64 = 0.6;
+/// Rounds in which the torque that passes through the gear follows the link; each leaves less than a half of what the one before left.
+const ROUNDS: usize = 4;
 /// Steps in a period of the resonance.
 const STEPS: f64 = 40.0;
 
 /// How a gear gives way.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Gear {
-    /// A spring of this stiffness, N m/rad or N/m.
+    /// A spring of this stiffness, N m/rad or N/m, on which the link is followed below its resonance.
     Spring(f64),
+    /// The same, on which the link swings with little damping.
+    Swinging(f64),
     /// Play of this width in all, rad or m.
     Play(f64),
 }
@@ -38,7 +44,7 @@ pub fn lag(load: &[f64], inertia: &[f64], period: f64, gear: Gear) -> [Vec<f64>;
     let (mut lag, mut rate) = (Vec::with_capacity(load.len()), Vec::with_capacity(load.len()));
     let mean = (inertia.iter().sum::<f64>() / inertia.len().max(1) as f64).max(f64::MIN_POSITIVE);
     let (stiffness, damping, gap) = match gear {
-        Gear::Spring(k) => (k, 2.0 * DAMPING * (k * mean).sqrt(), 0.0),
+        Gear::Spring(k) | Gear::Swinging(k) => (k, 2.0 * DAMPING * (k * mean).sqrt(), 0.0),
         Gear::Play(gap) => {
             let w = TAU * STOP_HZ;
             (mean * w * w, 2.0 * STOP_DAMPING * mean * w, gap)
@@ -74,14 +80,32 @@ pub fn lag(load: &[f64], inertia: &[f64], period: f64, gear: Gear) -> [Vec<f64>;
 
 /// What a gear that gives way at a joint changes in the torque of every joint along a motion, N m or N. `load` and `inertia` as in [`lag`].
 pub fn change(tree: &Tree, motion: &Motion, joint: usize, load: &Signals, inertia: &[f64], period: f64, gear: Gear) -> Signals {
-    let [x, v] = lag(&load[joint], inertia, period, gear);
-    let a = derivative(&v, period);
     let mut altered = motion.clone();
-    let less = |signal: &mut Vec<f64>, by: &[f64]| signal.iter_mut().zip(by).for_each(|(s, b)| *s -= b);
-    less(&mut altered.position[joint], &x);
-    less(&mut altered.velocity[joint], &v);
-    less(&mut altered.acceleration[joint], &a);
-    difference(&crate::rigid::torques(tree, &altered, &[]), load, 1.0)
+    let mut alter = |x: &[f64], v: &[f64]| {
+        let less = |signal: &[f64], by: &[f64]| signal.iter().zip(by).map(|(s, b)| s - b).collect();
+        altered.position[joint] = less(&motion.position[joint], x);
+        altered.velocity[joint] = less(&motion.velocity[joint], v);
+        altered.acceleration[joint] = less(&motion.acceleration[joint], &derivative(v, period));
+        crate::rigid::torques(tree, &altered, &[])
+    };
+    let changed = match gear {
+        Gear::Play(_) | Gear::Swinging(_) => {
+            let [x, v] = lag(&load[joint], inertia, period, gear);
+            alter(&x, &v)
+        }
+        Gear::Spring(stiffness) => {
+            let mean = (inertia.iter().sum::<f64>() / inertia.len().max(1) as f64).max(f64::MIN_POSITIVE);
+            let resonance = (stiffness / mean).sqrt() / TAU;
+            let slow = LowPass::butterworth(ORDER, (BELOW * resonance).min(0.4 / period), 1.0 / period);
+            let mut torque = load.clone();
+            for _ in 0..ROUNDS {
+                let x: Vec<f64> = slow.both_ways(&torque[joint]).iter().map(|t| t / stiffness).collect();
+                torque = alter(&x, &derivative(&x, period));
+            }
+            torque
+        }
+    };
+    difference(&changed, load, 1.0)
 }
 
 /// Inertia of each joint about itself along a motion, the others held, kg m² or kg.
