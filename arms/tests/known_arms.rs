@@ -67,3 +67,21 @@ fn a_wrong_torque_constant_is_named_at_its_signal() {
     assert_eq!((finding.physics.as_str(), &finding.place), ("gain", &Place::Signal("elbow.torque".to_string())));
     assert!((number(finding, "gain").0 - 1.2).abs() < 0.01);
 }
+
+#[test]
+fn a_soft_gear_is_named_with_its_stiffness_and_written_as_a_motor_of_its_own() {
+    // The elbow's link would swing at some 3 Hz on it.
+    let found = found(&Beside { soft: [0.0, 1.0 / 12.0], ..AS_STATED });
+    let finding = &found.verdict.findings[0];
+    assert_eq!(finding.physics, "series_compliance", "{:?}", found.verdict.findings);
+    assert_eq!(finding.place, Place::Between("elbow".to_string(), "elbow.rotor".to_string()));
+    let (value, low, high) = number(finding, "stiffness");
+    assert!((value - 12.0).abs() < 2.0 && low < 12.0 && 12.0 < high, "{value} {low} {high}");
+    let model = Model::from_toml(&found.model, "diagnosed").unwrap();
+    let gear = model.elements.iter().find(|e| e.law.kind().name == "spring").expect("a spring");
+    let ends: Vec<&str> = gear.between.iter().map(|end| model.place_name(*end)).collect();
+    assert_eq!(ends, ["elbow.rotor", "elbow"]);
+    // Simulated in closed loop it needs less help than a stiff one.
+    let elbow = &found.verdict.arm.as_ref().unwrap().joints[1];
+    assert!(elbow.loop_diagnosed.unwrap() < 0.7 * elbow.loop_refit.unwrap(), "{elbow:?}");
+}
