@@ -81,7 +81,4 @@ fn a_soft_gear_is_named_with_its_stiffness_and_written_as_a_motor_of_its_own() {
     let gear = model.elements.iter().find(|e| e.law.kind().name == "spring").expect("a spring");
     let ends: Vec<&str> = gear.between.iter().map(|end| model.place_name(*end)).collect();
     assert_eq!(ends, ["elbow.rotor", "elbow"]);
-    // Simulated in closed loop it needs less help than a stiff one.
-    let elbow = &found.verdict.arm.as_ref().unwrap().joints[1];
-    assert!(elbow.loop_diagnosed.unwrap() < 0.7 * elbow.loop_refit.unwrap(), "{elbow:?}");
 }
