@@ -3,7 +3,9 @@
 //! The position sensor sits on the motor, as in most drives, and the link lags behind it by δ. With M the inertia that the link has about its joint, and
 //! `load` the torque that it would take on a rigid gear, the torque that passes through the gear is
 //!
-//!     f(δ, dδ/dt) = load - M d²δ/dt²
+//! ```text
+//! f(δ, dδ/dt) = load - M d²δ/dt²
+//! ```
 //!
 //! (the elastic joint of M. Spong, ASME J. Dyn. Sys. 109 (1987) 310-319, with the motor's motion given), to first order in δ and with the other joints as
 //! they were measured. f is k δ with a little damping, or 0 within the gap and that of a stiff stop beyond. What this changes in the torque of every joint
