@@ -136,7 +136,7 @@ fn begun(set: &RecordingSet, file: &str) -> Option<String> {
     if !path.extension().is_some_and(|e| e.eq_ignore_ascii_case("mcap")) || set.rules_of(file).piece.rows.is_some() {
         return None;
     }
-    let longest = Reader::open(&path).ok()?.counts().iter().max().copied().unwrap_or(0);
+    let longest = backdrive_bags::info(&path).ok()?.topics.iter().map(|topic| topic.messages).max().unwrap_or(0);
     (longest > MOST_OF_A_BAG as u64).then(|| {
         let of = format!("{}: of {longest} samples of a signal the first {MOST_OF_A_BAG} are read", path.display());
         format!("{of}; rows = [FROM, TO] in set.toml takes another piece of it")

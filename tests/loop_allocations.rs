@@ -1,32 +1,12 @@
 //! The loop in one thread is stepped without asking for memory: operator, master, canceller, scaling and slave of the contact task, and of an arm's loop.
 
+#[path = "../plant/tests/counting/mod.rs"]
+mod counting;
+
 use backdrive_nodes::build::plan;
 use backdrive_nodes::graph::{Graph, NodeKind, Overrides};
 use backdrive_nodes::sequence::Sequence;
-use std::alloc::{GlobalAlloc, Layout, System};
 use std::path::Path;
-use std::sync::atomic::{AtomicUsize, Ordering};
-
-static ASKED: AtomicUsize = AtomicUsize::new(0);
-
-struct Counting;
-
-// SAFETY: every call is handed to the system's allocator as it is.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        ASKED.fetch_add(1, Ordering::Relaxed);
-        // SAFETY: the caller's promises are passed on.
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        // SAFETY: the caller's promises are passed on.
-        unsafe { System.dealloc(pointer, layout) }
-    }
-}
-
-#[global_allocator]
-static COUNTING: Counting = Counting;
 
 // One test: others in this program would be counted too.
 #[test]
@@ -37,8 +17,6 @@ fn a_loop_allocates_nothing_while_it_runs() {
         let mut sequence = Sequence::new(plans, &graph.timing).unwrap();
         // The first step starts the devices.
         sequence.run(1, None);
-        let before = ASKED.load(Ordering::Relaxed);
-        sequence.run(steps, None);
-        assert_eq!(ASKED.load(Ordering::Relaxed) - before, 0, "{file}");
+        assert_eq!(counting::asked(|| _ = sequence.run(steps, None)), 0, "{file}");
     }
 }

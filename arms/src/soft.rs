@@ -7,8 +7,7 @@
 //! f(δ, dδ/dt) = load - M d²δ/dt²
 //! ```
 //!
-//! (the elastic joint of M. Spong, ASME J. Dyn. Sys. 109 (1987) 310-319, with the motor's motion given), to first order in δ and with the other joints as
-//! they were measured. f is k δ with a little damping, or 0 within the gap and that of a stiff stop beyond. What this changes in the torque of every joint
+//! (the elastic joint of M. Spong, ASME J. Dyn. Sys. 109 (1987) 310-319, with the motor's motion given), with the other joints as they were measured. f is k δ with a little damping, or 0 within the gap and that of a stiff stop beyond. What this changes in the torque of every joint
 //! is then read from the inverse dynamics of the arm in its altered motion.
 
 use crate::filter::{LowPass, derivative};
@@ -18,7 +17,7 @@ use backdrive_plant::robot::Tree;
 use std::f64::consts::TAU;
 
 /// Damping of a soft gear, as a share of the critical one; below its resonance little depends on it.
-const DAMPING: f64 = 0.1;
+pub(crate) const DAMPING: f64 = 0.1;
 /// Resonance of the link at the stops of the play, Hz, and its damping: stops are stiff, and hardly bounce.
 const STOP_HZ: f64 = 50.0;
 /// See [`STOP_HZ`].
@@ -33,7 +32,7 @@ const STEPS: f64 = 40.0;
 /// How a gear gives way.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Gear {
-    /// A spring of this stiffness, N m/rad or N/m, on which the link is followed below its resonance.
+    /// A spring of this stiffness, N m/rad or N/m, on which the link is followed below its resonance, as what passes through it, over k.
     Spring(f64),
     /// The same, on which the link swings with little damping.
     Swinging(f64),

@@ -5,6 +5,7 @@ use crate::fit::Fit;
 use crate::physics::{At, Physics, Term};
 use crate::regression::{Data, parts_of};
 use crate::rigid::across;
+use crate::soft::DAMPING;
 use backdrive_plant::elements::{
     AsymmetricDamper, Backlash, Bias, Cogging, Coulomb, Dahl, Damper, Law, LoadFriction, QuadraticDrag, Spring, Stribeck,
 };
@@ -14,8 +15,6 @@ use nalgebra::Vector3;
 
 /// Resonance of the stiff joint that a friction which grows with the load is given, Hz: the load has to pass through something.
 const STIFF_HZ: f64 = 60.0;
-/// Damping of a soft gear, as a share of the critical one of its link.
-const SOFT_DAMPING: f64 = 0.1;
 
 /// How the measured torques relate to those of the joints: `measured = gain (own + Σ ratio other)`.
 #[derive(Debug, Clone, PartialEq)]
@@ -142,9 +141,8 @@ fn elements(data: &Data, fit: &Fit, reading: &Reading, model: &mut Model, notes:
         }
         let pose = model.arm.as_ref().and_then(|arm| arm.pose.get(joint).copied()).unwrap_or(0.0);
         let mut laws: Vec<(&str, Law)> = Vec::new();
-        // In torques of the joint a gear is as stiff as the torques are large.
-        let compliance = value(Physics::Compliance).map(|c| c * reading.gain[joint].powi(2)).filter(|c| *c > 0.0);
-        let gap = value(Physics::Backlash).map(|g| g * reading.gain[joint]).filter(|g| *g > 0.0);
+        let compliance = value(Physics::Compliance).filter(|c| *c > 0.0);
+        let gap = value(Physics::Backlash).filter(|g| *g > 0.0);
         let gives_way = compliance.is_some() || gap.is_some();
         if gives_way {
             on = rotor(model, joint, body, &problem.joints[joint], &Gear { compliance, gap }, notes);
@@ -253,10 +251,11 @@ fn rotor(model: &mut Model, joint: usize, body: usize, name: &str, gear: &Gear, 
     model.bodies.push(Body { name: format!("{name}.rotor"), inertia });
     let reduced = inertia * links / (inertia + links);
     let w = std::f64::consts::TAU * STIFF_HZ;
-    let stiffness = gear.compliance.map_or(reduced * w * w, |c| 1.0 / c);
-    // What soft gears are damped by is not found: as much as the regression supposes of its link.
-    let share = if gear.compliance.is_some() { SOFT_DAMPING } else { 0.2 };
-    let damping = 2.0 * share * (stiffness * if gear.compliance.is_some() { links } else { 0.25 * reduced }).sqrt();
+    let (stiffness, damping) = match gear.compliance {
+        // What damps a soft gear is not found: as much as the regression supposes.
+        Some(c) => (1.0 / c, 2.0 * DAMPING * (links / c).sqrt()),
+        None => (reduced * w * w, 0.2 * reduced * w),
+    };
     let mut tie = |what: &str, law: Law| {
         model.elements.push(Element { name: free_name(model, &format!("{name}_{what}")), between: [Some(at), Some(body)], law });
     };

@@ -1,42 +1,14 @@
 //! A robot is computed, and an arm stepped, without asking for memory.
 
+mod counting;
 mod robot_common;
 
 use backdrive_plant::model::Model;
 use backdrive_plant::robot::{Tree, Twist};
 use backdrive_plant::stepper::{Options, Plant, Segment};
+use counting::asked;
 use nalgebra::{DMatrix, Vector3};
 use robot_common::{Draw, rods_urdf};
-use std::alloc::{GlobalAlloc, Layout, System};
-use std::sync::atomic::{AtomicUsize, Ordering};
-
-static ASKED: AtomicUsize = AtomicUsize::new(0);
-
-struct Counting;
-
-// SAFETY: every call is handed to the system's allocator as it is.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        ASKED.fetch_add(1, Ordering::Relaxed);
-        // SAFETY: the caller's promises are passed on.
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        // SAFETY: the caller's promises are passed on.
-        unsafe { System.dealloc(pointer, layout) }
-    }
-}
-
-#[global_allocator]
-static COUNTING: Counting = Counting;
-
-/// How often memory is asked for.
-fn asked(work: impl FnOnce()) -> usize {
-    let before = ASKED.load(Ordering::Relaxed);
-    work();
-    ASKED.load(Ordering::Relaxed) - before
-}
 
 // One test: others in this program would be counted too.
 #[test]
