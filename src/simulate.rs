@@ -9,6 +9,7 @@ use backdrive_bags::{Reader, recording, topic_of};
 use backdrive_plant::excitation::{Excitation, load_experiments};
 use backdrive_plant::model::{Fragment, Hold, Model, OutputKind};
 use backdrive_plant::recording::{Columns, Piece, Recording, read_signals_of, signals_of, write_csv};
+use backdrive_plant::robot::Payload;
 use backdrive_plant::set::{Condition, RecordingSet};
 use backdrive_plant::stepper::{Options, simulate as simulate_model};
 use serde_json::json;
@@ -20,8 +21,8 @@ pub fn simulate(options: &cli::Simulate) -> Result<u8, Failure> {
     let mut results = Vec::new();
     let drives = busy(&format!("reading {}", options.drive), || drives(options, &model))?;
     drives.iter().try_for_each(|drive| may_replace(&drive.out, options.overwrite))?;
-    for Drive { recording: drive, out, condition } in drives {
-        let model = under(&model, &condition, &drive.name)?;
+    for Drive { recording: drive, out, condition, payload } in drives {
+        let model = under(&model, &condition, payload.as_ref(), &drive.name)?;
         let prediction = busy(&format!("simulating {}", drive.name), || predict(&model, &drive, options))?;
         if let Some(folder) = out.parent().filter(|f| !f.as_os_str().is_empty()) {
             output::folder(folder)?;
@@ -50,11 +51,16 @@ struct Drive {
     recording: Recording,
     out: PathBuf,
     condition: Vec<(String, Condition)>,
+    payload: Option<Payload>,
 }
 
 /// The model under the conditions of one experiment. What is to be estimated there keeps its number.
-fn under(model: &Model, condition: &[(String, Condition)], recording: &str) -> Result<Model, Failure> {
+fn under(model: &Model, condition: &[(String, Condition)], payload: Option<&Payload>, recording: &str) -> Result<Model, Failure> {
     let mut model = model.clone();
+    if let (Some(payload), Some(arm)) = (payload, &model.arm) {
+        let arm = arm.carrying(payload).map_err(|e| Failure::input(format!("{recording}: payload: {e}")))?;
+        model.arm = Some(Box::new(arm));
+    }
     for (path, value) in condition {
         match value {
             Condition::Value(value) => {
@@ -94,6 +100,7 @@ fn drives(options: &cli::Simulate, model: &Model) -> Result<Vec<Drive>, Failure>
     };
     if path.is_dir() || path.file_name().is_some_and(|n| n == "set.toml") {
         let set = RecordingSet::open(path)?;
+        set.check_conditions(model)?;
         let files: Vec<&String> = set.fit.iter().chain(&set.held_out).collect();
         return files
             .into_iter()
@@ -104,13 +111,18 @@ fn drives(options: &cli::Simulate, model: &Model) -> Result<Vec<Drive>, Failure>
                 let path = Path::new(file);
                 let inside = path.components().all(|part| matches!(part, Component::Normal(_) | Component::CurDir));
                 let name = if inside { path } else { Path::new(path.file_name().unwrap_or_default()) };
-                Ok(Drive { recording, out: options.out.join(name.with_extension("csv")), condition: rules.condition })
+                Ok(Drive {
+                    recording,
+                    out: options.out.join(name.with_extension("csv")),
+                    condition: rules.condition,
+                    payload: rules.payload,
+                })
             })
             .collect();
     }
     if extension == "csv" || extension == "mcap" {
         let recording = read_recording(path, model, &columns, &Piece::default())?;
-        return Ok(vec![Drive { recording, out: options.out.clone(), condition: Vec::new() }]);
+        return Ok(vec![Drive { recording, out: options.out.clone(), condition: Vec::new(), payload: None }]);
     }
     if extension == "toml" {
         let experiments = load_experiments(path)?;
@@ -119,7 +131,12 @@ fn drives(options: &cli::Simulate, model: &Model) -> Result<Vec<Drive>, Failure>
             .iter()
             .map(|experiment| {
                 let out = if single { options.out.clone() } else { options.out.join(format!("{}.csv", experiment.name)) };
-                Ok(Drive { recording: excited(model, &experiment.name, &experiment.drives, options)?, out, condition: Vec::new() })
+                Ok(Drive {
+                    recording: excited(model, &experiment.name, &experiment.drives, options)?,
+                    out,
+                    condition: Vec::new(),
+                    payload: None,
+                })
             })
             .collect();
     }
@@ -127,7 +144,12 @@ fn drives(options: &cli::Simulate, model: &Model) -> Result<Vec<Drive>, Failure>
         Failure::input(format!("{e}; it is no recording either: those end in .csv or .mcap, or are a folder with a set.toml"))
     })?;
     let drive = [(options.input.clone(), excitation)];
-    Ok(vec![Drive { recording: excited(model, &options.drive, &drive, options)?, out: options.out.clone(), condition: Vec::new() }])
+    Ok(vec![Drive {
+        recording: excited(model, &options.drive, &drive, options)?,
+        out: options.out.clone(),
+        condition: Vec::new(),
+        payload: None,
+    }])
 }
 
 /// The signals of a model from a recording: all of its inputs, and those of its outputs that were recorded.

@@ -4,10 +4,10 @@ use crate::audit::audit;
 use crate::consistent::consistent;
 use crate::drawn::{Drawn, drawn};
 use crate::error::ArmError;
-use crate::excitation;
+use crate::excitation::RATE;
+use crate::experiment::{Plan, REPEATS, plan, same_load};
 use crate::fit::Fit;
 use crate::judge::judge;
-use crate::physics::Physics;
 use crate::problem::Problem;
 use crate::regression::Data;
 use crate::search::{MOST, Search, added, search};
@@ -15,7 +15,7 @@ use crate::verdict::{Parts, place, verdict};
 use crate::written::{Reading, model_of};
 use backdrive_diagnosis::audit::Weight;
 use backdrive_diagnosis::hypothesis::Place;
-use backdrive_diagnosis::verdict::{NextExperiment, Planned, Verdict};
+use backdrive_diagnosis::verdict::{NextExperiment, Planned, PlannedPayload, Remark, Verdict};
 
 /// Name of the file of the next experiment.
 pub const EXPERIMENT_FILE: &str = "next-motion.csv";
@@ -80,7 +80,7 @@ pub fn diagnose(problem: &Problem, settings: &Settings) -> Result<Found, ArmErro
         return Err(ArmError::Log { log: bad.place.clone(), message: bad.message.clone() });
     }
     let mut found = search(&mut data, &settings.without, settings.effects)?;
-    remarks.extend(load_remarks(&data));
+    remarks.extend(load_remarks(&data, &found));
     let mut whole = Data::new(problem, settings.corner_hz, true)?;
     for fit in [&mut found.as_given, &mut found.refit, &mut found.best] {
         *fit = consistent(&data, fit, &found.weights)
@@ -115,12 +115,12 @@ pub fn diagnose(problem: &Problem, settings: &Settings) -> Result<Found, ArmErro
             settings.effects
         ));
     }
-    let planned = excitation::plan(problem)?;
-    let next = next(&found, &planned, problem);
-    let drawn = drawn(&data, &whole, &found, &planned);
+    let plan = plan(&data, &found)?;
+    let next = next(&plan, problem);
+    let drawn = drawn(&data, &whole, &found, &plan.excitation);
     let tried = found.tried.iter().map(|t| tried_of(&data, t)).collect();
     let verdict = verdict(Parts { data: &data, whole: &whole, search: &found, audit: remarks, loops, next: Some(next) })?;
-    Ok(Found { verdict, model: model.to_toml(), experiment: planned.csv, notes, tried, drawn })
+    Ok(Found { verdict, model: model.to_toml(), experiment: plan.excitation.csv(problem), notes, tried, drawn })
 }
 
 fn tried_of(data: &Data, tried: &crate::search::Tried) -> Tried {
@@ -152,54 +152,66 @@ fn slip_of_whole(whole: &Data, fit: &mut Fit) {
     }
 }
 
-/// Joints whose load hardly changes: friction that grows with it cannot be told from friction that does not.
-fn load_remarks(data: &Data) -> Vec<backdrive_diagnosis::verdict::Remark> {
-    use crate::physics::{At, Term};
-    let slip: Vec<f64> = (0..data.problem.joints.len()).map(|j| data.first_slip(j)).collect();
-    let mut out = Vec::new();
-    for (j, joint) in data.problem.joints.iter().enumerate() {
-        let column = |physics| data.columns(&Term::new(physics, At::Joint(j), Vec::new()), &slip)[0].clone();
-        let (plain, loaded) = (column(Physics::Coulomb), column(Physics::LoadFriction));
-        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>();
-        let alike = dot(&plain, &loaded) / (dot(&plain, &plain) * dot(&loaded, &loaded)).sqrt().max(f64::MIN_POSITIVE);
-        if alike > 0.985 {
-            out.push(backdrive_diagnosis::verdict::Remark {
-                what: "load".to_string(),
-                place: joint.clone(),
-                message:
-                    "carries nearly the same load wherever it moves: whether its friction grows with the load cannot be told; record it in \
-                          another pose or with a payload"
-                        .to_string(),
-                weight: Weight::Caution,
-            });
-        }
+/// Joints whose load hardly changes: friction that grows with it is not told from friction that does not.
+fn load_remarks(data: &Data, found: &Search) -> Vec<Remark> {
+    let remark = |j: usize| {
+        Remark {
+        what: "load".to_string(),
+        place: data.problem.joints[j].clone(),
+        message: "carries nearly the same load wherever it moves: whether its friction grows with the load these logs do not tell; the next motion is planned so \
+                  that it does"
+            .to_string(),
+        weight: Weight::Caution,
     }
-    out
+    };
+    same_load(data, found).into_iter().map(remark).collect()
 }
 
-fn next(found: &Search, planned: &excitation::Excitation, problem: &Problem) -> NextExperiment {
-    let rivals = found.rivals.iter().flatten().filter(|(_, above)| *above < 6.0).count();
-    let why = match rivals {
-        0 => "determines the inertial parameters and friction best",
-        _ => {
-            "tells more of what these logs leave open; with a known payload at the tip a second time it separates torque constants from masses"
+fn next(plan: &Plan, problem: &Problem) -> NextExperiment {
+    let seconds = plan.excitation.seconds;
+    let mut sentence = format!("Track {EXPERIMENT_FILE} {REPEATS} times");
+    let mut payload = None;
+    if let Some((link, known)) = &plan.payload {
+        let [x, y, z] = [known.at.x, known.at.y, known.at.z];
+        let link = problem.robot.links.get(*link).map_or(String::new(), |l| l.name.clone());
+        sentence += &format!(
+            " with {} kg fastened to link \"{link}\", its centre at ({x}, {y}, {z}) m of that link's frame, and say so of each of the logs in the set \
+             ([files.\"LOG.csv\"] payload = {{ mass = {}, at = [{x:?}, {y:?}, {z:?}] }})",
+            known.mass, known.mass
+        );
+        payload = Some(Box::new(PlannedPayload { mass_kg: known.mass, at_m: [x, y, z], link }));
+    }
+    sentence += ", and hold one of them out. ";
+    let between: Vec<String> = plan.between.iter().map(|[a, b]| format!("{a} from {b}")).collect();
+    sentence += &match (plan.separation, plan.without_payload) {
+        (Some(apart), without) => {
+            let without = without.map_or(String::new(), |w| format!(" (without the payload by {w:.1})"));
+            let little = if apart < 3.0 { "; that is little, and more playings of it are needed" } else { "" };
+            let apart = if apart > 100.0 {
+                "more than 100 standard deviations".to_string()
+            } else {
+                format!("{apart:.1} standard deviations or more")
+            };
+            format!("Of the motions that were drawn it tells best {}: by {apart}{without}{little}.", between.join(", and "))
         }
+        (None, _) => format!(
+            "Of the motions that were drawn it determines the inertial parameters and friction best (condition of the regressor {:.0}).",
+            plan.excitation.condition
+        ),
     };
     NextExperiment::Planned(Planned {
         file: EXPERIMENT_FILE.to_string(),
         input: "all joints".to_string(),
-        excitation: format!("Fourier series of 5 harmonics, {} s a period, within the joints' limits", planned.seconds),
-        sentence: format!(
-            "Track {EXPERIMENT_FILE}, repeated three times, and hold one of them out: of the motions that were drawn it {why} (condition of the regressor {:.0}).",
-            planned.condition
-        ),
-        between: problem.joints.clone(),
-        separation_sd: None,
+        excitation: format!("Fourier series of 5 harmonics, {seconds} s a period, within the joints' limits"),
+        sentence,
+        between: if between.is_empty() { problem.joints.clone() } else { plan.between.iter().flatten().cloned().collect() },
+        separation_sd: plan.separation.map(|s| (s * 10.0).round() / 10.0),
         level_floors: None,
         output: "torque of every joint".to_string(),
-        repeats: 3,
-        duration_s: Some(planned.seconds),
-        rate_hz: 100.0,
+        repeats: REPEATS,
+        duration_s: Some(seconds),
+        rate_hz: RATE,
         sensor: None,
+        payload,
     })
 }

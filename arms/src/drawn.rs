@@ -1,6 +1,6 @@
 //! What a report draws: torque and its predictions on a log, friction against velocity, and the motion to record next.
 
-use crate::excitation::Excitation;
+use crate::excitation::{Excitation, RATE};
 use crate::fit::Fit;
 use crate::physics::{At, Physics, Term};
 use crate::regression::Data;
@@ -86,7 +86,9 @@ pub fn drawn(moving: &Data, whole: &Data, search: &Search, next: &Excitation) ->
         })
         .collect();
     let log = (whole.motions.get(log).map_or(String::new(), |m| m.name.clone()), held);
-    Drawn { log, joints, next_time: next.time.clone(), next_position: next.position.clone() }
+    let next_position = next.motion(whole.problem, RATE).position;
+    let next_time = (0..next_position.first().map_or(0, Vec::len)).map(|i| i as f64 / RATE).collect();
+    Drawn { log, joints, next_time, next_position }
 }
 
 /// Whether a term is friction of its joint.

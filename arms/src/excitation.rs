@@ -1,27 +1,27 @@
-//! The next experiment: a motion of all joints within their limits that shows the inertial parameters well.
+//! Motions of all joints within their limits that show the inertial parameters well.
 //!
 //! A Fourier series for each joint (Swevers, Ganseman, Tükel, De Schutter & Van Brussel, Optimal robot excitation and identification, T-RO 13(5), 1997),
-//! the best of many drawn ones by the condition of the regressor of the base parameters.
+//! drawn at random, and ranked by the condition of the regressor of the base parameters.
 
 use crate::base::{Base, base};
 use crate::error::ArmError;
 use crate::inertial::COUNT;
 use crate::motion::Motion;
 use crate::problem::Problem;
-use crate::rigid::regressor;
+use crate::rigid::{regressor, torques};
 use nalgebra::DMatrix;
 use std::fmt::Write as _;
 
 /// Harmonics of the series.
 const HARMONICS: usize = 5;
-/// Length of a period, s.
-const PERIOD: f64 = 12.0;
+/// Lengths of a period, s: quick ones show inertia, slow ones friction at low speed.
+const PERIODS: [f64; 3] = [12.0, 8.0, 24.0];
 /// Series that are drawn.
-const DRAWN: usize = 40;
-/// Samples of a period at which they are looked at, and in the file.
+const DRAWN: usize = 60;
+/// Samples of a period at which they are looked at first.
 const LOOKED_AT: usize = 60;
 /// Rate of the file, Hz.
-const RATE: f64 = 100.0;
+pub const RATE: f64 = 100.0;
 /// Share of the joint's range that is used, and where the file has no limits, rad or m to either side.
 const USED: f64 = 0.8;
 /// See [`USED`].
@@ -30,26 +30,23 @@ const REACH: f64 = 1.5;
 /// Coefficients of a joint: cosine and sine of each harmonic.
 type Series = Vec<[f64; 2]>;
 
-/// An excitation.
+/// A motion that was drawn.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Excitation {
-    /// `t`, then position of each joint, as CSV.
-    pub csv: String,
-    /// Times of its rows, s.
-    pub time: Vec<f64>,
-    /// Position of each joint there, rad or m.
-    pub position: Vec<Vec<f64>>,
+    /// Of each joint.
+    series: Vec<Series>,
     /// Condition number of the regressor, each column in the size of its body.
     pub condition: f64,
     /// Length of a period, s.
     pub seconds: f64,
 }
 
-/// Plans one.
+/// Draws motions that the joints can follow, those that show the inertial parameters best first. `most`: the largest torque of each joint, N m or N; a
+/// motion that takes more is left out, unless all do.
 ///
 /// # Errors
-/// Where the robot cannot be computed.
-pub fn plan(problem: &Problem) -> Result<Excitation, ArmError> {
+/// Where the robot cannot be computed, or has no joints.
+pub fn draw(problem: &Problem, most: &[f64]) -> Result<Vec<Excitation>, ArmError> {
     let bases = base(problem)?;
     let mut random = 1u64;
     let mut draw = || {
@@ -59,33 +56,47 @@ pub fn plan(problem: &Problem) -> Result<Excitation, ArmError> {
         random ^= random >> 27;
         (random.wrapping_mul(0x2545_F491_4F6C_DD1D) >> 11) as f64 / (1u64 << 53) as f64 - 0.5
     };
-    let mut best: Option<(f64, Vec<Series>)> = None;
-    for _ in 0..DRAWN {
-        let series: Vec<Series> = problem
-            .joints
-            .iter()
-            .map(|_| (1..=HARMONICS).map(|h| [draw() / (h as f64).sqrt(), draw() / (h as f64).sqrt()]).collect())
-            .collect();
-        let condition = condition(problem, &bases, &motion(problem, &series, LOOKED_AT))?;
-        if best.as_ref().is_none_or(|(c, _)| condition < *c) {
-            best = Some((condition, series));
+    let mut out: Vec<(bool, Excitation)> = Vec::new();
+    for number in 0..DRAWN {
+        let mut joint = || (1..=HARMONICS).map(|h| [draw() / (h as f64).sqrt(), draw() / (h as f64).sqrt()]).collect();
+        let series: Vec<Series> = problem.joints.iter().map(|_| joint()).collect();
+        let seconds = PERIODS[number % PERIODS.len()];
+        let motion = motion(problem, &series, seconds, LOOKED_AT);
+        let torque = torques(&problem.tree, &motion, &[]);
+        let too_much = torque.iter().zip(most).any(|(signal, most)| signal.iter().any(|x| x.abs() > *most));
+        let condition = condition(problem, &bases, &motion)?;
+        out.push((too_much, Excitation { series, condition, seconds }));
+    }
+    out.sort_by(|a, b| (a.0, a.1.condition).partial_cmp(&(b.0, b.1.condition)).unwrap_or(std::cmp::Ordering::Equal));
+    let possible = out.iter().filter(|(too_much, _)| !too_much).count();
+    out.truncate(if possible > 0 { possible } else { 1 });
+    match out.is_empty() {
+        true => Err(ArmError::Robot("the robot has no joints".to_string())),
+        false => Ok(out.into_iter().map(|(_, e)| e).collect()),
+    }
+}
+
+impl Excitation {
+    /// The motion at a rate, Hz: one period.
+    pub fn motion(&self, problem: &Problem, rate: f64) -> Motion {
+        motion(problem, &self.series, self.seconds, (self.seconds * rate).round() as usize)
+    }
+
+    /// Times and positions of all joints, as CSV, at [`RATE`].
+    pub fn csv(&self, problem: &Problem) -> String {
+        let motion = self.motion(problem, RATE);
+        let mut csv = format!("t,{}\n", problem.joints.iter().map(|j| format!("{j}.position")).collect::<Vec<_>>().join(","));
+        for i in 0..motion.len() {
+            let row: Vec<String> = motion.position.iter().map(|q| format!("{:.6}", q[i])).collect();
+            // Writing to a String cannot fail.
+            let _ = writeln!(csv, "{:.3},{}", i as f64 / RATE, row.join(","));
         }
+        csv
     }
-    let Some((condition, series)) = best else { return Err(ArmError::Robot("the robot has no joints".to_string())) };
-    let count = (PERIOD * RATE) as usize;
-    let motion = motion(problem, &series, count);
-    let mut csv = format!("t,{}\n", problem.joints.iter().map(|j| format!("{j}.position")).collect::<Vec<_>>().join(","));
-    for i in 0..count {
-        let row: Vec<String> = motion.position.iter().map(|q| format!("{:.6}", q[i])).collect();
-        // Writing to a String cannot fail.
-        let _ = writeln!(csv, "{:.3},{}", i as f64 / RATE, row.join(","));
-    }
-    let time = (0..count).map(|i| i as f64 / RATE).collect();
-    Ok(Excitation { csv, time, position: motion.position, condition, seconds: PERIOD })
 }
 
 /// The motion of a series, scaled into the joints' ranges.
-fn motion(problem: &Problem, series: &[Series], count: usize) -> Motion {
+fn motion(problem: &Problem, series: &[Series], seconds: f64, count: usize) -> Motion {
     let mut out = Motion {
         name: String::new(),
         position: Vec::new(),
@@ -94,6 +105,7 @@ fn motion(problem: &Problem, series: &[Series], count: usize) -> Motion {
         torque: Vec::new(),
         told: Vec::new(),
         moves: Vec::new(),
+        payload: None,
     };
     for (j, coefficients) in series.iter().enumerate() {
         let limits = problem.tree.coordinates().get(j).and_then(|c| problem.robot.joints.get(c.joint)).map(|joint| joint.limits);
@@ -101,9 +113,9 @@ fn motion(problem: &Problem, series: &[Series], count: usize) -> Motion {
         let (low, high) = (low.max(-2.0 * REACH), high.min(2.0 * REACH));
         let (mut q, mut v, mut a) = (vec![0.0; count], vec![0.0; count], vec![0.0; count]);
         for i in 0..count {
-            let t = i as f64 * PERIOD / count as f64;
+            let t = i as f64 * seconds / count as f64;
             for (h, [c, s]) in coefficients.iter().enumerate() {
-                let w = std::f64::consts::TAU * (h + 1) as f64 / PERIOD;
+                let w = std::f64::consts::TAU * (h + 1) as f64 / seconds;
                 let (sin, cos) = (w * t).sin_cos();
                 q[i] += c * cos + s * sin;
                 v[i] += w * (s * cos - c * sin);

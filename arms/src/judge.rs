@@ -41,7 +41,11 @@ pub fn judge(data: &Data, model: &Model, reading: &Reading) -> Option<Vec<f64>> 
     let (mut added, mut torque, mut count) = (vec![0.0; joints], vec![0.0; joints], 0usize);
     for m in motions {
         let motion = &data.motions[m];
-        let mut plant = Plant::new(&driven, period, &Options::default()).ok()?;
+        let mut loaded = None;
+        if let Some((_, payload)) = &motion.payload {
+            loaded = Some(Model { arm: Some(Box::new(arm.carrying(payload).ok()?)), ..driven.clone() });
+        }
+        let mut plant = Plant::new(loaded.as_ref().unwrap_or(&driven), period, &Options::default()).ok()?;
         let at = |j: usize, i: usize| motion.position[j][i] - arm.pose[j] - reading.offset[j];
         for (j, body) in arm.bodies.iter().enumerate() {
             plant.set_motion(*body, at(j, 0), motion.velocity[j][0]);

@@ -5,7 +5,7 @@ use backdrive_bags::{BagError, Reader, recording, topic_of};
 use backdrive_plant::model::Hold;
 use backdrive_plant::recording::units::{Kind, split};
 use backdrive_plant::recording::{Columns, JointColumns, Piece, Recording, Source, read_csv, read_headings};
-use backdrive_plant::robot::{Coordinate, JointKind};
+use backdrive_plant::robot::{Coordinate, JointKind, Payload};
 use backdrive_plant::set::RecordingSet;
 use std::path::Path;
 
@@ -22,6 +22,8 @@ pub struct Log {
     pub velocity: Vec<Option<Vec<f64>>>,
     /// Torques or forces of the motors seen at the joints, N m or N.
     pub torque: Vec<Vec<f64>>,
+    /// A known mass that the arm carried, with the index of the link that it hung on.
+    pub payload: Option<(usize, Payload)>,
 }
 
 /// Where each joint stands in the files: as the set says, else by headings that are usual.
@@ -111,7 +113,7 @@ pub fn read_log(set: &RecordingSet, file: &str, joints: &[JointColumns], coordin
         torque.push(column(joint.torque())?);
         velocity.push(if joint.has_velocity { Some(column(joint.velocity())?) } else { None });
     }
-    Ok(Log { name: file.to_string(), t: recording.t.clone(), position, velocity, torque })
+    Ok(Log { name: file.to_string(), t: recording.t.clone(), position, velocity, torque, payload: None })
 }
 
 fn is_bag(path: &Path) -> bool {

@@ -8,6 +8,7 @@ use crate::filter::{LowPass, derivative};
 use crate::log::Log;
 use backdrive_plant::model::Hold;
 use backdrive_plant::recording::resample;
+use backdrive_plant::robot::Payload;
 use realfft::RealFftPlanner;
 
 /// Order of the Butterworth filters; run both ways the order counts twice.
@@ -103,6 +104,8 @@ pub struct Motion {
     pub told: Vec<Option<Vec<f64>>>,
     /// 1 while a joint moves, 0 where it hardly does: dry friction is then anything between its levels, and a regression learns nothing of it.
     pub moves: Vec<Vec<f64>>,
+    /// A known mass that the arm carries, with the index of its link.
+    pub payload: Option<(usize, Payload)>,
 }
 
 impl Motion {
@@ -124,7 +127,7 @@ impl Motion {
         // What the filter smears of a jump of the torque.
         let smeared = (0.5 / rates.position_corner / rates.period()).ceil() as usize;
         let moves = velocity.iter().zip(&log.position).map(|(v, q)| moving(v, resting(v, q, rates), smeared)).collect();
-        Motion { name: log.name.clone(), position, velocity, acceleration, torque, told, moves }
+        Motion { name: log.name.clone(), position, velocity, acceleration, torque, told, moves, payload: log.payload.clone() }
     }
 
     /// Samples.

@@ -32,7 +32,7 @@ pub enum Physics {
     Cogging,
     /// Inertia that turns with the joint alone, such as a rotor behind its gear.
     Inertia,
-    /// Torque that is read by a wrong factor (torque constant).
+    /// Torque that is read by a wrong factor (torque constant), at a joint or at all.
     Gain,
     /// A joint whose zero is not where its sensor says.
     Offset,
@@ -247,6 +247,7 @@ impl Sight<'_> {
                 vec![vec![(j, wave(f64::sin))], vec![(j, wave(f64::cos))]]
             }
             Physics::Inertia => one(motion.acceleration[j].clone()),
+            Physics::Gain if term.at == At::Base => vec![all(self.load, 1.0)],
             Physics::Gain => one(self.load[j].clone()),
             Physics::Offset => {
                 // τ(q - o) - τ(q) = -o τ' + o²/2 τ'', with o of the square from the fit before.
@@ -305,6 +306,11 @@ fn plus(mut signals: AtJoints, other: &Signals, factor: f64) -> AtJoints {
     signals
 }
 
+/// Whether logs differ by what the arm is known to carry.
+pub fn several_payloads(motions: &[Motion]) -> bool {
+    motions.windows(2).any(|pair| pair[0].payload != pair[1].payload)
+}
+
 /// Every physics at every place, with the shapes that a search tries first.
 pub fn candidates(problem: &Problem, motions: &[Motion]) -> Vec<Term> {
     let joints = problem.joints.len();
@@ -323,6 +329,10 @@ pub fn candidates(problem: &Problem, motions: &[Motion]) -> Vec<Term> {
                     if physics == Physics::Payload {
                         out.push(Term::new(physics, At::Base, vec![1.0]));
                     }
+                }
+                // One factor for all is the same as other masses, but for a mass that is known.
+                Physics::Gain if j == 0 && several_payloads(motions) => {
+                    out.extend([At::Base, at].map(|at| Term::new(physics, at, Vec::new())));
                 }
                 Physics::Coupling => out.extend((0..joints).filter(|k| *k != j).map(|k| Term::new(physics, At::Pair(j, k), Vec::new()))),
                 Physics::CoupledFriction => {

@@ -68,7 +68,11 @@ impl Problem {
         let coordinates = arm.tree.coordinates();
         let columns = joints_of(&mut set, coordinates, &first)?;
         let read = |names: &[String]| names.iter().map(|name| read_log(&set, name, &columns, coordinates)).collect::<Result<Vec<_>, _>>();
-        let (fit, held_out) = (read(&set.fit)?, read(&set.held_out)?);
+        let (mut fit, mut held_out) = (read(&set.fit)?, read(&set.held_out)?);
+        set.check_conditions(&model)?;
+        for log in fit.iter_mut().chain(&mut held_out) {
+            log.payload = set.rules_of(&log.name).payload.and_then(|payload| Some((arm.link_of(&payload).ok()?, payload)));
+        }
         Problem::new(model, model_file, columns, fit, held_out)
     }
 

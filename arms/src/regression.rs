@@ -12,7 +12,7 @@ use crate::soft::inertia;
 use crate::system::{Column, System, scaled_solve};
 use backdrive_plant::elements::Law;
 use backdrive_plant::robot::Tree;
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, Vector3};
 use std::cell::RefCell;
 use std::collections::HashMap;
 use std::ops::Range;
@@ -43,8 +43,10 @@ pub struct Data<'a> {
     pub inertial: Vec<Vec<f64>>,
     /// Stretches of all logs.
     pub blocks: Vec<Block>,
-    tree: Tree,
-    load: Vec<Signals>,
+    /// Inertial parameters with which all but the regressor was computed.
+    pub seen: Vec<Parameters>,
+    trees: Vec<Tree>,
+    pub(crate) load: Vec<Signals>,
     inertia: Vec<Signals>,
     by_position: Vec<Vec<Signals>>,
     curved: Vec<Vec<Signals>>,
@@ -88,7 +90,8 @@ impl<'a> Data<'a> {
             inertial: Vec::new(),
             layout,
             blocks,
-            tree: problem.tree.clone(),
+            seen: Vec::new(),
+            trees: Vec::new(),
             load: Vec::new(),
             inertia: Vec::new(),
             by_position: Vec::new(),
@@ -119,39 +122,50 @@ impl<'a> Data<'a> {
     /// # Errors
     /// Where the robot cannot be computed with them.
     pub fn see(&mut self, parameters: &[Parameters]) -> Result<(), ArmError> {
-        let robot = self.problem.bodies.applied(&self.problem.robot, parameters);
-        let tree = tree_of(&robot)?;
+        let bare = self.problem.bodies.applied(&self.problem.robot, parameters);
         let joints = self.problem.joints.len();
-        let tilted = across(&robot.gravity).map(|direction| {
-            let mut other = robot.clone();
-            other.gravity += direction * robot.gravity.norm();
-            other
-        });
-        let mut weightless = robot.clone();
-        weightless.gravity.fill(0.0);
-        let (tilted, weightless) = ([tree_of(&tilted[0])?, tree_of(&tilted[1])?], tree_of(&weightless)?);
-        self.load = self.motions.iter().map(|m| torques(&tree, m, &[])).collect();
-        let moved = |motion: &Motion, j: usize, step: f64| {
-            let mut offsets = vec![0.0; joints];
-            offsets[j] = -step;
-            torques(&tree, motion, &offsets)
-        };
-        let slope = |motion: &Motion, j| difference(&moved(motion, j, STEP), &moved(motion, j, -STEP), 0.5 / STEP);
-        self.by_position = self.motions.iter().map(|motion| (0..joints).map(|j| slope(motion, j)).collect()).collect();
-        let curve = |m: usize, j| {
-            let (up, down) = (moved(&self.motions[m], j, WIDE), moved(&self.motions[m], j, -WIDE));
-            let half = |a: &Signals| difference(a, &self.load[m], 1.0 / (WIDE * WIDE));
-            half(&up).into_iter().zip(half(&down)).map(|(a, b)| a.iter().zip(&b).map(|(x, y)| x + y).collect()).collect()
-        };
-        self.curved = (0..self.motions.len()).map(|m| (0..joints).map(|j| curve(m, j)).collect()).collect();
-        let load = &self.load;
-        let by_tilt = |(m, motion): (usize, &Motion)| -> Vec<Signals> {
-            let of_tilt = tilted.iter().map(|t| difference(&torques(t, motion, &[]), &load[m], 1.0));
-            of_tilt.chain(std::iter::once(difference(&load[m], &torques(&weightless, motion, &[]), 1.0))).collect()
-        };
-        self.by_tilt = self.motions.iter().enumerate().map(by_tilt).collect();
-        self.inertia = self.motions.iter().map(|m| inertia(&tree, m)).collect();
-        self.tree = tree;
+        for of_motion in [&mut self.load, &mut self.inertia] {
+            of_motion.clear();
+        }
+        for of_motion in [&mut self.by_position, &mut self.curved, &mut self.by_tilt] {
+            of_motion.clear();
+        }
+        self.trees.clear();
+        self.seen = parameters.to_vec();
+        for motion in &self.motions {
+            let robot = match &motion.payload {
+                Some((link, payload)) => bare.with_mass_at(*link, payload.mass, payload.at),
+                None => bare.clone(),
+            };
+            let with_gravity = |change: Vector3<f64>| {
+                let mut other = robot.clone();
+                other.gravity += change;
+                tree_of(&other)
+            };
+            let (tree, weightless) = (tree_of(&robot)?, with_gravity(-robot.gravity)?);
+            let load = torques(&tree, motion, &[]);
+            let moved = |j: usize, step: f64| {
+                let mut offsets = vec![0.0; joints];
+                offsets[j] = -step;
+                torques(&tree, motion, &offsets)
+            };
+            self.by_position.push((0..joints).map(|j| difference(&moved(j, STEP), &moved(j, -STEP), 0.5 / STEP)).collect());
+            let curve = |j| {
+                let half = |a: &Signals| difference(a, &load, 1.0 / (WIDE * WIDE));
+                let sum = |(a, b): (Vec<f64>, Vec<f64>)| a.iter().zip(&b).map(|(x, y)| x + y).collect();
+                half(&moved(j, WIDE)).into_iter().zip(half(&moved(j, -WIDE))).map(sum).collect()
+            };
+            self.curved.push((0..joints).map(curve).collect());
+            let mut by_tilt = Vec::new();
+            for direction in across(&robot.gravity) {
+                by_tilt.push(difference(&torques(&with_gravity(direction * robot.gravity.norm())?, motion, &[]), &load, 1.0));
+            }
+            by_tilt.push(difference(&load, &torques(&weightless, motion, &[]), 1.0));
+            self.by_tilt.push(by_tilt);
+            self.inertia.push(inertia(&tree, motion));
+            self.load.push(load);
+            self.trees.push(tree);
+        }
         self.cache.borrow_mut().clear();
         Ok(())
     }
@@ -186,28 +200,28 @@ impl<'a> Data<'a> {
         if let Some(found) = self.cache.borrow().get(&key) {
             return found.clone();
         }
-        let parts: Vec<Vec<AtJoints>> = (0..self.motions.len())
-            .map(|m| {
-                let sight = Sight {
-                    problem: self.problem,
-                    motion: &self.motions[m],
-                    rates: &self.rates,
-                    tree: &self.tree,
-                    load: &self.load[m],
-                    inertia: &self.inertia[m],
-                    by_position: &self.by_position[m],
-                    curved: &self.curved[m],
-                    by_tilt: &self.by_tilt[m],
-                    by_payload: &self.by_payload[m],
-                    slip,
-                };
-                sight.columns(term)
-            })
-            .collect();
+        let parts: Vec<Vec<AtJoints>> = (0..self.motions.len()).map(|m| self.sight(m, slip).columns(term)).collect();
         let count = parts.first().map_or(0, Vec::len);
         let columns: Vec<Column> = (0..count).map(|c| Rc::new(self.column(|m| parts[m][c].clone()))).collect();
         self.cache.borrow_mut().insert(key, columns.clone());
         columns
+    }
+
+    /// What columns of a motion are made of.
+    pub(crate) fn sight<'s>(&'s self, m: usize, slip: &'s [f64]) -> Sight<'s> {
+        Sight {
+            problem: self.problem,
+            motion: &self.motions[m],
+            rates: &self.rates,
+            tree: &self.trees[m],
+            load: &self.load[m],
+            inertia: &self.inertia[m],
+            by_position: &self.by_position[m],
+            curved: &self.curved[m],
+            by_tilt: &self.by_tilt[m],
+            by_payload: &self.by_payload[m],
+            slip,
+        }
     }
 
     /// What the nominal model has: terms of its elements and armatures, and starting values of the friction's displacement.
@@ -330,7 +344,7 @@ impl Data<'_> {
         bodies.nominal.iter().zip(&bodies.scale).enumerate().map(of).collect()
     }
 
-    fn all_columns(&self, structure: &Structure) -> (Vec<Column>, Vec<Range<usize>>) {
+    pub(crate) fn all_columns(&self, structure: &Structure) -> (Vec<Column>, Vec<Range<usize>>) {
         let mut columns: Vec<Column> = self.inertial.iter().map(|c| Rc::new(c.clone())).collect();
         let mut places = Vec::new();
         for term in &structure.terms {

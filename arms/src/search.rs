@@ -52,7 +52,18 @@ pub struct Search {
     /// Of each added term of the best structure: how much better the model with it predicts unseen stretches than one without it.
     pub gains: Vec<Option<Gain>>,
     /// Of each added term: what could stand in its place, with the score of that structure above the best one's.
-    pub rivals: Vec<Vec<(Term, f64)>>,
+    pub rivals: Vec<Vec<Rival>>,
+}
+
+/// Another structure, with a term in the place of one that was found.
+#[derive(Debug, Clone)]
+pub struct Rival {
+    /// The term.
+    pub term: Term,
+    /// Score above that of the best structure.
+    pub above: f64,
+    /// All of it.
+    pub structure: Structure,
 }
 
 /// Looks for what is missing. `without`: names of physics that are not considered; `most`: physics that are added at most.
@@ -461,7 +472,7 @@ fn refitted(data: &Data, nominal: &Structure, slip: &[f64], weights: &Weights) -
 }
 
 /// What could stand in the place of an added term, with the score above the best one's.
-fn rivals(data: &Data, pool: &[Term], best: &Fit, index: usize, weights: &Weights) -> Vec<(Term, f64)> {
+fn rivals(data: &Data, pool: &[Term], best: &Fit, index: usize, weights: &Weights) -> Vec<Rival> {
     let less = without(&best.structure, index);
     let pool: Vec<Term> = pool.iter().filter(|t| !t.is_like(&best.structure.terms[index])).cloned().collect();
     let mut out = Vec::new();
@@ -470,9 +481,9 @@ fn rivals(data: &Data, pool: &[Term], best: &Fit, index: usize, weights: &Weight
         let last = fit.structure.terms.len() - 1;
         let fit = shaped(data, fit, last, weights);
         if is_possible(data, &fit) {
-            out.push((term, fit.score - best.score));
+            out.push(Rival { term, above: fit.score - best.score, structure: fit.structure });
         }
     }
-    out.sort_by(|a, b| a.1.total_cmp(&b.1));
+    out.sort_by(|a, b| a.above.total_cmp(&b.above));
     out
 }

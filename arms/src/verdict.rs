@@ -7,7 +7,7 @@ use crate::left::{Left, left};
 use crate::physics::{At, Physics, Term};
 use crate::regression::Data;
 use crate::said::{remaining, sentence};
-use crate::search::{LEAST_SHARE, Search, added, by_block};
+use crate::search::{LEAST_SHARE, Rival, Search, added, by_block};
 use crate::written::gravity_of;
 use backdrive_diagnosis::hypothesis::Place;
 use backdrive_diagnosis::predictive::gain;
@@ -19,7 +19,7 @@ use statrs::distribution::{ContinuousCDF, Normal};
 use std::collections::BTreeMap;
 
 /// Score above that of the best structure up to which a rival counts as alike.
-const ALIKE: f64 = 6.0;
+pub(crate) const ALIKE: f64 = 6.0;
 
 /// Everything that a verdict is made of.
 pub struct Parts<'a> {
@@ -44,6 +44,7 @@ pub fn place(data: &Data, term: &Term) -> Place {
     match (term.physics, term.at) {
         (Physics::Gain | Physics::Delay, At::Joint(j)) => Place::Signal(format!("{}.torque", joint(j))),
         (Physics::Offset, At::Joint(j)) => Place::Signal(format!("{}.position", joint(j))),
+        (Physics::Gain, At::Base) => Place::Signal("torque of all joints".to_string()),
         (Physics::Payload, _) => Place::Between(joint(last), "ground".to_string()),
         (Physics::GravityDirection, _) => Place::Between("base".to_string(), "ground".to_string()),
         (Physics::Compliance | Physics::Backlash, At::Joint(j)) => Place::Between(joint(j), format!("{}.rotor", joint(j))),
@@ -127,20 +128,23 @@ fn findings(data: &Data, search: &Search) -> Vec<Finding> {
         if term.physics == Physics::Coulomb && richer.iter().any(|p| there(*p)) {
             continue;
         }
-        let rivals: Vec<&(Term, f64)> =
-            search.rivals.get(order).map_or(Vec::new(), |r| r.iter().filter(|(_, above)| *above < ALIKE).collect());
-        let weights: Vec<f64> = rivals.iter().map(|(_, above)| (-0.5 * above.max(0.0)).exp()).collect();
+        let rivals: Vec<&Rival> = search.rivals.get(order).map_or(Vec::new(), |r| r.iter().filter(|r| r.above < ALIKE).collect());
+        let weights: Vec<f64> = rivals.iter().map(|r| (-0.5 * r.above.max(0.0)).exp()).collect();
         let total = 1.0 + weights.iter().sum::<f64>();
         let alternatives: Vec<Alternative> = rivals
             .iter()
             .zip(&weights)
-            .map(|((t, _), w)| Alternative { physics: t.physics.facts().name.to_string(), place: place(data, t), confidence: w / total })
+            .map(|(r, w)| Alternative {
+                physics: r.term.physics.facts().name.to_string(),
+                place: place(data, &r.term),
+                confidence: w / total,
+            })
             .collect();
         let found = search.gains.get(order).copied().flatten();
         let sure = found.map_or(0.5, |g| Normal::standard().cdf(g.in_errors()));
         let facts = term.physics.facts();
         let kin: f64 =
-            rivals.iter().zip(&weights).filter(|((t, _), _)| t.physics.facts().family == facts.family).map(|(_, w)| w / total).sum();
+            rivals.iter().zip(&weights).filter(|(r, _)| r.term.physics.facts().family == facts.family).map(|(_, w)| w / total).sum();
         let confidence = sure / total;
         let replaces = replaced(data, term);
         let finding = Finding {

@@ -38,6 +38,7 @@ impl Reading {
             let value = fit.values[place.start];
             match (term.physics, term.at) {
                 (Physics::Gain, At::Joint(j)) => out.gain[j] += value,
+                (Physics::Gain, At::Base) => out.gain.iter_mut().for_each(|gain| *gain += value),
                 (Physics::Coupling, At::Pair(j, k)) => out.coupling.push((j, k, value)),
                 (Physics::Offset, At::Joint(j)) => out.offset[j] += value,
                 (Physics::Compliance | Physics::Backlash, At::Joint(j)) => out.of_motor[j] = true,

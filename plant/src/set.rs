@@ -2,6 +2,7 @@
 
 use crate::elements::Range;
 use crate::recording::{Cell, Columns, JointColumns, Piece, Recording, read_columns, read_csv, read_joints};
+use crate::robot::Payload;
 use crate::tomlfile::{FileError, Table, unknown};
 use std::path::{Path, PathBuf};
 
@@ -35,6 +36,8 @@ pub struct FileRules {
     pub piece: Piece,
     /// Parameters that differ in this file, by path: `elements.band.force`.
     pub condition: Vec<(String, Condition)>,
+    /// A known mass that an arm carried in this file.
+    pub payload: Option<Payload>,
 }
 
 /// A recording set.
@@ -115,8 +118,21 @@ impl RecordingSet {
         self.files.iter().find(|f| f.0 == file).map(|f| f.1.clone()).unwrap_or_default()
     }
 
-    /// Whether every condition names a number of the model; the error names the file or the session, and the path.
+    /// Whether every condition names a number of the model, and every payload hangs on a link of its robot; the error names the file or the session,
+    /// and the path.
     pub fn check_conditions(&self, model: &crate::model::Model) -> Result<(), FileError> {
+        for (name, payload) in self.files.iter().filter_map(|(name, rules)| Some((name, rules.payload.as_ref()?))) {
+            let found = match &model.arm {
+                Some(arm) => arm.link_of(payload).map(|_| ()),
+                None => Err("is of a model with a [robot], and this one has none".to_string()),
+            };
+            found.map_err(|message| FileError {
+                path: self.path_of("set.toml").display().to_string(),
+                line: None,
+                key: format!("files.{name}.payload"),
+                message,
+            })?;
+        }
         let of_sessions = self.sessions.iter().flat_map(|(name, paths)| paths.iter().map(move |path| (format!("sessions.{name}"), path)));
         let of_files =
             self.files.iter().flat_map(|(name, rules)| rules.condition.iter().map(move |(path, _)| (format!("files.{name}"), path)));
@@ -314,8 +330,21 @@ fn read_rules(mut table: Table) -> Result<FileRules, FileError> {
     if let Some(condition) = table.table("condition")? {
         read_condition(condition, "", &mut rules.condition)?;
     }
+    rules.payload = table.table("payload")?.map(read_payload).transpose()?;
     table.finish()?;
     Ok(rules)
+}
+
+/// `{ mass = 0.5, at = [0.0, 0.0, 0.2] }`, with `link` where it is not on the last one.
+fn read_payload(mut table: Table) -> Result<Payload, FileError> {
+    let mass = table.need_number("mass", Range::NonNegative)?;
+    let at = match table.numbers("at", Range::Any)?.ok_or_else(|| table.missing("at"))?.as_slice() {
+        [x, y, z] => [*x, *y, *z].into(),
+        _ => return Err(table.error_at("at", "expected three numbers: its centre in the frame of the link, m")),
+    };
+    let link = table.string("link")?;
+    table.finish()?;
+    Ok(Payload { mass, at, link })
 }
 
 /// `{ "elements.band.force" = "free" }`, and the same without the quotes, which TOML reads as tables.

@@ -17,6 +17,9 @@ pub const URDF: &str = r#"<robot name="arm">
 </robot>
 "#;
 
+/// Where the tip is in the frame of the last link, m.
+pub const TIP: [f64; 3] = [0.0, 0.0, -0.3];
+
 /// What the torque has besides the links, by joint.
 #[derive(Clone, Copy, Default)]
 pub struct Beside {
@@ -31,24 +34,21 @@ pub struct Beside {
 /// What the file states.
 pub const AS_STATED: Beside = Beside { damping: [0.1, 0.04], dry: [0.2, 0.0], by_load: [0.0; 2], gain: [1.0; 2], soft: [0.0; 2] };
 
-/// A log's columns: t, two positions, two velocities, two torques.
-pub fn log(seed: u64, beside: &Beside) -> [Vec<f64>; 7] {
-    let robot = RobotFile::from_xml(URDF, "arm.urdf").expect("the arm is read").robot;
-    let tree = Tree::new(&robot).expect("the arm is computed");
-    let mut work = tree.workspace();
+/// Positions, velocities and accelerations of both joints at a time, s.
+pub type Path2 = dyn Fn(f64) -> [[f64; 2]; 3];
+
+/// A Fourier series of both joints about a pose, rad, drawn from a seed.
+pub fn series(seed: u64, pose: [f64; 2], size: f64) -> Box<Path2> {
     let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
     let series: Vec<Vec<[f64; 2]>> = (0..2)
         .map(|_| {
             (1..6)
-                .map(|h| [0.6 / f64::from(h) * random.random_range(-1.0..1.0), 0.6 / f64::from(h) * random.random_range(-1.0..1.0)])
+                .map(|h| [size / f64::from(h) * random.random_range(-1.0..1.0), size / f64::from(h) * random.random_range(-1.0..1.0)])
                 .collect()
         })
         .collect();
-    let (period, count) = (1.0 / 200.0, 2400);
-    let mut out: [Vec<f64>; 7] = Default::default();
-    let mut links = |i: i32| {
-        let t = f64::from(i) * period;
-        let (mut q, mut v, mut a) = ([0.0; 2], [0.0; 2], [0.0; 2]);
+    Box::new(move |t| {
+        let (mut q, mut v, mut a) = (pose, [0.0; 2], [0.0; 2]);
         for j in 0..2 {
             for (h, [c, s]) in series[j].iter().enumerate() {
                 let w = std::f64::consts::TAU * 0.11 * (h + 1) as f64;
@@ -58,6 +58,27 @@ pub fn log(seed: u64, beside: &Beside) -> [Vec<f64>; 7] {
                 a[j] -= w * w * (c * cos + s * sin);
             }
         }
+        [q, v, a]
+    })
+}
+
+/// A log's columns: t, two positions, two velocities, two torques.
+pub fn log(seed: u64, beside: &Beside) -> [Vec<f64>; 7] {
+    along(&*series(seed, [0.0; 2], 0.6), seed, beside, 2400, 0.0)
+}
+
+/// The same along a path, with a mass at the tip, kg, at 200 Hz.
+pub fn along(path: &Path2, seed: u64, beside: &Beside, count: i32, at_tip: f64) -> [Vec<f64>; 7] {
+    let robot = RobotFile::from_xml(URDF, "arm.urdf").expect("the arm is read").robot;
+    let fore = robot.link("fore").expect("a link");
+    let robot = robot.with_mass_at(fore, at_tip, TIP.into());
+    let tree = Tree::new(&robot).expect("the arm is computed");
+    let mut work = tree.workspace();
+    let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(1000 + seed);
+    let period = 1.0 / 200.0;
+    let mut out: [Vec<f64>; 7] = Default::default();
+    let mut links = |i: i32| {
+        let [q, v, a] = path(f64::from(i) * period);
         let mut f = [0.0; 2];
         tree.inverse_dynamics(&q, &v, &a, &mut work, &mut f);
         (q, v, f)
@@ -80,20 +101,25 @@ pub fn log(seed: u64, beside: &Beside) -> [Vec<f64>; 7] {
     out
 }
 
+/// Writes a log's columns.
+pub fn write(file: &Path, columns: &[Vec<f64>; 7]) {
+    let mut text = "t,q1,q2,dq1,dq2,tau1,tau2\n".to_string();
+    for i in 0..columns[0].len() {
+        let row: Vec<String> = columns.iter().map(|c| format!("{:.7}", c[i])).collect();
+        let _ = writeln!(text, "{}", row.join(","));
+    }
+    std::fs::write(file, text).expect("a file is written");
+}
+
 /// A set of three logs, the last held out, in a folder; `change` is made to every log, `joints` stands in the set.
 pub fn set(folder: &Path, beside: &Beside, joints: &str, change: impl Fn(&mut [Vec<f64>; 7])) {
-    let write = |name: &str, text: &str| std::fs::write(folder.join(name), text).expect("a file is written");
-    write("arm.urdf", URDF);
-    write("arm.toml", "name = \"arm\"\n[robot]\nfile = \"arm.urdf\"\n");
-    write("set.toml", &format!("model = \"arm.toml\"\nfit = [\"a.csv\", \"b.csv\"]\nheld_out = [\"c.csv\"]\n{joints}"));
+    let text = |name: &str, text: &str| std::fs::write(folder.join(name), text).expect("a file is written");
+    text("arm.urdf", URDF);
+    text("arm.toml", "name = \"arm\"\n[robot]\nfile = \"arm.urdf\"\n");
+    text("set.toml", &format!("model = \"arm.toml\"\nfit = [\"a.csv\", \"b.csv\"]\nheld_out = [\"c.csv\"]\n{joints}"));
     for (seed, name) in ["a.csv", "b.csv", "c.csv"].iter().enumerate() {
         let mut columns = log(seed as u64 + 1, beside);
         change(&mut columns);
-        let mut text = "t,q1,q2,dq1,dq2,tau1,tau2\n".to_string();
-        for i in 0..columns[0].len() {
-            let row: Vec<String> = columns.iter().map(|c| format!("{:.7}", c[i])).collect();
-            let _ = writeln!(text, "{}", row.join(","));
-        }
-        write(name, &text);
+        write(&folder.join(name), &columns);
     }
 }

@@ -108,5 +108,6 @@ fn in_file(plan: &Experiment) -> Planned {
         duration_s: rounded(plan.duration, 6),
         rate_hz: plan.rate_hz,
         sensor: plan.sensor.clone().map(|NewSensor { kind, of, element, noise_sd }| Box::new(Sensor { kind, of, element, noise_sd })),
+        payload: None,
     }
 }

@@ -8,7 +8,7 @@ mod shown;
 
 pub use arm::{ArmJoint, ArmPart, BaseParameter};
 pub use finding::{Alternative, Detectable, Estimate, Estimates, Finding, Interval, Moved, Parameter};
-pub use next_experiment::{NextExperiment, Planned, Refused, Sensor};
+pub use next_experiment::{NextExperiment, Planned, PlannedPayload, Refused, Sensor};
 pub use shown::Where;
 
 use crate::audit::{self, Weight};

@@ -59,6 +59,20 @@ pub struct Planned {
     /// A sensor that has to be added for it: no excitation tells with those that are there. Not in files where those there are do.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sensor: Option<Box<Sensor>>,
+    /// A known mass that an arm has to carry for it. Only in files where one is asked for.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub payload: Option<Box<PlannedPayload>>,
+}
+
+/// A known mass on a link of an arm.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct PlannedPayload {
+    /// kg.
+    pub mass_kg: f64,
+    /// Where its centre is in the frame of the link, m.
+    pub at_m: [f64; 3],
+    /// The link that it is fastened to.
+    pub link: String,
 }
 
 /// A sensor that the device does not have, as an output of a model file has it.
