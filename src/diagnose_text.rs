@@ -251,6 +251,7 @@ mod tests {
             family: None,
             family_confidence: 0.0,
             alternatives: Vec::new(),
+            closed_loop: None,
         };
         assert_eq!(described(&finding), "dry friction at the drum: force 101 mN (95 %: 98.0 mN to 104 mN); well supported (97 %)");
         let of_some_law = Finding { confidence: 0.13, family: Some(Family::Friction), family_confidence: 0.97, ..finding };

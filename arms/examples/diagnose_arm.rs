@@ -21,6 +21,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             println!("{j:?}");
         }
     }
+    for t in &found.tried {
+        println!("tried {} {:?}: worth {:.1}, unseen {:?}, taken {}", t.physics, t.place, t.worth, t.unseen, t.taken);
+    }
     for note in &found.notes {
         println!("note: {note}");
     }

@@ -123,14 +123,16 @@ impl Base {
 /// # Errors
 /// Where the robot cannot be computed.
 pub fn of_fit(data: &Data, fit: &Fit, parameters: &[Parameters]) -> Result<Vec<BaseParameter>, ArmError> {
-    let scales: Vec<f64> = data.problem.bodies.scale.iter().flatten().copied().collect();
     let all = base(data.problem)?;
     Ok(all
         .iter()
         .map(|base| {
             let value = base.value(parameters);
-            let factors: Vec<(usize, f64)> =
-                std::iter::once((base.of, 1.0)).chain(base.with.iter().copied()).map(|(i, f)| (i, f * scales[i])).collect();
+            let of_parameters = std::iter::once((base.of, 1.0)).chain(base.with.iter().copied());
+            let factors: Vec<(usize, f64)> = of_parameters
+                .flat_map(|(i, f)| (0..COUNT).map(move |b| (i / COUNT * COUNT + b, f, (i, b))))
+                .map(|(at, f, (i, b))| (at, f * data.problem.bodies.basis[i / COUNT][(i % COUNT, b)]))
+                .collect();
             let error = 1.96 * fit.spread(&factors);
             let ci95 = [Some(value - error), Some(value + error)];
             BaseParameter {

@@ -8,7 +8,7 @@
 use crate::fit::{Fit, Weights};
 use crate::inertial::{COUNT, Parameters, pseudo_inertia};
 use crate::regression::Data;
-use nalgebra::{DMatrix, DVector, Matrix4};
+use nalgebra::{DMatrix, DVector, Matrix4, SVector};
 
 /// Weight of the barrier, in the units of the weighted squared residual: far below one independent row.
 const BARRIER: f64 = 1e-3;
@@ -24,7 +24,6 @@ pub fn consistent(data: &Data, fit: &Fit, weights: &Weights) -> Option<Fit> {
     let bodies = &data.problem.bodies;
     let count = bodies.nominal.len() * COUNT;
     let (hessian, at) = data.quadratic(&fit.structure, weights)?;
-    let scale: Vec<f64> = bodies.scale.iter().flatten().copied().collect();
     // A start inside: the file's bodies, made a little thicker where they are flat.
     let thick = |k: usize| {
         let mut p = bodies.nominal[k];
@@ -38,7 +37,13 @@ pub fn consistent(data: &Data, fit: &Fit, weights: &Weights) -> Option<Fit> {
         p
     };
     let start: Vec<Parameters> = (0..bodies.nominal.len()).map(thick).collect();
-    let mut x = DVector::from_fn(count, |i, _| (start[i / COUNT][i % COUNT] - bodies.nominal[i / COUNT][i % COUNT]) / scale[i]);
+    let mut x = DVector::zeros(count);
+    for (k, (start, nominal)) in start.iter().zip(&bodies.nominal).enumerate() {
+        let change = SVector::from(*start) - SVector::from(*nominal);
+        if let Some(inverse) = bodies.basis[k].try_inverse() {
+            x.rows_mut(k * COUNT, COUNT).copy_from(&(inverse * change));
+        }
+    }
     let value = |x: &DVector<f64>| -> Option<f64> {
         let away = x - &at;
         let mut sum = 0.5 * away.dot(&(&hessian * &away));
@@ -63,13 +68,8 @@ pub fn consistent(data: &Data, fit: &Fit, weights: &Weights) -> Option<Fit> {
         let (mut gradient, mut curvature) = (&hessian * (&x - &at), hessian.clone());
         for k in 0..bodies.nominal.len() {
             let Some(inverse) = pseudo_inertia(&body(data, &x, k)).try_inverse() else { continue };
-            let units: Vec<Matrix4<f64>> = (0..COUNT)
-                .map(|i| {
-                    let mut p = [0.0; COUNT];
-                    p[i] = scale[k * COUNT + i];
-                    inverse * pseudo_inertia(&p)
-                })
-                .collect();
+            let units: Vec<Matrix4<f64>> =
+                (0..COUNT).map(|i| inverse * pseudo_inertia(&std::array::from_fn(|j| bodies.basis[k][(j, i)]))).collect();
             for i in 0..COUNT {
                 gradient[k * COUNT + i] -= BARRIER * units[i].trace();
                 for j in 0..COUNT {
@@ -102,8 +102,7 @@ pub fn is_body(p: &Parameters) -> bool {
 }
 
 fn body(data: &Data, x: &DVector<f64>, k: usize) -> Parameters {
-    let bodies = &data.problem.bodies;
-    std::array::from_fn(|i| bodies.nominal[k][i] + bodies.scale[k][i] * x[k * COUNT + i])
+    data.problem.bodies.changed(k, x.rows(k * COUNT, COUNT).as_slice())
 }
 
 fn solve(matrix: &DMatrix<f64>, right: &DVector<f64>) -> Option<DVector<f64>> {

@@ -7,7 +7,7 @@ use crate::error::ArmError;
 use crate::excitation::RATE;
 use crate::experiment::{Plan, REPEATS, plan, same_load};
 use crate::fit::Fit;
-use crate::judge::judge;
+use crate::judge::{AGAINST, Judged, each, judge};
 use crate::problem::Problem;
 use crate::regression::Data;
 use crate::search::{MOST, Search, added, search};
@@ -94,20 +94,16 @@ pub fn diagnose(problem: &Problem, settings: &Settings) -> Result<Found, ArmErro
     let (nominal, _) = model_of(&data, &found.refit)?;
     notes.extend(problem.notes.iter().cloned());
     let loops = [judge(&data, &nominal, &Reading::of(&data, &found.refit)), judge(&data, &model, &Reading::of(&data, &found.best))];
-    if let [Some(before), Some(after)] = &loops
-        && !added(&found.best.structure).is_empty()
-    {
-        for (j, (b, a)) in before.iter().zip(after).enumerate() {
-            if *a > 1.2 * b && *a > 0.02 {
-                notes.push(format!(
-                    "in closed loop the diagnosed model does worse at {} than without what was found ({:.1} % of the torque, {:.1} % without): \
-                     take its findings with care",
-                    problem.joints[j],
-                    100.0 * a,
-                    100.0 * b
-                ));
-            }
-        }
+    let judged = each(&data, &found, loops[1].as_ref());
+    for (index, judged) in added(&found.best.structure).into_iter().zip(&judged) {
+        let Some(ratio) = judged.as_ref().map(Judged::ratio).filter(|r| *r > AGAINST) else { continue };
+        let term = &found.best.structure.terms[index];
+        notes.push(format!(
+            "simulated in closed loop the model needs {:.0} % more correction with {} {} than without it: it is not asserted",
+            100.0 * (ratio - 1.0),
+            term.physics.facts().words,
+            backdrive_diagnosis::words::place(&place(&data, term))
+        ));
     }
     if added(&found.best.structure).len() >= settings.effects {
         notes.push(format!(
@@ -119,7 +115,7 @@ pub fn diagnose(problem: &Problem, settings: &Settings) -> Result<Found, ArmErro
     let next = next(&plan, problem);
     let drawn = drawn(&data, &whole, &found, &plan.excitation);
     let tried = found.tried.iter().map(|t| tried_of(&data, t)).collect();
-    let verdict = verdict(Parts { data: &data, whole: &whole, search: &found, audit: remarks, loops, next: Some(next) })?;
+    let verdict = verdict(Parts { data: &data, whole: &whole, search: &found, audit: remarks, loops, judged, next: Some(next) })?;
     Ok(Found { verdict, model: model.to_toml(), experiment: plan.excitation.csv(problem), notes, tried, drawn })
 }
 

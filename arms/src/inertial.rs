@@ -4,12 +4,17 @@
 //! parameters of manipulator loads and links, IJRR 5(3), 1986).
 
 use backdrive_plant::robot::{Inertia, LinkInertia, Robot, Tree};
-use nalgebra::{Matrix3, Matrix4, Vector3};
+use nalgebra::{Matrix3, Matrix4, SMatrix, SVector, Vector3};
 
 /// How many there are for a body.
 pub const COUNT: usize = 10;
+/// How thin a body is taken to be at the least, as a share of its extent.
+const THIN: f64 = 0.1;
 /// Their names, each followed by the joint's number: `m1`, `mx1`, ..., `Izz1`.
 pub const NAMES: [&str; COUNT] = ["m", "mx", "my", "mz", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz"];
+
+/// A matrix over the parameters of a body.
+pub type Basis = SMatrix<f64, COUNT, COUNT>;
 
 /// The parameters of a body: kg, kg m (three), kg m² (xx, xy, xz, yy, yz, zz, about the origin of its frame).
 pub type Parameters = [f64; COUNT];
@@ -66,6 +71,41 @@ pub fn pseudo_inertia(p: &Parameters) -> Matrix4<f64> {
     )
 }
 
+/// Changes of a body's parameters that are as large as each other, in the metric that bodies have whatever frame and unit they are written in: the size of a
+/// change is ½ tr((J⁻¹ δJ)²), with J the pseudo-inertia (Lee & Park, A geometric algorithm for robust multibody inertial parameter identification, RA-L 3(4),
+/// 2018). So a slender link is not easily as stout as a drum, and a rotor's inertia not easily taken for that of a link about its own axis.
+///
+/// `size`: that of a change of each parameter where the body is half as heavy again; thinner than a tenth of its extent no body is taken to be.
+pub fn basis(p: &Parameters, size: &Parameters) -> Basis {
+    let mass = p[0].max(0.5 * size[0]);
+    let reach = (size[4] / size[0].max(f64::MIN_POSITIVE)).sqrt();
+    let centre = if p[0] > 0.0 { Vector3::new(p[1], p[2], p[3]) / p[0] } else { Vector3::zeros() };
+    let about_origin: Matrix3<f64> = pseudo_inertia(p).fixed_view::<3, 3>(0, 0).into_owned();
+    let spread = (about_origin - centre * centre.transpose() * p[0]).symmetric_eigen();
+    let least = mass * (THIN * reach).powi(2);
+    let thick = Matrix3::from_diagonal(&spread.eigenvalues.map(|x| x.max(least)));
+    let spread = spread.eigenvectors * thick * spread.eigenvectors.transpose();
+    let mut body = Matrix4::zeros();
+    body.fixed_view_mut::<3, 3>(0, 0).copy_from(&(spread + centre * centre.transpose() * mass));
+    body.fixed_view_mut::<3, 1>(0, 3).copy_from(&(centre * mass));
+    body.fixed_view_mut::<1, 3>(3, 0).copy_from(&(centre * mass).transpose());
+    body[(3, 3)] = mass;
+    let plain = || Basis::from_diagonal(&SVector::from(*size));
+    let Some(inverse) = body.try_inverse() else { return plain() };
+    let unit = |i: usize| {
+        let mut one = [0.0; COUNT];
+        one[i] = size[i];
+        inverse * pseudo_inertia(&one)
+    };
+    let units: [Matrix4<f64>; COUNT] = std::array::from_fn(unit);
+    let metric = Basis::from_fn(|i, j| 0.5 * (units[i] * units[j]).trace());
+    // In sizes, whose metric is well conditioned; then in the parameters' own units.
+    match metric.cholesky().and_then(|c| c.l().transpose().try_inverse()) {
+        Some(inverse) => plain() * inverse,
+        None => plain(),
+    }
+}
+
 /// The moving bodies of a robot: for each coordinate the link that the joint carries, and its parameters with all that is fixed to it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Bodies {
@@ -77,6 +117,8 @@ pub struct Bodies {
     pub nominal: Vec<Parameters>,
     /// Size that a change of each parameter has where the body is half as heavy again.
     pub scale: Vec<Parameters>,
+    /// Changes of the parameters that are as large as each other, in columns: see [`basis`].
+    pub basis: Vec<Basis>,
     /// Where a payload would be on the last body: the farthest frame that is fixed to it; `None` where none is.
     pub tip: Option<Vector3<f64>>,
 }
@@ -121,7 +163,13 @@ impl Bodies {
                 s
             })
             .collect();
-        Bodies { link, fixed, nominal, scale, tip }
+        let basis = nominal.iter().zip(&scale).map(|(p, s)| basis(p, s)).collect();
+        Bodies { link, fixed, nominal, scale, basis, tip }
+    }
+
+    /// Parameters of a body after a change, given along its [`Bodies::basis`].
+    pub fn changed(&self, body: usize, along: &[f64]) -> Parameters {
+        std::array::from_fn(|i| self.nominal[body][i] + along.iter().enumerate().map(|(b, x)| self.basis[body][(i, b)] * x).sum::<f64>())
     }
 
     /// The robot with these parameters of its moving bodies. What is fixed to a body keeps its own inertia where that leaves the body one that it can

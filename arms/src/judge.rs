@@ -3,8 +3,11 @@
 //! The model is fed the measured torque, and a loop adds what it takes to keep the measured motion. What the loop adds is what the model lacks, with
 //! friction as exact as the stepper has it, sticking too.
 
+use crate::consistent::consistent;
+use crate::physics::Physics;
 use crate::regression::Data;
-use crate::written::Reading;
+use crate::search::{Search, added};
+use crate::written::{Reading, model_of};
 use backdrive_plant::model::{Hold, Input, InputKind, Model};
 use backdrive_plant::robot::Arm;
 use backdrive_plant::stepper::{Options, Plant, Segment};
@@ -81,6 +84,49 @@ pub fn judge(data: &Data, model: &Model, reading: &Reading) -> Option<Vec<f64>> 
         return None;
     }
     Some(added.iter().zip(&torque).map(|(a, t)| (a / t.max(f64::MIN_POSITIVE)).sqrt()).collect())
+}
+
+/// Above which [`Judged::ratio`] a simulation speaks against a term.
+pub const AGAINST: f64 = 1.05;
+
+/// What the loop adds with and without a term that a search has added, as shares of the rms torque, by joint.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Judged {
+    /// Without it, all other numbers fitted again.
+    pub without: Vec<f64>,
+    /// With it.
+    pub with: Vec<f64>,
+}
+
+impl Judged {
+    /// How much the loop adds with the term, over all joints, in times of what it adds without it.
+    pub fn ratio(&self) -> f64 {
+        // Of each joint in the size of what is added there.
+        let sum = |shares: &[f64]| shares.iter().zip(&self.without).map(|(s, w)| (s / w.max(1e-6)).powi(2)).sum::<f64>();
+        (sum(&self.with) / sum(&self.without).max(f64::MIN_POSITIVE)).sqrt()
+    }
+}
+
+/// Judges every term that a search has added by a simulation without it; `None` where the model file cannot say it, or a model cannot be simulated.
+pub fn each(data: &Data, search: &Search, with: Option<&Vec<f64>>) -> Vec<Option<Judged>> {
+    let of = |index: usize| {
+        let term = &search.best.structure.terms[index];
+        let is_said = match term.physics {
+            // The logged torque is late, not the arm.
+            Physics::Delay => false,
+            Physics::CoupledFriction => term.shape.first() == Some(&-1.0),
+            // How heavy the motor before a gear is, nobody says, and the loop acts on that.
+            Physics::Compliance | Physics::Backlash => term.at.joint().is_some_and(|j| data.problem.armature[j] > 0.0),
+            _ => true,
+        };
+        let with = with.filter(|_| is_said)?.clone();
+        let mut structure = search.best.structure.clone();
+        structure.terms.remove(index);
+        let less = consistent(data, &data.fit(&structure, &search.weights)?, &search.weights)?;
+        let (model, _) = model_of(data, &less).ok()?;
+        Some(Judged { without: judge(data, &model, &Reading::of(data, &less))?, with })
+    };
+    added(&search.best.structure).into_iter().map(of).collect()
 }
 
 /// Of each joint the least inertia over the arm's poses that it moves against while all others are free.

@@ -27,6 +27,7 @@ pub mod layout;
 pub mod left;
 pub mod log;
 pub mod motion;
+mod offers;
 pub mod physics;
 pub mod problem;
 pub mod regression;

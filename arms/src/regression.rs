@@ -106,10 +106,11 @@ impl<'a> Data<'a> {
         for motion in &data.motions {
             by_parameter.push(regressor(&problem.robot, &problem.bodies, motion, &[])?);
         }
-        let scales: Vec<f64> = problem.bodies.scale.iter().flatten().copied().collect();
-        for (i, scale) in scales.iter().enumerate() {
-            let signals = |m: usize| by_parameter[m][i].iter().cloned().enumerate().collect();
-            data.inertial.push(data.column(signals).into_iter().map(|x| x * scale).collect());
+        for (k, basis) in problem.bodies.basis.iter().enumerate() {
+            let of_body: Vec<Vec<f64>> =
+                (0..COUNT).map(|i| data.column(|m| by_parameter[m][k * COUNT + i].iter().cloned().enumerate().collect())).collect();
+            let along = |direction: usize, row: usize| of_body.iter().enumerate().map(|(i, c)| c[row] * basis[(i, direction)]).sum();
+            data.inertial.extend((0..COUNT).map(|b| (0..data.layout.rows).map(|row| along(b, row)).collect::<Vec<f64>>()));
         }
         data.by_payload = by_parameter.into_iter().map(|mut p| p.split_off(p.len() - COUNT)).collect();
         data.see(&problem.bodies.nominal)?;
@@ -338,10 +339,7 @@ impl Data<'_> {
     /// Inertial parameters of a fit, by body.
     pub fn parameters(&self, fit: &Fit) -> Vec<Parameters> {
         let bodies = &self.problem.bodies;
-        let of = |(k, (nominal, scale)): (usize, (&Parameters, &Parameters))| {
-            std::array::from_fn(|i| nominal[i] + scale[i] * fit.values[k * COUNT + i])
-        };
-        bodies.nominal.iter().zip(&bodies.scale).enumerate().map(of).collect()
+        (0..bodies.nominal.len()).map(|k| bodies.changed(k, &fit.values[k * COUNT..(k + 1) * COUNT])).collect()
     }
 
     pub(crate) fn all_columns(&self, structure: &Structure) -> (Vec<Column>, Vec<Range<usize>>) {

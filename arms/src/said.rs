@@ -1,5 +1,6 @@
 //! What a verdict says in sentences.
 
+use crate::judge::AGAINST;
 use backdrive_diagnosis::verdict::{ArmJoint, ArmPart, Finding, Remaining, Where, Word};
 
 /// What is left over, and at which joint most.
@@ -38,8 +39,14 @@ fn hertz(f: f64) -> String {
 
 /// The verdict in a sentence.
 pub(crate) fn sentence(word: Word, findings: &[Finding], arm: &ArmPart, held: bool) -> String {
+    // What a simulation speaks against is not asserted beside others.
+    let against = |f: &&Finding| f.closed_loop.is_some_and(|ratio| ratio > AGAINST);
+    let asserted: Vec<&Finding> = match findings.iter().all(|f| against(&f)) {
+        true => findings.iter().collect(),
+        false => findings.iter().filter(|f| !against(f)).collect(),
+    };
     let named: Vec<String> =
-        findings.iter().map(|f| format!("{} {}", words(&f.physics), backdrive_diagnosis::words::place(&f.place))).collect();
+        asserted.iter().map(|f| format!("{} {}", words(&f.physics), backdrive_diagnosis::words::place(&f.place))).collect();
     let unseen = if held { "held-out" } else { "fitted" };
     let left: Vec<String> = arm.joints.iter().map(|j| format!("{:.1} %", 100.0 * j.diagnosed)).collect();
     let before: Vec<String> = arm.joints.iter().map(|j| format!("{:.1} %", 100.0 * j.refit)).collect();
@@ -50,14 +57,15 @@ pub(crate) fn sentence(word: Word, findings: &[Finding], arm: &ArmPart, held: bo
         Word::Missing => format!("The model leaves out {}; {tail} ({} without).{besides}", named.join(", "), before.join(", ")),
         Word::Ambiguous => {
             let other = findings.first().and_then(|f| f.alternatives.first());
-            let other = other.map_or(String::new(), |a| {
-                format!(", or in place of the first {} {}", words(&a.physics), backdrive_diagnosis::words::place(&a.place))
-            });
-            format!(
-                "The model leaves out {}{other}, which these logs do not tell apart; {tail} ({} without).{besides}",
-                named.join(", "),
-                before.join(", ")
-            )
+            let named = named.join(", ");
+            let open = match other {
+                Some(a) => {
+                    let other = format!("{} {}", words(&a.physics), backdrive_diagnosis::words::place(&a.place));
+                    format!("leaves out {named}, or in place of the first {other}, which these logs do not tell apart")
+                }
+                None => format!("may leave out {named}, which these logs and a simulation in closed loop do not agree on"),
+            };
+            format!("The model {open}; {tail} ({} without).{besides}", before.join(", "))
         }
         Word::Unexplained => format!("Something is missing that no physics tried explains: {}.", open.join("; ")),
         Word::Parameters => format!("No physics is missing; the model's parameters are off, and refitted {tail}."),

@@ -3,6 +3,7 @@
 use crate::consistent::consistent;
 use crate::error::ArmError;
 use crate::fit::{Fit, Structure, TOLERANCES, Weights};
+use crate::offers::{is_possible, ranked, shaped, slipped, tolerated, torque_share, with, without, without_term};
 use crate::physics::{Physics, Term, candidates};
 use crate::regression::Data;
 use backdrive_diagnosis::predictive::{Gain, gain};
@@ -11,18 +12,16 @@ use backdrive_diagnosis::predictive::{Gain, gain};
 pub const MOST: usize = 8;
 /// Candidates that are fitted in full in each round, those that promise most.
 const FITTED: usize = 10;
+/// The same of what inertial parameters can make up for, where they are free.
+const FITTED_BESIDE: usize = 3;
+/// Which of [`TOLERANCES`] is that of a file that somebody made with care.
+const STATED: usize = 1;
 /// By how much the information criterion has to fall for a physics to be taken up. A Bayes factor of 150 ("very strong", Kass & Raftery 1995) is 10.
 const WORTH: f64 = 10.0;
 /// The least share of the mean squared residual of unseen stretches, at the joint where it shows most, that a physics has to take.
 pub const LEAST_SHARE: f64 = 0.03;
 /// The least share of the rms torque of a joint, that where it shows most, that a physics has to be.
 pub const LEAST_TORQUE: f64 = 0.01;
-/// The least mass of a payload, as a share of the last body's own: a lighter one is as likely that body's mass, which nobody knows better.
-pub const LEAST_PAYLOAD: f64 = 0.15;
-/// The least displacement of presliding, in times what the sensor resolves.
-pub const PRESLIDING: f64 = 8.0;
-/// Rounds in which the friction's displacement is sought.
-const SLIP_STEPS: usize = 12;
 
 /// A candidate that was fitted in full.
 #[derive(Debug, Clone)]
@@ -53,6 +52,9 @@ pub struct Search {
     pub gains: Vec<Option<Gain>>,
     /// Of each added term: what could stand in its place, with the score of that structure above the best one's.
     pub rivals: Vec<Vec<Rival>>,
+    /// Of each added term that inertial parameters could make up for: the score, above the best one's, of the structure without it and with its bodies as free as is
+    /// worth it.
+    pub freed: Vec<Option<f64>>,
 }
 
 /// Another structure, with a term in the place of one that was found.
@@ -101,7 +103,8 @@ pub fn search(data: &mut Data, without: &[String], most: usize) -> Result<Search
     let gains =
         added.iter().map(|i| without_term(data, &best, *i, &weights).and_then(|less| compare(data, &less, &best, &weights))).collect();
     let rivals = added.iter().map(|i| rivals(data, &pool, &best, *i, &weights)).collect();
-    Ok(Search { as_given, refit, best, weights, tried, gains, rivals })
+    let freed = added.iter().map(|i| freed(data, &best, *i, &weights)).collect();
+    Ok(Search { as_given, refit, best, weights, tried, gains, rivals, freed })
 }
 
 /// Terms that a search has added, by index.
@@ -159,163 +162,6 @@ pub fn largest_share(data: &Data, base: &Fit, better: &Fit) -> f64 {
         .fold(f64::NEG_INFINITY, f64::max)
 }
 
-/// The torque of a term as a share of the rms torque of the joint where that is most.
-fn torque_share(data: &Data, fit: &Fit, index: usize) -> f64 {
-    let Some(term) = fit.structure.terms.get(index) else { return 0.0 };
-    let columns = data.columns(term, &fit.structure.slip);
-    let values = &fit.values[fit.places[index].clone()];
-    let torque: Vec<f64> = (0..data.layout.rows).map(|row| columns.iter().zip(values).map(|(c, x)| c[row] * x).sum()).collect();
-    let share = |j: usize| (data.mean_square(&torque, j, false) / data.mean_square(&data.torque, j, false).max(f64::MIN_POSITIVE)).sqrt();
-    (0..data.problem.joints.len()).map(share).fold(0.0, f64::max)
-}
-
-/// Whether what must not be negative is not, and a payload is one.
-fn is_possible(data: &Data, fit: &Fit) -> bool {
-    let last = data.problem.bodies.nominal.last().map_or(0.0, |p| p[0]);
-    fit.structure.terms.iter().zip(&fit.places).all(|(term, place)| {
-        let (value, error) = (fit.values[place.start], fit.errors[place.start]);
-        let least = match (term.given, term.physics) {
-            // What the file states may be nothing, what is added is something.
-            (Some(_), _) => -3.0 * error,
-            (None, Physics::Payload) => LEAST_PAYLOAD * last,
-            (None, _) => 0.0,
-        };
-        // Presliding over less is a direction that turns at once, for all that the sensor can tell.
-        let is_sharp = term.physics == Physics::Presliding
-            && term.given.is_none()
-            && term.at.joint().is_some_and(|j| term.shape.first().is_some_and(|d| *d < PRESLIDING * data.first_slip(j)));
-        // A gear whose number is not that of its shape is no gear.
-        let unit = match (term.physics, term.shape.first()) {
-            (Physics::Compliance, Some(k)) => k * value,
-            (Physics::Backlash, Some(gap)) => value / gap,
-            _ => 1.0,
-        };
-        !is_sharp && (0.5..2.0).contains(&unit) && (!term.physics.facts().positive || value > least)
-    })
-}
-
-fn with(structure: &Structure, term: &Term) -> Structure {
-    let mut out = structure.clone();
-    out.terms.push(term.clone());
-    out
-}
-
-fn without(structure: &Structure, index: usize) -> Structure {
-    let mut out = structure.clone();
-    out.terms.remove(index);
-    out
-}
-
-fn without_term(data: &Data, fit: &Fit, index: usize, weights: &Weights) -> Option<Fit> {
-    data.fit(&without(&fit.structure, index), weights)
-}
-
-/// Candidates by what they promise beside a structure, each physics and place once, with the best of its shapes.
-fn ranked(data: &Data, pool: &[Term], structure: &Structure, weights: &Weights) -> Vec<(Term, f64)> {
-    let Some((system, values)) = data.system(structure, weights) else { return Vec::new() };
-    let mut out: Vec<(Term, f64)> = Vec::new();
-    for term in pool.iter().filter(|t| !structure.terms.iter().any(|there| there.is_like(t))) {
-        let promise = data.promise(&system, &values, &data.columns(term, &structure.slip)) - 2.0 * term.physics.facts().numbers as f64;
-        match out.iter_mut().find(|(other, _)| {
-            other.is_like(term)
-                && (!matches!(term.physics, Physics::Payload | Physics::Compliance) || other.shape.len() == term.shape.len())
-        }) {
-            Some(there) if there.1 < promise => *there = (term.clone(), promise),
-            Some(_) => {}
-            None => out.push((term.clone(), promise)),
-        }
-    }
-    out.sort_by(|a, b| b.1.total_cmp(&a.1));
-    out
-}
-
-/// A fit whose last term has the shape that fits best, near the one that it has.
-fn shaped(data: &Data, fit: Fit, index: usize, weights: &Weights) -> Fit {
-    let mut best = fit;
-    let Some(term) = best.structure.terms.get(index).cloned() else { return best };
-    if matches!(term.physics, Physics::Offset | Physics::GravityDirection) {
-        // What is of second order follows from the value itself.
-        for _ in 0..3 {
-            let mut structure = best.structure.clone();
-            structure.terms[index].shape = best.values[best.places[index].clone()].to_vec();
-            match data.fit(&structure, weights) {
-                Some(other) => best = other,
-                None => break,
-            }
-        }
-        return best;
-    }
-    if term.shape.is_empty() || matches!(term.physics, Physics::CoupledFriction | Physics::Payload) {
-        return best;
-    }
-    if matches!(term.physics, Physics::Compliance | Physics::Backlash) {
-        // The shape that the number says, as long as that is better.
-        for _ in 0..4 {
-            let mut structure = best.structure.clone();
-            let value = best.values[best.places[index].start];
-            if value <= 0.0 {
-                break;
-            }
-            structure.terms[index].shape[0] = if term.physics == Physics::Compliance { 1.0 / value } else { value };
-            match data.fit(&structure, weights).filter(|f| f.score < best.score) {
-                Some(other) => best = other,
-                None => break,
-            }
-        }
-    }
-    let mut step: f64 = if term.physics == Physics::Cogging { 1.01 } else { 1.4 };
-    for _ in 0..6 {
-        let mut moved = false;
-        for factor in [step, 1.0 / step] {
-            let mut structure = best.structure.clone();
-            structure.terms[index].shape[0] *= factor;
-            if let Some(other) = data.fit(&structure, weights).filter(|f| f.score < best.score && is_possible(data, f)) {
-                best = other;
-                moved = true;
-                break;
-            }
-        }
-        if !moved {
-            step = step.sqrt();
-        }
-    }
-    best
-}
-
-/// A fit in which friction turns over the displacement that fits best, joint by joint.
-fn slipped(data: &Data, fit: Fit, weights: &Weights) -> Fit {
-    let mut best = fit;
-    for joint in 0..data.problem.joints.len() {
-        let turns =
-            |t: &Term| t.at.joint() == Some(joint) && matches!(t.physics, Physics::Coulomb | Physics::Stribeck | Physics::LoadFriction);
-        if !best.structure.terms.iter().any(turns) {
-            continue;
-        }
-        // The sensor's own step is the least that makes sense, a hundredth of the range is presliding and no longer a sharp turn.
-        let first = data.first_slip(joint);
-        for factor in [2.0, 0.5] {
-            for _ in 0..SLIP_STEPS {
-                let mut structure = best.structure.clone();
-                structure.slip[joint] *= factor;
-                if !(0.1 * first..=64.0 * first).contains(&structure.slip[joint]) {
-                    break;
-                }
-                match data.fit(&structure, weights).filter(|f| f.score < best.score) {
-                    Some(other) => best = other,
-                    None => break,
-                }
-            }
-        }
-    }
-    best
-}
-
-/// The tolerance of the inertial parameters that is worth its numbers.
-fn tolerated(data: &Data, fit: Fit, weights: &Weights) -> Fit {
-    let others = (0..TOLERANCES.len()).filter_map(|tolerance| data.fit(&Structure { tolerance, ..fit.structure.clone() }, weights));
-    others.fold(fit.clone(), |best, other| if other.score < best.score - 1e-9 { other } else { best })
-}
-
 /// Adds what is worth it.
 fn grow(data: &Data, pool: &[Term], most: usize, best: &mut Fit, weights: &Weights, tried: &mut Vec<Tried>) {
     // Adding and exchanging can take turns: what was there once ends it.
@@ -328,7 +174,15 @@ fn grow(data: &Data, pool: &[Term], most: usize, best: &mut Fit, weights: &Weigh
         }
         seen.push(now);
         let mut offers: Vec<Fit> = Vec::new();
-        for (term, _) in ranked(data, pool, &best.structure, weights).into_iter().filter(|(_, promise)| *promise > 0.0).take(FITTED) {
+        let promising = |structure: &Structure| ranked(data, pool, structure, weights).into_iter().filter(|(_, promise)| *promise > 0.0);
+        let mut terms: Vec<Term> = promising(&best.structure).take(FITTED).map(|(term, _)| term).collect();
+        if best.structure.tolerance > STATED {
+            // What bodies as free as these make up for shows where they are as the file has them.
+            let stated = Structure { tolerance: STATED, ..best.structure.clone() };
+            let hidden = promising(&stated).map(|(term, _)| term).filter(|t| is_like_bodies(t.physics)).take(FITTED_BESIDE);
+            terms.extend(hidden.filter(|t| !terms.contains(t)).collect::<Vec<_>>());
+        }
+        for term in terms {
             let Some(fit) = data.fit(&with(&best.structure, &term), weights) else { continue };
             let index = fit.structure.terms.len() - 1;
             // Beside some physics the file's inertial parameters are better, beside others worse than alone.
@@ -349,7 +203,9 @@ fn grow(data: &Data, pool: &[Term], most: usize, best: &mut Fit, weights: &Weigh
         for offer in offers {
             let worth = best.score - offer.score;
             let found = compare(data, best, &offer, weights);
-            let sure = worth > WORTH && found.is_some_and(|g| g.is_sure()) && largest_share(data, best, &offer) >= LEAST_SHARE;
+            let shows = found.is_some_and(|g| g.is_sure()) && largest_share(data, best, &offer) >= LEAST_SHARE;
+            let is_no_body = offer.structure.terms.last().is_some_and(|t| is_like_bodies(t.physics)) && offer.score < freer.score - WORTH;
+            let sure = worth > WORTH && (shows || is_no_body);
             let better_than_freer = offer.score <= freer.score;
             let take = sure && better_than_freer && !taken;
             if let Some(term) = offer.structure.terms.last() {
@@ -440,6 +296,19 @@ fn exchange(data: &Data, pool: &[Term], best: &mut Fit, weights: &Weights) {
     }
 }
 
+/// Whether inertial parameters, freed, can make up for a physics.
+fn is_like_bodies(physics: Physics) -> bool {
+    matches!(physics, Physics::Payload | Physics::Inertia)
+}
+
+/// Of a term that is mass or inertia: by how much the structure without it scores above the best one where its bodies are freed to make up for it. They predict
+/// the same, and only what is known of bodies speaks for the term.
+fn freed(data: &Data, best: &Fit, index: usize, weights: &Weights) -> Option<f64> {
+    best.structure.terms.get(index).filter(|t| is_like_bodies(t.physics))?;
+    let less = without_term(data, best, index, weights)?;
+    Some(tolerated(data, less, weights).score - best.score)
+}
+
 /// Takes off again what is not worth it.
 fn shrink(data: &Data, best: &mut Fit, weights: &Weights) {
     loop {
@@ -449,11 +318,11 @@ fn shrink(data: &Data, best: &mut Fit, weights: &Weights) {
             let worth = less.score - best.score;
             let sure = compare(data, &less, best, weights).is_some_and(|g| g.is_sure());
             let interval = best.places.get(index).is_some_and(|place| place.clone().any(|i| best.values[i].abs() > 1.96 * best.errors[i]));
+            let shows = sure && largest_share(data, &less, best) >= LEAST_SHARE;
             let keep = worth > WORTH
-                && sure
                 && interval
                 && torque_share(data, best, index) >= LEAST_TORQUE
-                && largest_share(data, &less, best) >= LEAST_SHARE;
+                && (shows || freed(data, best, index, weights).is_some_and(|above| above > WORTH));
             if !keep && worst.as_ref().is_none_or(|(w, _)| worth < *w) {
                 worst = Some((worth, less));
             }

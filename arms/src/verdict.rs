@@ -3,6 +3,8 @@
 use crate::base;
 use crate::error::ArmError;
 use crate::fit::Fit;
+use crate::inertial::{COUNT, NAMES};
+use crate::judge::{AGAINST, Judged};
 use crate::left::{Left, left};
 use crate::physics::{At, Physics, Term};
 use crate::regression::Data;
@@ -21,6 +23,9 @@ use std::collections::BTreeMap;
 /// Score above that of the best structure up to which a rival counts as alike.
 pub(crate) const ALIKE: f64 = 6.0;
 
+/// How sure mass can be at the most where only what is known of bodies speaks for it.
+const MASSES_SURE: f64 = 0.95;
+
 /// Everything that a verdict is made of.
 pub struct Parts<'a> {
     /// Rows that count while the joints move.
@@ -33,6 +38,8 @@ pub struct Parts<'a> {
     pub audit: Vec<Remark>,
     /// Torque that a loop has to add, by the refitted nominal and by the diagnosed model.
     pub loops: [Option<Vec<f64>>; 2],
+    /// Of each added term what a simulation says of it.
+    pub judged: Vec<Option<Judged>>,
     /// What to record next.
     pub next: Option<NextExperiment>,
 }
@@ -59,8 +66,8 @@ pub fn place(data: &Data, term: &Term) -> Place {
 /// # Errors
 /// Where the robot cannot be computed.
 pub fn verdict(parts: Parts) -> Result<Verdict, ArmError> {
-    let Parts { data, whole, search, audit, loops, next } = parts;
-    let findings = findings(data, search);
+    let Parts { data, whole, search, audit, loops, judged, next } = parts;
+    let findings = findings(data, search, &judged);
     let held = data.fit_count < data.motions.len();
     let moved = moved(data, search);
     let refit_helps =
@@ -116,8 +123,8 @@ fn estimate(value: f64, error: f64, unit: &str) -> Parameter {
     Parameter::One(Estimate { value, ci95, at_bound: false, unit: unit.to_string() })
 }
 
-/// The findings, those first whose absence would cost unseen stretches most; friction of one level and its excess at a joint are one finding.
-fn findings(data: &Data, search: &Search) -> Vec<Finding> {
+/// The findings, those first whose absence would cost unseen stretches most, and last what a simulation speaks against; friction of one level and its excess at a joint are one finding.
+fn findings(data: &Data, search: &Search, judged: &[Option<Judged>]) -> Vec<Finding> {
     let best = &search.best;
     let indices = added(&best.structure);
     let mut out: Vec<(f64, Finding)> = Vec::new();
@@ -131,7 +138,7 @@ fn findings(data: &Data, search: &Search) -> Vec<Finding> {
         let rivals: Vec<&Rival> = search.rivals.get(order).map_or(Vec::new(), |r| r.iter().filter(|r| r.above < ALIKE).collect());
         let weights: Vec<f64> = rivals.iter().map(|r| (-0.5 * r.above.max(0.0)).exp()).collect();
         let total = 1.0 + weights.iter().sum::<f64>();
-        let alternatives: Vec<Alternative> = rivals
+        let mut alternatives: Vec<Alternative> = rivals
             .iter()
             .zip(&weights)
             .map(|(r, w)| Alternative {
@@ -141,7 +148,20 @@ fn findings(data: &Data, search: &Search) -> Vec<Finding> {
             })
             .collect();
         let found = search.gains.get(order).copied().flatten();
-        let sure = found.map_or(0.5, |g| Normal::standard().cdf(g.in_errors()));
+        let mut sure = found.map_or(0.5, |g| Normal::standard().cdf(g.in_errors()));
+        if let Some(above) = search.freed.get(order).copied().flatten() {
+            // Unseen stretches may say nothing here: freed bodies predict the same.
+            let by_bodies = 1.0 / (1.0 + (-0.5 * above).exp());
+            if by_bodies > sure {
+                sure = by_bodies.min(MASSES_SURE);
+                let physics = "inertial_parameters".to_string();
+                alternatives.push(Alternative { physics, place: place(data, term), confidence: (1.0 - sure) / total });
+            }
+        }
+        let closed_loop = judged.get(order).and_then(|j| j.as_ref()).map(Judged::ratio);
+        if closed_loop.is_some_and(|ratio| ratio > AGAINST) {
+            sure = sure.min(0.5);
+        }
         let facts = term.physics.facts();
         let kin: f64 =
             rivals.iter().zip(&weights).filter(|(r, _)| r.term.physics.facts().family == facts.family).map(|(_, w)| w / total).sum();
@@ -156,8 +176,10 @@ fn findings(data: &Data, search: &Search) -> Vec<Finding> {
             family: Some(facts.family),
             family_confidence: (confidence + sure * kin).min(1.0),
             alternatives,
+            closed_loop,
         };
-        out.push((found.map_or(0.0, |g| g.mean), finding));
+        let against = closed_loop.is_some_and(|ratio| ratio > AGAINST);
+        out.push((if against { f64::NEG_INFINITY } else { found.map_or(0.0, |g| g.mean) }, finding));
     }
     out.sort_by(|a, b| b.0.total_cmp(&a.0));
     out.into_iter().map(|(_, f)| f).collect()
@@ -284,9 +306,9 @@ fn moved(data: &Data, search: &Search) -> BTreeMap<String, Moved> {
     }
     if best.structure.tolerance > 0 {
         for (k, (found, nominal)) in data.parameters(best).iter().zip(&data.problem.bodies.nominal).enumerate() {
-            for (i, name) in crate::inertial::NAMES.iter().enumerate() {
-                let index = k * crate::inertial::COUNT + i;
-                let error = best.errors[index] * data.problem.bodies.scale[k][i];
+            for (i, name) in NAMES.iter().enumerate() {
+                let along: Vec<(usize, f64)> = (0..COUNT).map(|b| (k * COUNT + b, data.problem.bodies.basis[k][(i, b)])).collect();
+                let error = best.spread(&along);
                 let sd = (found[i] - nominal[i]) / error.max(1e-300);
                 if sd.abs() > 1.96 {
                     let ci95 = [Some(found[i] - 1.96 * error), Some(found[i] + 1.96 * error)];

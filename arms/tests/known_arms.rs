@@ -3,7 +3,12 @@
 mod common;
 
 use backdrive_arms::diagnose::{Found, Settings, diagnose};
+use backdrive_arms::judge::{AGAINST, each, judge};
+use backdrive_arms::physics::Physics;
 use backdrive_arms::problem::Problem;
+use backdrive_arms::regression::Data;
+use backdrive_arms::search::{Search, added, search};
+use backdrive_arms::written::{Reading, model_of};
 use backdrive_diagnosis::hypothesis::Place;
 use backdrive_diagnosis::verdict::{Finding, Parameter, Word};
 use backdrive_plant::model::Model;
@@ -81,4 +86,27 @@ fn a_soft_gear_is_named_with_its_stiffness_and_written_as_a_motor_of_its_own() {
     let gear = model.elements.iter().find(|e| e.law.kind().name == "spring").expect("a spring");
     let ends: Vec<&str> = gear.between.iter().map(|end| model.place_name(*end)).collect();
     assert_eq!(ends, ["elbow.rotor", "elbow"]);
+}
+
+#[test]
+fn a_simulation_in_closed_loop_speaks_against_what_is_wrong() {
+    let folder = tempfile::tempdir().unwrap();
+    set(folder.path(), &Beside { dry: [0.2, 0.3], ..AS_STATED }, "", |_| {});
+    let problem = Problem::open(&RecordingSet::open(folder.path()).unwrap(), None).unwrap();
+    let mut data = Data::new(&problem, None, false).unwrap();
+    let mut found = search(&mut data, &[], 8).unwrap();
+    let ratio = |found: &Search| {
+        let (model, _) = model_of(&data, &found.best).unwrap();
+        let with = judge(&data, &model, &Reading::of(&data, &found.best)).unwrap();
+        each(&data, found, Some(&with))[0].as_ref().unwrap().ratio()
+    };
+    let right = ratio(&found);
+    assert!(right < 0.5, "{right}");
+    // The same friction at the elbow, three times as large.
+    let index = added(&found.best.structure)[0];
+    assert_eq!(found.best.structure.terms[index].physics, Physics::Coulomb);
+    let place = found.best.places[index].start;
+    found.best.values[place] *= 3.0;
+    let wrong = ratio(&found);
+    assert!(wrong > AGAINST, "{wrong}");
 }

@@ -93,6 +93,7 @@ mod tests {
             family: None,
             family_confidence: 0.0,
             alternatives: Vec::new(),
+            closed_loop: None,
         };
         assert_eq!(finding(&found), "backlash between motor and drum, 0.31 mm");
         let (motor, drum, force) = (between("motor", "ground"), between("drum", "ground"), Place::Signal("force".to_string()));

@@ -4,6 +4,7 @@ use super::phrases::capital;
 use crate::diagnose_text::{confidence, parameters};
 use crate::recordings::file_name;
 use backdrive_arms::diagnose::Tried;
+use backdrive_arms::judge::AGAINST;
 use backdrive_arms::problem::Problem;
 use backdrive_arms::said::{unexplained, words};
 use backdrive_diagnosis::audit::Weight;
@@ -24,6 +25,8 @@ pub(super) fn findings(page: &mut Page, verdict: &Verdict) {
     let mut headers = vec!["missing", "where", "numbers"];
     headers.extend(replacing.then_some("in place of"));
     headers.extend(["confidence", "or instead"]);
+    let simulated = all.iter().any(|f| f.closed_loop.is_some());
+    headers.extend(simulated.then_some("closed loop: correction with it, of that without"));
     let mut table = Table::new(headers);
     for finding in all {
         let sure = if finding.confidence > 0.8 { Tone::Good } else { Tone::Unsure };
@@ -36,6 +39,8 @@ pub(super) fn findings(page: &mut Page, verdict: &Verdict) {
         let mut row = vec![Cell::from(words(&finding.physics)), said::place(&finding.place).into(), parameters(finding).join("; ").into()];
         row.extend(replacing.then(|| Cell::from(finding.replaces.join(", "))));
         row.extend([Cell::tone(confidence(finding), sure), others.join("; ").into()]);
+        let tone = |ratio: f64| if ratio > AGAINST { Tone::Unsure } else { Tone::Good };
+        row.extend(simulated.then(|| finding.closed_loop.map_or(Cell::from("–"), |ratio| Cell::tone(percent(ratio), tone(ratio)))));
         table.push(row);
     }
     page.table(table);

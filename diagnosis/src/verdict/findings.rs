@@ -66,6 +66,7 @@ fn finding(search: &Search, best: &Candidate, spread: &Uncertainty, which: usize
         family: Some(hypothesis.physics.family),
         family_confidence: round_significant(probability_of_family(&figures).max(confidence), 3),
         alternatives: rivals.iter().zip(&weights).take(tuning().claim.alternatives).map(alternative).collect(),
+        closed_loop: None,
     }
 }
 

@@ -88,6 +88,7 @@ mod tests {
             family: None,
             family_confidence: 0.0,
             alternatives: vec![Alternative { physics: "coulomb".to_string(), place: at("drum"), confidence: rival }],
+            closed_loop: None,
         };
         assert!(first(0.04, 0.10).has_likelier_rival() && !first(0.97, 0.03).has_likelier_rival());
         assert_eq!(asserted(&first(0.04, 0.10)), "dry friction, at the motor or at the drum");

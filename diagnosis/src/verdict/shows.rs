@@ -47,6 +47,7 @@ mod tests {
             family: None,
             family_confidence: 0.0,
             alternatives: Vec::new(),
+            closed_loop: None,
         };
         let rubs = found("coulomb", Place::Between("drum".to_string(), "ground".to_string()));
         assert_eq!(state(Word::Missing, &[rubs], None).as_deref(), Some("reversals of the velocity across drum-ground"));

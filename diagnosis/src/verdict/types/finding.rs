@@ -33,6 +33,9 @@ pub struct Finding {
     /// What could stand in its place, the likeliest first.
     #[serde(default)]
     pub alternatives: Vec<Alternative>,
+    /// Of an arm that was simulated in closed loop: how much correction the loop adds with it, in times of what it adds without it. Above 1.05 it is not asserted.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub closed_loop: Option<f64>,
 }
 
 impl Finding {
