@@ -97,6 +97,12 @@ pub fn search(data: &mut Data, without: &[String], most: usize) -> Result<Search
     }
     best = data.fit(&best.structure, &weights).ok_or_else(failed)?;
     shrink(data, &mut best, &weights);
+    // What a factor of the torque is a factor of, and what friction grows with, is what these bodies take.
+    for _ in 0..2 {
+        let bodies = consistent(data, &best, &weights).ok_or_else(failed)?;
+        data.see(&data.parameters(&bodies))?;
+        best = data.fit(&best.structure, &weights).ok_or_else(failed)?;
+    }
     let refit = refitted(data, &nominal, &best.structure.slip, &weights).ok_or_else(failed)?;
     let as_given = data.fit(&Structure { slip: best.structure.slip.clone(), ..nominal }, &weights).ok_or_else(failed)?;
     let added: Vec<usize> = added(&best.structure);
