@@ -157,7 +157,7 @@ fn nyquist(found: &[(&LevelEstimate, &AxisEstimate)], gain: f64, title: &str) ->
 }
 
 /// Limits that leave out what lies far from +1, where anything does.
-fn within_reach(plot: Plot, points: &[(f64, f64)]) -> Plot {
+pub(super) fn within_reach(plot: Plot, points: &[(f64, f64)]) -> Plot {
     let near = |p: &&(f64, f64)| p.0.abs() <= NYQUIST_REACH && p.1.abs() <= NYQUIST_REACH;
     if points.iter().all(|p| near(&p) || !(p.0.is_finite() && p.1.is_finite())) {
         return plot;

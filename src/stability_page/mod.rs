@@ -1,5 +1,6 @@
 //! The report of `backdrive stability`: pictures first, the numbers beside them.
 
+mod axes;
 mod coupled;
 mod energy;
 mod gains;
@@ -43,6 +44,7 @@ pub fn page(found: &Answer, session: &Session, curve: &[&Point]) -> Page {
         page.table(methods(found));
         page.section("Loop, measured");
         measured(&mut page, found);
+        axes::axes(&mut page, found);
         page.section("Gain");
         gains(&mut page, found, curve);
         page.section(&format!("Response at μλ = {}", number(found.gain.product())));

@@ -19,7 +19,7 @@ mod tests;
 use crate::frequency::crossing;
 use crate::session::Session;
 use backdrive_nodes::graph::Graph;
-use eigenloci::{Matrix, alone, encirclements};
+use eigenloci::{Matrix, alone, encirclements, tracked};
 use models::loops;
 use serde::Serialize;
 
@@ -52,6 +52,12 @@ pub struct CoupledLoops {
     pub encirclements: i64,
     /// Axes that touched something in the recording; the models are those of that contact.
     pub touched: Vec<String>,
+    /// Lines of the eigenloci, Hz; not in files.
+    #[serde(skip)]
+    pub hz: Vec<f64>,
+    /// Of each eigenlocus its real and imaginary part at these lines, per unit of gain; not in files.
+    #[serde(skip)]
+    pub loci: Vec<Vec<[f64; 2]>>,
 }
 
 impl CoupledLoops {
@@ -93,6 +99,8 @@ fn of_loops(hz: &[f64], l: &[Matrix], session: &Session, touched: Vec<bool>, gai
         together: limit(hz, l),
         alone: (0..axes).map(|axis| (name(axis), limit(hz, &alone(l, axis)))).collect(),
         encirclements: encirclements(l, gain),
+        loci: tracked(l),
+        hz: hz.to_vec(),
         touched: touched.iter().enumerate().filter(|(_, touched)| **touched).map(|(axis, _)| name(axis)).collect(),
     }
 }
