@@ -1,5 +1,6 @@
 //! The answer as text.
 
+use crate::stability_page::CANCELLED;
 use backdrive_stability::nyquist::Limit;
 use backdrive_stability::verdict::Answer;
 use std::fmt::Write as _;
@@ -160,6 +161,9 @@ fn axes_together(found: &Answer, lines: &mut Lines) {
         ),
     );
     lines.put("", format!("alone, the others open: {}", each.join(", ")));
+    if loops.is_cancelled() {
+        lines.put("", CANCELLED.to_string());
+    }
     if loops.alone_misleads() {
         lines.put("", "the axes act on each other round the loop: what each allows alone is no answer for all of them".to_string());
     }

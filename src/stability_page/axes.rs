@@ -5,6 +5,10 @@ use backdrive_report::{Cell, Colour, Page, Plot, Series, Table, Tone, number, si
 use backdrive_stability::nyquist::{CoupledLoops, Limit};
 use backdrive_stability::verdict::Answer;
 
+/// What to make of loops that are nothing by the models.
+pub const CANCELLED: &str = "By the models next to nothing comes back round the loops: the canceller has the very model that the master has. \
+     That they are stable at any gain says nothing of a device that its model is not quite.";
+
 /// Eigenloci and limits; a sentence where the models do not tell; nothing of one axis.
 pub(super) fn axes(page: &mut Page, found: &Answer) {
     let loops = match &found.loops {
@@ -23,6 +27,9 @@ pub(super) fn axes(page: &mut Page, found: &Answer) {
         }
         n => format!("At the gain asked the eigenloci encircle +1: {n} unstable poles (generalised Nyquist criterion)."),
     });
+    if loops.is_cancelled() {
+        page.note(CANCELLED);
+    }
     page.figure(
         loci(loops, found.gain.product()),
         "Eigenvalues of the matrix of the loops at the gain asked, from the models about the contact that was recorded, without dry friction, \

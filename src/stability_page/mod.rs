@@ -10,6 +10,7 @@ mod words;
 
 use crate::page_parts::{ending, shell_word};
 use crate::stability::Point;
+pub use axes::CANCELLED;
 use backdrive_report::{Cell, Page, Table, Tone, number, percent, si};
 use backdrive_stability::frequency;
 use backdrive_stability::session::Session;

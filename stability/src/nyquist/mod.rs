@@ -29,6 +29,8 @@ const LINES: f64 = 300.0;
 const LOWEST_HZ: f64 = 0.02;
 /// No larger gain is asked for: what crosses there is rounding.
 const LARGEST: f64 = 1e6;
+/// A loop per unit of gain below which nothing comes back.
+const NOTHING: f64 = 1e-3;
 /// An axis alone is no measure of all where it has this many times their gain.
 const MISLEADING: f64 = 1.1;
 
@@ -64,6 +66,11 @@ impl CoupledLoops {
     /// The lowest gain at which an axis alone is on its edge; infinite where none is.
     pub fn lowest_alone(&self) -> f64 {
         self.alone.iter().filter_map(|(_, limit)| limit.critical_gain).fold(f64::INFINITY, f64::min)
+    }
+
+    /// Whether by the models next to nothing comes back round the loops: the canceller has the very model that the master has, or no force is reflected.
+    pub fn is_cancelled(&self) -> bool {
+        !self.loci.is_empty() && self.loci.iter().flatten().all(|[re, im]| re.hypot(*im) < NOTHING)
     }
 
     /// Whether the axes looked at one by one would allow gains at which all together are not stable.
