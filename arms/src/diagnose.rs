@@ -16,6 +16,8 @@ use crate::written::{Reading, model_of};
 use backdrive_diagnosis::audit::Weight;
 use backdrive_diagnosis::hypothesis::Place;
 use backdrive_diagnosis::verdict::{NextExperiment, Planned, PlannedPayload, Remark, Verdict};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Name of the file of the next experiment.
 pub const EXPERIMENT_FILE: &str = "next-motion.csv";
@@ -29,11 +31,13 @@ pub struct Settings {
     pub effects: usize,
     /// Corner of the regression's filter, Hz, where the motion shall not say it.
     pub corner_hz: Option<f64>,
+    /// Set by whoever interrupts: the search ends with what was found until then, and the verdict says so.
+    pub stop: Arc<AtomicBool>,
 }
 
 impl Default for Settings {
     fn default() -> Settings {
-        Settings { without: Vec::new(), effects: MOST, corner_hz: None }
+        Settings { without: Vec::new(), effects: MOST, corner_hz: None, stop: Arc::default() }
     }
 }
 
@@ -79,7 +83,8 @@ pub fn diagnose(problem: &Problem, settings: &Settings) -> Result<Found, ArmErro
     if let Some(bad) = remarks.iter().find(|r| r.weight == Weight::Unusable) {
         return Err(ArmError::Log { log: bad.place.clone(), message: bad.message.clone() });
     }
-    let mut found = search(&mut data, &settings.without, settings.effects)?;
+    let mut found = search(&mut data, &settings.without, settings.effects, &settings.stop)?;
+    let cut_short = settings.stop.load(Ordering::Relaxed);
     remarks.extend(load_remarks(&data, &found));
     let mut whole = Data::new(problem, settings.corner_hz, true)?;
     for fit in [&mut found.as_given, &mut found.refit, &mut found.best] {
@@ -105,6 +110,9 @@ pub fn diagnose(problem: &Problem, settings: &Settings) -> Result<Found, ArmErro
             backdrive_diagnosis::words::place(&place(&data, term))
         ));
     }
+    if cut_short {
+        notes.push("the search was interrupted: what else is missing was not looked for to the end".to_string());
+    }
     if added(&found.best.structure).len() >= settings.effects {
         notes.push(format!(
             "the search ended at {} physics, as many as were allowed (--effects): what remains may be others",
@@ -115,7 +123,8 @@ pub fn diagnose(problem: &Problem, settings: &Settings) -> Result<Found, ArmErro
     let next = next(&plan, problem);
     let drawn = drawn(&data, &whole, &found, &plan.excitation);
     let tried = found.tried.iter().map(|t| tried_of(&data, t)).collect();
-    let verdict = verdict(Parts { data: &data, whole: &whole, search: &found, audit: remarks, loops, judged, next: Some(next) })?;
+    let verdict =
+        verdict(Parts { data: &data, whole: &whole, search: &found, audit: remarks, loops, judged, next: Some(next), cut_short })?;
     Ok(Found { verdict, model: model.to_toml(), experiment: plan.excitation.csv(problem), notes, tried, drawn })
 }
 

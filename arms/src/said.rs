@@ -69,7 +69,8 @@ pub(crate) fn sentence(word: Word, findings: &[Finding], arm: &ArmPart, held: bo
         }
         Word::Unexplained => format!("Something is missing that no physics tried explains: {}.", open.join("; ")),
         Word::Parameters => format!("No physics is missing; the model's parameters are off, and refitted {tail}."),
-        Word::NothingMissing | Word::CannotTell => {
+        Word::CannotTell => format!("The search was interrupted before anything was found; {tail}."),
+        Word::NothingMissing => {
             let noise: Vec<String> = arm.joints.iter().filter_map(|j| Some(format!("{:.1} %", 100.0 * j.noise?))).collect();
             format!("Nothing that these logs would show is missing; {tail} (the sensors' noise would be {}).", noise.join(", "))
         }

@@ -7,6 +7,7 @@ use crate::offers::{is_possible, ranked, shaped, slipped, tolerated, torque_shar
 use crate::physics::{Physics, Term, candidates};
 use crate::regression::Data;
 use backdrive_diagnosis::predictive::{Gain, gain};
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Physics that are added at most.
 pub const MOST: usize = 8;
@@ -68,11 +69,12 @@ pub struct Rival {
     pub structure: Structure,
 }
 
-/// Looks for what is missing. `without`: names of physics that are not considered; `most`: physics that are added at most.
+/// Looks for what is missing. `without`: names of physics that are not considered; `most`: physics that are added at most; `stop`: set by whoever interrupts,
+/// which ends the search with what was found until then.
 ///
 /// # Errors
 /// Where a fit cannot be computed at all.
-pub fn search(data: &mut Data, without: &[String], most: usize) -> Result<Search, ArmError> {
+pub fn search(data: &mut Data, without: &[String], most: usize, stop: &AtomicBool) -> Result<Search, ArmError> {
     let failed = || ArmError::Robot("the regression has no solution; are all joints logged in motion?".to_string());
     let pool: Vec<Term> = candidates(data.problem, &data.motions[..data.fit_count])
         .into_iter()
@@ -87,7 +89,7 @@ pub fn search(data: &mut Data, without: &[String], most: usize) -> Result<Search
     for round in 0..2 {
         best = data.fit(&Structure { ..best.structure.clone() }, &weights).ok_or_else(failed)?;
         best = slipped(data, best, &weights);
-        grow(data, &pool, most, &mut best, &weights, &mut tried);
+        grow(data, &pool, most, &mut best, &weights, &mut tried, stop);
         if round == 0 {
             let bodies = consistent(data, &best, &weights).ok_or_else(failed)?;
             data.see(&data.parameters(&bodies))?;
@@ -169,7 +171,7 @@ pub fn largest_share(data: &Data, base: &Fit, better: &Fit) -> f64 {
 }
 
 /// Adds what is worth it.
-fn grow(data: &Data, pool: &[Term], most: usize, best: &mut Fit, weights: &Weights, tried: &mut Vec<Tried>) {
+fn grow(data: &Data, pool: &[Term], most: usize, best: &mut Fit, weights: &Weights, tried: &mut Vec<Tried>, stop: &AtomicBool) {
     // Adding and exchanging can take turns: what was there once ends it.
     let mut seen: Vec<Vec<(Physics, crate::physics::At)>> = Vec::new();
     while added(&best.structure).len() < most {
@@ -189,6 +191,9 @@ fn grow(data: &Data, pool: &[Term], most: usize, best: &mut Fit, weights: &Weigh
             terms.extend(hidden.filter(|t| !terms.contains(t)).collect::<Vec<_>>());
         }
         for term in terms {
+            if stop.load(Ordering::Relaxed) {
+                return;
+            }
             let Some(fit) = data.fit(&with(&best.structure, &term), weights) else { continue };
             let index = fit.structure.terms.len() - 1;
             // Beside some physics the file's inertial parameters are better, beside others worse than alone.

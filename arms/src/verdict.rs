@@ -15,7 +15,7 @@ use backdrive_diagnosis::hypothesis::Place;
 use backdrive_diagnosis::predictive::gain;
 use backdrive_diagnosis::verdict::{
     Alternative, ArmJoint, ArmPart, Estimate, Estimates, Finding, HeldOut, MODEL_FILE, Moved, NextExperiment, Parameter, RecordErrors,
-    Remark, SCHEMA, Verdict, Word,
+    Remark, SCHEMA, Searched, Verdict, Word,
 };
 use statrs::distribution::{ContinuousCDF, Normal};
 use std::collections::BTreeMap;
@@ -42,6 +42,8 @@ pub struct Parts<'a> {
     pub judged: Vec<Option<Judged>>,
     /// What to record next.
     pub next: Option<NextExperiment>,
+    /// Whether the search was interrupted.
+    pub cut_short: bool,
 }
 
 /// Where a term acts, as verdicts have it.
@@ -66,7 +68,7 @@ pub fn place(data: &Data, term: &Term) -> Place {
 /// # Errors
 /// Where the robot cannot be computed.
 pub fn verdict(parts: Parts) -> Result<Verdict, ArmError> {
-    let Parts { data, whole, search, audit, loops, judged, next } = parts;
+    let Parts { data, whole, search, audit, loops, judged, next, cut_short } = parts;
     let findings = findings(data, search, &judged);
     let held = data.fit_count < data.motions.len();
     let moved = moved(data, search);
@@ -79,6 +81,7 @@ pub fn verdict(parts: Parts) -> Result<Verdict, ArmError> {
     let word = match (findings.is_empty(), alike) {
         (false, true) => Word::Ambiguous,
         (false, false) => Word::Missing,
+        (true, _) if cut_short => Word::CannotTell,
         (true, _) if left.iter().any(|l| l.shows.is_some()) => Word::Unexplained,
         (true, _) if refit_helps && !moved.is_empty() => Word::Parameters,
         (true, _) => Word::NothingMissing,
@@ -102,7 +105,7 @@ pub fn verdict(parts: Parts) -> Result<Verdict, ArmError> {
         rival_models: Vec::new(),
         next_experiment: next,
         detectable: None,
-        searched: None,
+        searched: cut_short.then_some(Searched { steps: 0, exhausted: false, cut_short }),
         arm: Some(Box::new(arm)),
         findings,
     })

@@ -14,6 +14,7 @@ use backdrive_diagnosis::verdict::{Finding, Parameter, Word};
 use backdrive_plant::model::Model;
 use backdrive_plant::set::RecordingSet;
 use common::{AS_STATED, Beside, set};
+use std::sync::atomic::AtomicBool;
 
 fn found(beside: &Beside) -> Found {
     let folder = tempfile::tempdir().unwrap();
@@ -94,7 +95,7 @@ fn a_simulation_in_closed_loop_speaks_against_what_is_wrong() {
     set(folder.path(), &Beside { dry: [0.2, 0.3], ..AS_STATED }, "", |_| {});
     let problem = Problem::open(&RecordingSet::open(folder.path()).unwrap(), None).unwrap();
     let mut data = Data::new(&problem, None, false).unwrap();
-    let mut found = search(&mut data, &[], 8).unwrap();
+    let mut found = search(&mut data, &[], 8, &AtomicBool::new(false)).unwrap();
     let ratio = |found: &Search| {
         let (model, _) = model_of(&data, &found.best).unwrap();
         let with = judge(&data, &model, &Reading::of(&data, &found.best)).unwrap();
@@ -109,4 +110,16 @@ fn a_simulation_in_closed_loop_speaks_against_what_is_wrong() {
     found.best.values[place] *= 3.0;
     let wrong = ratio(&found);
     assert!(wrong > AGAINST, "{wrong}");
+}
+
+#[test]
+fn an_interrupted_search_says_so_and_gives_no_green_answer() {
+    let folder = tempfile::tempdir().unwrap();
+    set(folder.path(), &Beside { dry: [0.2, 0.3], ..AS_STATED }, "", |_| {});
+    let problem = Problem::open(&RecordingSet::open(folder.path()).unwrap(), None).unwrap();
+    let settings = Settings::default();
+    settings.stop.store(true, std::sync::atomic::Ordering::Relaxed);
+    let found = diagnose(&problem, &settings).unwrap();
+    assert_eq!(found.verdict.word, Word::CannotTell);
+    assert!(found.verdict.searched.as_ref().is_some_and(|s| s.cut_short) && found.notes.iter().any(|n| n.contains("interrupted")));
 }
