@@ -59,5 +59,10 @@ pub enum Told {
     /// An event, as it is published.
     Event(backdrive_msgs::Event),
     /// About ten times a second of real time.
-    Status(NodeStatus),
+    Status {
+        /// [`backdrive_msgs::source_id`] of the node that it is of.
+        source: u32,
+        /// How that node is doing.
+        status: NodeStatus,
+    },
 }
