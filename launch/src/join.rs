@@ -106,6 +106,7 @@ where
         };
         (t.topic.name, listeners)
     };
+    options.run.polls = graph.polls;
     options.run.listeners = topics(&graph).into_iter().map(expected).collect();
     run_processes(plans, &graph.timing, transport, options)
 }

@@ -48,6 +48,8 @@ pub struct Graph {
     pub nodes: Vec<Node>,
     /// In the order of the file.
     pub connections: Vec<Connection>,
+    /// Whether nodes wait by looking all the time, which keeps a processor busy for each process.
+    pub polls: bool,
     /// Nodes that share a process, as their indices; every other node is a process of its own.
     pub together: Vec<Vec<usize>>,
     /// Every file that was read for it but the graph itself: (path as in `text`, text).

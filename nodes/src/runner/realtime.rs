@@ -3,7 +3,7 @@
 use super::control::{Control, SLICE_NS, Told};
 use super::error::RunError;
 use super::state::Runner;
-use crate::clock::{Start, now_ns, sleep_until_ns};
+use crate::clock::{Start, now_ns, poll_until_ns, sleep_until_ns};
 use crate::input::Input;
 use crate::sentences::sentence;
 use std::time::Duration;
@@ -86,6 +86,7 @@ impl Runner {
             }
             match waits_for_input {
                 true => self.transport.wait(Duration::from_nanos((wake_at - now) as u64))?,
+                false if self.options.polls => poll_until_ns(wake_at),
                 false => sleep_until_ns(wake_at),
             }
         }

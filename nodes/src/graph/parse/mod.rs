@@ -75,6 +75,7 @@ impl Graph {
             nodes: Vec::new(),
             connections: Vec::new(),
             together: Vec::new(),
+            polls: top.one_of("wait", &[("sleep", false), ("poll", true)])?.unwrap_or(false),
             files: Vec::new(),
             experiments: Vec::new(),
         };
