@@ -55,7 +55,6 @@ pub fn run_processes(plans: Vec<NodePlan>, timing: &Timing, transport: Box<dyn T
             return Ok(NodeStatus::default());
         };
         let mut tell = |told| line.tell(told);
-        realtime::short_slices();
         if timing.clock == Clock::Realtime {
             let refused = realtime::enter(&options.realtime);
             if !refused.is_empty() {

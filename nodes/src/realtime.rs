@@ -56,39 +56,6 @@ pub fn enter(options: &Options) -> Vec<String> {
     refused
 }
 
-/// What `sched_setattr` takes, as the kernel lays it out.
-#[repr(C)]
-#[derive(Default)]
-struct Attributes {
-    size: u32,
-    policy: u32,
-    flags: u64,
-    nice: i32,
-    priority: u32,
-    runtime: u64,
-    deadline: u64,
-    period: u64,
-}
-
-/// The shortest slice that the kernel grants, ns.
-const SHORT_SLICE_NS: u64 = 100_000;
-
-/// Asks for short slices for the calling thread, where it is under the ordinary scheduler: what is woken with a short slice takes the
-/// processor from what has a long one, in place of waiting for up to 4 ms until that is used up. It needs no privilege. Kernels before
-/// 6.12 know nothing of it, and go on as before.
-pub(crate) fn short_slices() {
-    let mut now = Attributes::default();
-    let size = std::mem::size_of::<Attributes>() as u32;
-    // SAFETY: the kernel writes at most `size` bytes into the structure, and reads as many from it; 0 is the calling thread.
-    unsafe {
-        if libc::syscall(libc::SYS_sched_getattr, 0, &mut now, size, 0) == 0 && now.policy == libc::SCHED_OTHER as u32 {
-            now.size = size;
-            now.runtime = SHORT_SLICE_NS;
-            libc::syscall(libc::SYS_sched_setattr, 0, &now, 0);
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

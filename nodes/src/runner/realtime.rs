@@ -81,7 +81,7 @@ impl Runner {
             self.report_if_due(now, tell);
             self.tell_late(now, unix(now), tell);
             // What a stage has just sent may be what one of the same process waits for, and rings no bell.
-            if wake_at <= now || stepped && waits_for_input && self.members.len() > 1 {
+            if wake_at <= now || stepped && waits_for_input {
                 continue;
             }
             match waits_for_input {

@@ -252,7 +252,8 @@ impl Table {
             _ => false,
         };
         if !nested {
-            return Ok(self.strings(key)?.map(|one| vec![one]));
+            let lists = |one: Vec<String>| if one.is_empty() { Vec::new() } else { vec![one] };
+            return Ok(self.strings(key)?.map(lists));
         }
         let Some(node) = self.take(key) else { return Ok(None) };
         let Value::Array(lists) = &node.value else { return Err(self.wrong_type(key, &node, "a list of lists of strings")) };
