@@ -10,6 +10,8 @@ use backdrive_msgs::{Message, Sample};
 use backdrive_nodes::build::plan;
 use backdrive_nodes::graph::{Graph, NodeKind, Overrides};
 use backdrive_nodes::sequence::Sequence;
+use backdrive_nodes::transport::iceoryx2::Iceoryx2;
+use backdrive_nodes::transport::{Location, Transport};
 use backdrive_plant::model::Model;
 use backdrive_plant::stepper::{Options, Plant, Segment, simulate};
 use std::fmt::Write;
@@ -21,7 +23,7 @@ use std::time::Duration;
 type Work = fn(usize) -> f64;
 
 /// By name; each gives a number that depends on all of its work.
-const COUNTERS: &[(&str, Work)] = &[("step", step), ("chain", chain), ("simulate", simulated), ("record", record)];
+const COUNTERS: &[(&str, Work)] = &[("step", step), ("chain", chain), ("simulate", simulated), ("record", record), ("hop", hop)];
 
 fn at(path: &str) -> std::path::PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join(path)
@@ -86,6 +88,30 @@ fn record(count: usize) -> f64 {
     }
     let verdict = recorder.finish().expect("ends");
     verdict.written() as f64 - verdict.lost() as f64
+}
+
+/// A sample over shared memory from its publisher to two subscribers, one of which would be woken if it slept.
+fn hop(count: usize) -> f64 {
+    let root = tempfile::tempdir().expect("a folder");
+    let location = Location { prefix: format!("counted{}_", std::process::id()), root: root.path().join("run") };
+    let mut transport = Iceoryx2::open(&location, "counted").expect("shared memory");
+    let topic = Topic { name: "/counted".to_owned(), kind: Kind::Sample };
+    let mut publisher = transport.publisher(&topic, 2).expect("publishes");
+    let mut subscribers = [true, false].map(|wakes| transport.subscriber(&topic, usize::MAX, wakes).expect("subscribes"));
+    let (mut sample, mut sum) = (Sample::new(1), 0.0);
+    publisher.listeners();
+    for step in 0..count {
+        (sample.step, sample.sequence, sample.position[0]) = (step as u64, step as u64, step as f64);
+        publisher.send(&Message::Sample(sample)).expect("sends");
+        for subscriber in &mut subscribers {
+            if let Some(Message::Sample(heard)) = subscriber.receive().expect("receives") {
+                sum += heard.position[0];
+            }
+        }
+    }
+    drop((publisher, subscribers, transport));
+    location.remove().expect("removes what it left");
+    sum
 }
 
 fn main() -> ExitCode {

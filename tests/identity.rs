@@ -84,6 +84,35 @@ fn over_a_bad_connection() {
     assert_eq!(diff(&place, "other.mcap", "apart.mcap").code, Some(1), "another seed changed nothing");
 }
 
+/// Nodes that share a process say on their topics what they say in processes of their own.
+#[test]
+fn nodes_together_in_a_process() {
+    let place = Place::new();
+    let changes = ["--guard", "--dither", "--lambda", "5"];
+    run(&place, &file("launch/contact.toml"), "iceoryx2", "apart.mcap", &changes);
+    for (together, sharing) in [
+        ("[\"scaling\", \"canceller\"]", 2),
+        ("[[\"operator\", \"master\"], [\"slave\", \"scaling\"]]", 4),
+        ("[\"slave\", \"scaling\", \"canceller\", \"master\", \"operator\"]", 5),
+    ] {
+        let text = format!("together = {together}\n{}", graph_text("launch/contact.toml"));
+        let graph = place.write("together.toml", &text).display().to_string();
+        let mut arguments = vec!["run", &graph, "--bag", "together.mcap", "--duration", SHORT, "--json", "--overwrite"];
+        arguments.extend(changes);
+        let done = place.backdrive(&arguments);
+        let report = done.json();
+        assert_eq!(report["lost"], 0, "{done:?}");
+        // Every node is reported under its own name, with those that shared its process.
+        let nodes = report["run"]["nodes"].as_array().unwrap();
+        for name in ["operator", "master", "canceller", "scaling", "slave", "recorder"] {
+            let node = nodes.iter().find(|n| n["name"] == name).unwrap_or_else(|| panic!("{name} is not reported: {report}"));
+            assert_eq!((&node["end"], &node["status"]["steps"]), (&"done".into(), &5000.into()), "{report}");
+        }
+        assert_eq!(nodes.iter().filter(|n| n["with"].is_array()).count(), sharing, "{report}");
+        assert_same(&place, "apart.mcap", "together.mcap", 9 * 5000);
+    }
+}
+
 /// A copy of a bag in which one message is changed.
 fn copy_with(from: &Path, to: &Path, mut change: impl FnMut(&str, &mut Message)) {
     let reader = Reader::open(from).unwrap();

@@ -257,6 +257,35 @@ fn a_slave_that_is_started_again_brings_the_force_back() {
     place.assert_clean(&runs);
 }
 
+/// Two nodes in one process die together and come back together; each says so itself.
+#[test]
+fn nodes_together_in_a_process_come_back_together() {
+    let (_alone, place) = (alone(), Place::new());
+    let mut graph = format!("together = [\"scaling\", \"canceller\"]\n{}", graph_text("launch/contact.toml"));
+    for kind in ["scaling", "canceller"] {
+        graph = graph.replace(&format!("kind = \"{kind}\"\n"), &format!("kind = \"{kind}\"\nrestart = true\n"));
+    }
+    let (run, bag) = start(&place, &graph, "2.9");
+    let runs = place.runs();
+    assert_eq!(place.processes().len(), 5);
+    let first = place.process("scaling").unwrap();
+    kill(first, Signal::SIGKILL);
+    until("another process", || place.process("scaling").is_some_and(|pid| pid != first));
+    let done = run.end();
+    assert_eq!(done.code, Some(7), "{done:?}");
+    assert!(done.stderr.contains("`scaling+canceller` is back"), "{done:?}");
+    let report = done.json();
+    let death = &report["run"]["deaths"][0];
+    assert_eq!((&death["node"], &death["recovered"], &report["lost"]), (&"scaling+canceller".into(), &true.into(), &0.into()));
+    for (name, other) in [("scaling", "canceller"), ("canceller", "scaling")] {
+        let node = report["run"]["nodes"].as_array().unwrap().iter().find(|n| n["name"] == name).unwrap();
+        assert_eq!((&node["restarts"], &node["with"][0]), (&1.into(), &other.into()), "{node}");
+        let told: Vec<String> = events(&bag, name).into_iter().map(|(_, kind, _)| kind).collect();
+        assert!(told.iter().any(|k| k == "joined_late"), "{name}: {told:?}");
+    }
+    place.assert_clean(&runs);
+}
+
 /// Nobody dies, but next to nothing comes through: staleness travels along the loop in lockstep too.
 #[test]
 fn a_connection_that_fails_lets_the_force_go() {

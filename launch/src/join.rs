@@ -6,7 +6,7 @@ use backdrive_bags::{BagError, BagHeader, Recorder, RecorderOptions, TopicInfo};
 use backdrive_control::core::Core;
 use backdrive_nodes::build::{self, GraphTopic, credit_listeners, listeners_on, topics};
 use backdrive_nodes::graph::{Files, Graph, Node, NodeKind, Overrides};
-use backdrive_nodes::process::{ProcessOptions, run_process};
+use backdrive_nodes::process::{ProcessOptions, run_processes};
 use backdrive_nodes::protocol::FromNode;
 use backdrive_nodes::realtime;
 use backdrive_nodes::recorder::{RecorderPlan, run_recorder};
@@ -87,8 +87,11 @@ where
             Err(e) => fail(e.to_string(), 5),
         };
     }
-    let plan = match plan(&graph, node) {
-        Ok(plan) => plan,
+    // A program of the user's own is never with others.
+    let others = graph.process_of(name).into_iter().filter(|n| n.name != name);
+    let others = others.map(|n| build::plan(&graph, &n.name).map_err(|e| e.to_string()));
+    let plans: Vec<_> = match std::iter::once(plan(&graph, node)).chain(others).collect::<Result<_, _>>() {
+        Ok(plans) => plans,
         Err(e) => return fail(e, 3),
     };
     let mut options = ProcessOptions::default();
@@ -103,8 +106,9 @@ where
         };
         (t.topic.name, listeners)
     };
+    options.run.polls = graph.polls;
     options.run.listeners = topics(&graph).into_iter().map(expected).collect();
-    run_process(plan, &graph.timing, transport, options)
+    run_processes(plans, &graph.timing, transport, options)
 }
 
 /// The graph of a run as its processes read it: the resolved text, and the files as they were when the run began.

@@ -20,6 +20,7 @@ mod child;
 mod error;
 mod hosts;
 pub mod join;
+mod member;
 mod options;
 mod pace;
 mod paths;

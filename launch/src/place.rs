@@ -54,7 +54,7 @@ impl Place {
     /// The transport refuses.
     pub fn join(&self, paths: &RunPaths, graph: &Graph, name: &str) -> Result<Box<dyn Transport>, TransportError> {
         Ok(match self.wire {
-            Wire::Iceoryx2 => Box::new(Iceoryx2::open(&paths.location(), name)?),
+            Wire::Iceoryx2 => Box::new(Iceoryx2::open(&paths.location(), name)?.polling(graph.polls)),
             Wire::Ros2 => Box::new(self.join_ros2(graph, name)?),
         })
     }

@@ -31,6 +31,8 @@ pub struct NodePlan {
     pub name: String,
     /// The name of its kind, such as `master`.
     pub kind: String,
+    /// Nodes that share the process with it.
+    pub others: Vec<Named>,
     /// The user's own program and its arguments; `--run ROOT --name NAME` is added to them.
     pub command: Option<Vec<String>>,
     /// Whether it is started again when it dies (real time only).
@@ -41,17 +43,42 @@ pub struct NodePlan {
     pub has_gains: bool,
 }
 
+/// A node by its name.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Named {
+    /// Unique in the graph.
+    pub name: String,
+    /// The name of its kind, such as `master`.
+    pub kind: String,
+}
+
+impl NodePlan {
+    /// All nodes of the process.
+    pub fn nodes(&self) -> impl Iterator<Item = Named> {
+        std::iter::once(Named { name: self.name.clone(), kind: self.kind.clone() }).chain(self.others.iter().cloned())
+    }
+
+    /// The process for a person: the name of its node, or the names of its nodes, such as `scaling+canceller`.
+    pub fn label(&self) -> String {
+        self.nodes().map(|n| n.name).collect::<Vec<_>>().join("+")
+    }
+}
+
 impl Plan {
     /// What the supervisor needs of this graph, on this host if it has several, and where its nodes meet.
     pub fn of(graph: &Graph, place: &Place) -> Plan {
         let here = |n: &&Node| place.host.as_deref().is_none_or(|host| graph.runs_on(n, host));
-        let nodes = graph.nodes.iter().filter(here).map(|n| NodePlan {
+        let named = |n: &Node| Named { name: n.name.clone(), kind: n.kind.name().to_string() };
+        // A process is where the node stands that leads it.
+        let leads = |n: &&Node| graph.process_of(&n.name).first().is_some_and(|first| first.name == n.name);
+        let nodes = graph.nodes.iter().filter(here).filter(leads).map(|n| NodePlan {
             name: n.name.clone(),
             kind: n.kind.name().to_string(),
+            others: graph.process_of(&n.name).into_iter().skip(1).map(named).collect(),
             command: n.command.clone(),
             restart: n.restart,
             records: n.kind == NodeKind::Recorder,
-            has_gains: n.kind.closes_loop(),
+            has_gains: graph.process_of(&n.name).iter().any(|n| n.kind.closes_loop()),
         });
         Plan {
             title: graph.title.clone(),

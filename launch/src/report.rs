@@ -46,7 +46,7 @@ pub struct RunReport {
     pub bag: Option<PathBuf>,
     /// Messages and bytes in the bag, as last told by the recorder.
     pub recorded: Option<(u64, u64)>,
-    /// In the order of the graph.
+    /// In the order of the graph; nodes that share a process follow the one that leads it.
     pub nodes: Vec<NodeReport>,
     /// In the order in which they arrived, the first ten thousand.
     pub events: Vec<RunEvent>,
@@ -78,6 +78,9 @@ pub struct NodeReport {
     pub restarts: u32,
     /// How its last life ended, such as `done`.
     pub end: String,
+    /// Nodes that shared its process: what restarts and how it ended is said of is that process.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub with: Vec<String>,
 }
 
 /// Something that happened.

@@ -1,18 +1,16 @@
-//! The place of a node in a run, over all lives of its process.
+//! The place of a process in a run, over all lives of its process.
 
 use crate::child::Child;
+use crate::member::Member;
 use crate::pace::Pace;
 use crate::plan::NodePlan;
 use backdrive_nodes::protocol::{NodeStatus, ToNode};
 use nix::sys::signal::Signal;
 use std::collections::VecDeque;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 /// Lines of standard error that are kept for the report.
 const LAST_LINES: usize = 20;
-
-/// Peaks of the last second, as many as there can be status messages.
-const PEAKS: usize = 32;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Phase {
@@ -53,11 +51,8 @@ pub(crate) struct Slot {
     pub failed: Option<(String, u8)>,
     pub asked: Asked,
     pub asked_at: Instant,
-    pub status: Option<NodeStatus>,
-    /// Missed deadlines and losses of former lives.
-    before: (u64, u64),
-    pub peak: f64,
-    peaks: VecDeque<(Instant, f64)>,
+    /// The nodes of the process, at least one.
+    pub members: Vec<Member>,
     /// When its steps last advanced.
     pub progress: Instant,
     /// When it was last heard.
@@ -72,6 +67,7 @@ pub(crate) struct Slot {
 
 impl Slot {
     pub fn new(plan: NodePlan, now: Instant) -> Slot {
+        let members = plan.nodes().map(Member::new).collect();
         Slot {
             plan,
             child: None,
@@ -85,10 +81,7 @@ impl Slot {
             failed: None,
             asked: Asked::No,
             asked_at: now,
-            status: None,
-            before: (0, 0),
-            peak: 0.0,
-            peaks: VecDeque::new(),
+            members,
             progress: now,
             heard: now,
             silent: false,
@@ -107,9 +100,7 @@ impl Slot {
 
     /// A new process takes the place.
     pub fn begin(&mut self, child: Child, now: Instant) {
-        if let Some(status) = &self.status {
-            self.before = (status.missed_deadlines, status.lost);
-        }
+        self.members.iter_mut().for_each(Member::begin);
         self.child = Some(child);
         self.created = false;
         self.missing.clear();
@@ -148,35 +139,21 @@ impl Slot {
         }
     }
 
-    pub fn take_status(&mut self, mut status: NodeStatus, now: Instant) {
-        status.missed_deadlines += self.before.0;
-        status.lost += self.before.1;
-        let steps = self.status.as_ref().map_or(0, |s| s.steps);
-        let recorded = self.status.as_ref().and_then(|s| s.recorded);
-        if status.steps > steps || (status.recorded.is_some() && status.recorded != recorded) {
+    /// Takes what a node of the process says of itself; one that it does not name is the first.
+    pub fn take_status(&mut self, node: Option<&str>, status: NodeStatus, now: Instant) {
+        let index = node.and_then(|name| self.members.iter().position(|m| m.node.name == name)).unwrap_or(0);
+        if self.members.get_mut(index).is_some_and(|m| m.take_status(status, now)) {
             self.progress = now;
         }
-        // A node that was started again may count from 0.
-        status.steps = status.steps.max(steps);
-        if status.peak_effort.is_finite() {
-            self.peak = self.peak.max(status.peak_effort);
-            self.peaks.push_back((now, status.peak_effort));
-            while self.peaks.len() > PEAKS {
-                self.peaks.pop_front();
-            }
-        }
-        status.peak_effort = self.peak;
-        self.status = Some(status);
     }
 
     /// Largest effort of the last second, N.
     pub fn recent_peak(&self, now: Instant) -> Option<f64> {
-        let recent = self.peaks.iter().filter(|(at, _)| now.saturating_duration_since(*at) < Duration::from_secs(1));
-        recent.map(|(_, peak)| *peak).reduce(f64::max)
+        self.members.iter().filter_map(|m| m.recent_peak(now)).reduce(f64::max)
     }
 
     pub fn steps(&self) -> u64 {
-        self.status.as_ref().map_or(0, |s| s.steps)
+        self.members.first().and_then(|m| m.status.as_ref()).map_or(0, |s| s.steps)
     }
 
     pub fn wrote(&mut self, line: String) {
@@ -188,7 +165,7 @@ impl Slot {
 
     /// Why it is not ready, for a person.
     pub fn lack(&self) -> String {
-        let name = &self.plan.name;
+        let name = self.plan.label();
         match (&self.missing[..], self.created) {
             ([], false) => format!("{name}: has not said a word; does the program speak the node protocol?"),
             ([], true) => format!("{name}: is still connecting"),
@@ -205,13 +182,13 @@ mod tests {
     fn losses_add_up_over_lives_and_steps_do_not_go_back() {
         let now = Instant::now();
         let mut slot = Slot::new(NodePlan::default(), now);
-        slot.take_status(NodeStatus { steps: 90, lost: 2, missed_deadlines: 1, peak_effort: 5.0, ..NodeStatus::default() }, now);
-        slot.before = (1, 2);
-        slot.take_status(NodeStatus { steps: 10, lost: 4, peak_effort: 3.0, ..NodeStatus::default() }, now);
-        let status = slot.status.unwrap_or_default();
+        slot.take_status(None, NodeStatus { steps: 90, lost: 2, missed_deadlines: 1, peak_effort: 5.0, ..NodeStatus::default() }, now);
+        slot.members[0].before = (1, 2);
+        slot.take_status(None, NodeStatus { steps: 10, lost: 4, peak_effort: 3.0, ..NodeStatus::default() }, now);
+        let status = slot.members[0].status.unwrap_or_default();
         assert_eq!((status.steps, status.lost, status.missed_deadlines, status.peak_effort), (90, 6, 1, 5.0));
         assert_eq!(slot.recent_peak(now), Some(5.0));
-        assert_eq!(slot.recent_peak(now + Duration::from_secs(2)), None);
+        assert_eq!(slot.recent_peak(now + std::time::Duration::from_secs(2)), None);
     }
 
     #[test]

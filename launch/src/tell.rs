@@ -1,10 +1,13 @@
 //! What the supervisor tells a person during the run, and the report after it.
 
+use crate::member::Member;
+use crate::plan::Named;
 use crate::report::{Cause, NodeReport, RunEvent, RunReport};
 use crate::screen::Display;
 use crate::slot::{Phase, Slot};
 use crate::status::Summary;
 use crate::watch::{MOST_EVENTS, Supervisor, seconds_since};
+use backdrive_nodes::protocol::NodeStatus;
 use std::time::{Duration, Instant};
 
 /// How long the pace is averaged.
@@ -50,10 +53,11 @@ impl Supervisor {
     pub fn pass_on(&mut self, index: usize, line: &str, now: Instant) {
         let slot = &mut self.slots[index];
         let Some(held) = slot.lines.pass(now) else { return };
+        let label = slot.plan.label();
         if held > 0 {
-            self.screen.line(format!("{} | ({held} lines not shown)", slot.plan.name));
+            self.screen.line(format!("{label} | ({held} lines not shown)"));
         }
-        self.screen.line(format!("{} | {line}", slot.plan.name));
+        self.screen.line(format!("{label} | {line}"));
     }
 
     pub fn keep_pace(&mut self, index: usize, now: Instant) {
@@ -72,7 +76,7 @@ impl Supervisor {
     pub fn show(&mut self, now: Instant) {
         for index in 0..self.slots.len() {
             let slot = &mut self.slots[index];
-            let name = &slot.plan.name;
+            let name = slot.plan.label();
             if let Some(held) = slot.lines.settle(now) {
                 self.screen.line(format!("{name} | ({held} lines not shown)"));
             }
@@ -86,8 +90,7 @@ impl Supervisor {
     }
 
     fn doing(&self, now: Instant) -> String {
-        let names =
-            |with: fn(&Slot) -> bool| -> Vec<&str> { self.slots.iter().filter(|s| with(s)).map(|s| s.plan.name.as_str()).collect() };
+        let names = |with: fn(&Slot) -> bool| -> Vec<String> { self.slots.iter().filter(|s| with(s)).map(|s| s.plan.label()).collect() };
         if self.stopping {
             return format!("stopping, waiting for {}", names(|s| !s.ended()).join(", "));
         }
@@ -123,12 +126,12 @@ impl Supervisor {
             steps_per_s,
             loop_p50_us,
             loop_p99_us,
-            lost: self.slots.iter().flat_map(|s| &s.status).map(|s| s.lost).sum(),
-            missed_deadlines: self.slots.iter().flat_map(|s| &s.status).map(|s| s.missed_deadlines).sum(),
+            lost: self.statuses().map(|s| s.lost).sum(),
+            missed_deadlines: self.statuses().map(|s| s.missed_deadlines).sum(),
             peak_effort: self.slots.iter().filter(|s| !s.plan.records).filter_map(|s| s.recent_peak(now)).reduce(f64::max),
-            margin: self.slots.iter().flat_map(|s| &s.status).find_map(|s| s.margin).map(|m| m.to_string()),
-            bag_bytes: self.slots.iter().flat_map(|s| &s.status).find_map(|s| s.recorded).map(|(_, bytes)| bytes),
-            dead: self.slots.iter().filter(|s| lost(s)).map(|s| s.plan.name.clone()).collect(),
+            margin: self.statuses().find_map(|s| s.margin).map(|m| m.to_string()),
+            bag_bytes: self.statuses().find_map(|s| s.recorded).map(|(_, bytes)| bytes),
+            dead: self.slots.iter().filter(|s| lost(s)).map(|s| s.plan.label()).collect(),
         }
     }
 
@@ -136,20 +139,27 @@ impl Supervisor {
         self.slots.iter().filter(|s| !s.plan.records).map(Slot::steps).max().unwrap_or(0)
     }
 
+    /// Of every node that has said how it does.
+    fn statuses(&self) -> impl Iterator<Item = &NodeStatus> {
+        self.slots.iter().flat_map(|s| &s.members).filter_map(|m| m.status.as_ref())
+    }
+
+    /// Nodes other than the recorder that have said how they do.
+    fn running(&self) -> impl Iterator<Item = (&Named, &NodeStatus)> {
+        self.slots.iter().filter(|s| !s.plan.records).flat_map(|s| &s.members).filter_map(|m| Some((&m.node, m.status.as_ref()?)))
+    }
+
     /// The master's loop times, or without a master those of the slowest node.
     fn loop_times(&self) -> (Option<String>, Option<f64>, Option<f64>) {
-        let timed =
-            || self.slots.iter().filter(|s| !s.plan.records && s.status.as_ref().is_some_and(|t| t.steps > 0 && t.loop_p50_us > 0.0));
-        let time = |s: &&Slot| s.status.as_ref().map_or(0.0, |t| t.loop_p50_us);
-        let slot = timed().find(|s| s.plan.kind == "master").or_else(|| timed().max_by(|a, b| time(a).total_cmp(&time(b))));
-        let status = slot.and_then(|s| s.status.as_ref());
-        (slot.map(|s| s.plan.name.clone()), status.map(|t| t.loop_p50_us), status.map(|t| t.loop_p99_us))
+        let timed = || self.running().filter(|(_, t)| t.steps > 0 && t.loop_p50_us > 0.0);
+        let slowest = || timed().max_by(|(_, a), (_, b)| a.loop_p50_us.total_cmp(&b.loop_p50_us));
+        let found = timed().find(|(node, _)| node.kind == "master").or_else(slowest);
+        (found.map(|(node, _)| node.name.clone()), found.map(|(_, t)| t.loop_p50_us), found.map(|(_, t)| t.loop_p99_us))
     }
 
     fn latest_node(&self) -> Option<(String, u64)> {
-        let missed = |s: &Slot| s.status.as_ref().map_or(0, |t| t.missed_deadlines);
-        let slot = self.slots.iter().filter(|s| !s.plan.records && missed(s) > 0).max_by_key(|s| missed(s))?;
-        Some((slot.plan.name.clone(), missed(slot)))
+        let (node, status) = self.running().filter(|(_, t)| t.missed_deadlines > 0).max_by_key(|(_, t)| t.missed_deadlines)?;
+        Some((node.name.clone(), status.missed_deadlines))
     }
 
     /// What is known when all have ended.
@@ -158,17 +168,22 @@ impl Supervisor {
         let steps = self.steps();
         let duration_s = self.start.map_or(0.0, |s| seconds_since(self.finished.unwrap_or(now), s.at).max(0.0));
         let (loop_node, loop_p50_us, loop_p99_us) = self.loop_times();
-        let statuses = |records: bool| self.slots.iter().filter(move |s| s.plan.records == records).filter_map(|s| s.status.as_ref());
-        let recorder = self.slots.iter().find(|s| s.plan.records).and_then(|s| s.status.as_ref());
-        let lost = statuses(false).map(|s| s.lost).sum();
-        let missed_deadlines = statuses(false).map(|s| s.missed_deadlines).sum();
-        let nodes = self.slots.iter().map(|s| NodeReport {
-            name: s.plan.name.clone(),
-            kind: s.plan.kind.clone(),
-            status: s.status,
-            restarts: s.restarts,
-            end: s.end.clone(),
-        });
+        let recorder = self.slots.iter().find(|s| s.plan.records).and_then(|s| s.members.first()?.status);
+        let lost = self.running().map(|(_, s)| s.lost).sum();
+        let missed_deadlines = self.running().map(|(_, s)| s.missed_deadlines).sum();
+        let of_slot = |s: &Slot| -> Vec<NodeReport> {
+            let others = || s.plan.nodes().map(|n| n.name).collect::<Vec<_>>();
+            let report = |m: &Member| NodeReport {
+                name: m.node.name.clone(),
+                kind: m.node.kind.clone(),
+                status: m.status,
+                restarts: s.restarts,
+                end: s.end.clone(),
+                with: others().into_iter().filter(|name| *name != m.node.name).collect(),
+            };
+            s.members.iter().map(report).collect()
+        };
+        let nodes = self.slots.iter().flat_map(of_slot);
         RunReport {
             id: self.directory.paths().id().to_string(),
             title: self.plan.title.clone(),

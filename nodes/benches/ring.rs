@@ -1,5 +1,6 @@
 //! How much our transport costs: a lockstep loop through five processes with a recorder listening to all
-//! of it, against bytes going round a ring of five processes through pipes.
+//! of it, against bytes going round a ring of five processes through pipes; the same with the bag written, with nodes
+//! that share processes, and a hop between two processes that poll.
 //!
 //! `cargo bench -p backdrive-nodes --bench ring [-- LOOPS RUNS]`. The runs are interleaved and medians
 //! compared, for on a shared machine only ratios of neighbouring runs mean anything. One loop crosses
@@ -8,12 +9,12 @@
 #[path = "../tests/common/mod.rs"]
 mod common;
 
-use backdrive_bags::Completeness;
+use backdrive_bags::{BagHeader, Completeness, Recorder, RecorderOptions, TopicInfo};
 use backdrive_control::core::{Core, Events, Port, Tick};
 use backdrive_msgs::{Message, Sample};
 use backdrive_nodes::clock::{Start, now_ns};
 use backdrive_nodes::histogram::Histogram;
-use backdrive_nodes::process::{ProcessOptions, run_process};
+use backdrive_nodes::process::{ProcessOptions, run_processes};
 use backdrive_nodes::protocol::{FromNode, NodeStatus, ToNode};
 use backdrive_nodes::recorder::{Sink, run_recorder};
 use backdrive_nodes::runner::{Options, RunError};
@@ -34,7 +35,8 @@ fn main() -> Result<ExitCode> {
     let args: Vec<String> = std::env::args().skip(1).filter(|a| a != "--bench").collect();
     match args.iter().map(String::as_str).collect::<Vec<_>>().as_slice() {
         ["pipe"] => relay(),
-        ["node", name, location, steps] => node(name, &serde_json::from_str(location)?, steps.parse()?),
+        ["node", names, location, steps, bag] => node(names, &serde_json::from_str(location)?, steps.parse()?, bag),
+        ["hop", name, location, steps, wait] => hopper(name, &serde_json::from_str(location)?, steps.parse()?, wait == &"poll"),
         numbers => compare(number(numbers.first(), 30_000)?, number(numbers.get(1), 10)?),
     }
 }
@@ -45,15 +47,35 @@ fn number(text: Option<&&str>, default: u64) -> Result<u64> {
 
 fn compare(loops: u64, runs: u64) -> Result<ExitCode> {
     println!("{loops} loops per run, medians of {runs} interleaved runs, messages of {SIZE} bytes");
-    let (mut pipes, mut ours) = (Vec::new(), Vec::new());
+    let folder = tempfile::tempdir()?;
+    let bag = folder.path().join("ring.mcap").display().to_string();
+    let apart: [&str; 5] = NODES;
+    let pairs = ["operator,master", "canceller,scaling", "slave"];
+    let one = ["operator,master,canceller,scaling,slave"];
+    let mut all: [Vec<Figures>; 7] = Default::default();
     for _ in 0..runs {
-        pipes.push(pipe_ring(loops)?);
-        ours.push(lockstep_ring(loops)?);
+        all[0].push(pipe_ring(loops)?);
+        all[1].push(lockstep_ring(loops, &apart, "")?);
+        all[2].push(lockstep_ring(loops, &apart, &bag)?);
+        all[3].push(lockstep_ring(loops, &pairs, "")?);
+        all[4].push(lockstep_ring(loops, &one, "")?);
+        all[5].push(hop(loops, "sleep")?);
+        all[6].push(hop(loops, "poll")?);
     }
-    let pipe = show("pipe ring of 5", &pipes);
-    let own = show("lockstep of 5 + recorder", &ours);
+    let [pipes, ours, written, paired, together, sleeping, polling] = &all;
+    let pipe = show("pipe ring of 5", pipes);
+    let ratios = |name: &str, runs: &[Figures]| {
+        let own = show(name, runs);
+        println!("    over the pipes': throughput {:.2}, p50 {:.2}, p99 {:.2}", pipe[0] / own[0], own[1] / pipe[1], own[2] / pipe[2]);
+    };
+    ratios("lockstep of 5 + recorder", ours);
+    ratios("with the bag written, lz4", written);
+    ratios("in 3 processes + recorder", paired);
+    ratios("in 1 process + recorder", together);
+    for (name, runs) in [("a hop of two that sleep", sleeping), ("a hop of two that poll", polling)] {
+        show(name, &runs.iter().map(|[rate, p50, p99]| [*rate, p50 / 2.0, p99 / 2.0]).collect::<Vec<_>>());
+    }
     println!("in one thread: {:.0} ns per loop of the same nodes around empty cores", one_thread()?);
-    println!("ratio of p50: {:.2} (target at most 4, aim 2); of loops/s: {:.2}", own[1] / pipe[1], pipe[0] / own[0]);
     Ok(ExitCode::SUCCESS)
 }
 
@@ -88,7 +110,7 @@ fn show(name: &str, runs: &[Figures]) -> Figures {
         values[values.len() / 2]
     };
     let figures = [median(0), median(1), median(2)];
-    println!("{name:26} {:8.0} loops/s  p50 {:6.1} us  p99 {:6.1} us", figures[0], figures[1], figures[2]);
+    println!("{name:26} {:8.0} loops/s  p50 {:7.2} us  p99 {:7.1} us", figures[0], figures[1], figures[2]);
     figures
 }
 
@@ -152,15 +174,57 @@ fn ring_timing(steps: u64) -> Timing {
     timing(Clock::Lockstep, 1000.0, Some(steps))
 }
 
-fn node(name: &str, location: &Location, steps: u64) -> Result<ExitCode> {
-    let transport = Box::new(Iceoryx2::open(location, name)?);
+/// The recorder with the bag that it writes, or nodes in one process, their names with commas between them.
+fn node(names: &str, location: &Location, steps: u64, bag: &str) -> Result<ExitCode> {
+    let transport = Box::new(Iceoryx2::open(location, names)?);
     let timing = ring_timing(steps);
-    if name == "recorder" {
-        return Ok(run_recorder(&recorder_plan(), &timing, transport, Box::new(Counting::default())));
+    if names == "recorder" {
+        let sink: Box<dyn Sink> = match bag {
+            "" => Box::new(Counting::default()),
+            bag => {
+                Box::new(Recorder::create(bag.as_ref(), &header(), &RecorderOptions { overwrite: true, ..RecorderOptions::lockstep() })?)
+            }
+        };
+        return Ok(run_recorder(&recorder_plan(), &timing, transport, sink));
     }
-    let plan = plans(None, true).into_iter().find(|p| p.name == name).ok_or("no such node")?;
+    let plan_of = |name: &str| plans(None, true).into_iter().find(|p| p.name == name).ok_or("no such node");
+    let plans = names.split(',').map(plan_of).collect::<std::result::Result<Vec<_>, _>>()?;
     let options = ProcessOptions { run: Options { listeners: listeners(true), ..Options::default() }, ..ProcessOptions::default() };
-    Ok(run_process(plan, &timing, transport, options))
+    Ok(run_processes(plans, &timing, transport, options))
+}
+
+fn header() -> BagHeader {
+    let topics = recorder_plan().topics.into_iter();
+    let axes = |t: &backdrive_msgs::topic::Topic| match t.kind {
+        backdrive_msgs::topic::Kind::Sample => vec!["x".to_string()],
+        _ => Vec::new(),
+    };
+    BagHeader {
+        title: "ring".to_string(),
+        graph_toml: String::new(),
+        files: Default::default(),
+        versions: Default::default(),
+        seeds: Default::default(),
+        clock: backdrive_bags::Clock::Lockstep,
+        rate_hz: 1000.0,
+        host: String::new(),
+        topics: topics.map(|topic| TopicInfo { axes: axes(&topic), topic, publisher: String::new() }).collect(),
+    }
+}
+
+/// One of two nodes that send a sample to and fro.
+fn hopper(name: &str, location: &Location, steps: u64, polls: bool) -> Result<ExitCode> {
+    let transport = Box::new(Iceoryx2::open(location, name)?.polling(polls));
+    let (heard, delay, spoken) = if name == "ping" { ("/pong/js", 1, "/ping/js") } else { ("/ping/js", 0, "/pong/js") };
+    let plan = common::node(name, vec![common::stage(name, Empty, vec![common::input("in", heard, delay)], &[spoken])]);
+    let listeners = ["/ping/js", "/pong/js"].map(|topic| (topic.to_string(), 1)).into_iter().collect();
+    let options = ProcessOptions { run: Options { listeners, ..Options::default() }, ..ProcessOptions::default() };
+    Ok(run_processes(vec![plan], &ring_timing(steps), transport, options))
+}
+
+/// There and back.
+fn hop(steps: u64, wait: &str) -> Result<Figures> {
+    ring_of(steps, "hop", &[("ping".to_string(), wait.to_string()), ("pong".to_string(), wait.to_string())], 0)
 }
 
 /// Checks sequence numbers and throws away.
@@ -201,9 +265,9 @@ struct Node {
 }
 
 impl Node {
-    fn start(name: &str, location: &Location, steps: u64) -> Result<Node> {
+    fn start(what: &str, name: &str, location: &Location, steps: u64, how: &str) -> Result<Node> {
         let (place, steps) = (serde_json::to_string(location)?, steps.to_string());
-        let mut child = this_program(&["node", name, &place, &steps])?.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn()?;
+        let mut child = this_program(&[what, name, &place, &steps, how])?.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn()?;
         let (stdin, stdout) = (child.stdin.take().ok_or("no stdin")?, child.stdout.take().ok_or("no stdout")?);
         Ok(Node { child, stdin, lines: BufReader::new(stdout) })
     }
@@ -224,9 +288,17 @@ impl Node {
         }
     }
 
+    /// The figures of its master, or of its first node.
     fn until_done(&mut self) -> Result<NodeStatus> {
+        let mut master = None;
         loop {
             match self.next()? {
+                FromNode::Of { node, said } if node == "master" => {
+                    if let FromNode::Status(status) = *said {
+                        master = Some(status);
+                    }
+                }
+                FromNode::Done(_) if master.is_some() => return Ok(master.unwrap_or_default()),
                 FromNode::Done(status) => return Ok(status),
                 FromNode::Failed { error, .. } => return Err(error.into()),
                 _ => {}
@@ -235,12 +307,20 @@ impl Node {
     }
 }
 
-fn lockstep_ring(steps: u64) -> Result<Figures> {
+/// The nodes of these processes and the recorder, which writes a bag where one is named.
+fn lockstep_ring(steps: u64, processes: &[&str], bag: &str) -> Result<Figures> {
+    let all: Vec<(String, String)> = processes.iter().chain(&["recorder"]).map(|name| (name.to_string(), bag.to_string())).collect();
+    let timed = processes.iter().position(|names| names.split(',').any(|n| n == "master")).unwrap_or(0);
+    ring_of(steps, "node", &all, timed)
+}
+
+/// Processes of this program, (name, how); the figures are those of the one at `timed`.
+fn ring_of(steps: u64, what: &str, processes: &[(String, String)], timed: usize) -> Result<Figures> {
     let root = tempfile::tempdir()?;
     let location = Location { prefix: format!("ring{}_", std::process::id()), root: root.path().join("run") };
     let mut nodes = Vec::new();
-    for name in NODES.into_iter().chain(["recorder"]) {
-        nodes.push(Node::start(name, &location, steps)?);
+    for (name, how) in processes {
+        nodes.push(Node::start(what, name, &location, steps, how)?);
     }
     nodes.iter_mut().try_for_each(Node::until_ready)?;
     let Start { t0_ns, unix_ns } = Start::after(0);
@@ -251,10 +331,10 @@ fn lockstep_ring(steps: u64) -> Result<Figures> {
         line.push(b'\n');
         node.stdin.write_all(&line)?;
     }
-    let master = nodes[1].until_done()?;
+    let master = nodes[timed].until_done()?;
     let seconds = (now_ns() - begun) as f64 * 1e-9;
     for (i, node) in nodes.iter_mut().enumerate() {
-        if i != 1 {
+        if i != timed {
             node.until_done()?;
         }
         node.child.wait()?;

@@ -34,6 +34,13 @@ pub fn now_ns() -> i64 {
     time.tv_sec * 1_000_000_000 + time.tv_nsec
 }
 
+/// Looks at CLOCK_MONOTONIC until it reaches `due_ns`.
+pub(crate) fn poll_until_ns(due_ns: i64) {
+    while now_ns() < due_ns {
+        std::hint::spin_loop();
+    }
+}
+
 /// Sleeps until CLOCK_MONOTONIC reaches `due_ns`; a signal ends it early.
 pub(crate) fn sleep_until_ns(due_ns: i64) {
     let time = libc::timespec { tv_sec: due_ns.div_euclid(1_000_000_000), tv_nsec: due_ns.rem_euclid(1_000_000_000) };

@@ -9,7 +9,7 @@ use crate::realtime;
 use crate::runner::{Control, Options, RunError, Runner, Told};
 use crate::stage::{Clock, NodePlan, Timing};
 use crate::transport::Transport;
-use backdrive_msgs::measured;
+use backdrive_msgs::{measured, source_id};
 use nix::sys::signal::{SigHandler, Signal, signal};
 use std::io::{BufRead, Write};
 use std::process::ExitCode;
@@ -40,10 +40,17 @@ const ORPHANED: Duration = Duration::from_millis(700);
 ///
 /// `listeners` names how many listeners each topic has in the graph: the node is ready when they are all there.
 pub fn run_process(plan: NodePlan, timing: &Timing, transport: Box<dyn Transport>, options: ProcessOptions) -> ExitCode {
-    let line = Line::open(ORPHANED);
+    run_processes(vec![plan], timing, transport, options)
+}
+
+/// The same for nodes that share this process and its thread. What is said of the first is said as of a process of its own, and of
+/// the others by their names ([`FromNode::Of`]).
+pub fn run_processes(plans: Vec<NodePlan>, timing: &Timing, transport: Box<dyn Transport>, options: ProcessOptions) -> ExitCode {
+    let others: Vec<String> = plans.iter().skip(1).map(|p| p.name.clone()).collect();
+    let line = Line::open(ORPHANED, others.clone());
     let timing = timing.clone();
     line.supervised(|line| {
-        let mut runner = Runner::new(plan, &timing, transport, options.run)?;
+        let mut runner = Runner::together(plans, &timing, transport, options.run)?;
         let Some(start) = line.meet(|| runner.missing()) else {
             return Ok(NodeStatus::default());
         };
@@ -54,7 +61,12 @@ pub fn run_process(plan: NodePlan, timing: &Timing, transport: Box<dyn Transport
                 runner.note("realtime_refused", 1, &refused.join("; "), &mut tell);
             }
         }
-        runner.run(start, &line.control, &mut tell)
+        let mut reports = runner.run(start, &line.control, &mut tell)?.into_iter();
+        let first = reports.next().unwrap_or_default();
+        for (node, status) in others.iter().zip(reports) {
+            line.say(FromNode::Of { node: node.clone(), said: Box::new(FromNode::Status(status)) });
+        }
+        Ok(first)
     })
 }
 
@@ -82,7 +94,8 @@ extern "C" fn on_terminate(_: i32) {
 
 impl Line {
     /// Starts to listen and to talk; a process whose loop does not end by itself ends `orphaned` after the supervisor.
-    pub fn open(orphaned: Duration) -> Line {
+    /// `others` names the nodes of the process beside the first.
+    pub fn open(orphaned: Duration, others: Vec<String>) -> Line {
         // An interrupt from the keyboard goes to the whole group; the supervisor stops us in order.
         // SAFETY: the handlers do nothing but store to an atomic.
         unsafe {
@@ -96,7 +109,7 @@ impl Line {
         let control = Arc::new(Control::default());
         let (to_start, start) = sync_channel(1);
         let (out, said) = sync_channel(256);
-        let writer = std::thread::spawn(move || write_lines(&said));
+        let writer = std::thread::spawn(move || write_lines(&said, &others));
         let reader = Arc::clone(&control);
         std::thread::spawn(move || {
             read_lines(&reader, &to_start);
@@ -163,12 +176,13 @@ impl Line {
 }
 
 /// Writes one line per message; ends after the last one, or when nobody reads any more.
-fn write_lines(said: &Receiver<Out>) {
+fn write_lines(said: &Receiver<Out>, others: &[String]) {
+    let others: Vec<(u32, &String)> = others.iter().map(|name| (source_id(name), name)).collect();
     let mut stdout = std::io::stdout().lock();
     for out in said.iter() {
         let message = match out {
             Out::Said(message) => *message,
-            Out::Told(told) => spell(told),
+            Out::Told(told) => spell(told, &others),
         };
         let is_last = matches!(message, FromNode::Done(_) | FromNode::Failed { .. });
         let Ok(mut line) = serde_json::to_vec(&message) else { continue };
@@ -179,16 +193,23 @@ fn write_lines(said: &Receiver<Out>) {
     }
 }
 
-fn spell(told: Told) -> FromNode {
-    match told {
-        Told::Status(report) => FromNode::Status(report),
-        Told::Event(event) => FromNode::Event {
-            step: event.step,
-            severity: event.severity,
-            kind: event.kind.as_str().to_string(),
-            text: event.text.as_str().to_string(),
-            value: measured(event.value),
-        },
+fn spell(told: Told, others: &[(u32, &String)]) -> FromNode {
+    let (source, said) = match told {
+        Told::Status { source, status } => (source, FromNode::Status(status)),
+        Told::Event(event) => (
+            event.source,
+            FromNode::Event {
+                step: event.step,
+                severity: event.severity,
+                kind: event.kind.as_str().to_string(),
+                text: event.text.as_str().to_string(),
+                value: measured(event.value),
+            },
+        ),
+    };
+    match others.iter().find(|(other, _)| *other == source) {
+        Some((_, name)) => FromNode::Of { node: (*name).clone(), said: Box::new(said) },
+        None => said,
     }
 }
 

@@ -59,6 +59,13 @@ pub enum FromNode {
         /// A number that belongs to it.
         value: Option<f64>,
     },
+    /// The same of a node that shares the process of the one that speaks.
+    Of {
+        /// Name of the node.
+        node: String,
+        /// Its status, or an event of it.
+        said: Box<FromNode>,
+    },
     /// It has ended as it should; the last line.
     Done(NodeStatus),
     /// It ends because of this; the last line.

@@ -273,7 +273,7 @@ impl RunningRecorder {
             }
             if reported.elapsed() >= Duration::from_millis(100) {
                 reported = Instant::now();
-                tell(Told::Status(self.report()));
+                tell(Told::Status { source: self.source, status: self.report() });
             }
             let complete = steps.is_some_and(|steps| self.steps() >= steps);
             if complete || stopped() || ends_at.is_some() {
@@ -316,7 +316,7 @@ impl RunningRecorder {
 /// Records as this process until every topic has reached its last step, or the supervisor says stop (see [`crate::process::run_process`]).
 /// The exit code is 4 when messages were lost.
 pub fn run_recorder(plan: &RecorderPlan, timing: &Timing, transport: Box<dyn Transport>, sink: Box<dyn Sink>) -> ExitCode {
-    Line::open(GRACE).supervised(|line| {
+    Line::open(GRACE, Vec::new()).supervised(|line| {
         let mut recorder = RunningRecorder::new(plan, timing, transport, sink)?;
         let Some(start) = line.meet(|| recorder.missing()) else {
             return recorder.finish();

@@ -333,6 +333,11 @@ fn seen(inputs: &[InputPort]) -> impl Iterator<Item = &InputPort> {
     inputs.iter().filter(|p| p.name != PACE_PORT)
 }
 
+/// (plan, stage) of all stages, each after those of the same plans that it waits for in the same step.
+pub(crate) fn stage_order(plans: &[NodePlan]) -> Result<Vec<(usize, usize)>, SequenceError> {
+    Ok(order(plans)?.into_iter().map(|place| (place.node, place.stage)).collect())
+}
+
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Place {
     node: usize,

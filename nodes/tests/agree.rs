@@ -39,20 +39,28 @@ fn in_one_thread(impairment: Option<Impairment>) -> Heard {
 }
 
 fn in_threads(impairment: Option<Impairment>) -> Heard {
+    in_threads_of(&NODES.map(|name| vec![name]), impairment)
+}
+
+/// A thread for each of these groups of nodes.
+fn in_threads_of(groups: &[Vec<&str>], impairment: Option<Impairment>) -> Heard {
     let hub = Hub::default();
     let (keeping, heard) = Keeping::new(recorder_plan().topics.len());
     let mut recording = RunningRecorder::new(&recorder_plan(), &lockstep(), Box::new(hub.join()), Box::new(keeping)).unwrap();
-    let barrier = Arc::new(std::sync::Barrier::new(NODES.len()));
+    let barrier = Arc::new(std::sync::Barrier::new(groups.len()));
     std::thread::scope(|scope| {
-        for plan in plans(impairment, true) {
+        for group in groups {
+            let plan_of = |name: &&str| plans(impairment, true).into_iter().find(|p| p.name == *name).unwrap();
+            let plans: Vec<_> = group.iter().map(plan_of).collect();
             let (hub, barrier) = (hub.clone(), Arc::clone(&barrier));
             scope.spawn(move || {
                 let options = Options { listeners: listeners(true), ..Options::default() };
-                let mut runner = Runner::new(plan, &lockstep(), Box::new(hub.join()), options).unwrap();
+                let mut runner = Runner::together(plans, &lockstep(), Box::new(hub.join()), options).unwrap();
                 barrier.wait();
                 assert_eq!(runner.missing(), Vec::<String>::new());
-                let status = runner.run(Start::after(0), &Arc::new(Control::default()), &mut |_| {}).unwrap();
-                assert_eq!((status.steps, status.lost), (STEPS, 0));
+                let reports = runner.run(Start::after(0), &Arc::new(Control::default()), &mut |_| {}).unwrap();
+                assert_eq!(reports.len(), group.len());
+                reports.iter().for_each(|status| assert_eq!((status.steps, status.lost), (STEPS, 0)));
             });
         }
         recording.run(Start::after(0), Some(STEPS), || false, &mut |_| {}).unwrap();
@@ -165,6 +173,22 @@ fn assert_same(a: &Heard, b: &Heard, what: &str) {
             assert_eq!(a.len() as u64, STEPS, "{what}: {}", topic.name);
         }
         assert!(!a.is_empty(), "{what}: {}", topic.name);
+    }
+}
+
+#[test]
+fn nodes_that_share_a_thread_agree() {
+    let ways: [&[&[&str]]; 3] = [
+        &[&["scaling", "canceller"], &["operator"], &["master"], &["slave"]],
+        &[&["operator", "master"], &["slave", "scaling"], &["canceller"]],
+        &[&["slave", "scaling", "canceller", "master", "operator"]],
+    ];
+    for impairment in [None, Some(bad_line())] {
+        let whole = in_one_thread(impairment);
+        for groups in ways {
+            let groups: Vec<Vec<&str>> = groups.iter().map(|g| g.to_vec()).collect();
+            assert_same(&whole, &in_threads_of(&groups, impairment), "nodes together");
+        }
     }
 }
 

@@ -67,7 +67,7 @@ fn run(runner: &mut Runner, start: Start, control: &Arc<Control>) -> (Result<Nod
             events.push((e.kind.as_str().to_string(), e.value));
         }
     });
-    (result, events)
+    (result.map(|reports| reports[0]), events)
 }
 
 #[test]

@@ -167,6 +167,10 @@ pub struct Changes {
     /// record_origin = true.
     #[arg(long)]
     pub record_origin: bool,
+    /// Let nodes wait for their inputs by looking all the time in place of sleeping: shorter ways, for machines with a processor to
+    /// spare for each process. In a graph file: wait = "poll".
+    #[arg(long)]
+    pub poll: bool,
 }
 
 impl Changes {
@@ -181,6 +185,7 @@ impl Changes {
             bag: self.bag.clone(),
             overwrite: self.overwrite,
             record_origin: self.record_origin,
+            poll: self.poll,
             clock: clock.map(|c| c.word().to_string()),
             rate_hz: self.rate,
             duration_s: self.duration,

@@ -3,8 +3,10 @@
 use super::Finding;
 use backdrive_launch::RunHome;
 use backdrive_nodes::clock::now_ns;
+use backdrive_nodes::graph::MAX_RATE_HZ;
 use backdrive_nodes::realtime;
 use nix::libc;
+use std::io::{Read, Write};
 use std::time::Duration;
 
 /// Shared memory that a graph of six nodes and a long recorder buffer uses, bytes.
@@ -12,6 +14,9 @@ const SHM_WANTED: u64 = 256 << 20;
 
 /// Wake-ups that are timed.
 const WAKES: usize = 500;
+
+/// Ways there and back between two threads that are timed.
+const HOPS: usize = 2000;
 
 pub(super) fn look() -> Vec<Finding> {
     let mut findings = vec![shared_memory()];
@@ -21,6 +26,7 @@ pub(super) fn look() -> Vec<Finding> {
         findings.push(rights(&refused));
         findings.push(timers(p50, p99));
     }
+    findings.extend(hop_us().map(|(p50, p99)| ways(p50, p99)));
     findings.extend([timer_slack(), processors(), wall_clock(), leftovers()]);
     findings
 }
@@ -79,6 +85,45 @@ fn timers(p50: f64, p99: f64) -> Finding {
         return Finding::weak("timers", found, advice);
     }
     Finding::fine("timers", found)
+}
+
+/// How long a byte takes from one thread that sleeps to the other and wakes it, median and 99th percentile, us; with what the machine
+/// grants a loop in real time.
+fn hop_us() -> Option<(f64, f64)> {
+    let ((mut heard, mut there), (mut back, mut answer)) = (std::io::pipe().ok()?, std::io::pipe().ok()?);
+    let echo = std::thread::spawn(move || {
+        realtime::enter(&realtime::Options::default());
+        let mut byte = [0];
+        while heard.read_exact(&mut byte).is_ok() && answer.write_all(&byte).is_ok() {}
+    });
+    let timed = std::thread::spawn(move || {
+        realtime::enter(&realtime::Options::default());
+        let (mut times, mut byte) = (Vec::with_capacity(HOPS), [0]);
+        for _ in 0..HOPS {
+            let begun = now_ns();
+            there.write_all(&byte).and_then(|()| back.read_exact(&mut byte)).ok()?;
+            times.push(now_ns() - begun);
+        }
+        times.sort_unstable();
+        Some((times[HOPS / 2] as f64 * 0.5e-3, times[HOPS * 99 / 100] as f64 * 0.5e-3))
+    });
+    let times = timed.join().ok()?;
+    echo.join().ok()?;
+    times
+}
+
+fn ways(p50: f64, p99: f64) -> Finding {
+    const PART: &str = "between processes";
+    // Five nodes one after the other within a step, all five as slow as one in a hundred.
+    let rate = (1e6 / (5.0 * p99)).min(MAX_RATE_HZ);
+    let found = format!(
+        "a sample wakes the next process in {p50:.1} us in the median, {p99:.1} us at the 99th percentile; five nodes in a row leave time for {rate:.0} Hz"
+    );
+    if rate < MAX_RATE_HZ {
+        let advice = "nodes of a faster loop share a process (`together` in the graph, docs/guide.md), or get processors of their own";
+        return Finding::weak(PART, found, advice);
+    }
+    Finding::fine(PART, found)
 }
 
 fn timer_slack() -> Finding {

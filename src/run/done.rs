@@ -181,6 +181,7 @@ mod tests {
     /// A run at 5 kHz of 20 000 steps in which nodes missed so many deadlines.
     fn report(missed: &[(&str, u64)]) -> RunReport {
         let node = |(name, missed): &(&str, u64)| NodeReport {
+            with: Vec::new(),
             name: name.to_string(),
             kind: name.to_string(),
             status: Some(NodeStatus {

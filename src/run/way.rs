@@ -62,8 +62,22 @@ fn ready(graph: &Graph, host: Option<&str>) -> Result<(), Failure> {
 /// How long hosts may take to find each other: somebody walks from one to the other.
 const HOSTS_TIMEOUT: Duration = Duration::from_secs(120);
 
+/// Who waits by looking takes a processor from whom it waits for, where they share one.
+fn too_many_poll(graph: &Graph, host: Option<&str>) {
+    let here = graph.nodes.iter().filter(|n| n.kind != NodeKind::Recorder && host.is_none_or(|host| graph.runs_on(n, host)));
+    let processes = here.filter(|n| graph.process_of(&n.name).first().is_some_and(|first| first.name == n.name)).count();
+    let processors = std::thread::available_parallelism().map_or(1, usize::from);
+    if graph.polls && processes > processors {
+        output::note(format_args!(
+            "warning: wait = \"poll\" keeps a processor busy for each process, and {processes} processes share {processors}: the loop will be slow; \
+             take it away, or let nodes share a process (together)"
+        ));
+    }
+}
+
 fn run_processes(graph: &Graph, place: &Place) -> Result<Done, Failure> {
     ready(graph, place.host.as_deref())?;
+    too_many_poll(graph, place.host.as_deref());
     let courier = Courier::start(&place.network).map_err(Failure::machine)?;
     let mut options = SuperviseOptions::default();
     if place.host.is_some() {

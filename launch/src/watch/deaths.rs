@@ -20,7 +20,7 @@ impl Supervisor {
         let started = self.start.is_some();
         let slot = &mut self.slots[index];
         slot.child = None;
-        let name = slot.plan.name.clone();
+        let name = slot.plan.label();
         let asked = slot.asked;
         if slot.done && end.signal.is_none() || asked >= Asked::Stop && slot.failed.is_none() && end.code == Some(0) {
             slot.end = if slot.done { "done" } else { "stopped" }.to_string();
@@ -57,7 +57,7 @@ impl Supervisor {
         let realtime = self.plan.realtime();
         let t_s = self.start.map_or(0.0, |s| seconds_since(now, s.at));
         let slot = &mut self.slots[index];
-        let name = slot.plan.name.clone();
+        let name = slot.plan.label();
         let how = slot.failed.as_ref().map_or_else(|| end.words(), |(error, _)| format!("failed: {error}"));
         self.deaths.push(Death {
             node: name.clone(),
@@ -112,7 +112,7 @@ impl Supervisor {
         if slot.plan.records || self.stopping || self.start.is_none() {
             return;
         }
-        let (name, steps) = (slot.plan.name.clone(), slot.steps());
+        let (name, steps) = (slot.plan.label(), slot.steps());
         if !self.plan.realtime() && self.plan.timing.steps.is_none_or(|planned| steps < planned) {
             self.tell(1, "ended_early", format!("`{name}` has ended by itself after {steps} steps, and the others with it"));
             self.cause.get_or_insert(Cause::EndedEarly { node: name, steps });

@@ -102,7 +102,7 @@ impl Supervisor {
         }
         self.slots[index].heard = now;
         if std::mem::take(&mut self.slots[index].silent) {
-            self.tell(0, "node_back", format!("`{}` is heard again", self.slots[index].plan.name));
+            self.tell(0, "node_back", format!("`{}` is heard again", self.slots[index].plan.label()));
         }
         match notice.heard {
             Heard::Said(FromNode::Created) => self.slots[index].created = true,
@@ -111,8 +111,9 @@ impl Supervisor {
                 self.slots[index].missing = missing;
             }
             Heard::Said(FromNode::Ready) => self.ready(index, now),
+            Heard::Said(FromNode::Of { node, said }) => self.hear_of(index, node, *said, now),
             Heard::Said(FromNode::Status(status)) => {
-                self.slots[index].take_status(status, now);
+                self.slots[index].take_status(None, status, now);
                 self.keep_pace(index, now);
             }
             Heard::Said(FromNode::Event { step, severity, kind, text, value }) => {
@@ -121,14 +122,14 @@ impl Supervisor {
                 self.event(Some(index), RunEvent { node, t_s, step: Some(step), severity, kind, text, value });
             }
             Heard::Said(FromNode::Done(status)) => {
-                self.slots[index].take_status(status, now);
+                self.slots[index].take_status(None, status, now);
                 self.slots[index].done = true;
                 self.keep_pace(index, now);
             }
             Heard::Said(FromNode::Failed { error, code }) => self.slots[index].failed = Some((error, code)),
             Heard::Stray(line) => {
                 if !std::mem::replace(&mut self.slots[index].stray, true) {
-                    let name = &self.slots[index].plan.name;
+                    let name = self.slots[index].plan.label();
                     let text = format!("`{name}` writes lines on standard output that are not of the protocol; they are shown here");
                     self.tell(1, "stray_output", text);
                 }
@@ -139,6 +140,19 @@ impl Supervisor {
                 self.slots[index].wrote(line);
             }
             Heard::Ended(end) => self.ended(index, end, now),
+        }
+    }
+
+    /// What is said of a node that shares the process of the first.
+    fn hear_of(&mut self, index: usize, node: String, said: FromNode, now: Instant) {
+        match said {
+            FromNode::Status(status) => self.slots[index].take_status(Some(&node), status, now),
+            FromNode::Event { step, severity, kind, text, value } => {
+                let t_s = self.start.map(|s| seconds_since(now, s.at));
+                self.event(Some(index), RunEvent { node, t_s, step: Some(step), severity, kind, text, value });
+            }
+            // Everything else is said of the process.
+            _ => {}
         }
     }
 

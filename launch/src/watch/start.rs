@@ -30,9 +30,10 @@ impl Supervisor {
         // A recorder may finish its file: the end of its standard input tells it to. Our own nodes set a signal
         // that only wakes them, and end by themselves within seconds. Whoever hangs is left to the next sweep.
         let orphaned = if slot.plan.records { Signal::SIGTERM } else { Signal::SIGKILL };
-        let spawn = Spawn { name: &slot.plan.name, node: index, life: slot.life, argv: &argv, orphaned };
+        let label = slot.plan.label();
+        let spawn = Spawn { name: &label, node: index, life: slot.life, argv: &argv, orphaned };
         let child = Child::spawn(&spawn, self.notices.clone())?;
-        self.directory.note(child.pid(), &slot.plan.name);
+        self.directory.note(child.pid(), &slot.plan.label());
         slot.begin(child, Instant::now());
         Ok(())
     }
@@ -48,7 +49,7 @@ impl Supervisor {
             // It was started again, and joins at the step that is due.
             slot.enter(Phase::Running, now);
             slot.tell(&ToNode::Start { t0_ns: start.t0_ns, unix_ns: start.unix_ns });
-            let name = slot.plan.name.clone();
+            let name = slot.plan.label();
             self.pass_gains(index);
             if let Some(death) = self.deaths.iter_mut().rev().find(|d| d.node == name) {
                 death.recovered = true;

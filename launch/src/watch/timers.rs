@@ -63,8 +63,8 @@ impl Supervisor {
                 slot.end = "does not die".to_string();
                 slot.enter(Phase::Ended, now);
                 self.unkillable = true;
-                self.killed.push(slot.plan.name.clone());
-                let text = format!("`{}` does not die; what the run leaves is removed at the next start", slot.plan.name);
+                self.killed.push(slot.plan.label());
+                let text = format!("`{}` does not die; what the run leaves is removed at the next start", slot.plan.label());
                 self.tell(2, "node_unkillable", text);
             }
             (Phase::Joining, Asked::No) if started && now.saturating_duration_since(slot.since) > self.options.ready_timeout => {
@@ -78,7 +78,7 @@ impl Supervisor {
                 let late = self.finishing.is_some_and(|f| now.saturating_duration_since(f.max(progress)) > self.options.grace);
                 if late && !slot.plan.records {
                     slot.ask(Asked::Stop, now);
-                    let text = format!("`{}` has not ended with the others; it is stopped", slot.plan.name);
+                    let text = format!("`{}` has not ended with the others; it is stopped", slot.plan.label());
                     self.tell(1, "node_late", text);
                 } else if self.plan.realtime() && !slot.silent && now.saturating_duration_since(slot.heard) > SILENCE {
                     slot.silent = true;

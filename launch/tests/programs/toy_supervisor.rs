@@ -48,7 +48,7 @@ fn toys(clock: &str, steps: &str, nodes: &[&str]) -> Outcome<Plan> {
         let flags: Vec<&str> = flags.collect();
         let command = [toy.as_str()].iter().chain(&words[1..]).map(|w| w.to_string()).collect();
         let (restart, records) = (flags.contains(&"restart"), flags.contains(&"records"));
-        Some(NodePlan { kind: name.clone(), name, command: Some(command), restart, records, has_gains: false })
+        Some(NodePlan { kind: name.clone(), name, command: Some(command), restart, records, ..NodePlan::default() })
     });
     let clock = if clock == "realtime" { Clock::Realtime } else { Clock::Lockstep };
     Ok(Plan {

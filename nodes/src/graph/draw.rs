@@ -35,6 +35,10 @@ pub fn draw(graph: &Graph) -> String {
         let line = format!("{:width$}{}  {}", row.text, cells.into_iter().collect::<String>(), notes.join(" "));
         let _ = writeln!(text, "{}", line.trim_end());
     }
+    for group in &graph.together {
+        let names: Vec<&str> = group.iter().map(|i| graph.nodes[*i].name.as_str()).collect();
+        let _ = writeln!(text, "in one process: {}", names.join(" + "));
+    }
     text
 }
 

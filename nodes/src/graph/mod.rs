@@ -15,6 +15,7 @@ mod overrides;
 mod parse;
 mod recorded;
 mod swap;
+mod together;
 mod types;
 
 pub use check::step_order;

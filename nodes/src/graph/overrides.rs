@@ -51,6 +51,8 @@ pub struct Overrides {
     pub duration_s: Option<f64>,
     /// Whether the bag says on which machine and from which folders it was made.
     pub record_origin: bool,
+    /// Whether nodes wait by looking all the time.
+    pub poll: bool,
     /// Seed of everything random.
     pub seed: Option<u64>,
     /// Whether sensors round and are noisy as the model files say (`as_modelled`) or not (`ideal`).
@@ -105,6 +107,9 @@ impl Overrides {
         }
         if self.record_origin {
             doc["record_origin"] = value(true);
+        }
+        if self.poll {
+            doc["wait"] = value("poll");
         }
         if let Some(seed) = self.seed {
             doc["seed"] = value(seed.min(i64::MAX as u64) as i64);

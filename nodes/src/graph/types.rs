@@ -48,6 +48,10 @@ pub struct Graph {
     pub nodes: Vec<Node>,
     /// In the order of the file.
     pub connections: Vec<Connection>,
+    /// Whether nodes wait by looking all the time, which keeps a processor busy for each process.
+    pub polls: bool,
+    /// Nodes that share a process, as their indices; every other node is a process of its own.
+    pub together: Vec<Vec<usize>>,
     /// Every file that was read for it but the graph itself: (path as in `text`, text).
     pub files: Vec<(String, String)>,
     /// Runs of their own that the file lists, each with changes to the nodes.
@@ -80,7 +84,7 @@ pub struct Host {
     pub line: usize,
 }
 
-/// A node of a graph: one process.
+/// A node of a graph: a process, or with others a part of one ([`Graph::together`]).
 #[derive(Debug, Clone)]
 pub struct Node {
     /// Unique in the graph.

@@ -13,13 +13,15 @@ pub struct Options {
     /// enough for what a busy virtual machine withholds in a piece, short enough that forces are never
     /// computed from a time that the hand has left.
     pub horizon_s: f64,
+    /// Real time: whether it looks at the clock until a step is due, in place of sleeping.
+    pub polls: bool,
     /// Listeners that each topic should have before the run may start, by name of the topic.
     pub listeners: BTreeMap<String, usize>,
 }
 
 impl Default for Options {
     fn default() -> Options {
-        Options { horizon_s: 0.25, listeners: BTreeMap::new() }
+        Options { horizon_s: 0.25, polls: false, listeners: BTreeMap::new() }
     }
 }
 
@@ -59,5 +61,10 @@ pub enum Told {
     /// An event, as it is published.
     Event(backdrive_msgs::Event),
     /// About ten times a second of real time.
-    Status(NodeStatus),
+    Status {
+        /// [`backdrive_msgs::source_id`] of the node that it is of.
+        source: u32,
+        /// How that node is doing.
+        status: NodeStatus,
+    },
 }

@@ -23,7 +23,7 @@ impl Runner {
                 }
                 finished = false;
                 if stage.poll()? {
-                    let stamp = self.teller.book.simulated_ns(stage.step);
+                    let stamp = self.members[stage.member].teller.book.simulated_ns(stage.step);
                     self.do_step(i, stamp, tell)?;
                     self.refuse_losses(i, tell)?;
                     stepped = true;
@@ -55,8 +55,9 @@ impl Runner {
             return Ok(());
         };
         let (step, topic, lost) = (stage.step - 1, input.topic.clone(), input.lost);
-        let stamp = self.teller.book.simulated_ns(step);
-        self.teller.tell_event(step, stamp, "samples_lost", lost as f64, 2, sentence("samples_lost", lost as f64), tell);
+        let teller = &mut self.members[stage.member].teller;
+        let stamp = teller.book.simulated_ns(step);
+        teller.tell_event(step, stamp, "samples_lost", lost as f64, 2, sentence("samples_lost", lost as f64), tell);
         Err(RunError::Lost { step, topic, lost })
     }
 
@@ -66,8 +67,11 @@ impl Runner {
         let missing = stuck.flat_map(|s| s.inputs.iter().zip(&s.satisfied)).filter(|(_, satisfied)| !**satisfied);
         let topics: Vec<String> = missing.map(|(i, _)| i.topic.clone()).collect();
         let timeout_s = self.timing.peer_timeout_s;
-        let stamp = self.teller.book.simulated_ns(step);
-        self.teller.tell_event(step, stamp, "peer_timeout", timeout_s, 2, sentence("peer_timeout", timeout_s), tell);
+        // Of nodes that share the process the one that is furthest behind says it.
+        let behind = self.stages.iter().filter(|s| s.step < steps).min_by_key(|s| s.step).map_or(0, |s| s.member);
+        let teller = &mut self.members[behind].teller;
+        let stamp = teller.book.simulated_ns(step);
+        teller.tell_event(step, stamp, "peer_timeout", timeout_s, 2, sentence("peer_timeout", timeout_s), tell);
         Err(RunError::PeerTimeout { step, topics, timeout_s })
     }
 }

@@ -1,4 +1,4 @@
-//! Drives the stages of one node over a transport, in either clock.
+//! Drives the stages of one node, or of several that share a process, over a transport in either clock.
 //!
 //! One rule for both: at step k a stage waits until all its inputs for k are there, or, in real time,
 //! until one period has passed since it could have begun; then it steps with what it has. In real time
@@ -9,6 +9,7 @@
 mod control;
 mod error;
 mod lockstep;
+mod member;
 mod realtime;
 mod stage;
 mod state;
@@ -22,22 +23,21 @@ pub use state::Runner;
 use crate::clock::{Start, now_ns};
 use crate::protocol::NodeStatus;
 use crate::stage::Clock;
+use stage::lost;
 use std::sync::Arc;
 
 impl Runner {
     /// Runs until all steps are done or `control` stops it; tells events and reports on the way, and
-    /// returns the figures of the whole run.
+    /// returns the figures of the whole run, a node each.
     ///
     /// # Errors
     /// In lockstep a missing input or a lost sample; in either clock a transport that fails for good.
-    pub fn run(&mut self, start: Start, control: &Arc<Control>, tell: &mut dyn FnMut(Told)) -> Result<NodeStatus, RunError> {
+    pub fn run(&mut self, start: Start, control: &Arc<Control>, tell: &mut dyn FnMut(Told)) -> Result<Vec<NodeStatus>, RunError> {
         self.reported_at = now_ns();
         match self.timing.clock {
             Clock::Lockstep => self.run_lockstep(control, tell)?,
             Clock::Realtime => self.run_realtime(start, control, tell)?,
         }
-        let peak_effort = self.teller.report.peak_effort;
-        let report = self.report(&self.loop_time);
-        Ok(NodeStatus { peak_effort, ..report })
+        Ok(self.members.iter().enumerate().map(|(i, m)| m.report(lost(&self.stages, i), &m.loop_time)).collect())
     }
 }

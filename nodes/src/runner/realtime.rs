@@ -3,7 +3,7 @@
 use super::control::{Control, SLICE_NS, Told};
 use super::error::RunError;
 use super::state::Runner;
-use crate::clock::{Start, now_ns, sleep_until_ns};
+use crate::clock::{Start, now_ns, poll_until_ns, sleep_until_ns};
 use crate::input::Input;
 use crate::sentences::sentence;
 use std::time::Duration;
@@ -24,13 +24,15 @@ impl Runner {
         }
         if first > 0 {
             self.stages.iter_mut().flat_map(|s| &mut s.inputs).for_each(Input::join_late);
-            let text = sentence("joined_late", first as f64);
-            self.teller.tell_event(first, unix(begun), "joined_late", first as f64, 0, text, tell);
+            for member in &mut self.members {
+                let text = sentence("joined_late", first as f64);
+                member.teller.tell_event(first, unix(begun), "joined_late", first as f64, 0, text, tell);
+            }
         }
         while !control.is_stopped() {
             self.take_gains(control);
             let mut now = now_ns();
-            let (mut wake_at, mut waits_for_input, mut finished) = (now + SLICE_NS, false, true);
+            let (mut wake_at, mut waits_for_input, mut finished, mut stepped) = (now + SLICE_NS, false, true, false);
             for i in 0..self.stages.len() {
                 let stage = &mut self.stages[i];
                 if stage.step >= steps {
@@ -45,28 +47,31 @@ impl Runner {
                 if now - due > horizon_ns {
                     let (to, from) = (due_step(now), stage.step);
                     (stage.step, stage.waiting_since) = (to, now);
-                    self.skipped += to - from;
+                    let member = &mut self.members[stage.member];
+                    member.skipped += to - from;
                     let value = (to - from) as f64;
-                    self.teller.tell_event(to, unix(now), "steps_skipped", value, 1, sentence("steps_skipped", value), tell);
+                    member.teller.tell_event(to, unix(now), "steps_skipped", value, 1, sentence("steps_skipped", value), tell);
                     wake_at = now;
                     continue;
                 }
                 let ready = match stage.poll() {
                     Ok(ready) => ready,
-                    Err(e) => self.teller.tell_broken(stage.step, unix(now), &e, tell),
+                    Err(e) => self.members[stage.member].teller.tell_broken(stage.step, unix(now), &e, tell),
                 };
                 let give_up = stage.waiting_since + period_ns as i64;
                 if !ready && now < give_up {
                     (waits_for_input, wake_at) = (true, wake_at.min(give_up));
                     continue;
                 }
+                let member = stage.member;
                 if let Err(e) = self.do_step(i, unix(now), tell) {
-                    self.teller.tell_broken(self.stages[i].step, unix(now), &e, tell);
+                    self.members[member].teller.tell_broken(self.stages[i].step, unix(now), &e, tell);
                 }
+                stepped = true;
                 now = now_ns();
                 let stage = &mut self.stages[i];
                 let next_due = due_ns(stage.step);
-                self.teller.report.missed_deadlines += u64::from(now > next_due);
+                self.members[member].teller.report.missed_deadlines += u64::from(now > next_due);
                 stage.waiting_since = now.max(next_due);
                 wake_at = wake_at.min(next_due);
             }
@@ -75,15 +80,19 @@ impl Runner {
             }
             self.report_if_due(now, tell);
             self.tell_late(now, unix(now), tell);
-            if wake_at <= now {
+            // What a stage has just sent may be what one of the same process waits for, and rings no bell.
+            if wake_at <= now || stepped && waits_for_input {
                 continue;
             }
             match waits_for_input {
                 true => self.transport.wait(Duration::from_nanos((wake_at - now) as u64))?,
+                false if self.options.polls => poll_until_ns(wake_at),
                 false => sleep_until_ns(wake_at),
             }
         }
-        self.teller.report.missed_deadlines += self.skipped;
+        for member in &mut self.members {
+            member.teller.report.missed_deadlines += member.skipped;
+        }
         Ok(())
     }
 }

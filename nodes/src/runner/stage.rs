@@ -15,6 +15,10 @@ pub(super) struct Output {
 }
 
 pub(super) struct Stage {
+    /// Index of its node among those of the runner.
+    pub(super) member: usize,
+    /// Whether it is the first of its node: its steps are the node's.
+    pub(super) is_first: bool,
     pub(super) inputs: Vec<Input>,
     pub(super) satisfied: Vec<bool>,
     pub(super) ports: Vec<Port>,
@@ -40,12 +44,12 @@ impl Stage {
     }
 }
 
-pub(super) fn lost(stages: &[Stage]) -> u64 {
-    stages.iter().flat_map(|s| &s.inputs).map(|i| i.lost).sum()
+pub(super) fn lost(stages: &[Stage], member: usize) -> u64 {
+    stages.iter().filter(|s| s.member == member).flat_map(|s| &s.inputs).map(|i| i.lost).sum()
 }
 
-pub(super) fn want(stages: &mut [Stage], gains: Gains) {
+pub(super) fn want(stages: &mut [Stage], member: usize, gains: Gains) {
     if gains_are_valid(&gains) {
-        stages.iter_mut().for_each(|s| s.wanted.push(gains));
+        stages.iter_mut().filter(|s| s.member == member).for_each(|s| s.wanted.push(gains));
     }
 }

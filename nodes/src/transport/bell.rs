@@ -20,13 +20,50 @@ pub(crate) struct Bell {
     awaited: AtomicU64,
 }
 
-/// How long a receiver looks at its bell before it sleeps.
+/// How a receiver looks at its bell before it sleeps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Spin {
-    /// Looks with a pause instruction between them.
-    pub pauses: u32,
-    /// Looks with the processor offered to others between them.
-    pub yields: u32,
+pub(crate) enum Looks {
+    /// Not at all: it sleeps at once.
+    None,
+    /// Once more after it has offered its processor to others. Where nodes outnumber processors the publisher it waits for often runs
+    /// then, and neither sleep nor wake is paid for. Where a process that has nothing to do with the run takes the offer it keeps the
+    /// processor for milliseconds; so the longer an offer took, the longer no other is made.
+    Offer(Offer),
+    /// As long as it may wait: it never sleeps, and needs a processor for itself.
+    Poll,
+}
+
+/// When a processor is offered to others.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(crate) struct Offer {
+    /// Waits that go by without one.
+    pause: u32,
+    /// The pause after the next one that takes long.
+    penalty: u32,
+}
+
+/// An offer that took longer went to somebody else; a round of five nodes takes a tenth of it.
+const LONG: Duration = Duration::from_micros(150);
+
+/// Most waits without an offer: one that takes 4 ms then costs a microsecond a wait.
+const MOST_PAUSE: u32 = 4096;
+
+impl Offer {
+    /// Whether this wait makes one.
+    fn due(&mut self) -> bool {
+        let due = self.pause == 0;
+        self.pause = self.pause.saturating_sub(1);
+        due
+    }
+
+    fn took(&mut self, time: Duration) {
+        if time > LONG {
+            self.penalty = (self.penalty.max(32) * 2).min(MOST_PAUSE);
+            self.pause = self.penalty;
+        } else {
+            self.penalty -= self.penalty / 8;
+        }
+    }
 }
 
 impl Bell {
@@ -47,21 +84,38 @@ impl Bell {
 
     /// Waits until the bell has rung since `seen`, or the time is over, or a signal came. Once asleep only
     /// a tone of `awaited` ends it.
-    pub fn wait(&self, seen: &mut u32, awaited: u64, timeout: Duration, spin: Spin) {
+    pub fn wait(&self, seen: &mut u32, awaited: u64, timeout: Duration, looks: &mut Looks) {
         if self.rung(seen) || timeout.is_zero() {
             return;
         }
-        for _ in 0..spin.pauses {
-            std::hint::spin_loop();
-            if self.rung(seen) {
-                return;
+        match looks {
+            Looks::None => {}
+            Looks::Offer(offer) => {
+                if offer.due() {
+                    let started = Instant::now();
+                    std::thread::yield_now();
+                    let rung = self.rung(seen);
+                    let took = started.elapsed();
+                    offer.took(took);
+                    if rung || took >= timeout {
+                        return;
+                    }
+                }
             }
-        }
-        let started = Instant::now();
-        for _ in 0..spin.yields {
-            std::thread::yield_now();
-            if self.rung(seen) || started.elapsed() >= timeout {
-                return;
+            Looks::Poll => {
+                let started = Instant::now();
+                loop {
+                    // The clock costs more than a look.
+                    for _ in 0..64 {
+                        std::hint::spin_loop();
+                        if self.rung(seen) {
+                            return;
+                        }
+                    }
+                    if started.elapsed() >= timeout {
+                        return;
+                    }
+                }
             }
         }
         // Before the sleeping bit: who sees the bit sees these.
@@ -129,17 +183,53 @@ mod tests {
     use super::*;
     use std::sync::Arc;
 
-    const NONE: Spin = Spin { pauses: 0, yields: 0 };
-
     #[test]
     fn a_ring_before_the_wait_is_not_lost() {
         let (bell, mut seen) = (Bell::new(), 0);
         bell.ring(0);
         let started = Instant::now();
-        bell.wait(&mut seen, 1, Duration::from_secs(10), NONE);
+        bell.wait(&mut seen, 1, Duration::from_secs(10), &mut Looks::None);
         assert!(started.elapsed() < Duration::from_secs(5));
-        bell.wait(&mut seen, 1, Duration::from_millis(20), NONE);
+        bell.wait(&mut seen, 1, Duration::from_millis(20), &mut Looks::None);
         assert!(started.elapsed() >= Duration::from_millis(20));
+    }
+
+    #[test]
+    fn offers_that_take_long_become_rare() {
+        let mut offer = Offer::default();
+        let mut made = 0;
+        for _ in 0..100_000 {
+            if offer.due() {
+                made += 1;
+                offer.took(Duration::from_millis(4));
+            }
+        }
+        assert!((10..60).contains(&made), "{made} offers");
+        // Where they are short again they are made at every wait.
+        let mut waits = 0;
+        while offer.penalty > 8 {
+            waits += 1;
+            if offer.due() {
+                offer.took(Duration::from_micros(20));
+            }
+        }
+        assert!(offer.due() && waits < 10_000, "{waits}");
+    }
+
+    #[test]
+    fn who_polls_sees_a_ring_and_the_end_of_its_time() {
+        let bell = Arc::new(Bell::new());
+        let other = Arc::clone(&bell);
+        let (mut seen, started) = (0, Instant::now());
+        bell.wait(&mut seen, 1, Duration::from_millis(20), &mut Looks::Poll);
+        assert!(started.elapsed() >= Duration::from_millis(20));
+        let thread = std::thread::spawn(move || {
+            std::thread::sleep(Duration::from_millis(20));
+            other.ring(0);
+        });
+        bell.wait(&mut seen, 1, Duration::from_secs(20), &mut Looks::Poll);
+        assert!(started.elapsed() < Duration::from_secs(10));
+        assert!(thread.join().is_ok());
     }
 
     #[test]
@@ -151,7 +241,7 @@ mod tests {
             let mut seen = 0;
             for i in 0..rounds {
                 while other.2.load(Ordering::SeqCst) != 2 * i + 1 {
-                    other.0.wait(&mut seen, 1, Duration::from_secs(10), NONE);
+                    other.0.wait(&mut seen, 1, Duration::from_secs(10), &mut Looks::None);
                 }
                 other.2.store(2 * i + 2, Ordering::SeqCst);
                 other.1.ring(0);
@@ -163,7 +253,7 @@ mod tests {
             bells.2.store(2 * i + 1, Ordering::SeqCst);
             bells.0.ring(0);
             while bells.2.load(Ordering::SeqCst) != 2 * i + 2 {
-                bells.1.wait(&mut seen, 1, Duration::from_secs(10), NONE);
+                bells.1.wait(&mut seen, 1, Duration::from_secs(10), &mut Looks::None);
             }
         }
         assert!(thread.join().is_ok());

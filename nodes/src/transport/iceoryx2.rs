@@ -1,7 +1,7 @@
 //! Shared memory between processes of one machine: iceoryx2 carries the messages, bells of our own
 //! (see `bell.rs`) wake the receivers.
 
-use super::bell::{Spin, Tones};
+use super::bell::{Looks, Offer, Tones};
 use super::board::Board;
 use super::{Location, MAX_LISTENERS, Publisher, Subscriber, Transport, TransportError, capacity, check_layout, wrong_kind};
 use crate::clock::now_ns;
@@ -22,15 +22,6 @@ const MAX_PUBLISHERS: usize = 4;
 /// Processes that may have a topic open: its publisher, its listeners, and tools that look on.
 const MAX_NODES: usize = 64;
 
-/// A receiver offers its processor to others once before it sleeps: where processes outnumber processors
-/// the publisher it waits for often runs at once, and neither sleep nor wake is paid for.
-///
-/// Median loop time of the `ring` bench over that of a raw pipe ring, seven interleaved runs on two
-/// processors: futex 1.4; futex after one yield 0.86, after three 0.8 to 1.3; futex after 100 pauses 2.6
-/// (it keeps the publisher from running); a named pipe as bell 1.8, after one yield 1.8; iceoryx2's
-/// event 2.3, after one yield 0.93. Before sleepers were woken only for what they wait for: 2.6.
-const SPIN: Spin = Spin { pauses: 0, yields: 1 };
-
 /// A node's way into a run over shared memory.
 pub struct Iceoryx2 {
     node: Node<ipc::Service>,
@@ -38,6 +29,7 @@ pub struct Iceoryx2 {
     bell: usize,
     tones: Rc<Tones>,
     seen: u32,
+    looks: Looks,
 }
 
 impl Iceoryx2 {
@@ -64,7 +56,13 @@ impl Iceoryx2 {
             .map_err(|e| start(&e))?;
         let board = Board::open(location)?;
         let bell = board.bell_of(name).ok_or_else(|| start(&"the run has no room for another node (64)"))?;
-        Ok(Iceoryx2 { node, board: Rc::new(board), bell, tones: Rc::default(), seen: 0 })
+        Ok(Iceoryx2 { node, board: Rc::new(board), bell, tones: Rc::default(), seen: 0, looks: Looks::Offer(Offer::default()) })
+    }
+
+    /// Whether the node waits for its inputs by looking all the time. That keeps a processor busy, and is worth it where each node has one.
+    pub fn polling(mut self, polls: bool) -> Iceoryx2 {
+        self.looks = if polls { Looks::Poll } else { Looks::Offer(Offer::default()) };
+        self
     }
 
     /// The service of a topic; made by whoever comes first, so all must ask for the same.
@@ -139,7 +137,7 @@ impl Transport for Iceoryx2 {
     }
 
     fn wait(&mut self, timeout: Duration) -> Result<(), TransportError> {
-        self.board.bell(self.bell).wait(&mut self.seen, self.tones.awaited(), timeout, SPIN);
+        self.board.bell(self.bell).wait(&mut self.seen, self.tones.awaited(), timeout, &mut self.looks);
         Ok(())
     }
 

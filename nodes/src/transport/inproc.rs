@@ -1,6 +1,6 @@
 //! Between threads of one process: the same behaviour as over shared memory, without any.
 
-use super::bell::{Bell, Spin};
+use super::bell::{Bell, Looks};
 use super::{Publisher, Subscriber, Transport, TransportError, capacity, check_layout, wrong_kind};
 use crate::clock::now_ns;
 use backdrive_msgs::Message;
@@ -88,7 +88,7 @@ impl Transport for Inproc {
     }
 
     fn wait(&mut self, timeout: Duration) -> Result<(), TransportError> {
-        self.bell.wait(&mut self.seen, 1, timeout, Spin { pauses: 0, yields: 0 });
+        self.bell.wait(&mut self.seen, 1, timeout, &mut Looks::None);
         Ok(())
     }
 }

@@ -245,6 +245,33 @@ impl Table {
             .map(Some)
     }
 
+    /// A list of lists of strings; one list of strings is a list of one.
+    pub fn string_lists(&mut self, key: &str) -> Result<Option<Vec<Vec<String>>>, FileError> {
+        let nested = match self.entries.iter().find(|e| e.key == key).map(|e| &e.node.value) {
+            Some(Value::Array(items)) => items.iter().any(|item| matches!(item.value, Value::Array(_))),
+            _ => false,
+        };
+        if !nested {
+            let lists = |one: Vec<String>| if one.is_empty() { Vec::new() } else { vec![one] };
+            return Ok(self.strings(key)?.map(lists));
+        }
+        let Some(node) = self.take(key) else { return Ok(None) };
+        let Value::Array(lists) = &node.value else { return Err(self.wrong_type(key, &node, "a list of lists of strings")) };
+        let wrong = |item: &Node, index: usize, expected: &str| {
+            let message = format!("expected {expected}, found {}", item.describe());
+            FileError::at(&self.file.name, item.line, format!("{}[{index}]", self.path_of(key)), message)
+        };
+        let list = |(index, list): (usize, &Node)| -> Result<Vec<String>, FileError> {
+            let Value::Array(items) = &list.value else { return Err(wrong(list, index, "a list of strings")) };
+            let text = |item: &Node| match &item.value {
+                Value::String(text) => Ok(text.clone()),
+                _ => Err(wrong(item, index, "strings")),
+            };
+            items.iter().map(text).collect()
+        };
+        lists.iter().enumerate().map(list).collect::<Result<_, _>>().map(Some)
+    }
+
     /// A string or a list of strings; one string is a list of one.
     pub fn string_or_strings(&mut self, key: &str) -> Result<Option<Vec<String>>, FileError> {
         match self.entries.iter().find(|e| e.key == key).map(|e| &e.node.value) {

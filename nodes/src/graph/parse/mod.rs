@@ -10,6 +10,7 @@ mod played;
 use super::files::Files;
 use super::hosts::read_hosts;
 use super::overrides::experiment_text;
+use super::together::read_together;
 use super::{Graph, Overrides, check};
 use crate::stage::{Clock, Timing};
 use backdrive_plant::elements::Range;
@@ -73,6 +74,8 @@ impl Graph {
             hosts: read_hosts(&mut top)?,
             nodes: Vec::new(),
             connections: Vec::new(),
+            together: Vec::new(),
+            polls: top.one_of("wait", &[("sleep", false), ("poll", true)])?.unwrap_or(false),
             files: Vec::new(),
             experiments: Vec::new(),
         };
@@ -94,6 +97,7 @@ impl Graph {
             graph.connections[index].topic = graph.topic_of(node, &port);
         }
         settle_axes(&mut graph);
+        graph.together = read_together(&mut top, &graph)?;
         check::check(&graph, &top)?;
         top.finish()?;
         Ok(graph)

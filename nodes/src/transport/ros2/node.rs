@@ -1,6 +1,6 @@
 //! A node's way into a graph over ROS 2.
 
-use super::super::bell::{Bell, Spin};
+use super::super::bell::{Bell, Looks};
 use super::super::{Publisher, Subscriber, Transport, TransportError};
 use super::clock::ClockWatch;
 use super::delivery::Delivery;
@@ -79,7 +79,7 @@ impl Transport for Ros2 {
         self.shared.watch_clock();
         // An input that is ahead is not asked for; what it has must not stay in the middleware until it is.
         inbox::drain(&self.shared.inboxes);
-        self.shared.bell.wait(&mut self.seen, 1, timeout, Spin { pauses: 0, yields: 0 });
+        self.shared.bell.wait(&mut self.seen, 1, timeout, &mut Looks::None);
         Ok(())
     }
 }

@@ -7,7 +7,7 @@ use super::node::Ros2;
 use super::participant::{Participant, open_error};
 use super::shared::Shared;
 use crate::transport::TransportError;
-use crate::transport::bell::{Bell, Spin};
+use crate::transport::bell::{Bell, Looks};
 use rustdds::QosPolicyBuilder;
 use rustdds::no_key::{DataWriterCdr, SimpleDataReaderCdr};
 use rustdds::policy::{Durability, History};
@@ -92,6 +92,6 @@ impl Talk {
         {
             (self.ends, self.life) = (ends, self.shared.life.get());
         }
-        self.bell.wait(&mut self.seen, 1, timeout, Spin { pauses: 0, yields: 0 });
+        self.bell.wait(&mut self.seen, 1, timeout, &mut Looks::None);
     }
 }

@@ -1,0 +1,35 @@
+//! What a runner keeps for each of its nodes beside their stages.
+
+use super::stage::Output;
+use super::teller::Teller;
+use crate::histogram::Histogram;
+use crate::protocol::NodeStatus;
+use crate::transport::Subscriber;
+
+/// One of the nodes that a runner drives; most drive one.
+pub(super) struct Member {
+    pub(super) name: String,
+    pub(super) teller: Teller,
+    pub(super) gains_in: Option<Box<dyn Subscriber>>,
+    pub(super) gains_out: Option<Output>,
+    pub(super) margin_out: Option<Output>,
+    pub(super) loop_time: Histogram,
+    pub(super) loop_time_recent: Histogram,
+    /// Steps left out because the node was too far behind.
+    pub(super) skipped: u64,
+    /// Late samples that were told, and when, ns.
+    pub(super) late_told: (u64, i64),
+}
+
+impl Member {
+    /// Outputs beside those of its stages.
+    pub(super) fn side_outputs(&self) -> impl Iterator<Item = &Output> {
+        [&self.teller.events, &self.teller.status].into_iter().chain(&self.gains_out).chain(&self.margin_out)
+    }
+
+    /// Its figures, with `lost` samples and times from this histogram.
+    pub(super) fn report(&self, lost: u64, times: &Histogram) -> NodeStatus {
+        let us = |q: f64| times.quantile(q) * 1e-3;
+        NodeStatus { lost, loop_p50_us: us(0.5), loop_p99_us: us(0.99), ..self.teller.report }
+    }
+}

@@ -1,0 +1,66 @@
+//! `together` in graph files: which nodes share a process, and what is wrong with wrong ones.
+
+use backdrive_nodes::graph::{Files, Graph, Overrides, draw};
+use std::path::Path;
+
+fn read(together: &str, change: impl Fn(String) -> String, file: &str) -> Result<Graph, String> {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../launch").join(file);
+    let text = change(std::fs::read_to_string(&path).unwrap());
+    let text = format!("together = {together}\n{text}");
+    Graph::from_text(&text, &path, &Overrides::default(), &Files::Disk).map_err(|e| e.to_string())
+}
+
+fn contact(together: &str) -> Result<Graph, String> {
+    read(together, |text| text, "contact.toml")
+}
+
+fn names(graph: &Graph, of: &str) -> Vec<String> {
+    graph.process_of(of).iter().map(|n| n.name.clone()).collect()
+}
+
+#[test]
+fn who_shares_a_process() {
+    let graph = contact("[\"scaling\", \"canceller\"]").unwrap();
+    assert_eq!(names(&graph, "canceller"), ["scaling", "canceller"]);
+    assert_eq!(names(&graph, "scaling"), ["scaling", "canceller"]);
+    assert_eq!(names(&graph, "master"), ["master"]);
+    assert!(names(&graph, "nobody").is_empty());
+    assert!(draw(&graph).contains("in one process: scaling + canceller"), "{}", draw(&graph));
+
+    let graph = contact("[[\"operator\", \"master\"], [\"scaling\", \"slave\"]]").unwrap();
+    assert_eq!(names(&graph, "master"), ["operator", "master"]);
+    assert_eq!(names(&graph, "slave"), ["scaling", "slave"]);
+    assert_eq!(names(&contact("[]").unwrap_or_else(|e| panic!("{e}")), "slave"), ["slave"]);
+}
+
+#[test]
+fn what_is_wrong_is_said_with_file_and_key() {
+    let wrong = |together: &str| {
+        let told = contact(together).unwrap_err();
+        assert!(told.contains("contact.toml:1") && told.contains("together"), "{told}");
+        told
+    };
+    let told = wrong("[\"scaling\", \"canceler\"]");
+    assert!(told.contains("canceler") && told.contains("did you mean \"canceller\""), "{told}");
+    assert!(wrong("[\"scaling\", \"scaling\"]").contains("\"scaling\" twice"));
+    assert!(wrong("[[\"scaling\", \"slave\"], [\"canceller\", \"scaling\"]]").contains("\"scaling\" twice"));
+    assert!(wrong("[\"scaling\"]").contains("two or more"));
+    let told = wrong("[\"operator\", \"slave\"]");
+    assert!(told.contains("no connection joins \"slave\" with \"operator\"") && told.contains("follow one another"), "{told}");
+    assert!(wrong("[\"scaling\", \"recorder\"]").contains("recorder"));
+    assert!(wrong("[\"scaling\", 3]").contains("expected a string"));
+    assert!(wrong("\"scaling\"").contains("list of strings"));
+    assert!(wrong("[[\"scaling\", \"slave\"], \"canceller\"]").contains("expected a list of strings"));
+}
+
+#[test]
+fn what_cannot_share_a_process() {
+    let master = |line: &'static str| move |text: String| text.replace("kind = \"master\"\n", &format!("kind = \"master\"\n{line}\n"));
+    let told = read("[\"master\", \"canceller\"]", master("command = [\"./own\"]"), "contact.toml").unwrap_err();
+    assert!(told.contains("\"master\" is a program of your own"), "{told}");
+    let realtime = |text: String| master("restart = true")(text.replace("clock = \"lockstep\"", "clock = \"realtime\""));
+    let told = read("[\"master\", \"canceller\"]", realtime, "contact.toml").unwrap_err();
+    assert!(told.contains("both or neither"), "{told}");
+    let told = read("[\"scaling\", \"slave\"]", |text| text, "contact-hosts.toml").unwrap_err();
+    assert!(told.contains("a process runs on one host"), "{told}");
+}
