@@ -6,7 +6,7 @@ import ast
 import html as _html
 import os
 import tomllib
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 from . import _backdrive, _toml
@@ -90,6 +90,15 @@ class Model:
             for key, value in element.items():
                 if isinstance(value, (int, float)) and not isinstance(value, bool):
                     yield f"elements.{element['name']}.{key}", float(value)
+
+    def driven(self, inputs: Sequence[Mapping[str, Any]], outputs: Sequence[Mapping[str, Any]]) -> Model:
+        """The same network with other inputs and outputs, such as a force in the place of a motion: tables as in a model file,
+        `[{"name": "force", "kind": "force", "on": "carriage"}]`. Axes, which name the old ones, are left out.
+        """
+        text = _backdrive.without(self._text, ["inputs", "outputs", "axes"]).rstrip() + "\n"
+        for section, tables in (("inputs", inputs), ("outputs", outputs)):
+            text += "".join(f"\n[[{section}]]\n{_toml.document(table)}" for table in tables)
+        return Model(text, name=self._name, folder=self._folder)
 
     def copy(self) -> Model:
         """Another with the same text."""

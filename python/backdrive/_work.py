@@ -23,7 +23,7 @@ class Bar:
     def __init__(self) -> None:
         self.began = time.monotonic()
         self.next = self.began + 0.5
-        self.bar: Any = None
+        self.bar: Any = None  # False where there is no tqdm
         self.line = False
 
     def __call__(self, message: str, position: int, length: int | None) -> None:
@@ -38,7 +38,7 @@ class Bar:
                 self.bar = tqdm(total=length, leave=False, bar_format="{desc} {bar} {elapsed}" if length else "{desc} {elapsed}")
             except ImportError:
                 self.bar = False
-        if self.bar:
+        if self.bar is not False:  # a bar without an end has no truth
             self.bar.set_description_str(message, refresh=False)
             self.bar.total = length
             self.bar.n = min(position, length) if length else position
@@ -49,7 +49,7 @@ class Bar:
             self.line = True
 
     def close(self) -> None:
-        if self.bar:
+        if self.bar is not None and self.bar is not False:
             self.bar.close()
         if self.line:
             sys.stderr.write("\r" + 70 * " " + "\r")

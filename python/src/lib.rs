@@ -64,5 +64,6 @@ fn _backdrive(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(table::read_table, module)?)?;
     module.add_function(wrap_pyfunction!(model::patched, module)?)?;
     module.add_function(wrap_pyfunction!(model::anywhere, module)?)?;
+    module.add_function(wrap_pyfunction!(model::without, module)?)?;
     module.add_function(wrap_pyfunction!(model::value_at, module)?)
 }

@@ -30,6 +30,19 @@ pub fn value_at(text: &str, name: &str, folder: Option<PathBuf>, path: Option<&s
     path.map_or(Ok(Vec::new()), |path| model.values_at(path).map_err(|e| PyValueError::new_err(format!("{name}: {path}: {e}"))))
 }
 
+/// The text without some of its tables, such as `inputs`.
+///
+/// # Errors
+/// When the text is not TOML.
+#[pyfunction]
+pub fn without(text: &str, tables: Vec<String>) -> PyResult<String> {
+    let mut document: DocumentMut = text.parse().map_err(|e: toml_edit::TomlError| PyValueError::new_err(e.to_string()))?;
+    for table in &tables {
+        document.remove(table);
+    }
+    Ok(document.to_string())
+}
+
 /// The text with the files that it names by their whole paths, so that it may stand in any folder.
 ///
 /// # Errors

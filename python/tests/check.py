@@ -207,6 +207,9 @@ class Package(unittest.TestCase):
             model["elements.rope.stiffness"] = 1.0
         self.assertIn("[motor] 0.03 kg", model.diagram)
         self.assertIn("<pre", model._repr_html_())
+        pushed = model.driven([{"name": "hand", "kind": "force", "on": "handle"}], [{"name": "speed", "kind": "velocity", "of": "handle"}])
+        frame = backdrive.simulate(pushed, DRIVES["sweep"], kind="numpy", progress=False).frame
+        self.assertEqual(set(frame), {"t", "hand", "speed"})
         arm = backdrive.Model(ROOT / "plant/robots/two-joint-arm.toml")
         arm.write(self.folder / "arm.toml")
         self.assertEqual(backdrive.Model(self.folder / "arm.toml").diagram, arm.diagram)

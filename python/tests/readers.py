@@ -4,9 +4,12 @@
 """
 
 import json
+import os
 import pathlib
+import subprocess
 import sys
 import tempfile
+import time
 import unittest
 import warnings
 
@@ -79,6 +82,21 @@ class Readers(unittest.TestCase):
         numpy.testing.assert_array_equal(moved["elbow.command"], 0.5 * (states[0] + 1.0)[:-1, 1].astype(float))
         numpy.testing.assert_array_equal(moved["elbow.position"], 0.5 * states[0][1:, 1].astype(float))
         self.assertEqual(moved["t"][0], 1 / 30)
+
+    def test_an_arm_is_diagnosed_from_a_lerobot_folder(self):
+        """The example: friction and play that were left out are named at their joints, in less than a minute."""
+        examples = pathlib.Path(__file__).resolve().parents[1] / "examples"
+        environment = os.environ | {"PYTHONPATH": PLACE}
+        for script in ("so101_dataset.py", "so101_verdict.py"):
+            began = time.monotonic()
+            done = subprocess.run([sys.executable, examples / script, self.folder], capture_output=True, text=True, env=environment)
+            self.assertEqual(done.returncode, 0, done.stderr)
+        taken = time.monotonic() - began
+        print(f"from a LeRobot folder to a verdict: {taken:.1f} s")
+        self.assertIn("dry friction at the elbow_flex", done.stdout)
+        self.assertIn("play of the gear between shoulder_pan", done.stdout)
+        self.assertTrue((self.folder / "report.html").exists())
+        self.assertLess(taken, 60.0)
 
     def test_what_is_wrong_with_a_dataset_is_told(self):
         with self.assertRaisesRegex(backdrive.InputError, "info.json: cannot be read"):
