@@ -35,8 +35,13 @@ class Figure:
         figure, all_axes = pyplot.subplots(len(panels), 1, sharex=True, squeeze=False, layout="constrained", figsize=(8.0, 1.0 + 2.4 * len(panels)))
         for panel, axes in zip(panels, all_axes[:, 0]):
             axes.set_title(panel["title"], fontsize="medium")
+            places = sorted({x for series in panel["series"] if series["kind"] == "bars" for x in series["x"] if x is not None})
+            width = 0.85 * min((b - a for a, b in zip(places, places[1:])), default=1.0)
             for number, series in enumerate(panel["series"]):
-                _draw(axes, series, f"C{number}")
+                _draw(axes, series, f"C{number}", width)
+            for point in panel["points"]:
+                axes.plot(point["x"], point["y"], "o", color="k", markersize=4)
+                axes.annotate(point.get("label", ""), (point["x"], point["y"]), fontsize="small")
             for region in panel["regions"]:
                 axes.axvspan(region["from"], region["to"], alpha=0.12, color="C3")
             for marker in panel["markers"]:
@@ -48,13 +53,23 @@ class Figure:
         return figure
 
 
-def _draw(axes: Any, series: dict[str, Any], colour: str) -> None:
-    x, y, name = series["x"], series["y"], series["name"]
+def _draw(axes: Any, series: dict[str, Any], colour: str, bar: float) -> None:
+    import numpy
+
+    # What no axis can show is null there, and a gap here.
+    x, y, z = (numpy.array(series.get(key) or [], dtype=float) for key in ("x", "y", "z"))
+    name = series["name"]
     kind = series["kind"]
     if kind == "band":
-        axes.fill_between(x, y, series["z"], alpha=0.25, label=name, color=colour, linewidth=0)
+        axes.fill_between(x, y, z, alpha=0.25, label=name, color=colour, linewidth=0)
     elif kind == "bars":
-        axes.bar(x, y, label=name, color=colour, width=0.6)
+        axes.bar(x, y, label=name, color=colour, width=bar)
+    elif kind == "discs":
+        from matplotlib.patches import Circle
+
+        axes.plot(x, y, ".", markersize=2, label=name, color=colour)
+        for middle in zip(x, y, z):
+            axes.add_patch(Circle(middle[:2], middle[2], alpha=0.15, color=colour, linewidth=0))
     elif kind == "points":
         axes.plot(x, y, ".", label=name, color=colour)
     else:
@@ -66,8 +81,9 @@ def _axis(axes: Any, which: str, data: dict[str, Any]) -> None:
     getattr(axes, f"set_{which}label")(data["label"] + unit)
     if data["log"]:
         getattr(axes, f"set_{which}scale")("log")
+    getattr(axes, f"set_{which}lim")(data["lo"], data["hi"])
     if data.get("names"):
-        getattr(axes, f"set_{which}ticks")(range(len(data["names"])), data["names"])
+        getattr(axes, f"set_{which}ticks")(range(1, len(data["names"]) + 1), data["names"])
 
 
 def figures_of(page: str) -> list[Figure]:

@@ -156,14 +156,27 @@ def _matrix(column: Any, rows: Any, file: Path, name: str) -> Any:
 
 def load_parquet(path: str | os.PathLike[str], *, time: str = "t", kind: str = "auto") -> Any:
     """A table in parquet as a frame; `time` is its column of times, s. Columns that hold no numbers are left out."""
+    return _timed(_parquet(path), time, path, kind)
+
+
+def _parquet(path: Any) -> dict[str, Any]:
+    """The columns of numbers; what is missing in them is NaN."""
+    import numpy
+
     parquet = _module("pyarrow.parquet", "pyarrow")
     table = _read(lambda: parquet.read_table(os.fspath(path)), path)
-    frame = {}
-    for name in table.column_names:
-        kind_of = str(table[name].type)
-        if kind_of.startswith(("float", "double", "halffloat", "int", "uint", "bool")):
-            frame[name] = table[name].to_numpy().astype(float)
-    return _timed(frame, time, path, kind)
+    numbers = ("float", "double", "halffloat", "int", "uint", "bool")
+    return {name: numpy.asarray(table[name].to_numpy(), dtype=float) for name in table.column_names if str(table[name].type).startswith(numbers)}
+
+
+def numbers_of(path: str) -> dict[str, Any] | None:
+    """The columns of a file that is no recording of ours; `None` of one that is, or may be."""
+    suffix = os.path.splitext(path)[1].lower()
+    if suffix == ".parquet":
+        return _parquet(path)
+    if suffix == ".mat":
+        return _mat(path, None)[0]
+    return None
 
 
 def load_mat(path: str | os.PathLike[str], *, time: str = "t", variable: str | None = None, kind: str = "auto") -> Any:
@@ -171,6 +184,14 @@ def load_mat(path: str | os.PathLike[str], *, time: str = "t", variable: str | N
 
     variable: the structure whose fields they are, where they are those of one. A matrix becomes columns `NAME[0]`, `NAME[1]` and so on.
     """
+    frame, vectors = _mat(path, variable, time)
+    if time not in frame:
+        raise InputError(f"{path}: {time}: is no vector of times; vectors are {', '.join(vectors)}: name one with time=...")
+    return _timed(frame, time, path, kind)
+
+
+def _mat(path: Any, variable: str | None, time: str | None = None) -> tuple[dict[str, Any], list[str]]:
+    """The vectors as long as that of the times, or as the longest, and the names of all vectors."""
     import numpy
 
     scipy_io = _module("scipy.io", "scipy")
@@ -181,9 +202,8 @@ def load_mat(path: str | os.PathLike[str], *, time: str = "t", variable: str | N
         struct = held[variable]
         held = {name: struct[name].item() for name in struct.dtype.names or ()}
     arrays = {k: numpy.asarray(v) for k, v in held.items() if not k.startswith("__")}
-    if time not in arrays or arrays[time].ndim != 1:
-        raise InputError(f"{path}: {time}: is no vector of times; vectors are {', '.join(k for k, v in arrays.items() if v.ndim == 1)}: name one with time=...")
-    rows = len(arrays[time])
+    vectors = [k for k, v in arrays.items() if v.ndim == 1 and v.dtype.kind in "fiub"]
+    rows = len(arrays[time]) if time in vectors else max((len(arrays[k]) for k in vectors), default=0)
     frame: dict[str, Any] = {}
     for name, values in arrays.items():
         if values.dtype.kind not in "fiub" or values.ndim not in (1, 2):
@@ -193,7 +213,7 @@ def load_mat(path: str | os.PathLike[str], *, time: str = "t", variable: str | N
         elif values.ndim == 2 and rows in values.shape:
             by_row = values if values.shape[0] == rows else values.T
             frame.update({f"{name}[{n}]": by_row[:, n].astype(float) for n in range(by_row.shape[1])})
-    return _timed(frame, time, path, kind)
+    return frame, vectors
 
 
 def load_rosbag(path: str | os.PathLike[str], *, topics: str | Iterable[str] | None = None, kind: str = "auto") -> dict[str, Any]:
@@ -232,6 +252,36 @@ def load_rosbag(path: str | os.PathLike[str], *, topics: str | Iterable[str] | N
         frame.update({name: numpy.array([numbers.get(name, numpy.nan) for _, _, numbers in of]) for name in headings})
         out[topic] = of_kind(frame, kind)
     return out
+
+
+def save(frame: Any, path: str | os.PathLike[str], *, overwrite: bool = False) -> None:
+    """Writes a recording as .csv, .parquet, .mat or .mcap, as the path's ending says; what is read back is the same to the last bit."""
+    import numpy
+
+    from ._frames import columns_of, write
+
+    name, suffix = os.fspath(path), os.path.splitext(os.fspath(path))[1].lower()
+    if os.path.exists(name) and not overwrite:
+        raise InputError(f"{name}: is there already; say overwrite=True, or write to another file")
+    if suffix == ".csv":
+        write(frame, name, "recording")
+        return
+    if suffix == ".mcap":
+        from ._verbs import save_bag
+
+        save_bag(frame, name, overwrite=overwrite)
+        return
+    columns = {heading: numpy.frombuffer(column, dtype="<f8") for heading, column in columns_of(frame, "recording").items()}
+    if suffix == ".parquet":
+        pyarrow, parquet = _module("pyarrow", "pyarrow"), _module("pyarrow.parquet", "pyarrow")
+        parquet.write_table(pyarrow.table(columns), name)
+    elif suffix == ".mat":
+        for heading in columns:
+            if not heading.isidentifier() or heading.startswith("_") or len(heading) > 63:
+                raise InputError(f"{name}: {heading}: is no name that MATLAB takes: a letter, then letters, digits and _, at most 63; rename the column")
+        _module("scipy.io", "scipy").savemat(name, columns, oned_as="column", long_field_names=True)
+    else:
+        raise InputError(f"{name}: ends in none of .csv, .parquet, .mat and .mcap, so nobody knows what to write")
 
 
 def _flatten(value: Any, name: str, out: dict[str, float]) -> None:

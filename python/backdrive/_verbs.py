@@ -151,7 +151,7 @@ def simulate(
     """
     with Work(progress) as work:
         set_file = None if columns is None else work.text_file("columns.toml", _toml.document({"fit": [], "columns": columns}))
-        driven = os.fspath(drive) if _frames.is_path(drive) else work.file(drive, "recording")
+        driven = work.file(drive, "recording")
         several = os.path.isdir(driven) or driven.endswith("set.toml")
         out = work.path("predicted" if several else "predicted.csv")
         arguments = ["simulate", _model_file(work, model), driven, "--out", out, "--json", *_options({"grip": _grip(work, grip), "input": input})]

@@ -7,11 +7,13 @@ import re
 import sys
 import tempfile
 import time
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from . import _backdrive, _frames, _toml
 from ._errors import UsageError, raised
+from ._readers import numbers_of
 
 INTERRUPTED = 130
 Progress = bool | Callable[[str, int, int | None], None]
@@ -33,7 +35,9 @@ class Bar:
         self.next = now + 0.2
         if self.bar is None:
             try:
-                from tqdm.auto import tqdm
+                with warnings.catch_warnings():
+                    warnings.simplefilter("ignore")  # a notebook without widgets gets a bar of characters
+                    from tqdm.auto import tqdm
 
                 self.bar = tqdm(total=length, leave=False, bar_format="{desc} {bar} {elapsed}" if length else "{desc} {elapsed}")
             except ImportError:
@@ -105,7 +109,10 @@ class Work:
     def file(self, given: Any, name: str) -> str:
         """One recording as a path."""
         if _frames.is_path(given):
-            return os.fspath(given)
+            numbers = numbers_of(os.fspath(given))
+            if numbers is None:
+                return os.fspath(given)
+            given, name = numbers, os.path.splitext(os.path.basename(given))[0]
         shown = re.sub(r"[^\w.\-]+", "-", name).strip("-.") or "recording"
         path = self.path(shown + ".csv")
         if os.path.exists(path):

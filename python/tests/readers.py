@@ -125,6 +125,36 @@ class Readers(unittest.TestCase):
         with self.assertRaisesRegex(backdrive.InputError, "t: there is no such column"):
             backdrive.load_parquet(path)
 
+    def test_what_is_saved_comes_back_to_the_last_bit(self):
+        frame = {"t": numpy.arange(40) / 1000.0, "q": self.random(40).astype(float), "tiny": 1e-300 * self.random(40)}
+        loads = {
+            "csv": lambda path: __import__("pandas").read_csv(path),
+            "parquet": backdrive.load_parquet,
+            "mat": backdrive.load_mat,
+            "mcap": backdrive.load_bag,
+        }
+        for suffix, load in loads.items():
+            path = self.folder / f"log.{suffix}"
+            backdrive.save(frame, path)
+            back = load(path)
+            for name, column in frame.items():
+                numpy.testing.assert_array_equal(back[name], column, f"{suffix}: {name}")
+            with self.assertRaisesRegex(backdrive.InputError, "is there already"):
+                backdrive.save(frame, path)
+        with self.assertRaisesRegex(backdrive.InputError, "a b: is no name that MATLAB takes"):
+            backdrive.save({"t": frame["t"], "a b": frame["q"]}, self.folder / "other.mat")
+        with self.assertRaisesRegex(backdrive.InputError, "ends in none of"):
+            backdrive.save(frame, self.folder / "log.xlsx")
+
+    def test_parquet_and_mat_files_are_recordings_by_their_paths(self):
+        model = backdrive.Model("name = 'm'\n[bodies]\nb = 2.0\n[[inputs]]\nname = 'f'\nkind = 'force'\non = 'b'\n[[outputs]]\nname = 'v'\nkind = 'velocity'\nof = 'b'\n")
+        log = backdrive.simulate(model, "sweep:amplitude=1,from=1,to=20,duration=1", rate=1000.0, kind="numpy", progress=False).frame
+        log["v"] = log["v"] + 1e-6 * self.random(len(log["v"]))
+        told = backdrive.fit(log, model, progress=False).numbers
+        for suffix in ("parquet", "mat"):
+            backdrive.save(log, self.folder / f"log.{suffix}")
+            self.assertEqual(backdrive.fit(self.folder / f"log.{suffix}", model, progress=False).numbers, told)
+
     def test_mat_files_give_vectors_matrices_and_structures(self):
         import scipy.io
 
