@@ -1,11 +1,15 @@
 //! Ctrl-C in long work: the first ends it with what is done, a second one at once.
 
+use crate::caller;
 use crate::failure::{Failure, code};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Becomes true with the first Ctrl-C. To be asked for once in a process.
+/// Becomes true with the first Ctrl-C, or when the caller of a verb says so. To be asked for once in a process of ours.
 pub fn heard() -> Result<Arc<AtomicBool>, Failure> {
+    if let Some(caller) = caller::caller() {
+        return Ok(caller.stop.clone());
+    }
     let stop = Arc::new(AtomicBool::new(false));
     let heard = stop.clone();
     let handler = move || {

@@ -5,6 +5,8 @@
 
 mod bag;
 mod bridge;
+pub mod call;
+pub mod caller;
 mod cli;
 mod columns;
 mod compare;
@@ -57,30 +59,10 @@ pub fn main() -> ExitCode {
         Err(code) => return code,
     };
     end_with_the_reader(&command);
-    let result = match command {
-        Command::Run(options) => run::run(&options),
-        Command::Replay(options) => replay::replay(&options),
-        Command::Stability(options) => stability::stability(&options),
-        Command::Why(options) => why::why(&options),
-        Command::Compare(options) => compare::compare(&options),
-        Command::Init(options) => init::init(&options),
-        Command::Diagnose(options) => diagnose::diagnose(&options),
-        Command::Fit(options) => fit::fit(&options),
-        Command::TestBench(options) => test_bench::test_bench(&options),
-        Command::Check(options) => graph::check(&options),
-        Command::Graph(options) => graph::draw(&options),
-        Command::Simulate(options) => simulate::simulate(&options),
-        Command::Export(options) => export::export(&options),
-        Command::Model(command) => model::model(&command),
-        Command::Bag(command) => bag::bag(&command),
-        Command::Clean => run::clean(),
-        Command::Bridge(options) => bridge::bridge(&options),
-        Command::Doctor(options) => doctor::doctor(&options),
-        Command::Prove(options) => prove::prove(&options),
-        Command::Completions(options) => shell::completions(&options),
-        Command::Man(options) => shell::man(&options),
-        Command::Node(options) => return node::node(&options),
-        Command::SealedMaster(options) => return prove::sealed_master(&options),
+    let result = match &command {
+        Command::Node(options) => return node::node(options),
+        Command::SealedMaster(options) => return prove::sealed_master(options),
+        command => call::dispatch(command),
     };
     match result {
         Ok(code) => ExitCode::from(code),

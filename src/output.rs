@@ -6,6 +6,7 @@
 
 #![allow(clippy::print_stdout, clippy::print_stderr)]
 
+use crate::caller;
 use crate::failure::{Failure, code};
 use clap::Parser;
 use std::fmt::Display;
@@ -29,6 +30,9 @@ pub fn line(result: impl Display) -> Result<(), Failure> {
 pub fn text(result: impl Display) -> Result<(), Failure> {
     // At once: a text that is half written before the error tells no more than none.
     let bytes = result.to_string();
+    if caller::kept(&bytes) {
+        return Ok(());
+    }
     let mut stdout = io::stdout().lock();
     written(stdout.write_all(bytes.as_bytes()).and_then(|()| stdout.flush()))
 }
@@ -51,6 +55,9 @@ fn written(result: io::Result<()>) -> Result<(), Failure> {
 /// A line on standard error: a note, a warning, an error. Where that is full or closed it is lost.
 pub fn note(told: impl Display) {
     let line = format!("{told}\n");
+    if caller::noted(&line) {
+        return;
+    }
     let _ = io::stderr().lock().write_all(line.as_bytes());
 }
 

@@ -1,7 +1,8 @@
 //! Progress on standard error: bars where that is a terminal, else a line every 5 s of what takes longer.
 
+use crate::caller::{self, Progress};
 use crate::output;
-use indicatif::{ProgressBar, ProgressState, ProgressStyle};
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 use std::fmt::Write;
 use std::io::IsTerminal;
 use std::time::Duration;
@@ -9,12 +10,26 @@ use std::time::Duration;
 /// Time between two lines where there is no terminal.
 const EVERY: Duration = Duration::from_secs(5);
 
+/// Time between two looks at a bar for the caller of a verb.
+const OFTEN: Duration = Duration::from_millis(100);
+
 /// Tells of a bar until it is finished or gone, where standard error is no terminal to draw it on. `line` says how far it is.
 fn tell(bar: &ProgressBar, line: impl Fn(&ProgressBar) -> String + Send + 'static) {
+    let weak = bar.downgrade();
+    if let Some(caller) = caller::caller() {
+        bar.set_draw_target(ProgressDrawTarget::hidden());
+        std::thread::spawn(move || {
+            while let Some(bar) = weak.upgrade().filter(|bar| !bar.is_finished()) {
+                caller.tell(Some(Progress { message: bar.message(), position: bar.position(), length: bar.length() }));
+                drop(bar);
+                std::thread::sleep(OFTEN);
+            }
+        });
+        return;
+    }
     if std::io::stderr().is_terminal() {
         return;
     }
-    let weak = bar.downgrade();
     std::thread::spawn(move || {
         loop {
             std::thread::sleep(EVERY);

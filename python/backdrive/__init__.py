@@ -1,0 +1,26 @@
+"""Find the physics that a robot's model leaves out, from logs of what it did; ask whether a telerobot's loop is stable.
+
+    import backdrive
+    verdict = backdrive.diagnose({"a": frame_a, "b": frame_b}, "model.toml", held_out=frame_c)
+    print(verdict)                      # as the command line tells it; in a notebook `verdict` alone shows the report
+    verdict.model.write("better.toml")  # the model with what was found
+
+A recording is a path (a set's folder, `set.toml`, CSV, MCAP, parquet, MAT), or columns: a pandas or polars frame, a dictionary of arrays, a structured NumPy array.
+Its column `t` is the time in s; the others are called as the model's inputs and outputs, in SI units, unless `columns` says otherwise. The work is that of
+the command line `backdrive`, with the same numbers to the last bit; other threads of Python go on meanwhile, and Ctrl-C ends it.
+"""
+
+from ._backdrive import __version__
+from ._clock import ClockWarning
+from ._errors import Error, InputError, MachineError, UsageError
+from ._figures import Figure
+from ._model import Model
+from ._readers import Contract, load_lerobot, load_mat, load_parquet, load_rosbag, save
+from ._results import Exported, Fields, Fit, Prediction, Report, Verdict
+from ._verbs import diagnose, export, fit, load_bag, save_bag, simulate, stability, why
+
+__all__ = [
+    "ClockWarning", "Contract", "Error", "Exported", "Fields", "Figure", "Fit", "InputError", "MachineError", "Model", "Prediction", "Report", "UsageError",
+    "Verdict", "__version__", "diagnose", "export", "fit", "load_bag", "load_lerobot", "load_mat", "load_parquet", "load_rosbag", "save", "save_bag", "simulate",
+    "stability", "why",
+]

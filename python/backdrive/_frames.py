@@ -1,0 +1,88 @@
+"""Columns of numbers: out of whatever holds them, and into what people work with."""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+from collections.abc import Mapping
+from typing import Any
+
+from . import _backdrive
+from ._errors import InputError, UsageError
+
+KINDS = ("auto", "numpy", "pandas", "polars")
+
+
+def is_path(value: Any) -> bool:
+    """Whether this names a file or a folder."""
+    return isinstance(value, (str, os.PathLike))
+
+
+def is_frame(value: Any) -> bool:
+    """Whether this is one recording as columns, and not several of them by name."""
+    if hasattr(value, "columns") and hasattr(value, "__getitem__"):
+        return True
+    if getattr(getattr(value, "dtype", None), "names", None):
+        return True
+    return isinstance(value, Mapping) and bool(value) and not any(is_path(v) or is_frame(v) for v in value.values())
+
+
+def columns_of(frame: Any, name: str) -> dict[str, bytes]:
+    """The columns of numbers as doubles. Of a column of something else nothing is taken: it is missing then, and who needs it says so."""
+    import numpy
+
+    if getattr(getattr(frame, "dtype", None), "names", None):
+        pairs = [(heading, frame[heading]) for heading in frame.dtype.names]
+    elif isinstance(frame, Mapping):
+        pairs = list(frame.items())
+    else:
+        pairs = [(heading, frame[heading]) for heading in frame.columns]
+    out: dict[str, bytes] = {}
+    rows = None
+    for heading, column in pairs:
+        values = column.to_numpy() if hasattr(column, "to_numpy") else numpy.asarray(column)
+        if values.dtype.kind not in "fiub":
+            if values.dtype.kind != "O":
+                continue
+            try:  # numbers with gaps
+                values = values.astype("<f8")
+            except (TypeError, ValueError):
+                continue
+        if values.ndim != 1:
+            raise InputError(f"{name}: {heading}: has the shape {values.shape}; a column has one number a row: give each of its parts a name of its own")
+        if rows is not None and len(values) != rows[1]:
+            raise InputError(f"{name}: {heading}: has {len(values)} samples, \"{rows[0]}\" has {rows[1]}")
+        rows = rows or (heading, len(values))
+        out[str(heading)] = numpy.ascontiguousarray(values, dtype="<f8").tobytes()
+    if not out:
+        raise InputError(f"{name}: has no columns of numbers; a recording is a frame or a dictionary with a column t (s) and one for each signal")
+    return out
+
+
+def write(frame: Any, path: str, name: str) -> None:
+    """Writes a recording as CSV, to the last bit."""
+    columns = columns_of(frame, name)
+    _backdrive.write_table(path, list(columns), list(columns.values()))
+
+
+def read(path: str, kind: str = "auto") -> Any:
+    """Reads a table of numbers as a frame of a kind; `auto` is pandas where it is installed, else a dictionary of arrays."""
+    import numpy
+
+    names, columns = _backdrive.read_table(path)
+    return of_kind({name: numpy.frombuffer(column, dtype="<f8").copy() for name, column in zip(names, columns)}, kind)
+
+
+def of_kind(arrays: dict[str, Any], kind: str) -> Any:
+    """Columns as a frame of a kind."""
+    if kind not in KINDS:
+        raise UsageError(f"kind is {kind!r}, expected one of {', '.join(KINDS)}", 2)
+    if kind == "polars":
+        import polars
+
+        return polars.DataFrame(arrays)
+    if kind == "pandas" or kind == "auto" and importlib.util.find_spec("pandas"):
+        import pandas
+
+        return pandas.DataFrame(arrays)
+    return arrays

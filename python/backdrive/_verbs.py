@@ -1,0 +1,265 @@
+"""The verbs of the command line as functions."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from . import _frames, _toml
+from ._model import Model
+from ._results import Exported, Fit, Prediction, Report, Verdict, fields
+from ._work import INTERRUPTED, Progress, Work
+
+Path = str | os.PathLike[str]
+
+
+def _model_file(work: Work, model: Any, name: str = "model.toml") -> str:
+    """A model as a path: its own where it has one, else a file of its text."""
+    if isinstance(model, Model):
+        return model.path or work.text_file(name, model.anywhere())
+    return os.fspath(model)
+
+
+def _folder_of(model: Any) -> str | None:
+    if isinstance(model, Model):
+        return None if model._folder is None else os.fspath(model._folder)
+    return None if model is None else os.path.dirname(os.path.abspath(os.fspath(model)))
+
+
+def _options(given: Mapping[str, Any]) -> list[str]:
+    """Options as arguments; `None` and `False` are none, a list is the option again and again."""
+    out: list[str] = []
+    for name, value in given.items():
+        flag = "--" + name.strip("_").replace("_", "-")
+        if value is True:
+            out.append(flag)
+        elif isinstance(value, (list, tuple)):
+            for one in value:
+                out += [flag, _text(one)]
+        elif value is not None and value is not False:
+            out += [flag, _text(value)]
+    return out
+
+
+def _text(value: Any) -> str:
+    return os.fspath(value) if _frames.is_path(value) else repr(float(value)) if isinstance(value, float) else str(value)
+
+
+def _some(value: str | Sequence[str]) -> list[str]:
+    return [value] if isinstance(value, str) else list(value)
+
+
+def _grip(work: Work, grip: Any) -> str | None:
+    return None if grip is None else _model_file(work, grip, "grip.toml")
+
+
+def diagnose(
+    recordings: Any,
+    model: Path | Model | None = None,
+    *,
+    held_out: Any = None,
+    grip: Path | Model | None = None,
+    columns: Mapping[str, Any] | None = None,
+    joints: Mapping[str, Mapping[str, Any]] | None = None,
+    initial: str | None = None,
+    ignore: str | Sequence[str] = (),
+    without: str | Sequence[str] = (),
+    effects: int | None = None,
+    effort: float | None = None,
+    patience: float | None = None,
+    settings: Mapping[str, Any] | None = None,
+    out: Path | None = None,
+    report: bool = True,
+    progress: Progress = True,
+) -> Verdict:
+    """Finds the physics that a model leaves out, by recordings of its device.
+
+    recordings: one or several: paths, frames, dictionaries of arrays, or a dictionary of these by name. Columns in SI units, `t` in s.
+    model: the nominal model; without it the set's own.
+    held_out: recordings that no fit may see; without it, of several recordings, the last one.
+    grip: the grip that holds the model, where a hand held the device.
+    columns: which column is which signal: `{"position": {"column": "pos", "unit": "deg"}, "t": "time"}`.
+    joints: of an arm, the columns of each joint: `{"elbow": {"position": "q2", "torque": "tau2"}}`, rad and N m.
+    initial: "rest" (the device starts at rest) or "free" (it does not).
+    ignore: recorded inputs that may have no place in the model. without: physics that are not to be considered.
+    effects: how many physics may be missing at once. effort: how much to search, 1 is usual. patience: a limit on the clock, s.
+    settings: further keys of `set.toml`. out: a folder for verdict, model and report. report: whether to make the page.
+    progress: whether to show it; or a function of message, position and length.
+
+    Raises InputError where a file or a recording is wrong, with `file`, `line`, `key`; UsageError where an argument is.
+    """
+    with Work(progress) as work:
+        where = os.fspath(out) if out is not None else work.path("out")
+        if joints is not None:
+            joints = {name: dict(table) for name, table in joints.items()}
+        more = {"initial": initial, "columns": columns, "joints": joints, **(settings or {})}
+        arguments = ["diagnose", *work.set(recordings, held_out, more), "--out", where]
+        arguments += _options({"model": None if model is None else _model_file(work, model), "grip": _grip(work, grip), "ignore_signal": _some(ignore)})
+        arguments += _options({"without": _some(without), "effects": effects, "effort": effort, "patience": patience, "no_report": not report})
+        said = work.run(arguments)
+        files = {}
+        for name in os.listdir(where):
+            if name.endswith((".json", ".toml", ".csv")) or report and name == "report.html":
+                with open(os.path.join(where, name), encoding="utf-8") as file:
+                    files[name] = file.read()
+        return Verdict(files, work.notes, work.code, said.partition("\nwrote ")[0].rstrip(), _folder_of(model))
+
+
+def fit(
+    recordings: Any,
+    model: Path | Model,
+    *,
+    held_out: Any = None,
+    grip: Path | Model | None = None,
+    columns: Mapping[str, Any] | None = None,
+    initial: str | None = None,
+    ignore: str | Sequence[str] = (),
+    effort: float | None = None,
+    patience: float | None = None,
+    settings: Mapping[str, Any] | None = None,
+    progress: Progress = True,
+) -> Fit:
+    """Refits a model's numbers to recordings, its structure as it is; arguments as those of `diagnose`. Models of one axis only."""
+    with Work(progress) as work:
+        out = work.path("fitted.toml")
+        given = work.set(recordings, held_out, {"initial": initial, "columns": columns, **(settings or {})})
+        arguments = ["fit", _model_file(work, model), *given, "--out", out, "--json"]
+        arguments += _options({"grip": _grip(work, grip), "ignore_signal": _some(ignore), "effort": effort, "patience": patience})
+        text = work.run(arguments)
+        with open(out, encoding="utf-8") as file:
+            return Fit(text, work.notes, work.code, Model(file.read(), name="fitted.toml", folder=_folder_of(model)))
+
+
+def simulate(
+    model: Path | Model,
+    drive: Any,
+    *,
+    grip: Path | Model | None = None,
+    input: str | None = None,
+    rate: float | None = None,
+    substeps: int | None = None,
+    noise: int | None = None,
+    columns: Mapping[str, Any] | None = None,
+    kind: str = "auto",
+    progress: Progress = True,
+) -> Prediction:
+    """Runs a model on recordings, or on an excitation such as `"sweep:amplitude=2,from=1,to=200,duration=10"`.
+
+    input: which input an excitation drives. rate: its samples per second, Hz. noise: add the sensors' noise and rounding, with this seed.
+    kind: what the predictions are given as: "pandas", "polars", "numpy" (a dictionary of arrays), or "auto".
+    """
+    with Work(progress) as work:
+        set_file = None if columns is None else work.text_file("columns.toml", _toml.document({"fit": [], "columns": columns}))
+        driven = work.file(drive, "recording")
+        several = os.path.isdir(driven) or driven.endswith("set.toml")
+        out = work.path("predicted" if several else "predicted.csv")
+        arguments = ["simulate", _model_file(work, model), driven, "--out", out, "--json", *_options({"grip": _grip(work, grip), "input": input})]
+        arguments += _options({"rate": rate, "substeps": substeps, "noise": noise, "columns": set_file})
+        text = work.run(arguments)
+        runs = fields(text)["runs"]
+        # What is said without the folder is found in it.
+        frames = {run["recording"]: _frames.read(os.path.join(work.folder, run["out"]), kind) for run in runs}
+        return Prediction(text, work.notes, work.code, frames)
+
+
+def stability(
+    recording: Any,
+    *,
+    gain: float | None = None,
+    mu: float | None = None,
+    lambda_: float | None = None,
+    sweep: tuple[float, float, int] | None = None,
+    grips: Sequence[float] | None = None,
+    roles: Path | Mapping[str, Any] | None = None,
+    coupling: str | None = None,
+    progress: Progress = True,
+    **parts: Any,
+) -> Report:
+    """Asks the bag of a run, or with `roles` any recording, whether its loop would be stable at a gain, and how far away the limit is.
+
+    gain: the product mu*lambda asked about. sweep: (from, to, count): the whole curve. grips: factors on the grip's stiffness and damping.
+    roles: which topic or column is which signal: a file, or the same as dictionaries (docs/roles-example.toml).
+    parts: other parts of the loop, as on the command line: `master="model.toml"`, `canceller="none"`.
+    """
+    with Work(progress) as work:
+        arguments = ["stability", work.file(recording, "recording"), *_options({"gain": gain, "mu": mu, "lambda": lambda_, "roles": _roles(work, roles)})]
+        arguments += _options({"sweep": None if sweep is None else ":".join(_text(x) for x in sweep), "coupling": coupling})
+        arguments += _options({"grips": None if grips is None else ",".join(_text(x) for x in grips), **parts})
+        return _reported(work, arguments)
+
+
+def why(recording: Any, *, roles: Path | Mapping[str, Any] | None = None, progress: Progress = True) -> Report:
+    """Asks the bag of a run, or with `roles` any recording, why its loop shakes and what would stop it."""
+    with Work(progress) as work:
+        return _reported(work, ["why", work.file(recording, "recording"), *_options({"roles": _roles(work, roles)})])
+
+
+def _roles(work: Work, roles: Any) -> str | None:
+    if roles is None or _frames.is_path(roles):
+        return roles
+    return work.text_file("roles.toml", _toml.document(roles))
+
+
+def _reported(work: Work, arguments: list[str]) -> Report:
+    page = work.path("report.html")
+    text = work.run([*arguments, "--html", page, "--json"])
+    html = None
+    if os.path.exists(page):
+        with open(page, encoding="utf-8") as file:
+            html = work.said(file.read())
+    return Report(text, work.notes, work.code, html, text.rstrip())
+
+
+def load_bag(path: Path, *, topics: str | Sequence[str] = (), kind: str = "auto") -> Any:
+    """The signals of a bag (MCAP) as a frame: `t` (s), and a column for each, `topic.field.axis`, NaN where nothing was measured.
+
+    kind: "pandas", "polars", "numpy" (a dictionary of arrays), or "auto": pandas where it is installed. topics: only these.
+    """
+    with Work(False) as work:
+        table = work.path("bag.csv")
+        work.run(["bag", "export", os.fspath(path), "--csv", table, *_options({"topic": _some(topics)})])
+        return _frames.read(table, kind)
+
+
+def save_bag(frame: Any, path: Path, *, map: Mapping[str, str] | None = None, overwrite: bool = False) -> None:
+    """Writes a recording as a bag (MCAP). map: which column is what, `{"motor_position": "/master/measured_js.position[0]"}`."""
+    with Work(False) as work:
+        maps = [f"{column}={place}" for column, place in (map or {}).items()]
+        table = work.file(frame, "recording")
+        work.run(["bag", "import", table, "--bag", os.fspath(path), *_options({"map": maps, "overwrite": overwrite})])
+
+
+def export(
+    model: Path | Model,
+    to: str,
+    *,
+    language: str | None = None,
+    width: float | None = None,
+    step: float | None = None,
+    on: Any = None,
+    out: Path | None = None,
+    overwrite: bool = False,
+) -> Exported:
+    """A model in another form: `to` is "mjcf", "urdf", "isaac" or "feedforward" (`language`: "c", "python", "yaml").
+
+    width: of a feed-forward's smooth sign, m/s or rad/s. step: of an MJCF, s. on: recordings on which the error is worked out that leaving something out
+    makes. What the form cannot hold is in `left_out`.
+    """
+    with Work(False) as work:
+        where = os.fspath(out) if out is not None else work.path("exported")
+        arguments = ["export", _model_file(work, model), "--to", to, "--out", where, "--json", *_options({"overwrite": overwrite, "on": work.files(on, "on")})]
+        arguments += _options({"language": language, "width": width, "step": step})
+        text = work.run(arguments)
+        with open(where, encoding="utf-8") as file:
+            return Exported(text, work.notes, work.code, file.read())
+
+
+def described(model: Model, grip: Any, amplitude: float | None) -> Any:
+    """What `backdrive model show` says of a model."""
+    with Work(False) as work:
+        text = work.run(["model", "show", _model_file(work, model), "--json", *_options({"grip": _grip(work, grip), "amplitude": amplitude})])
+        return fields(text)
+
+
+__all__ = ["INTERRUPTED", "described", "diagnose", "export", "fit", "load_bag", "save_bag", "simulate", "stability", "why"]
