@@ -4,6 +4,7 @@ use super::arm_options;
 use crate::cli;
 use crate::diagnose_page::arm::{Shown, page};
 use crate::failure::Failure;
+use crate::interrupt;
 use crate::output;
 use crate::progress;
 use crate::recordings;
@@ -49,7 +50,8 @@ pub fn diagnose(options: &cli::Diagnose, set: &RecordingSet, model: &Path, repor
     let problem = Problem::open(set, Some(model)).map_err(Failure::input)?;
     let usual = Settings::default();
     let effects = options.effects.map_or(usual.effects, usize::from);
-    let settings = Settings { without: arm_options::without(options), effects, ..usual };
+    let stop = interrupt::heard()?;
+    let settings = Settings { without: arm_options::without(options), effects, stop, ..usual };
     let found = progress::busy("diagnosing the arm", || diagnosed(&problem, &settings)).map_err(Failure::input)?;
     notes.extend(found.notes.iter().cloned());
     let write = |name: &str, text: &str| output::file(&options.out.join(name), text);
