@@ -96,6 +96,16 @@ class Verdict(Report):
     the text of a proposed next experiment.
     """
 
+    verdict: str
+    sentence: str
+    findings: list[Fields]
+    parameters: Fields
+    held_out: Fields
+    audit: list[Fields]
+    next_experiment: Fields | None
+    detectable: list[Fields] | None
+    arm: Fields | None
+
     def __init__(self, files: dict[str, str], notes: list[str], code: int, said: str, folder: str | None) -> None:
         super().__init__(files["verdict.json"], notes, code, files.get("report.html"), said)
         self.model: Model = Model(files["model.diagnosed.toml"], name="model.diagnosed.toml", folder=folder)
@@ -108,6 +118,13 @@ class Fit(Result):
     """A refit: `numbers` (name, unit, given, value, standard_error, ci95), `correlations`, `given` and `fitted` (errors of every recording), `agree`,
     `kept` (names of what the recordings do not determine) and `model`, the refitted one.
     """
+
+    numbers: list[Fields]
+    correlations: list[Fields]
+    given: list[Fields]
+    fitted: list[Fields]
+    agree: bool
+    kept: list[str]
 
     def __init__(self, text: str, notes: list[str], code: int, model: Model) -> None:
         super().__init__(text, notes, code)
@@ -146,6 +163,8 @@ class Prediction(Result):
 
 class Exported(Result):
     """A model in another form: `text`, and `left_out`, what that form cannot hold."""
+
+    left_out: list[Fields]
 
     def __init__(self, text: str, notes: list[str], code: int, exported: str) -> None:
         super().__init__(text, notes, code)

@@ -169,6 +169,23 @@ class Package(unittest.TestCase):
         backdrive.save_bag(frame, self.folder / "sweep.mcap", overwrite=True)
         pandas.testing.assert_frame_equal(backdrive.load_bag(self.folder / "sweep.mcap"), frame, check_exact=True)
 
+    def test_a_loop_is_judged_as_by_the_command_line(self):
+        bag = self.folder / "hold.mcap"
+        self.program("run", ROOT / "launch/push-and-hold.toml", "--bag", bag)
+        told = json.loads(self.program("stability", bag, "--gain", 1, "--sweep", "0.5:20:2", "--json"))
+        judged = backdrive.stability(bag, gain=1, sweep=(0.5, 20, 2), progress=False)
+        self.assertEqual(dict(judged.data), told)
+        self.assertGreater(len(judged.figures), 1)
+        answer = backdrive.why(bag, progress=False)
+        self.assertEqual(dict(answer.data), json.loads(self.program("why", bag, "--json")))
+        self.assertIn("<html", answer.html)
+        frame = backdrive.load_bag(bag, topics="/master/measured_js", kind="numpy")
+        self.program("bag", "export", bag, "--csv", "hold.csv", "--topic", "/master/measured_js")
+        table = pandas.read_csv(self.folder / "hold.csv")
+        self.assertEqual(list(frame), list(table))
+        for name in table:
+            numpy.testing.assert_array_equal(frame[name], table[name].to_numpy())
+
     def test_errors_name_file_line_and_key(self):
         broken = NOMINAL.replace("motor = 0.02", "motor = -0.02")
         (self.folder / "broken.toml").write_text(broken)
