@@ -15,6 +15,7 @@ mod stage;
 mod state;
 mod step;
 mod teller;
+mod together;
 
 pub use control::{Control, Options, Told};
 pub use error::RunError;

@@ -8,7 +8,6 @@ pub mod inproc;
 mod location;
 mod ports;
 pub mod ros2;
-pub(crate) mod together;
 
 pub use error::TransportError;
 pub use location::Location;

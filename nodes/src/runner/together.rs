@@ -1,7 +1,9 @@
 //! Between nodes of one thread: a sample goes from an output straight to the inputs beside it, and over the transport to everyone else.
+//!
+//! No transport of its own: inputs are made after all outputs, so nothing of the past is kept for one that joins late.
 
-use super::{Publisher, Subscriber, Transport, TransportError, capacity};
 use crate::clock::now_ns;
+use crate::transport::{Publisher, Subscriber, Transport, TransportError, capacity};
 use backdrive_msgs::Message;
 use backdrive_msgs::topic::Topic;
 use std::cell::RefCell;
@@ -16,7 +18,7 @@ type Queue = Rc<RefCell<VecDeque<(Message, i64)>>>;
 type Queues = Rc<RefCell<Vec<Queue>>>;
 
 /// A transport around which the nodes of a thread speak to each other directly. Outputs are made before inputs.
-pub(crate) struct Together {
+pub(super) struct Together {
     inner: Box<dyn Transport>,
     spoken: HashMap<String, Queues>,
 }
