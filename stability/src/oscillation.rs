@@ -1,7 +1,12 @@
 //! How large an oscillation is, at which frequency, and how fast it grows.
 
-use rustfft::FftPlanner;
-use rustfft::num_complex::Complex;
+use realfft::RealFftPlanner;
+use std::cell::RefCell;
+
+thread_local! {
+    /// Runs of a sweep have holds of the same length: a transform is planned once in a thread.
+    static PLANNER: RefCell<RealFftPlanner<f64>> = RefCell::new(RealFftPlanner::new());
+}
 
 /// What oscillates in a piece of a signal.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -65,8 +70,12 @@ fn strongest_line(fast: &[f64], period_s: f64, lowest_hz: f64) -> f64 {
     let n = fast.len();
     let padded = (4 * n).next_power_of_two();
     let hann = |i: usize| 0.5 - 0.5 * (2.0 * std::f64::consts::PI * i as f64 / n as f64).cos();
-    let mut bins: Vec<Complex<f64>> = (0..padded).map(|i| Complex::new(if i < n { fast[i] * hann(i) } else { 0.0 }, 0.0)).collect();
-    FftPlanner::new().plan_fft_forward(padded).process(&mut bins);
+    let transform = PLANNER.with_borrow_mut(|planner| planner.plan_fft_forward(padded));
+    let (mut windowed, mut bins) = (transform.make_input_vec(), transform.make_output_vec());
+    windowed.iter_mut().zip(fast).enumerate().for_each(|(i, (to, x))| *to = x * hann(i));
+    if transform.process(&mut windowed, &mut bins).is_err() {
+        return 0.0;
+    }
     let hz_per_bin = 1.0 / (padded as f64 * period_s);
     let first = ((lowest_hz / hz_per_bin).ceil() as usize).max(1);
     let power: Vec<f64> = bins[..padded / 2].iter().map(|b| b.norm_sqr()).collect();

@@ -180,9 +180,10 @@ impl Scenario {
             }
         }
         let traces = collector.traces();
-        let outcome = Outcome::worst(traces.iter().map(judge)).unwrap_or(Outcome::NotJudged { why: Unjudged::Empty });
-        let rough = traces.iter().max_by_key(|t| judge(t).rank());
-        let frequency_hz = rough.filter(|_| !outcome.is_stable()).map(frequency_hz);
+        let outcomes: Vec<Outcome> = traces.iter().map(judge).collect();
+        let outcome = Outcome::worst(outcomes.iter().copied()).unwrap_or(Outcome::NotJudged { why: Unjudged::Empty });
+        let rough = traces.iter().zip(&outcomes).max_by_key(|(_, outcome)| outcome.rank());
+        let frequency_hz = rough.filter(|_| !outcome.is_stable()).map(|(trace, _)| frequency_hz(trace));
         let unclamped = |t: Trace| Trace { clamped: Vec::new(), travel: None, ..t };
         let (contact_s, judged_s) = contact(&traces);
         let beneath = match outcome {
