@@ -57,7 +57,7 @@ use clap::{Parser, Subcommand};
 /// 4 data was lost; 5 this machine does not let it (shared memory, disk, permission); 6 a node failed;
 /// 7 it cannot be told; 130 interrupted.
 #[derive(Debug, Parser)]
-#[command(name = "backdrive", version, propagate_version = true, arg_required_else_help = true)]
+#[command(name = "backdrive", version = env!("BACKDRIVE_VERSION"), propagate_version = true, arg_required_else_help = true)]
 pub struct Cli {
     /// What to do.
     #[command(subcommand)]

@@ -132,3 +132,16 @@ fn a_set_that_names_recordings_elsewhere_is_simulated_into_the_folder_and_not_on
     assert_eq!(done.code, Some(0), "{done:?}");
     assert!(place.path("out/mine.csv").exists() && std::fs::read(place.path("mine.csv")).unwrap() == before);
 }
+
+#[test]
+fn the_version_names_the_commit_that_it_was_built_from() {
+    let place = Place::new();
+    let done = place.backdrive(&["--version"]);
+    assert_eq!(done.code, Some(0), "{done:?}");
+    let said = done.stdout.trim().to_string();
+    let head = Command::new("git").args(["-C", env!("CARGO_MANIFEST_DIR"), "log", "-1", "--format=%h, %cs", "--abbrev=10"]).output();
+    let head = head.ok().filter(|git| git.status.success() && file(".git").exists());
+    let commit = std::env::var("BACKDRIVE_COMMIT").ok().or_else(|| head.map(|git| String::from_utf8_lossy(&git.stdout).trim().to_string()));
+    let version = env!("CARGO_PKG_VERSION");
+    assert_eq!(said, commit.map_or(format!("backdrive {version}"), |commit| format!("backdrive {version} ({commit})")));
+}
