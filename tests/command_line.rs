@@ -140,8 +140,33 @@ fn the_version_names_the_commit_that_it_was_built_from() {
     assert_eq!(done.code, Some(0), "{done:?}");
     let said = done.stdout.trim().to_string();
     let head = Command::new("git").args(["-C", env!("CARGO_MANIFEST_DIR"), "log", "-1", "--format=%h, %cs", "--abbrev=10"]).output();
-    let head = head.ok().filter(|git| git.status.success() && file(".git").exists());
+    let head = head.ok().filter(|git| git.status.success() && std::path::Path::new(&file(".git")).exists());
     let commit = std::env::var("BACKDRIVE_COMMIT").ok().or_else(|| head.map(|git| String::from_utf8_lossy(&git.stdout).trim().to_string()));
     let version = env!("CARGO_PKG_VERSION");
     assert_eq!(said, commit.map_or(format!("backdrive {version}"), |commit| format!("backdrive {version} ({commit})")));
+}
+
+#[test]
+fn a_tarball_holds_the_program_and_what_belongs_to_it_and_runs_where_it_is_unpacked() {
+    let place = Place::new();
+    let mut pack = Command::new("bash");
+    pack.arg(file("packaging/tarball")).args(["--program", env!("CARGO_BIN_EXE_backdrive"), "--out"]);
+    let done = pack.arg(place.path("packed")).stdin(Stdio::null()).output().unwrap();
+    assert!(done.status.success(), "{done:?}");
+    let shell = format!("cd {} && tar xzf packed/backdrive-*.tar.gz && mv backdrive-* unpacked", place.path("").display());
+    assert!(Command::new("bash").args(["-c", &shell]).status().unwrap().success());
+    for piece in [
+        "INSTALL",
+        "share/man/man1/backdrive-stability.1.gz",
+        "share/bash-completion/completions/backdrive",
+        "share/zsh/site-functions/_backdrive",
+        "share/fish/vendor_completions.d/backdrive.fish",
+        "share/doc/backdrive/LICENSE-MIT",
+        "share/doc/backdrive/LICENSE-APACHE",
+    ] {
+        assert!(place.path("unpacked").join(piece).is_file(), "no {piece}");
+    }
+    let check = ["check", "launch/contact.toml"];
+    let run = Command::new("../../bin/backdrive").args(check).current_dir(place.path("unpacked/share/backdrive")).output().unwrap();
+    assert!(run.status.success(), "{run:?}");
 }
