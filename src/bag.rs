@@ -59,6 +59,9 @@ fn import(csv: &[std::path::PathBuf], bag: &Path, overwrite: bool, maps: &[Strin
                 table.display()
             ));
         }
+        for remark in &report.clock {
+            output::note(format_args!("warning: {}: {remark}", table.display()));
+        }
         output::line(format_args!(
             "{}: {} rows, {} topics -> {}",
             table.display(),

@@ -214,7 +214,7 @@ fn tables() {
             case(&["bag", "import", "absent.csv", "--bag", "x.mcap"], 3, &["absent.csv", "No such file"]),
             case(&["bag", "import", "empty.csv", "--bag", "x.mcap"], 3, &["empty.csv", "is empty", "heading"]),
             case(&["bag", "import", "heading.csv", "--bag", "x.mcap"], 3, &["heading.csv", "no rows"]),
-            case(&["bag", "import", "back.csv", "--bag", "x.mcap"], 3, &["back.csv, line 4", "time goes from 0.001 to 0.0005"]),
+            case(&["bag", "import", "back.csv", "--bag", "x.mcap"], 3, &["back.csv, line 4", "time goes back from 0.001 to 0.0005"]),
             case(&["bag", "import", "untimed.csv", "--bag", "x.mcap"], 3, &["untimed.csv", "no column \"t\"", "time"]),
             case(&["bag", "import", "ragged.csv", "--bag", "x.mcap"], 3, &["ragged.csv, line 3"]),
             case(&["bag", "import", "nan.csv", "--bag", "x.mcap", "--map", "motor_position"], 2, &["--map", "COLUMN=TOPIC.FIELD[AXIS]"]),

@@ -61,6 +61,22 @@ fn several_tables_become_a_folder_of_bags() {
 }
 
 #[test]
+fn an_import_tells_what_is_wrong_with_the_clock() {
+    let place = Place::new();
+    let table = |times: &[f64]| times.iter().fold("t,x\n".to_owned(), |text, t| format!("{text}{t:?},1\n"));
+    place.write("gap.csv", &table(&[0.0, 0.001, 0.002, 0.003, 0.008, 0.009]));
+    let done = place.backdrive(&["bag", "import", "gap.csv", "--bag", "gap.mcap"]);
+    assert_eq!(done.code, Some(0), "{done:?}");
+    assert!(done.stderr.contains("gap.csv: the clock jumps once") && done.stderr.contains("rows 4 and 5"), "{done:?}");
+    place.write("twice.csv", &table(&[0.0, 0.001, 0.001]));
+    let done = place.backdrive(&["bag", "import", "twice.csv", "--bag", "twice.mcap"]);
+    assert!(done.code == Some(3) && done.stderr.contains("stands in two rows") && !place.path("twice.mcap").exists(), "{done:?}");
+    place.write("back.csv", &table(&[0.0, 0.002, 0.001]));
+    let done = place.backdrive(&["bag", "import", "back.csv", "--bag", "back.mcap"]);
+    assert!(done.code == Some(3) && done.stderr.contains("goes back from 0.002 to 0.001"), "{done:?}");
+}
+
+#[test]
 fn played_to_its_end_or_until_it_is_stopped() {
     let place = Place::new();
     let graph = file("launch/contact.toml");

@@ -13,6 +13,7 @@
 
 mod cdr;
 mod claim;
+mod clock_check;
 mod clock_offset;
 mod completeness;
 mod diff;
@@ -37,6 +38,7 @@ mod writer;
 
 pub use cdr::{FieldPath, Schema};
 pub use claim::check_target;
+pub use clock_check::clock_remarks;
 pub use clock_offset::{CLOCK_OFFSET, ClockOffset};
 pub use completeness::{Completeness, TopicCompleteness};
 pub use diff::{DiffOptions, DiffReport, Divergence, TopicDiff, diff};

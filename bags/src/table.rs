@@ -2,7 +2,7 @@
 
 use crate::header::{BagHeader, Clock};
 use crate::signals::{TIME_TOPIC, gather};
-use crate::{BagError, Reader, Recorder, RecorderOptions, Signal, TopicInfo};
+use crate::{BagError, Reader, Recorder, RecorderOptions, Signal, TopicInfo, clock_remarks};
 use backdrive_msgs::topic::{Kind, Topic};
 use backdrive_msgs::{MAX_AXES, Message, Sample, source_id};
 use backdrive_plant::model::Hold;
@@ -178,6 +178,8 @@ pub struct ImportReport {
     pub topics: Vec<String>,
     /// Columns left out because they hold something that is no number.
     pub skipped: Vec<String>,
+    /// What is wrong with the clock: a sentence each, see [`clock_remarks`].
+    pub clock: Vec<String>,
 }
 
 /// Turns a table, which is one experiment, into a bag that [`crate::signals()`] reads the same numbers from.
@@ -202,7 +204,10 @@ pub fn import_csv(table: &Path, bag: &Path, options: &ImportOptions) -> Result<I
     }
     for (row, pair) in times.windows(2).enumerate() {
         if pair[1].is_nan() || pair[1] <= pair[0] {
-            let what = format!("time goes from {:?} to {:?} s; it must grow", pair[0], pair[1]);
+            let what = match pair[1] == pair[0] {
+                true => format!("the time {:?} s stands in two rows; leave out what was recorded twice", pair[0]),
+                false => format!("time goes back from {:?} to {:?} s; cut the recording there", pair[0], pair[1]),
+            };
             return Err(BagError::Table { path: table.to_owned(), line: row as u64 + 3, what });
         }
     }
@@ -268,7 +273,7 @@ pub fn import_csv(table: &Path, bag: &Path, options: &ImportOptions) -> Result<I
     }
     recorder.finish()?;
     let topics = header.topics.into_iter().skip(1).map(|info| info.topic.name).collect();
-    Ok(ImportReport { rows: times.len() as u64, topics, skipped })
+    Ok(ImportReport { rows: times.len() as u64, topics, skipped, clock: clock_remarks(times) })
 }
 
 fn topic_info(name: &str, axis: &str) -> TopicInfo {

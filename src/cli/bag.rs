@@ -22,7 +22,7 @@ pub enum Bag {
     },
     /// CSV recordings into a bag.
     #[command(
-        after_help = "Example:\n  backdrive bag import sweep.csv --bag sweep.mcap\n\nExit codes: 0 imported, 2 usage, 3 a table is wrong or the bag exists, 5 the bag cannot be written."
+        after_help = "Example:\n  backdrive bag import sweep.csv --bag sweep.mcap\n\nTells where the clock jumps or its steps are uneven; times that repeat or go back are an error.\n\nExit codes: 0 imported, 2 usage, 3 a table is wrong or the bag exists, 5 the bag cannot be written."
     )]
     Import {
         /// CSV files with a column `t`, s.
