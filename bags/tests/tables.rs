@@ -188,7 +188,8 @@ fn a_bad_table_is_told_with_its_line() {
     let dir = tempfile::tempdir().expect("a directory");
     let (table, bag) = (dir.path().join("x.csv"), dir.path().join("x.mcap"));
     for (text, says) in [
-        ("t,x\n0,1\n0.2,2\n0.1,3\n", "line 4: time goes from 0.2 to 0.1"),
+        ("t,x\n0,1\n0.2,2\n0.1,3\n", "line 4: time goes back from 0.2 to 0.1"),
+        ("t,x\n0,1\n0.2,2\n0.2,3\n", "line 4"),
         ("t,x\n0,1\nzero,2\n", "line 3: column \"t\": \"zero\""),
         ("x,y\n0,1\n", "there is no column \"t\"; there is x, y"),
         ("t,x\n0,1\n1,2,3\n", "line 3"),
