@@ -25,7 +25,7 @@ mod test_bench;
 mod values;
 mod why;
 
-pub use bag::Bag;
+pub use bag::{Bag, BagExport, BagImport, ExportTo};
 pub use bridge::Bridge;
 pub use compare::Compare;
 pub use diagnose::Diagnose;

@@ -62,6 +62,7 @@ impl Failure {
             | BagError::NoTopic { .. }
             | BagError::Field { .. }
             | BagError::Table { .. }
+            | BagError::File { .. }
             | BagError::Recording(_)
             | BagError::Usage(_) => code::BAD_INPUT,
         };

@@ -118,6 +118,20 @@ pub fn replace<T>(path: &Path, write: impl FnOnce(&Path) -> Result<T, Failure>) 
     moved.map(|()| result).map_err(failed)
 }
 
+/// A table that is there already is replaced only where that was asked for.
+///
+/// # Errors
+/// It is a folder, or there and not to be replaced.
+pub fn may_replace(table: &Path, overwrite: bool) -> Result<(), Failure> {
+    if table.is_dir() {
+        return Err(Failure::write(table, io::ErrorKind::IsADirectory.into()));
+    }
+    match table.exists() && !is_stream(table) && !overwrite {
+        true => Err(Failure::input(format!("{}: exists already; --overwrite replaces it, or name another", table.display()))),
+        false => Ok(()),
+    }
+}
+
 /// Whether a path is a device or a pipe: what is written there cannot be read again.
 pub fn is_stream(path: &Path) -> bool {
     std::fs::metadata(path).is_ok_and(|m| !m.is_file() && !m.is_dir())

@@ -1,9 +1,9 @@
 //! `backdrive simulate`: a model run on recordings or on an excitation.
 
-use crate::bag::may_replace;
 use crate::cli;
 use crate::failure::Failure;
 use crate::output;
+use crate::output::may_replace;
 use crate::progress::busy;
 use backdrive_bags::{Reader, recording, topic_of};
 use backdrive_plant::excitation::{Excitation, load_experiments};

@@ -202,6 +202,13 @@ fn tables() {
     let place = Place::new();
     place.write("nan.csv", "t,motor_position,feedback_force\n0,0,0\n0.001,nan,1\n0.002,0,1\n");
     place.write("empty.csv", "");
+    for name in ["text.parquet", "text.mat", "text.bag", "text.db3"] {
+        place.write(name, "t,x\n0,1\n");
+    }
+    place.write("stub.parquet", "PAR1");
+    place.write("stub.mat", "MATLAB 5.0 MAT-file");
+    place.write("stub.db3", "SQLite format 3\0");
+    std::fs::create_dir(place.path("nothing")).unwrap();
     place.write("heading.csv", "t,motor_position\n");
     place.write("back.csv", "t,x\n0,1\n0.001,2\n0.0005,3\n");
     place.write("untimed.csv", "time,x\n0,1\n");
@@ -220,6 +227,18 @@ fn tables() {
             case(&["bag", "import", "nan.csv", "--bag", "x.mcap", "--map", "motor_position"], 2, &["--map", "COLUMN=TOPIC.FIELD[AXIS]"]),
             case(&["bag", "import", "nan.csv", "--bag", "x.mcap"], 3, &["nan.csv, line 3", "motor_position", "expected a number"]),
             case(&["bag", "import", "nan.csv", "--bag", "back.csv"], 3, &["back.csv", "exists and is not a bag"]),
+            case(&["bag", "import", "text.parquet", "--bag", "x.mcap"], 3, &["text.parquet", "not a parquet file", "PAR1"]),
+            case(&["bag", "import", "stub.parquet", "--bag", "x.mcap"], 3, &["stub.parquet", "not a whole parquet file"]),
+            case(&["bag", "import", "text.mat", "--bag", "x.mcap"], 3, &["text.mat", "version 5", "-v7"]),
+            case(&["bag", "import", "stub.mat", "--bag", "x.mcap"], 3, &["stub.mat", "ends at byte 19"]),
+            case(&["bag", "import", "text.bag", "--bag", "x.mcap"], 3, &["text.bag", "#ROSBAG V2.0"]),
+            case(&["bag", "import", "text.db3", "--bag", "x.mcap"], 3, &["text.db3", "SQLite format 3"]),
+            case(&["bag", "import", "stub.db3", "--bag", "x.mcap"], 3, &["stub.db3", "rosbag2"]),
+            case(&["bag", "import", "absent.bag", "--bag", "x.mcap"], 3, &["absent.bag", "No such file"]),
+            case(&["bag", "import", "nothing", "--bag", "x.mcap"], 3, &["nothing", "neither a LeRobot dataset"]),
+            case(&["bag", "import", "nan.csv", "--bag", "x.mcap", "--episode", "1"], 2, &["--episode", "LeRobot"]),
+            case(&["bag", "import", "nan.csv", "--bag", "x.mcap", "--variable", "log"], 3, &["nan.csv", "no MATLAB file"]),
+            case(&["bag", "import", "back.csv", "back.csv", "--bag", "x"], 2, &["would both become"]),
             case(&["simulate", &model, "nan.csv", "--out", "x.csv"], 3, &["nan.csv:3", "motor_position", "expected a number"]),
             case(&["simulate", &model, "empty.csv", "--out", "x.csv"], 3, &["empty.csv", "is empty"]),
             case(&["simulate", &model, "absent.csv", "--out", "x.csv"], 3, &["absent.csv", "there is no such file"]),

@@ -77,6 +77,44 @@ fn an_import_tells_what_is_wrong_with_the_clock() {
 }
 
 #[test]
+fn a_table_goes_through_every_format_and_comes_back() {
+    let place = Place::new();
+    let rows: String = (0..500).map(|k| format!("{:?},{:?},{:?}\n", k as f64 * 0.01, (k as f64 * 0.1).sin(), -0.5 * k as f64)).collect();
+    place.write("arm.csv", &format!("t,elbow.position,elbow.effort\n{rows}"));
+    assert_eq!(place.backdrive(&["bag", "import", "arm.csv", "--bag", "arm.mcap"]).code, Some(0));
+    for (format, out) in [("parquet", "arm.parquet"), ("mat", "arm.mat"), ("csv", "back.csv")] {
+        let done = place.backdrive(&["bag", "export", "arm.mcap", "--to", format, "--out", out]);
+        assert_eq!((done.code, done.stdout.as_str()), (Some(0), format!("{out}: 500 rows\n").as_str()), "{done:?}");
+        assert_eq!(done.stderr.contains("\"elbow.position\" is called elbow_position"), format == "mat", "{done:?}");
+        assert_eq!(place.backdrive(&["bag", "import", out, "--bag", "again.mcap", "--overwrite"]).code, Some(0));
+        let same = place.backdrive(&["bag", "diff", "arm.mcap", "again.mcap"]);
+        assert_eq!(same.code, Some(0), "{format}: {same:?}");
+        let refused = place.backdrive(&["bag", "export", "arm.mcap", "--to", format, "--out", out]);
+        assert!(refused.code == Some(3) && refused.stderr.contains("--overwrite"), "{refused:?}");
+    }
+    let done = place.backdrive(&["bag", "export", "arm.mcap", "again.mcap", "--to", "lerobot", "--out", "set", "--task", "wave"]);
+    assert_eq!((done.code, done.stdout.as_str()), (Some(0), "set: 2 episodes, 1000 rows at 100 Hz, joints elbow\n"), "{done:?}");
+    let done = place.backdrive(&["bag", "import", "set", "--episode", "1", "--bag", "episodes"]);
+    assert!(done.code == Some(0) && done.stdout.contains("set/episode_000001: 500 rows, 2 topics"), "{done:?}");
+    let values = |bag: &str, topic: &str| samples(&place.path(bag), topic).iter().map(|s| s.position[0]).collect::<Vec<_>>();
+    assert_eq!(values("episodes/episode_000001.mcap", "/recording/elbow_effort"), values("arm.mcap", "/recording/elbow_effort"));
+    for (was, is) in
+        values("arm.mcap", "/recording/elbow_position").iter().zip(values("episodes/episode_000001.mcap", "/recording/elbow_position"))
+    {
+        assert!((was - is).abs() <= 4e-16 * was.abs(), "{was} became {is}: degrees and back");
+    }
+    // A dataset is replaced only where that was asked for, and nothing else ever.
+    let refused = place.backdrive(&["bag", "export", "arm.mcap", "--to", "lerobot", "--out", "set"]);
+    assert!(refused.code == Some(3) && refused.stderr.contains("--overwrite"), "{refused:?}");
+    assert_eq!(place.backdrive(&["bag", "export", "arm.mcap", "--to", "lerobot", "--out", "set", "--overwrite"]).code, Some(0));
+    let refused = place.backdrive(&["bag", "export", "arm.mcap", "--to", "lerobot", "--out", "episodes", "--overwrite"]);
+    assert!(
+        refused.code == Some(3) && refused.stderr.contains("is no LeRobot dataset") && place.path("episodes/episode_000001.mcap").exists(),
+        "{refused:?}"
+    );
+}
+
+#[test]
 fn played_to_its_end_or_until_it_is_stopped() {
     let place = Place::new();
     let graph = file("launch/contact.toml");

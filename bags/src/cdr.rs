@@ -5,18 +5,18 @@ use std::collections::HashMap;
 /// A ROS 2 message definition with everything that it refers to.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Schema {
-    types: Vec<Vec<Field>>,
+    pub(crate) types: Vec<Vec<Field>>,
 }
 
 #[derive(Debug, Clone, PartialEq)]
-struct Field {
-    name: String,
-    of: Type,
-    count: Count,
+pub(crate) struct Field {
+    pub(crate) name: String,
+    pub(crate) of: Type,
+    pub(crate) count: Count,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Type {
+pub(crate) enum Type {
     Bool,
     Unsigned(u8),
     Signed(u8),
@@ -28,7 +28,7 @@ enum Type {
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Count {
+pub(crate) enum Count {
     One,
     Array(usize),
     Sequence,
@@ -44,7 +44,7 @@ pub struct FieldPath {
 }
 
 /// Nesting beyond this is a definition that contains itself.
-const MOST_NESTED: usize = 16;
+pub(crate) const MOST_NESTED: usize = 16;
 
 /// Most numbers that [`Schema::numbers`] lists.
 const MOST_NUMBERS: usize = 256;

@@ -120,6 +120,14 @@ pub enum BagError {
         /// What is wrong, and what there is.
         what: String,
     },
+    /// A file does not hold what it should; `what` tells where in it.
+    #[error("{}: {what}", path.display())]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong, with the row, the column or the byte.
+        what: String,
+    },
     /// A table cannot be read.
     #[error("{}, line {line}: {what}", path.display())]
     Table {

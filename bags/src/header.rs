@@ -1,6 +1,7 @@
 //! What a bag says about the run that it holds.
 
 use crate::BagError;
+use crate::number_type::NumberType;
 use backdrive_msgs::topic::{Kind, Topic};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -67,6 +68,8 @@ pub struct BagHeader {
     pub host: String,
     /// Topics, in the order of their indices.
     pub topics: Vec<TopicInfo>,
+    /// Of a table that was imported: what the numbers of a column were in it, by where they stand now (`/recording/x.position[0]`); doubles are left out.
+    pub column_types: BTreeMap<String, NumberType>,
 }
 
 impl BagHeader {
@@ -78,7 +81,7 @@ impl BagHeader {
     /// As the entries of a metadata record, whose values are all text.
     pub(crate) fn to_metadata(&self) -> Result<BTreeMap<String, String>, serde_json::Error> {
         let file_names: Vec<&str> = self.files.iter().map(|(name, _)| name.as_str()).collect();
-        Ok(BTreeMap::from([
+        let mut metadata = BTreeMap::from([
             ("format".to_owned(), "1".to_owned()),
             ("title".to_owned(), self.title.clone()),
             ("graph".to_owned(), self.graph_toml.clone()),
@@ -89,7 +92,11 @@ impl BagHeader {
             ("rate_hz".to_owned(), format!("{:?}", self.rate_hz)),
             ("host".to_owned(), self.host.clone()),
             ("topics".to_owned(), serde_json::to_string(&self.topics)?),
-        ]))
+        ]);
+        if !self.column_types.is_empty() {
+            metadata.insert("column_types".to_owned(), serde_json::to_string(&self.column_types)?);
+        }
+        Ok(metadata)
     }
 
     /// Back from a metadata record; the texts of the files are attachments and are looked up with `file`.
@@ -118,6 +125,11 @@ impl BagHeader {
             rate_hz: text("rate_hz")?.parse().map_err(|_| wrong("rate_hz", "is not a number".to_owned()))?,
             host: text("host")?.to_owned(),
             topics: json(text("topics")?).map_err(|what| wrong("topics", what))?,
+            // Bags of before have none.
+            column_types: match metadata.get("column_types") {
+                Some(text) => json(text).map_err(|what| wrong("column_types", what))?,
+                None => BTreeMap::new(),
+            },
         })
     }
 }

@@ -3,7 +3,7 @@
 //! [`Recorder`] writes one while a graph runs, on a thread of its own; [`Reader`] reads one, whoever
 //! wrote it and however it ended. Around them: [`info()`] sums a bag up, [`recover()`] saves what a killed
 //! recorder left behind, [`diff()`] compares two bags, [`merge()`] joins those of several hosts, [`signals()`] picks the columns of a recording,
-//! [`export_csv`] and [`import_csv`] cross over to tables, and [`play()`] sends a bag's messages again.
+//! [`import_table`], [`import_lerobot`] and [`import_rosbag`] take recordings of other formats, [`export_table`] and [`export_lerobot`] write them, and [`play()`] sends a bag's messages again.
 //!
 //! Payloads are CDR with ros2msg schemas whatever the live transport was; the graph, the models and a
 //! verdict on completeness are in the file.
@@ -22,13 +22,18 @@ mod framing;
 mod header;
 mod index;
 mod info;
+mod lerobot;
 mod merge;
+mod number_type;
 mod order;
+mod parquet_file;
+mod parquet_writer;
 mod play;
 mod reader;
 mod recorder;
 mod recording;
 mod recover;
+mod ros_bags;
 mod signals;
 mod span;
 mod steps;
@@ -45,12 +50,17 @@ pub use diff::{DiffOptions, DiffReport, Divergence, TopicDiff, diff};
 pub use error::BagError;
 pub use header::{BagHeader, Clock, TopicInfo};
 pub use info::{BagInfo, TopicSummary, check, info};
+pub use lerobot::{CommandedAt, Contract, Episode, LerobotOptions, LerobotReport, PerJoint, export_lerobot, import_lerobot, is_lerobot};
 pub use merge::{MergeReport, merge};
+pub use number_type::NumberType;
 pub use play::{PlayOptions, PlayReport, Sink, play};
 pub use reader::{Entry, Messages, Reader, TopicRef};
 pub use recorder::{Health, Recorder, RecorderOptions, WhenFull};
 pub use recording::{recording, recording_up_to};
 pub use recover::{RecoverReport, recover};
+pub use ros_bags::{RosbagReport, RosbagTopic, import_rosbag, is_rosbag};
 pub use signals::{Alignment, Signal, Signals, signals};
-pub use table::{ColumnMap, ImportOptions, ImportReport, Quantity, columns_of, export_csv, import_csv, topic_of};
+pub use table::{
+    ColumnMap, ImportOptions, ImportReport, Quantity, TableFormat, columns_of, export_csv, export_table, import_csv, import_table, topic_of,
+};
 pub use without::without;

@@ -142,6 +142,7 @@ pub fn recording(graph: &Graph, name: &str, host: Option<&str>) -> (RecorderPlan
         // Hosts of a graph are called as its author likes, and merging needs to know them.
         host: host.map_or_else(|| if graph.record_origin { self::host() } else { String::new() }, str::to_string),
         topics: topics.into_iter().map(|t| TopicInfo { topic: t.topic, axes: t.axes, publisher: t.publisher }).collect(),
+        ..BagHeader::default()
     };
     (plan, header)
 }

@@ -209,6 +209,7 @@ fn header() -> BagHeader {
         rate_hz: 1000.0,
         host: String::new(),
         topics: topics.map(|topic| TopicInfo { axes: axes(&topic), topic, publisher: String::new() }).collect(),
+        ..BagHeader::default()
     }
 }
 

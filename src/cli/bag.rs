@@ -1,6 +1,6 @@
 //! Options of `backdrive bag`.
 
-use clap::Subcommand;
+use clap::{Args, Subcommand, ValueEnum};
 use std::path::PathBuf;
 
 /// `backdrive bag`
@@ -20,41 +20,10 @@ pub enum Bag {
         #[arg(long)]
         json: bool,
     },
-    /// CSV recordings into a bag.
-    #[command(
-        after_help = "Example:\n  backdrive bag import sweep.csv --bag sweep.mcap\n\nTells where the clock jumps or its steps are uneven; times that repeat or go back are an error.\n\nExit codes: 0 imported, 2 usage, 3 a table is wrong or the bag exists, 5 the bag cannot be written."
-    )]
-    Import {
-        /// CSV files with a column `t`, s.
-        #[arg(required = true)]
-        csv: Vec<PathBuf>,
-        /// The new bag; of several CSV files the folder in which each becomes one.
-        #[arg(long, visible_alias = "out", value_name = "FILE")]
-        bag: PathBuf,
-        /// Replace a bag that exists.
-        #[arg(long)]
-        overwrite: bool,
-        /// Which column is what, as `motor_position=/master/measured_js.position[0]`; repeatable.
-        #[arg(long, value_name = "COLUMN=TOPIC.FIELD[AXIS]")]
-        map: Vec<String>,
-    },
-    /// A bag's signals as CSV.
-    #[command(
-        after_help = "Example:\n  backdrive bag export contact.mcap --csv contact.csv\n\nExit codes: 0 exported, 2 usage, 3 the bag is wrong or the table exists, 5 the table cannot be written."
-    )]
-    Export {
-        /// The bag.
-        bag: PathBuf,
-        /// The CSV file.
-        #[arg(long, visible_alias = "out", value_name = "FILE")]
-        csv: PathBuf,
-        /// Replace a file that exists.
-        #[arg(long)]
-        overwrite: bool,
-        /// Only these topics; repeatable.
-        #[arg(long)]
-        topic: Vec<String>,
-    },
+    /// Recordings of other formats into bags: CSV, parquet, MATLAB, LeRobot datasets, ROS bags.
+    Import(BagImport),
+    /// A bag's signals as CSV, parquet or a MATLAB file, or bags as a LeRobot dataset.
+    Export(BagExport),
     /// What can be saved of a bag that was cut off.
     #[command(
         after_help = "Example:\n  backdrive bag recover contact.mcap --bag saved.mcap\n\nExit codes: 0 all was saved, 2 usage, 3 it is no bag or the copy exists, 4 something was lost, 5 the copy cannot be written."
@@ -121,4 +90,80 @@ pub enum Bag {
         #[arg(long)]
         json: bool,
     },
+}
+
+/// `backdrive bag import`
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Examples:\n  backdrive bag import sweep.csv --bag sweep.mcap\n  backdrive bag import log.parquet --time time --bag log.mcap\n  backdrive bag import rig.mat --variable run1 --bag rig.mcap\n  backdrive bag import my_dataset --episode 0 --episode 3 --bag episodes\n  backdrive bag import session_db3 --bag session.mcap\n\nA file tells by its first bytes what it is, a folder by what is in it. The bag remembers what the numbers of a column were (single precision, whole \
+                  numbers, ...), and `bag export` writes them so again. Of every recording the clock is looked at: a jump and uneven steps are a warning; times that \
+                  repeat or go back are an error of a table and a warning of ROS topics.\n\nExit codes: 0 imported, 2 usage, 3 a recording is wrong or the bag exists, 5 the bag cannot be written."
+)]
+pub struct BagImport {
+    /// CSV, parquet or MATLAB files with a column `t`, s; folders of LeRobot datasets (version 3) or of rosbag2 in sqlite3; ROS 1 bags.
+    #[arg(required = true)]
+    pub recordings: Vec<PathBuf>,
+    /// The new bag; of several recordings, or of a LeRobot dataset, the folder in which each, or each episode, becomes one.
+    #[arg(long, visible_alias = "out", value_name = "FILE")]
+    pub bag: PathBuf,
+    /// Replace a bag that exists.
+    #[arg(long)]
+    pub overwrite: bool,
+    /// Of a table: which column is what, as `motor_position=/master/measured_js.position[0]`; repeatable. Without one each becomes a topic of its own.
+    #[arg(long, value_name = "COLUMN=TOPIC.FIELD[AXIS]")]
+    pub map: Vec<String>,
+    /// Of a table: the column with the times, s.
+    #[arg(long, default_value = "t", value_name = "COLUMN")]
+    pub time: String,
+    /// Of a MATLAB file: the structure whose fields the columns are.
+    #[arg(long, value_name = "NAME")]
+    pub variable: Option<String>,
+    /// Of a LeRobot dataset: a TOML file that tells what its features are (measured, commanded, velocity, effort, commanded_at, angle, effort_scale, joints).
+    #[arg(long, value_name = "FILE")]
+    pub contract: Option<PathBuf>,
+    /// Of a LeRobot dataset: only this episode; repeatable.
+    #[arg(long, value_name = "NUMBER")]
+    pub episode: Vec<u64>,
+}
+
+/// `backdrive bag export`
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Examples:\n  backdrive bag export contact.mcap --csv contact.csv\n  backdrive bag export contact.mcap --to parquet --out contact.parquet\n  backdrive bag export episode_000000.mcap episode_000001.mcap --to lerobot --out my_dataset\n\nExit codes: 0 exported, 2 usage, 3 a bag is wrong or what is to be written exists, 5 it cannot be written."
+)]
+pub struct BagExport {
+    /// The bag; for a LeRobot dataset one an episode, with columns JOINT.position and the like.
+    #[arg(required = true, value_name = "BAG")]
+    pub bags: Vec<PathBuf>,
+    /// The file, or the folder of a dataset.
+    #[arg(long, visible_alias = "csv", value_name = "FILE")]
+    pub out: PathBuf,
+    /// The format; without it what the file's ending says, else CSV.
+    #[arg(long, value_name = "FORMAT")]
+    pub to: Option<ExportTo>,
+    /// Replace what exists.
+    #[arg(long)]
+    pub overwrite: bool,
+    /// Only these topics; repeatable.
+    #[arg(long)]
+    pub topic: Vec<String>,
+    /// Of a LeRobot dataset: a TOML file that tells what its features are called and in which units, as for `bag import`.
+    #[arg(long, value_name = "FILE")]
+    pub contract: Option<PathBuf>,
+    /// Of a LeRobot dataset: what the arm was to do, in words.
+    #[arg(long, value_name = "TEXT")]
+    pub task: Option<String>,
+}
+
+/// A format to export to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum ExportTo {
+    /// Apache Parquet.
+    Parquet,
+    /// A LeRobot dataset, version 3: a folder.
+    Lerobot,
+    /// Text.
+    Csv,
+    /// MATLAB, version 5 (`-v7`).
+    Mat,
 }

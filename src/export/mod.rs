@@ -2,10 +2,10 @@
 
 mod error_without;
 
-use crate::bag::may_replace;
 use crate::cli;
 use crate::failure::{Failure, code};
 use crate::output;
+use crate::output::may_replace;
 use crate::progress::busy;
 use backdrive_export::{Exported, LeftOut, feedforward, isaac, mjcf, urdf};
 use backdrive_plant::model::Model;

@@ -6,10 +6,10 @@ mod found;
 mod plan;
 mod write;
 
-use crate::bag::may_replace;
 use crate::cli::{self, Attached, Driven, Start};
 use crate::failure::Failure;
 use crate::output;
+use crate::output::may_replace;
 use crate::recordings as sets;
 use ask::{Asker, Question, usage};
 use backdrive_bags::Reader;

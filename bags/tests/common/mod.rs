@@ -56,6 +56,7 @@ pub fn header() -> BagHeader {
             info("/master/events", Kind::Event, &[], "master"),
             info("/master/status", Kind::Status, &[], "master"),
         ],
+        ..BagHeader::default()
     }
 }
 

@@ -1,20 +1,21 @@
 //! `backdrive bag ...`
 
+mod export;
+mod import;
+
 use crate::cli;
 use crate::failure::{Failure, code};
 use crate::output;
 use crate::progress::busy;
-use backdrive_bags::{
-    ColumnMap, DiffOptions, ImportOptions, Quantity, Reader, check, check_target, diff, export_csv, import_csv, info, merge, recover,
-};
+use backdrive_bags::{DiffOptions, Reader, check, check_target, diff, info, merge, recover};
 use std::path::Path;
 
 /// Does what `backdrive bag` is asked.
 pub fn bag(command: &cli::Bag) -> Result<u8, Failure> {
     match command {
         cli::Bag::Info { bag, json, check } => show(bag, *json, *check),
-        cli::Bag::Import { csv, bag, overwrite, map } => import(csv, bag, *overwrite, map),
-        cli::Bag::Export { bag, csv, overwrite, topic } => export(bag, csv, *overwrite, topic),
+        cli::Bag::Import(asked) => import::import(asked),
+        cli::Bag::Export(asked) => export::export(asked),
         cli::Bag::Recover { damaged, bag, overwrite } => save(damaged, bag, *overwrite),
         cli::Bag::Merge { a, b, bag, overwrite, offset, json } => join([a, b], bag, *overwrite, *offset, *json),
         cli::Bag::Play { bag, speed } => crate::play::play(bag, *speed),
@@ -32,85 +33,6 @@ fn show(bag: &Path, json: bool, whole: bool) -> Result<u8, Failure> {
     }
     let lossy = info.damage.is_some() || !info.ended_cleanly;
     Ok(if lossy { code::LOST_DATA } else { 0 })
-}
-
-fn import(csv: &[std::path::PathBuf], bag: &Path, overwrite: bool, maps: &[String]) -> Result<u8, Failure> {
-    let columns = maps.iter().map(|map| column_map(map)).collect::<Result<Vec<_>, _>>()?;
-    // One table is one experiment and one bag: several go into a folder.
-    let into = |table: &Path| -> std::path::PathBuf {
-        match csv.len() {
-            1 => bag.to_path_buf(),
-            _ => bag.join(table.with_extension("mcap").file_name().unwrap_or_default()),
-        }
-    };
-    if csv.len() > 1 {
-        std::fs::create_dir_all(bag).map_err(|e| Failure::write(bag, e))?;
-    }
-    for table in csv {
-        check_target(&into(table), overwrite).map_err(Failure::bag)?;
-    }
-    for table in csv {
-        let options = ImportOptions { columns: columns.clone(), overwrite, ..ImportOptions::default() };
-        let importing = format!("importing {}", table.display());
-        let report = busy(&importing, || import_csv(table, &into(table), &options)).map_err(Failure::bag)?;
-        for column in &report.skipped {
-            output::note(format_args!(
-                "warning: {}: column \"{column}\" holds something that is no number and was left out",
-                table.display()
-            ));
-        }
-        for remark in &report.clock {
-            output::note(format_args!("warning: {}: {remark}", table.display()));
-        }
-        output::line(format_args!(
-            "{}: {} rows, {} topics -> {}",
-            table.display(),
-            report.rows,
-            report.topics.len(),
-            into(table).display()
-        ))?;
-    }
-    Ok(0)
-}
-
-/// A table that is there already is replaced only where that was asked for.
-pub fn may_replace(table: &Path, overwrite: bool) -> Result<(), Failure> {
-    if table.is_dir() {
-        return Err(Failure::write(table, std::io::ErrorKind::IsADirectory.into()));
-    }
-    match table.exists() && !output::is_stream(table) && !overwrite {
-        true => Err(Failure::input(format!("{}: exists already; --overwrite replaces it, or name another", table.display()))),
-        false => Ok(()),
-    }
-}
-
-/// `COLUMN=TOPIC.FIELD[AXIS]`
-fn column_map(text: &str) -> Result<ColumnMap, Failure> {
-    let wrong = || Failure {
-        code: 2,
-        message: format!("--map \"{text}\": expected COLUMN=TOPIC.FIELD[AXIS], such as force=/master/servo_jf.effort[0]"),
-    };
-    let (column, rest) = text.split_once('=').ok_or_else(wrong)?;
-    let (topic, field) = rest.rsplit_once('.').ok_or_else(wrong)?;
-    let (field, axis) = field.strip_suffix(']').and_then(|f| f.split_once('[')).ok_or_else(wrong)?;
-    let quantity = match field {
-        "position" => Quantity::Position,
-        "velocity" => Quantity::Velocity,
-        "effort" => Quantity::Effort,
-        _ => return Err(wrong()),
-    };
-    let axis = axis.parse().map_err(|_| wrong())?;
-    Ok(ColumnMap { column: column.to_string(), topic: topic.to_string(), quantity, axis, scale: 1.0, offset: 0.0 })
-}
-
-fn export(bag: &Path, csv: &Path, overwrite: bool, topics: &[String]) -> Result<u8, Failure> {
-    may_replace(csv, overwrite)?;
-    let reader = Reader::open(bag).map_err(Failure::input)?;
-    let topics = (!topics.is_empty()).then_some(topics);
-    let exporting = format!("exporting {}", bag.display());
-    let rows = busy(&exporting, || output::replace(csv, |to| export_csv(&reader, to, topics).map_err(Failure::input)))?;
-    output::line(format_args!("{}: {rows} rows", csv.display()))?;
-    Ok(0)
 }
 
 fn save(damaged: &Path, bag: &Path, overwrite: bool) -> Result<u8, Failure> {

@@ -1,0 +1,113 @@
+//! The formats of tables, and how a file tells which one it is.
+
+use super::mapping::{ImportOptions, ImportReport};
+use super::{csv_file, from_bag, mat_in, mat_out, parquet_in, parquet_out, to_bag};
+use crate::{BagError, Reader};
+use std::io::Read;
+use std::path::Path;
+
+/// A format of tables.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum TableFormat {
+    /// Text, a heading and rows; numbers are doubles.
+    Csv,
+    /// Apache Parquet; columns keep their types.
+    Parquet,
+    /// MATLAB MAT, version 5, as `save` writes it up to `-v7`; columns keep their types.
+    Mat,
+}
+
+impl TableFormat {
+    /// What a file is: by its first bytes, else by its ending; what is neither is taken for CSV, which any text may be.
+    ///
+    /// # Errors
+    /// It cannot be read, or its ending promises what its bytes are not.
+    pub fn of_file(path: &Path) -> Result<TableFormat, BagError> {
+        let mut start = Vec::new();
+        std::fs::File::open(path).and_then(|file| file.take(128).read_to_end(&mut start)).map_err(BagError::io(path))?;
+        let promised = TableFormat::of_ending(path);
+        let wrong = |what: &str| Err(BagError::File { path: path.to_owned(), what: what.to_owned() });
+        if start.starts_with(b"PAR1") {
+            return Ok(TableFormat::Parquet);
+        }
+        if start.starts_with(b"MATLAB 5.0 MAT-file") {
+            return Ok(TableFormat::Mat);
+        }
+        if start.starts_with(b"\x89HDF\r\n\x1a\n") || start.starts_with(b"MATLAB 7.3 MAT-file") {
+            return wrong("is a MATLAB file of version 7.3 (HDF5); save it again with save(..., '-v7')");
+        }
+        if start.starts_with(&mcap::MAGIC[..6]) {
+            return wrong("is an MCAP file already: every command takes it as it is");
+        }
+        match promised {
+            Some(TableFormat::Parquet) => wrong("is not a parquet file: it does not start with the bytes PAR1"),
+            Some(TableFormat::Mat) => wrong(
+                "is not a MATLAB file of version 5: it does not start with \"MATLAB 5.0 MAT-file\"; save it again with save(..., '-v7')",
+            ),
+            _ => Ok(TableFormat::Csv),
+        }
+    }
+
+    /// What a file's ending promises: `.csv`, `.parquet`, `.mat`.
+    pub fn of_ending(path: &Path) -> Option<TableFormat> {
+        match path.extension()?.to_str()?.to_ascii_lowercase().as_str() {
+            "csv" => Some(TableFormat::Csv),
+            "parquet" => Some(TableFormat::Parquet),
+            "mat" => Some(TableFormat::Mat),
+            _ => None,
+        }
+    }
+}
+
+/// Turns a table, which is one experiment, into a bag that [`crate::signals()`] reads the same numbers from.
+///
+/// A row is a step, its stamp the row's time to the ns; the exact time is in `position[0]` of `/recording/t`. A heading may name its unit
+/// (`x [mm]`): the bag holds SI units. The bag remembers what the numbers of a column were in the file, and [`export_table`] writes them so again.
+/// As where a table is read as it is, an empty cell or `nan` is an error. Errors: the file cannot be read, a column is missing, a time is no number or
+/// goes back, a mapped cell is no number, `bag` exists or cannot be written.
+pub fn import_table(table: &Path, bag: &Path, options: &ImportOptions) -> Result<ImportReport, BagError> {
+    let format = TableFormat::of_file(table)?;
+    if let Some(variable) = options.variable.as_ref().filter(|_| format != TableFormat::Mat) {
+        return Err(BagError::Usage(format!("{}: is no MATLAB file, so it has no structure {variable:?}", table.display())));
+    }
+    let read = match format {
+        TableFormat::Csv => csv_file::read(table, options)?,
+        TableFormat::Parquet => parquet_in::read(table)?,
+        TableFormat::Mat => mat_in::read(table, options)?,
+    };
+    to_bag::write_bag(table, &read, bag, options)
+}
+
+/// As [`import_table`], of a file that is CSV whatever its ending says.
+///
+/// # Errors
+/// As of [`import_table`].
+pub fn import_csv(table: &Path, bag: &Path, options: &ImportOptions) -> Result<ImportReport, BagError> {
+    to_bag::write_bag(table, &csv_file::read(table, options)?, bag, options)
+}
+
+/// Writes one table: `t`, `step` (if the messages have steps), and every signal as `topic.field.axis`; what was imported is called as in its table, and has the
+/// type that it had there.
+///
+/// Every number reads back to the same bits; what was not measured is NaN. Topics that speak now and then (gains) have their last value in every
+/// row. `topics` limits it to some. Returns the rows, and what a person should know: a sentence each.
+///
+/// # Errors
+/// A topic that is not there, nothing to write, a damaged bag, `out` exists or cannot be written.
+pub fn export_table(reader: &Reader, out: &Path, format: TableFormat, topics: Option<&[String]>) -> Result<(u64, Vec<String>), BagError> {
+    let table = from_bag::table_of(reader, topics)?;
+    let notes = match format {
+        TableFormat::Csv => csv_file::write(&table, out).map(|()| Vec::new())?,
+        TableFormat::Parquet => parquet_out::write(&table, out).map(|()| Vec::new())?,
+        TableFormat::Mat => mat_out::write(&table, out)?,
+    };
+    Ok((table.rows() as u64, notes))
+}
+
+/// As [`export_table`], as CSV; numbers have the shortest digits that read back to the same bits. Returns the rows.
+///
+/// # Errors
+/// As of [`export_table`].
+pub fn export_csv(reader: &Reader, out: &Path, topics: Option<&[String]>) -> Result<u64, BagError> {
+    Ok(export_table(reader, out, TableFormat::Csv, topics)?.0)
+}

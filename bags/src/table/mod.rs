@@ -1,0 +1,22 @@
+//! To and from tables: CSV, parquet and MATLAB files.
+
+mod bag_columns;
+mod csv_file;
+mod formats;
+mod from_bag;
+mod mapping;
+mod mat_array;
+mod mat_format;
+mod mat_in;
+mod mat_out;
+mod parquet_in;
+mod parquet_out;
+mod to_bag;
+mod types;
+
+pub use bag_columns::columns_of;
+pub use formats::{TableFormat, export_csv, export_table, import_csv, import_table};
+pub(crate) use from_bag::table_of;
+pub use mapping::{ColumnMap, ImportOptions, ImportReport, Quantity, topic_of};
+pub(crate) use to_bag::write_bag;
+pub(crate) use types::{Cells, Column, Table};
