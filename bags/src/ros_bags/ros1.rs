@@ -5,6 +5,7 @@ use super::target::{Form, Target};
 use crate::BagError;
 use rosbag::{ChunkRecord, MessageRecord, RosBag};
 use std::collections::HashMap;
+use std::collections::hash_map::Entry;
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
@@ -31,9 +32,8 @@ pub(crate) fn copy(file: &Path, target: &mut Target) -> Result<(), BagError> {
         for message in chunk.messages() {
             match message.map_err(failed)? {
                 MessageRecord::Connection(connection) => {
-                    if !topics.contains_key(&connection.id) {
-                        let topic = announce(target, connection.topic, connection.tp, connection.message_definition)?;
-                        topics.insert(connection.id, topic);
+                    if let Entry::Vacant(vacant) = topics.entry(connection.id) {
+                        vacant.insert(announce(target, connection.topic, connection.tp, connection.message_definition)?);
                     }
                 }
                 MessageRecord::MessageData(message) => {
