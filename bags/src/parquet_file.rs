@@ -53,11 +53,30 @@ impl Default for Numbers {
 impl ParquetFile {
     pub(crate) fn open(path: &Path) -> Result<ParquetFile, BagError> {
         let file = File::open(path).map_err(BagError::io(path))?;
+        let size = file.metadata().map_err(BagError::io(path))?.len();
         let reader = SerializedFileReader::new(file).map_err(|error| {
             let what = format!("is not a whole parquet file: {}; if it was cut off, it has to be written again", told(&error));
             BagError::File { path: path.to_owned(), what }
         })?;
-        Ok(ParquetFile { path: path.to_owned(), reader })
+        let file = ParquetFile { path: path.to_owned(), reader };
+        file.check_extents(size)?;
+        Ok(file)
+    }
+
+    /// What the reader takes on trust: that columns lie within the file and have as many values as it says.
+    fn check_extents(&self, size: u64) -> Result<(), BagError> {
+        for group in self.reader.metadata().row_groups() {
+            for column in group.columns() {
+                let begin = column.dictionary_page_offset().unwrap_or_else(|| column.data_page_offset()).min(column.data_page_offset());
+                let end = begin.checked_add(column.compressed_size()).and_then(|end| u64::try_from(end).ok());
+                let is_sound = begin >= 0 && column.compressed_size() >= 0 && end.is_some_and(|end| end <= size);
+                if !is_sound || column.num_values() < 0 || group.num_rows() < 0 {
+                    let what = format!("lies at byte {begin}, {} bytes long, in a file of {size}; it is damaged", column.compressed_size());
+                    return Err(self.wrong(column.column_descr(), what));
+                }
+            }
+        }
+        Ok(())
     }
 
     /// Columns of single values and of anything deeper, by their place; a column that is deeper comes once for each of its leaves.
