@@ -5,6 +5,10 @@
 //! Takes the name of a counter, and how often its unit is done. A new one is a line in `COUNTERS` and a table in benches/counts.toml.
 
 use backdrive_bags::{BagHeader, Recorder, RecorderOptions, TopicInfo, WhenFull};
+use backdrive_diagnosis::effort::Effort;
+use backdrive_diagnosis::evaluator::Evaluator;
+use backdrive_diagnosis::problem::{Problem, Record};
+use backdrive_diagnosis::structure::Structure;
 use backdrive_msgs::topic::{Kind, Topic};
 use backdrive_msgs::{Message, Sample};
 use backdrive_nodes::build::plan;
@@ -13,6 +17,8 @@ use backdrive_nodes::sequence::Sequence;
 use backdrive_nodes::transport::iceoryx2::Iceoryx2;
 use backdrive_nodes::transport::{Location, Transport};
 use backdrive_plant::model::Model;
+use backdrive_plant::recording::Recording;
+use backdrive_plant::set::Initial;
 use backdrive_plant::stepper::{Options, Plant, Segment, simulate};
 use std::fmt::Write;
 use std::io::Cursor;
@@ -23,7 +29,8 @@ use std::time::Duration;
 type Work = fn(usize) -> f64;
 
 /// By name; each gives a number that depends on all of its work.
-const COUNTERS: &[(&str, Work)] = &[("step", step), ("chain", chain), ("simulate", simulated), ("record", record), ("hop", hop)];
+const COUNTERS: &[(&str, Work)] =
+    &[("step", step), ("chain", chain), ("simulate", simulated), ("fit", fit), ("record", record), ("hop", hop)];
 
 fn at(path: &str) -> std::path::PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join(path)
@@ -67,6 +74,28 @@ fn simulated(count: usize) -> f64 {
     let column: Vec<f64> = (0..count + 1).map(|i| 1e-4 * (0.01 * i as f64).sin()).collect();
     let outputs = simulate(&model, &vec![column; model.inputs.len()], 1e-3, &Options::default()).expect("runs");
     outputs.iter().flatten().filter(|y| y.is_finite()).sum()
+}
+
+/// A fit of all numbers of the ball screw to one second of it with a third more viscous friction: its Gauss-Newton steps, to the end.
+fn fit(count: usize) -> f64 {
+    let text = std::fs::read_to_string(at("plant/models/ball-screw.toml")).expect("part of the workspace");
+    let model = Model::from_toml(&text, "ball-screw").expect("a model");
+    let other = text.replacen("damping = 0.01 ", "damping = 0.0133 ", 1);
+    assert_ne!(text, other, "the file has another viscous friction");
+    let truth = Model::from_toml(&other, "truth").expect("a model");
+    let t: Vec<f64> = (0..1000).map(|i| 1e-3 * i as f64).collect();
+    let push: Vec<f64> = t.iter().map(|t| (12.0 * t).sin() + 0.5 * (71.0 * t).sin()).collect();
+    let outputs = simulate(&truth, std::slice::from_ref(&push), 1e-3, &Options::default()).expect("runs");
+    let signals = std::iter::once((model.inputs[0].name.clone(), push));
+    let signals = signals.chain(model.outputs.iter().zip(outputs).map(|(output, samples)| (output.name.clone(), samples))).collect();
+    let recording = Recording::new("counted", t, signals).expect("a recording");
+    let record = Record::new(&recording, &model, Vec::new()).expect("enough samples");
+    let problem = Problem::new(text, "ball-screw.toml".into(), model, vec![record], Vec::new(), Initial::Rest).expect("a problem");
+    let structure = Structure::new(&problem, &problem.fit, Vec::new());
+    let given: Vec<f64> = problem.stated.iter().map(|s| s.given).collect();
+    let start = structure.values(&problem, &given, &[], &[]);
+    let effort = Effort { steps: 30, tolerance: 1e-4 };
+    (0..count).filter_map(|_| Evaluator::new(&problem).fit(&structure, &start, effort)).map(|fit| fit.cost + fit.steps as f64).sum()
 }
 
 /// Messages of one axis on five topics, recorded to memory; chunks end by size alone, so that their number does not depend on the clock.

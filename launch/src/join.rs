@@ -72,8 +72,8 @@ where
         Err(e) => return fail(e.to_string(), 5),
     };
     if node.kind == NodeKind::Recorder {
-        if graph.timing.clock == Clock::Realtime {
-            // Before its writer's thread is made, which inherits it. What is refused here is refused to the other nodes
+        if graph.timing.clock == Clock::Realtime && !(graph.polls && realtime::is_throttled()) {
+            // Above nodes of the ordinary class it would take their processors even where another is idle. Before its writer's thread is made, which inherits it. What is refused here is refused to the other nodes
             // too, and they say so.
             let _ = realtime::enter(&realtime::Options { priority: Some(RECORDER_PRIORITY), ..realtime::Options::default() });
         }
@@ -107,6 +107,10 @@ where
         (t.topic.name, listeners)
     };
     options.run.polls = graph.polls;
+    if graph.polls && realtime::is_throttled() {
+        // A SCHED_FIFO thread that never sleeps loses its processor for 50 ms of each second: the ordinary one does better.
+        options.realtime.priority = None;
+    }
     options.run.listeners = topics(&graph).into_iter().map(expected).collect();
     run_processes(plans, &graph.timing, transport, options)
 }

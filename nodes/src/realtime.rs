@@ -22,6 +22,12 @@ impl Default for Options {
     }
 }
 
+/// Whether the kernel holds SCHED_FIFO threads back that never sleep, which it does for a twentieth of each second by default
+/// (`kernel.sched_rt_runtime_us`; -1 lets them run). True where it does not say.
+pub fn is_throttled() -> bool {
+    std::fs::read_to_string("/proc/sys/kernel/sched_rt_runtime_us").map_or(true, |text| text.trim() != "-1")
+}
+
 /// Enters real time with the calling thread; returns what was refused, a clause each.
 ///
 /// The timer slack is always cut to 1 ns: it needs no privilege, and its default alone makes every

@@ -63,7 +63,7 @@ impl Plant {
         if points {
             self.fixed.points.pass_on(&mut motion.force);
         }
-        self.move_freely(n, &mut motion);
+        self.move_freely::<N>(n, &mut motion);
         if points {
             self.carry_points(&mut motion);
         }
@@ -92,9 +92,6 @@ impl Plant {
         for i in self.fixed.points.places() {
             motion.force[i] = 0.0;
         }
-        for drive in &self.drives {
-            motion.pushed[drive.slot] = 0.0;
-        }
         for drive in &mut self.drives {
             let slot = drive.slot;
             if drive.moves {
@@ -107,7 +104,7 @@ impl Plant {
             } else {
                 let push = drive.mean(from, to);
                 motion.force[slot] += push;
-                motion.pushed[slot] += push;
+                motion.pushed[slot] = if drive.is_first { push } else { motion.pushed[slot] + push };
             }
         }
         for i in 0..n {
@@ -147,24 +144,42 @@ impl Plant {
 
     /// Velocities as they would be without constraints.
     #[inline(always)]
-    fn move_freely(&self, n: usize, motion: &mut Motion) {
-        let (h, fixed) = (self.substep, &self.fixed);
-        // Half the velocity change.
-        let mut change = if let Some(sparse) = &fixed.sparse {
-            sparse.change(&motion.force, &self.x, &self.v)
-        } else {
+    fn move_freely<const N: usize>(&self, n: usize, motion: &mut Motion) {
+        if let Some(sparse) = &self.fixed.sparse {
+            let mut change = sparse.change(&motion.force, &self.x, &self.v);
+            return self.change_velocities(n, motion, &mut change);
+        }
+        // No more room than is needed: to clear that of the largest network takes longer than to step a small one.
+        if N == ANY {
             let mut change = [0.0; SLOTS];
-            for j in 0..n {
-                let (f, x, v) = (motion.force[j], self.x[j], self.v[j]);
-                let (by_force, by_position, by_velocity) =
-                    (&fixed.from_force[j][..n], &fixed.from_position[j][..n], &fixed.from_velocity[j][..n]);
-                for i in 0..n {
-                    change[i] += by_force[i] * f + by_position[i] * x + by_velocity[i] * v;
-                }
+            self.answer_forces(n, motion, &mut change);
+            self.change_velocities(n, motion, &mut change);
+        } else {
+            let mut change = [0.0; N];
+            self.answer_forces(N, motion, &mut change);
+            self.change_velocities(N, motion, &mut change);
+        }
+    }
+
+    /// Half of what forces, springs and dampers change of the velocities in a substep.
+    #[inline(always)]
+    fn answer_forces(&self, n: usize, motion: &Motion, change: &mut [f64]) {
+        let fixed = &self.fixed;
+        for j in 0..n {
+            let (f, x, v) = (motion.force[j], self.x[j], self.v[j]);
+            let (by_force, by_position, by_velocity) =
+                (&fixed.from_force[j][..n], &fixed.from_position[j][..n], &fixed.from_velocity[j][..n]);
+            for i in 0..n {
+                change[i] += by_force[i] * f + by_position[i] * x + by_velocity[i] * v;
             }
-            change
-        };
-        for (p, by) in fixed.from_prescribed.iter().enumerate() {
+        }
+    }
+
+    /// `change`: half the change of the velocities, still without what prescribed bodies add.
+    #[inline(always)]
+    fn change_velocities(&self, n: usize, motion: &mut Motion, change: &mut [f64]) {
+        let h = self.substep;
+        for (p, by) in self.fixed.from_prescribed.iter().enumerate() {
             let slot = prescribed_slot(p);
             let acceleration = (motion.end_velocity[slot] - self.v[slot]) / h;
             let (x, v) = (motion.middle[slot], motion.mean_velocity[slot]);
@@ -319,12 +334,12 @@ impl Plant {
     }
 
     /// Forces of the inputs at `s` of this period, seen from before.
+    #[inline]
     pub(super) fn note_pushes(&mut self, s: f64) {
         for drive in self.drives.iter().filter(|drive| !drive.moves) {
-            self.pushed[drive.slot] = 0.0;
-        }
-        for drive in self.drives.iter().filter(|drive| !drive.moves) {
-            self.pushed[drive.slot] += drive.force_before(s);
+            let force = drive.force_before(s);
+            let pushed = &mut self.pushed[drive.slot];
+            *pushed = if drive.is_first { force } else { *pushed + force };
         }
     }
 }

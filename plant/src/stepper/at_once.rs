@@ -12,14 +12,23 @@ use super::sticking::Sticking;
 const CHANGES: usize = 8;
 
 impl Constraints {
-    /// Adds to the forces of the set what takes away the velocities across its contacts. Twice: the second time what rounding left.
+    /// Adds to the forces of the set what takes away the velocities across its contacts. Where they depend much on each other twice: the second time what
+    /// rounding left.
+    #[inline]
     fn hold(&self, work: &mut Work, sticking: &mut Sticking) {
-        for _ in 0..2 {
-            for (right, c) in sticking.right.iter_mut().zip(&sticking.set[..sticking.count]) {
+        let count = sticking.count;
+        for _ in 0..if sticking.inverted { 1 } else { 2 } {
+            for (right, c) in sticking.right.iter_mut().zip(&sticking.set[..count]) {
                 *right = self.velocity(*c, work);
             }
+            if sticking.inverted {
+                for (row, c) in sticking.set[..count].iter().enumerate() {
+                    work.force[*c] += sticking.answer(&sticking.right[..count], row);
+                }
+                continue;
+            }
             sticking.solve();
-            for ((c, more), kept) in sticking.set[..sticking.count].iter().zip(&sticking.right).zip(&sticking.kept) {
+            for ((c, more), kept) in sticking.set[..count].iter().zip(&sticking.right).zip(&sticking.kept) {
                 if *kept {
                     work.force[*c] += more;
                 }
@@ -30,7 +39,7 @@ impl Constraints {
     /// All friction contacts at once, where there are no other constraints. `false` where contacts depend on each other (several in one place) or the set
     /// does not settle.
     pub(super) fn solve_contacts(&self, work: &mut Work) -> bool {
-        let mut sticking = std::mem::take(&mut work.sticking);
+        let Some(mut sticking) = work.sticking.take() else { return false };
         for c in 0..self.frictions {
             // Bounds may have changed since.
             work.force[c] = work.force[c].min(work.bounds[c].high).max(work.bounds[c].low);
@@ -40,7 +49,7 @@ impl Constraints {
         if !settled {
             work.force[..self.frictions].copy_from_slice(&sticking.start);
         }
-        work.sticking = sticking;
+        work.sticking = Some(sticking);
         settled
     }
 
@@ -97,7 +106,7 @@ impl Constraints {
 
     /// Newton step for the contacts inside their bounds: makes all of them stick at once. Contacts that depend on others keep their force.
     pub(super) fn make_stick(&self, work: &mut Work) {
-        let mut sticking = std::mem::take(&mut work.sticking);
+        let Some(mut sticking) = work.sticking.take() else { return };
         sticking.gather((0..self.frictions).filter(|c| work.force[*c] > work.bounds[*c].low && work.force[*c] < work.bounds[*c].high));
         sticking.factorise(self.changes, |c, d| self.compliance(c, d));
         for (right, c) in sticking.right.iter_mut().zip(&sticking.set[..sticking.count]) {
@@ -108,6 +117,6 @@ impl Constraints {
             let Bounds { low, high } = work.bounds[*c];
             work.force[*c] = (work.force[*c] + more).min(high).max(low);
         }
-        work.sticking = sticking;
+        work.sticking = Some(sticking);
     }
 }

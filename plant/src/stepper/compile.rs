@@ -385,7 +385,10 @@ fn plant(model: &Model, period: f64, options: &Options) -> Result<Plant, Compile
         None => choose_substeps(&network, model, &poses, period),
     };
     let substep = period / substeps as f64;
-    let drives: Vec<Drive> = model.inputs.iter().map(|input| Drive::new(input, network.slots[input.on], period, substep)).collect();
+    let mut drives: Vec<Drive> = model.inputs.iter().map(|input| Drive::new(input, network.slots[input.on], period, substep)).collect();
+    for index in 1..drives.len() {
+        drives[index].is_first = !drives[..index].iter().any(|other| !other.moves && other.slot == drives[index].slot);
+    }
 
     let (elements, frictions, mut paths) = parts(model, &network);
 

@@ -70,7 +70,8 @@ pub(super) struct Work {
     /// Forces and bounds before it was known that they stop.
     pub(super) first_force: [f64; MAX_ELEMENTS],
     pub(super) first_bounds: [Bounds; MAX_ELEMENTS],
-    pub(super) sticking: Sticking,
+    /// Always there between solutions.
+    pub(super) sticking: Option<Box<Sticking>>,
 }
 
 impl Work {
@@ -85,7 +86,7 @@ impl Work {
             shares: [(0.0, 0.0); MAX_ELEMENTS],
             first_force: [0.0; MAX_ELEMENTS],
             first_bounds: [Bounds::default(); MAX_ELEMENTS],
-            sticking: Sticking::new(frictions),
+            sticking: Some(Box::new(Sticking::new(frictions))),
         }
     }
 }

@@ -10,6 +10,8 @@ pub(super) struct Drive {
     pub(super) slot: usize,
     /// Whether it prescribes a motion; else it is a force.
     pub(super) moves: bool,
+    /// Whether it is the first force input on its place.
+    pub(super) is_first: bool,
     pub(super) gain: f64,
     /// Of a motion, m.
     pub(super) offset: f64,
@@ -44,6 +46,7 @@ impl Drive {
         Drive {
             slot,
             moves: input.kind == InputKind::Motion,
+            is_first: true,
             gain: input.gain,
             offset: if input.kind == InputKind::Motion { input.offset } else { 0.0 },
             saturation: if input.kind == InputKind::Force { input.saturation } else { f64::INFINITY },
@@ -79,7 +82,9 @@ impl Drive {
     #[inline]
     fn past(&self, periods: usize) -> &Segment {
         let len = self.history.len();
-        &self.history[(self.newest + len - periods) % len]
+        // Never more periods than there are segments.
+        let index = self.newest + len - periods;
+        &self.history[if index < len { index } else { index - len }]
     }
 
     /// The delayed segment in force on `from <= s` of this period, and what to take from s. Where the delay's rest lies
