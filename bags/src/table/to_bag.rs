@@ -99,8 +99,10 @@ pub(crate) fn write_bag(path: &Path, table: &Table, bag: &Path, options: &Import
         let column = find(&map.column)?;
         if let Some(row) = column.values.iter().position(|value| !value.is_finite()) {
             let found = if column.values[row].is_nan() { "none (NaN)".to_owned() } else { format!("{:?}", column.values[row]) };
-            let what =
-                format!("column {:?}: expected a number, found {found}; leave such rows out, or name the columns that count with --map", map.column);
+            let what = format!(
+                "column {:?}: expected a number, found {found}; leave such rows out, or name the columns that count with --map",
+                map.column
+            );
             return Err(table.wrong(path, row, what));
         }
         let place = info.iter().position(|info| info.topic.name == map.topic).unwrap_or_else(|| {
