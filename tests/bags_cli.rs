@@ -107,6 +107,10 @@ fn a_table_goes_through_every_format_and_comes_back() {
     let refused = place.backdrive(&["bag", "export", "arm.mcap", "--to", "lerobot", "--out", "set"]);
     assert!(refused.code == Some(3) && refused.stderr.contains("--overwrite"), "{refused:?}");
     assert_eq!(place.backdrive(&["bag", "export", "arm.mcap", "--to", "lerobot", "--out", "set", "--overwrite"]).code, Some(0));
+    place.write("gap.csv", "t,j.position\n0,1\n0.01,2\n0.02,3\n0.06,4\n");
+    assert_eq!(place.backdrive(&["bag", "import", "gap.csv", "--bag", "gap.mcap"]).code, Some(0));
+    let refused = place.backdrive(&["bag", "export", "gap.mcap", "--to", "lerobot", "--out", "gap"]);
+    assert!(refused.code == Some(3) && refused.stderr.contains("gap.mcap: row 4: 0.040000 s behind the row before"), "{refused:?}");
     let refused = place.backdrive(&["bag", "export", "arm.mcap", "--to", "lerobot", "--out", "episodes", "--overwrite"]);
     assert!(
         refused.code == Some(3) && refused.stderr.contains("is no LeRobot dataset") && place.path("episodes/episode_000001.mcap").exists(),

@@ -63,6 +63,10 @@ pub fn import_lerobot(folder: &Path, into: &Path, options: &LerobotOptions) -> R
     let features: Vec<&str> = there.iter().filter_map(|role| contract.feature(*role)).collect();
     let joints = features.iter().map(|feature| info.joints(feature)).collect::<Result<Vec<_>, _>>()?;
     let widths: Vec<usize> = joints.iter().map(Vec::len).collect();
+    // What the contract does not say is told before anything is written.
+    for (role, joints) in there.iter().zip(&joints) {
+        joints.iter().try_for_each(|joint| contract.scale(*role, joint).map(drop)).map_err(BagError::Usage)?;
+    }
     let (episodes, types) = read_episodes(folder, &features, &widths, options.episodes.as_deref())?;
     std::fs::create_dir_all(into).map_err(|source| BagError::Create { path: into.to_owned(), source })?;
     let bag_of = |episode: u64| into.join(format!("episode_{episode:06}.mcap"));

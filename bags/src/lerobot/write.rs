@@ -151,13 +151,15 @@ fn rate(times: &[f64]) -> Result<f64, String> {
     let whole = Some(short(0)).filter(|fps| is_same(fps, 1e-6));
     let fps = whole.or_else(|| (1..=6).map(short).find(|fps| is_same(fps, 1e-9))).unwrap_or(measured);
     let late = |row: usize| (times[row] - first - row as f64 / fps).abs();
-    match (0..times.len()).find(|row| late(*row) > TOLERANCE_S) {
-        Some(row) => Err(format!(
-            "row {}: its time is {:.6} s off an even clock of {fps} frames a second; a LeRobot dataset has one rate and no gaps: cut the recording there, or resample it",
-            row + 1,
-            late(row)
-        )),
-        None => Ok(fps),
+    let Some(row) = (0..times.len()).find(|row| late(*row) > TOLERANCE_S) else { return Ok(fps) };
+    let steps: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    let mut sorted = steps.clone();
+    sorted.sort_by(f64::total_cmp);
+    let usual = sorted[(sorted.len() - 1) / 2];
+    let advice = "a LeRobot dataset has one rate and no gaps: cut the recording there, or resample it";
+    match steps.iter().position(|step| (step - usual).abs() > TOLERANCE_S) {
+        Some(odd) => Err(format!("row {}: {:.6} s behind the row before, where {usual:.6} s are usual; {advice}", odd + 2, steps[odd])),
+        None => Err(format!("row {}: its time is {:.6} s off an even clock of {fps} frames a second; {advice}", row + 1, late(row))),
     }
 }
 
