@@ -78,6 +78,31 @@ fn a_heading_may_name_its_unit_and_so_may_a_rule() {
     assert_eq!(r.check_units(&model), Ok(()));
 }
 
+/// Headings and separators as the client of Universal Robots (`record.py` with `csv_writer.py`) and libfranka (`logToCSV`) write them.
+#[test]
+fn logs_of_robots_controllers_are_read_where_columns_name_them() {
+    let ur = "timestamp actual_q_0 actual_q_1 actual_qd_0 actual_qd_1 actual_current_0 actual_current_1\n\
+              100.002 0.1 -1.5 0.01 0.02 0.5 -2.0\n100.004 0.2 -1.4 0.01 0.02 0.6 -2.5\n100.006 0.3 -1.3 0.01 0.02 0.7 -3.0\n";
+    let franka = "duration, success rate, q[0], q[1],q_d[0], q_d[1],dq[0], dq[1],tau_J[0], tau_J[1],sent commands\n\
+                  0,1,0.1,-1.5,0,0,0.01,0.02,5,-20,none\n1,1,0.2,-1.4,0,0,0.01,0.02,6,-25,none\n2,1,0.3,-1.3,0,0,0.01,0.02,7,-30,none\n";
+    let set_of_ur = "[columns]\nt = 'timestamp'\n\
+                     [joints]\nbase = { position = 'actual_q_0', velocity = 'actual_qd_0', current = 'actual_current_0', torque_constant = 10.0 }\n\
+                     shoulder = { position = 'actual_q_1', velocity = 'actual_qd_1', current = 'actual_current_1', torque_constant = 10.0 }\n";
+    let set_of_franka = "[columns]\nt = { column = 'duration', unit = 'ms' }\n\
+                         [joints]\nbase = { position = 'q[0]', velocity = 'dq[0]', torque = 'tau_J[0]' }\n\
+                         shoulder = { position = 'q[1]', velocity = 'dq[1]', torque = 'tau_J[1]' }\n";
+    for (set, text, period) in [(set_of_ur, ur, 2e-3), (set_of_franka, franka, 1e-3)] {
+        let dir = folder(&[("set.toml", set), ("x.csv", text)]);
+        let set = RecordingSet::open(dir.path()).unwrap();
+        let signals: Vec<String> = set.joints.iter().flat_map(|j| [j.position(), j.velocity(), j.torque()]).collect();
+        let r = set.read_csv("x.csv", &signals.iter().map(String::as_str).collect::<Vec<_>>()).unwrap();
+        assert!((r.period - period).abs() < 1e-9, "{}", r.period);
+        assert_eq!(r.signal("shoulder.position").unwrap(), [-1.5, -1.4, -1.3]);
+        assert_eq!(r.signal("base.torque").unwrap(), [5.0, 6.0, 7.0]);
+        assert_eq!(r.signal("shoulder.torque").unwrap(), [-20.0, -25.0, -30.0]);
+    }
+}
+
 #[test]
 fn a_unit_that_is_not_known_or_does_not_go_with_the_signal_is_told() {
     let read = |text: &str| read_text(text, Some(&["torque", "angle"]), &Columns::new(), &Piece::default());

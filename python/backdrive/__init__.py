@@ -16,11 +16,11 @@ from ._errors import Error, InputError, MachineError, UsageError
 from ._figures import Figure
 from ._model import Model
 from ._readers import Contract, load_lerobot, load_mat, load_parquet, load_rosbag, save
-from ._results import Exported, Fields, Fit, Prediction, Report, Verdict
+from ._results import Exported, Fields, Fit, Interrupted, Prediction, Report, Verdict
 from ._verbs import diagnose, export, fit, load_bag, save_bag, simulate, stability, why
 
 __all__ = [
-    "ClockWarning", "Contract", "Error", "Exported", "Fields", "Figure", "Fit", "InputError", "MachineError", "Model", "Prediction", "Report", "UsageError",
+    "ClockWarning", "Contract", "Error", "Exported", "Fields", "Figure", "Fit", "InputError", "Interrupted", "MachineError", "Model", "Prediction", "Report", "UsageError",
     "Verdict", "__version__", "diagnose", "export", "fit", "load_bag", "load_lerobot", "load_mat", "load_parquet", "load_rosbag", "save", "save_bag", "simulate",
     "stability", "why",
 ]

@@ -114,6 +114,14 @@ class Verdict(Report):
         self.experiment: str | None = next((text for name, text in files.items() if name.startswith("next-")), None)
 
 
+class Interrupted(KeyboardInterrupt):
+    """Ctrl-C ended a diagnosis. `verdict` is what it had found until then, which is never the word that all is well; `None` where it had not begun."""
+
+    def __init__(self, verdict: Verdict | None) -> None:
+        super().__init__("the diagnosis was stopped" + ("" if verdict is None else "; `verdict` of this exception is what was found until then"))
+        self.verdict: Verdict | None = verdict
+
+
 class Fit(Result):
     """A refit: `numbers` (name, unit, given, value, standard_error, ci95), `correlations`, `given` and `fitted` (errors of every recording), `agree`,
     `kept` (names of what the recordings do not determine) and `model`, the refitted one.

@@ -8,7 +8,7 @@ from typing import Any
 
 from . import _frames, _toml
 from ._model import Model
-from ._results import Exported, Fit, Prediction, Report, Verdict, fields
+from ._results import Exported, Fit, Interrupted, Prediction, Report, Verdict, fields
 from ._work import INTERRUPTED, Progress, Work
 
 Path = str | os.PathLike[str]
@@ -54,6 +54,16 @@ def _grip(work: Work, grip: Any) -> str | None:
     return None if grip is None else _model_file(work, grip, "grip.toml")
 
 
+def _written(folder: str, report: bool) -> dict[str, str]:
+    """What a diagnosis has left in its folder, by name."""
+    files: dict[str, str] = {}
+    for name in os.listdir(folder) if os.path.isdir(folder) else []:
+        if name.endswith((".json", ".toml", ".csv")) or report and name == "report.html":
+            with open(os.path.join(folder, name), encoding="utf-8") as file:
+                files[name] = file.read()
+    return files
+
+
 def diagnose(
     recordings: Any,
     model: Path | Model | None = None,
@@ -87,7 +97,8 @@ def diagnose(
     settings: further keys of `set.toml`. out: a folder for verdict, model and report. report: whether to make the page.
     progress: whether to show it; or a function of message, position and length.
 
-    Raises InputError where a file or a recording is wrong, with `file`, `line`, `key`; UsageError where an argument is.
+    Raises InputError where a file or a recording is wrong, with `file`, `line`, `key`; UsageError where an argument is; Interrupted, a KeyboardInterrupt, at
+    Ctrl-C: its `verdict` is what was found until then. A second Ctrl-C does not wait for it.
     """
     with Work(progress) as work:
         where = os.fspath(out) if out is not None else work.path("out")
@@ -97,13 +108,13 @@ def diagnose(
         arguments = ["diagnose", *work.set(recordings, held_out, more), "--out", where]
         arguments += _options({"model": None if model is None else _model_file(work, model), "grip": _grip(work, grip), "ignore_signal": _some(ignore)})
         arguments += _options({"without": _some(without), "effects": effects, "effort": effort, "patience": patience, "no_report": not report})
-        said = work.run(arguments)
-        files = {}
-        for name in os.listdir(where):
-            if name.endswith((".json", ".toml", ".csv")) or report and name == "report.html":
-                with open(os.path.join(where, name), encoding="utf-8") as file:
-                    files[name] = file.read()
-        return Verdict(files, work.notes, work.code, said.partition("\nwrote ")[0].rstrip(), _folder_of(model))
+        try:
+            said = work.run(arguments)
+        except KeyboardInterrupt as stop:
+            files = _written(where, report)
+            whole = {"verdict.json", "model.diagnosed.toml"} <= files.keys()
+            raise Interrupted(Verdict(files, work.notes, INTERRUPTED, "", _folder_of(model)) if whole else None) from stop
+        return Verdict(_written(where, report), work.notes, work.code, said.partition("\nwrote ")[0].rstrip(), _folder_of(model))
 
 
 def fit(
@@ -152,7 +163,7 @@ def simulate(
     with Work(progress) as work:
         set_file = None if columns is None else work.text_file("columns.toml", _toml.document({"fit": [], "columns": columns}))
         driven = work.file(drive, "recording")
-        several = os.path.isdir(driven) or driven.endswith("set.toml")
+        several = os.path.isdir(driven) or driven.endswith(".toml")
         out = work.path("predicted" if several else "predicted.csv")
         arguments = ["simulate", _model_file(work, model), driven, "--out", out, "--json", *_options({"grip": _grip(work, grip), "input": input})]
         arguments += _options({"rate": rate, "substeps": substeps, "noise": noise, "columns": set_file})

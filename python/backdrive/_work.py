@@ -145,4 +145,4 @@ class Work:
             held = [fit.pop()]
         names = {"fit": [self.from_here(f) for f in fit], "held_out": [self.from_here(f) for f in held]}
         text = _toml.document({**names, **settings})
-        return [self.text_file("set.toml", text)]
+        return [self.text_file("recordings.toml", text)]

@@ -12,13 +12,13 @@ use pyo3::prelude::*;
 use std::sync::atomic::Ordering;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::sync::{Arc, Mutex};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// Time between two looks at signals and progress.
 const LOOK: Duration = Duration::from_millis(20);
 
-/// How long a verb that was interrupted is waited for.
-const PATIENCE: Duration = Duration::from_secs(2);
+/// How long a verb that was interrupted is waited for, unless it is interrupted again.
+const PATIENCE: Duration = Duration::from_secs(10);
 
 /// Runs a verb: `(exit code, standard output, notes, error or None)`. `progress(message, position, length or None)` is called now and then.
 ///
@@ -45,7 +45,10 @@ fn run(py: Python<'_>, arguments: Vec<String>, progress: Option<Py<PyAny>>) -> P
         let told = progress.as_ref().zip(caller.progress()).map(|(tell, now)| tell.call1(py, (now.message, now.position, now.length)));
         if let Err(raised) = py.check_signals().and(told.transpose().map(|_| ())) {
             caller.stop.store(true, Ordering::SeqCst);
-            py.detach(|| heard(&result, PATIENCE)).ok();
+            let until = Instant::now() + PATIENCE;
+            while matches!(py.detach(|| heard(&result, LOOK)), Err(RecvTimeoutError::Timeout)) && Instant::now() < until {
+                py.check_signals()?;
+            }
             return Err(raised);
         }
     }

@@ -285,17 +285,23 @@ class Package(unittest.TestCase):
             print("begins", flush=True)
             try:
                 backdrive.diagnose({str(self.folder / "set.toml")!r}, {str(self.folder / "model.toml")!r}, effort=50.0, effects=6)
-            except KeyboardInterrupt:
+            except KeyboardInterrupt as stop:
                 print("interrupted", flush=True)
+                print(type(stop).__name__, None if stop.verdict is None else stop.verdict.verdict, flush=True)
         """
         child = subprocess.Popen([sys.executable, "-c", textwrap.dedent(script)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
         self.assertEqual(child.stdout.readline(), "begins\n")
-        time.sleep(0.7)
+        time.sleep(3.0)
         child.send_signal(signal.SIGINT)
         began = time.monotonic()
         said, _ = child.communicate(timeout=30)
-        self.assertEqual(said, "interrupted\n")
-        self.assertLess(time.monotonic() - began, 5.0)
+        first, second = said.splitlines()
+        self.assertEqual(first, "interrupted")
+        # What was found until then, and never that nothing is missing.
+        kind, word = second.split()
+        self.assertEqual(kind, "Interrupted")
+        self.assertNotIn(word, ["None", "nothing_missing"])
+        self.assertLess(time.monotonic() - began, 15.0)
 
     def test_the_import_takes_less_than_a_third_of_a_second(self):
         script = f"import sys, time; sys.path.insert(0, {PLACE!r}); t = time.perf_counter(); import backdrive; print(time.perf_counter() - t)"

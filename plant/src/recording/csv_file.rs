@@ -2,6 +2,7 @@
 
 use super::columns::{Columns, Piece, Source};
 use super::record::{Recording, RecordingError, signals_of};
+use super::separator::{separator_in, separator_of};
 use super::units::{self, Kind, Unit};
 use crate::model::Model;
 use crate::tomlfile::{self, FileError};
@@ -27,9 +28,16 @@ struct Wanted {
 pub fn read_headings(path: &Path) -> Result<Vec<String>, FileError> {
     let name = path.display().to_string();
     let file = File::open(path).map_err(|e| tomlfile::unreadable(path, &e))?;
-    let mut reader = ReaderBuilder::new().trim(Trim::All).flexible(true).comment(Some(b'#')).from_reader(file);
+    let mut reader = table(separator_of(path)).from_reader(file);
     let headings = heading_of(&mut reader, &name)?;
     Ok(headings.iter().map(|heading| heading.trim_start_matches('\u{feff}').to_string()).collect())
+}
+
+/// How a table is read.
+fn table(separator: u8) -> ReaderBuilder {
+    let mut table = ReaderBuilder::new();
+    table.delimiter(separator).trim(Trim::All).flexible(true).comment(Some(b'#'));
+    table
 }
 
 fn heading_of<R: std::io::Read>(reader: &mut csv::Reader<R>, name: &str) -> Result<StringRecord, FileError> {
@@ -70,14 +78,14 @@ pub fn read_signals_of(
 
 /// Reads the named signals of a CSV file, or all of its columns where `signals` is `None`.
 ///
-/// The first line is the heading, `name` or `name [unit]`; time is the column `t` unless `columns` says otherwise. A unit that `columns` names
+/// Cells are separated by commas, semicolons, tabs or spaces. The first line is the heading, `name` or `name [unit]`; time is the column `t` unless `columns` says otherwise. A unit that `columns` names
 /// goes before one in the heading, and so does a scale. Samples are in SI units. Cells of other
 /// columns are not looked at. A cell that is no finite number, or a time that does not rise, is an error at its line.
 pub fn read_csv(path: &Path, signals: Option<&[&str]>, columns: &Columns, piece: &Piece) -> Result<Recording, FileError> {
     let name = path.display().to_string();
     let text = tomlfile::read_text(path)?;
     let text = text.strip_prefix('\u{feff}').unwrap_or(&text);
-    let mut reader = ReaderBuilder::new().trim(Trim::All).flexible(true).comment(Some(b'#')).from_reader(text.as_bytes());
+    let mut reader = table(separator_in(text.as_bytes())).from_reader(text.as_bytes());
     let headings = heading_of(&mut reader, &name)?;
     let file = Headings { name: &name, headings: &headings };
     let time = file.find("t", columns)?;

@@ -5,6 +5,7 @@ mod csv_file;
 mod hold;
 mod joints;
 mod record;
+mod separator;
 pub mod units;
 
 pub use columns::{Cell, ColumnRule, Columns, Piece, Source, read_columns};
@@ -13,3 +14,4 @@ pub use hold::{resample, segments};
 pub use joints::JointColumns;
 pub(crate) use joints::read_joints;
 pub use record::{Gap, Jitter, Recording, RecordingError, signals_of};
+pub use separator::separator_of;
