@@ -110,6 +110,9 @@ fn compare(loops: u64, rounds: u64, file: Option<&str>) -> Result<ExitCode> {
     for _ in 0..rounds {
         for point in &mut points {
             let figures = point.kind.measure(point.nodes, point.size, loops);
+            if children::interrupted() {
+                return Ok(ExitCode::from(130));
+            }
             point.runs.push(figures.map_err(|e| format!("{}, {} nodes, {} bytes: {e}", point.kind.name(), point.nodes, point.size))?);
         }
     }

@@ -32,6 +32,11 @@ pub fn end_with_signals() -> Result<()> {
     Ok(())
 }
 
+/// Whether one of those signals came: what failed since then failed because of it.
+pub fn interrupted() -> bool {
+    running().1
+}
+
 /// A process of this program to which one may talk; killed where it is dropped before it has ended.
 pub struct Process {
     child: Child,

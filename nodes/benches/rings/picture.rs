@@ -95,8 +95,9 @@ fn above(rate: f64) -> f64 {
     levels(rate, rate * 10.0).next().unwrap_or(rate)
 }
 
-/// With a gap before the thousands.
+/// With a gap before each three digits.
 fn spaced(number: f64) -> String {
-    let whole = number.round() as u64;
-    if whole < 1000 { whole.to_string() } else { format!("{}\u{202f}{:03}", whole / 1000, whole % 1000) }
+    let digits = format!("{number:.0}");
+    let gap = |i: usize| if i > 0 && (digits.len() - i).is_multiple_of(3) { "\u{202f}" } else { "" };
+    digits.chars().enumerate().map(|(i, digit)| format!("{}{digit}", gap(i))).collect()
 }
