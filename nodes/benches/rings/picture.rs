@@ -40,7 +40,7 @@ fn write(svg: &mut String, panels: &[Panel]) -> Result {
     writeln!(svg, "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} 456\" font-family=\"sans-serif\" font-size=\"13\">")?;
     writeln!(svg, "<rect width=\"{width}\" height=\"456\" fill=\"white\"/>")?;
     for (index, curve) in panels.iter().take(1).flat_map(|p| &p.curves).enumerate() {
-        let (at, colour) = (LEFT + 225.0 * index as f64, COLOURS[index % COLOURS.len()]);
+        let (at, colour) = (LEFT + 240.0 * index as f64, COLOURS[index % COLOURS.len()]);
         mark(svg, at + 10.0, 20.0, colour)?;
         writeln!(svg, "<path d=\"M{at} 20h20\" stroke=\"{colour}\" stroke-width=\"2\"/>")?;
         writeln!(svg, "<text x=\"{}\" y=\"24\">{}</text>", at + 27.0, curve.name)?;
