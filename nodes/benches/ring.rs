@@ -8,33 +8,31 @@
 
 #[path = "../tests/common/mod.rs"]
 mod common;
+mod rings;
 
-use backdrive_bags::{BagHeader, Completeness, Recorder, RecorderOptions, TopicInfo};
+use backdrive_bags::{BagHeader, Recorder, RecorderOptions, TopicInfo};
 use backdrive_control::core::{Core, Events, Port, Tick};
-use backdrive_msgs::{Message, Sample};
-use backdrive_nodes::clock::{Start, now_ns};
-use backdrive_nodes::histogram::Histogram;
+use backdrive_msgs::Sample;
+use backdrive_nodes::clock::now_ns;
 use backdrive_nodes::process::{ProcessOptions, run_processes};
-use backdrive_nodes::protocol::{FromNode, NodeStatus, ToNode};
 use backdrive_nodes::recorder::{Sink, run_recorder};
-use backdrive_nodes::runner::{Options, RunError};
+use backdrive_nodes::runner::Options;
 use backdrive_nodes::sequence::Sequence;
 use backdrive_nodes::stage::{Clock, Timing};
 use backdrive_nodes::transport::Location;
 use backdrive_nodes::transport::iceoryx2::Iceoryx2;
 use common::{NODES, listeners, plans, recorder_plan, timing};
-use std::error::Error;
-use std::io::{BufRead, BufReader, Read, Write};
-use std::process::{Child, ChildStdin, ChildStdout, Command, ExitCode, Stdio};
-
-type Result<T> = std::result::Result<T, Box<dyn Error>>;
+use rings::stopwatch::{Figures, medians};
+use rings::supervised::{Counting, Ended, run};
+use rings::{Result, children, pipes};
+use std::process::ExitCode;
 
 const SIZE: usize = std::mem::size_of::<Sample>();
 
 fn main() -> Result<ExitCode> {
     let args: Vec<String> = std::env::args().skip(1).filter(|a| a != "--bench").collect();
     match args.iter().map(String::as_str).collect::<Vec<_>>().as_slice() {
-        ["pipe"] => relay(),
+        ["pipe", size] => pipes::relay(size.parse()?),
         ["node", names, location, steps, bag] => node(names, &serde_json::from_str(location)?, steps.parse()?, bag),
         ["hop", name, location, steps, wait] => hopper(name, &serde_json::from_str(location)?, steps.parse()?, wait == &"poll"),
         numbers => compare(number(numbers.first(), 30_000)?, number(numbers.get(1), 10)?),
@@ -46,6 +44,7 @@ fn number(text: Option<&&str>, default: u64) -> Result<u64> {
 }
 
 fn compare(loops: u64, runs: u64) -> Result<ExitCode> {
+    children::end_with_signals()?;
     println!("{loops} loops per run, medians of {runs} interleaved runs, messages of {SIZE} bytes");
     let folder = tempfile::tempdir()?;
     let bag = folder.path().join("ring.mcap").display().to_string();
@@ -54,7 +53,7 @@ fn compare(loops: u64, runs: u64) -> Result<ExitCode> {
     let one = ["operator,master,canceller,scaling,slave"];
     let mut all: [Vec<Figures>; 7] = Default::default();
     for _ in 0..runs {
-        all[0].push(pipe_ring(loops)?);
+        all[0].push(pipes::ring(5, SIZE, loops)?);
         all[1].push(lockstep_ring(loops, &apart, "")?);
         all[2].push(lockstep_ring(loops, &apart, &bag)?);
         all[3].push(lockstep_ring(loops, &pairs, "")?);
@@ -100,74 +99,10 @@ fn one_thread() -> Result<f64> {
     Ok(runs.fold(f64::INFINITY, f64::min))
 }
 
-/// loops/s, p50 µs, p99 µs.
-type Figures = [f64; 3];
-
 fn show(name: &str, runs: &[Figures]) -> Figures {
-    let median = |i: usize| {
-        let mut values: Vec<f64> = runs.iter().map(|r| r[i]).collect();
-        values.sort_by(f64::total_cmp);
-        values[values.len() / 2]
-    };
-    let figures = [median(0), median(1), median(2)];
+    let figures = medians(runs);
     println!("{name:26} {:8.0} loops/s  p50 {:7.2} us  p99 {:7.1} us", figures[0], figures[1], figures[2]);
     figures
-}
-
-fn this_program(args: &[&str]) -> Result<Command> {
-    let mut command = Command::new(std::env::current_exe()?);
-    command.args(args);
-    Ok(command)
-}
-
-/// Passes on what it is given.
-fn relay() -> Result<ExitCode> {
-    let (mut input, mut output, mut bytes) = (std::io::stdin().lock(), std::fs::File::from(dup_stdout()?), [0; SIZE]);
-    while input.read_exact(&mut bytes).is_ok() {
-        output.write_all(&bytes)?;
-    }
-    Ok(ExitCode::SUCCESS)
-}
-
-/// Standard output without the buffer of the standard library.
-fn dup_stdout() -> Result<std::os::fd::OwnedFd> {
-    use std::os::fd::AsFd;
-    Ok(std::io::stdout().as_fd().try_clone_to_owned()?)
-}
-
-/// This process and four relays.
-fn pipe_ring(loops: u64) -> Result<Figures> {
-    let mut children: Vec<Child> = Vec::new();
-    let mut first = None;
-    let mut last: Option<ChildStdout> = None;
-    for _ in 0..4 {
-        let stdin = last.take().map_or_else(Stdio::piped, Stdio::from);
-        let mut child = this_program(&["pipe"])?.stdin(stdin).stdout(Stdio::piped()).spawn()?;
-        first = first.or(child.stdin.take());
-        last = child.stdout.take();
-        children.push(child);
-    }
-    let (Some(mut first), Some(mut last)) = (first, last) else { return Err("no pipe".into()) };
-    let (mut histogram, mut bytes) = (Histogram::default(), [0; SIZE]);
-    for _ in 0..loops / 10 {
-        first.write_all(&bytes)?;
-        last.read_exact(&mut bytes)?;
-    }
-    let begun = now_ns();
-    let mut before = begun;
-    for _ in 0..loops {
-        first.write_all(&bytes)?;
-        last.read_exact(&mut bytes)?;
-        let now = now_ns();
-        histogram.record((now - before) as u64);
-        before = now;
-    }
-    let seconds = (before - begun) as f64 * 1e-9;
-    drop(first);
-    for mut child in children {
-        child.wait()?;
-    }
-    Ok([loops as f64 / seconds, histogram.quantile(0.5) * 1e-3, histogram.quantile(0.99) * 1e-3])
 }
 
 fn ring_timing(steps: u64) -> Timing {
@@ -228,86 +163,6 @@ fn hop(steps: u64, wait: &str) -> Result<Figures> {
     ring_of(steps, "hop", &[("ping".to_string(), wait.to_string()), ("pong".to_string(), wait.to_string())], 0)
 }
 
-/// Checks sequence numbers and throws away.
-#[derive(Default)]
-struct Counting {
-    next: Vec<u64>,
-    lost: u64,
-    written: u64,
-}
-
-impl Sink for Counting {
-    fn push(&mut self, topic: usize, message: Message, _: i64) -> std::result::Result<(), RunError> {
-        if self.next.len() <= topic {
-            self.next.resize(topic + 1, 0);
-        }
-        self.lost += message.sequence().saturating_sub(self.next[topic]);
-        self.next[topic] = message.sequence() + 1;
-        self.written += 1;
-        Ok(())
-    }
-
-    fn health(&self) -> (u64, u64, u64) {
-        (self.written, 0, self.lost)
-    }
-
-    fn finish(self: Box<Self>) -> std::result::Result<Completeness, RunError> {
-        match self.lost {
-            0 => Ok(Completeness::default()),
-            lost => Err(RunError::Incomplete { lost }),
-        }
-    }
-}
-
-struct Node {
-    child: Child,
-    stdin: ChildStdin,
-    lines: BufReader<ChildStdout>,
-}
-
-impl Node {
-    fn start(what: &str, name: &str, location: &Location, steps: u64, how: &str) -> Result<Node> {
-        let (place, steps) = (serde_json::to_string(location)?, steps.to_string());
-        let mut child = this_program(&[what, name, &place, &steps, how])?.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn()?;
-        let (stdin, stdout) = (child.stdin.take().ok_or("no stdin")?, child.stdout.take().ok_or("no stdout")?);
-        Ok(Node { child, stdin, lines: BufReader::new(stdout) })
-    }
-
-    fn next(&mut self) -> Result<FromNode> {
-        let mut line = String::new();
-        self.lines.read_line(&mut line)?;
-        Ok(serde_json::from_str(&line)?)
-    }
-
-    fn until_ready(&mut self) -> Result<()> {
-        loop {
-            match self.next()? {
-                FromNode::Ready => return Ok(()),
-                FromNode::Failed { error, .. } => return Err(error.into()),
-                _ => {}
-            }
-        }
-    }
-
-    /// The figures of its master, or of its first node.
-    fn until_done(&mut self) -> Result<NodeStatus> {
-        let mut master = None;
-        loop {
-            match self.next()? {
-                FromNode::Of { node, said } if node == "master" => {
-                    if let FromNode::Status(status) = *said {
-                        master = Some(status);
-                    }
-                }
-                FromNode::Done(_) if master.is_some() => return Ok(master.unwrap_or_default()),
-                FromNode::Done(status) => return Ok(status),
-                FromNode::Failed { error, .. } => return Err(error.into()),
-                _ => {}
-            }
-        }
-    }
-}
-
 /// The nodes of these processes and the recorder, which writes a bag where one is named.
 fn lockstep_ring(steps: u64, processes: &[&str], bag: &str) -> Result<Figures> {
     let all: Vec<(String, String)> = processes.iter().chain(&["recorder"]).map(|name| (name.to_string(), bag.to_string())).collect();
@@ -317,29 +172,6 @@ fn lockstep_ring(steps: u64, processes: &[&str], bag: &str) -> Result<Figures> {
 
 /// Processes of this program, (name, how); the figures are those of the one at `timed`.
 fn ring_of(steps: u64, what: &str, processes: &[(String, String)], timed: usize) -> Result<Figures> {
-    let root = tempfile::tempdir()?;
-    let location = Location { prefix: format!("ring{}_", std::process::id()), root: root.path().join("run") };
-    let mut nodes = Vec::new();
-    for (name, how) in processes {
-        nodes.push(Node::start(what, name, &location, steps, how)?);
-    }
-    nodes.iter_mut().try_for_each(Node::until_ready)?;
-    let Start { t0_ns, unix_ns } = Start::after(0);
-    let begun = now_ns();
-    // The source last: the others are then all waiting when it begins.
-    for node in nodes.iter_mut().rev() {
-        let mut line = serde_json::to_vec(&ToNode::Start { t0_ns, unix_ns })?;
-        line.push(b'\n');
-        node.stdin.write_all(&line)?;
-    }
-    let master = nodes[timed].until_done()?;
-    let seconds = (now_ns() - begun) as f64 * 1e-9;
-    for (i, node) in nodes.iter_mut().enumerate() {
-        if i != timed {
-            node.until_done()?;
-        }
-        node.child.wait()?;
-    }
-    location.remove()?;
-    Ok([steps as f64 / seconds, master.loop_p50_us, master.loop_p99_us])
+    let Ended { seconds, status, .. } = run(steps, what, processes, timed)?;
+    Ok([steps as f64 / seconds, status.loop_p50_us, status.loop_p99_us])
 }
