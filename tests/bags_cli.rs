@@ -61,6 +61,16 @@ fn several_tables_become_a_folder_of_bags() {
 }
 
 #[test]
+fn a_table_comes_through_a_pipe() {
+    let place = Place::new();
+    let program = env!("CARGO_BIN_EXE_backdrive");
+    let line = format!("printf 't,x\\n0,1\\n0.001,2\\n' | {program} bag import /dev/stdin --bag piped.mcap");
+    let done = place.command("sh").args(["-c", &line]).output().unwrap();
+    assert!(done.status.success(), "{done:?}");
+    assert_eq!(samples(&place.path("piped.mcap"), "/recording/x").iter().map(|s| s.position[0]).collect::<Vec<_>>(), [1.0, 2.0]);
+}
+
+#[test]
 fn an_import_tells_what_is_wrong_with_the_clock() {
     let place = Place::new();
     let table = |times: &[f64]| times.iter().fold("t,x\n".to_owned(), |text, t| format!("{text}{t:?},1\n"));

@@ -153,6 +153,20 @@ fn a_table_comes_back_from_a_bag() {
 }
 
 #[test]
+fn cells_are_separated_as_others_do_it() {
+    let dir = tempfile::tempdir().expect("a directory");
+    let (table, bag) = (dir.path().join("x.csv"), dir.path().join("x.mcap"));
+    for separator in [",", ";", "\t", " "] {
+        write(&table, &["t,x,y", "0,1,4", "0.5,2,5"].join("\n").replace(',', separator));
+        let options = ImportOptions { overwrite: true, ..ImportOptions::default() };
+        import_csv(&table, &bag, &options).unwrap_or_else(|error| panic!("{separator:?}: {error}"));
+        let found =
+            signals(&Reader::open(&bag).expect("it opens"), &[Signal::new("y", "/recording/y", "position[0]")]).expect("it is there");
+        assert_eq!(found.columns, [vec![4.0, 5.0]], "{separator:?}");
+    }
+}
+
+#[test]
 fn columns_go_where_they_are_sent() {
     let dir = tempfile::tempdir().expect("a directory");
     let (table, bag) = (dir.path().join("x.csv"), dir.path().join("x.mcap"));

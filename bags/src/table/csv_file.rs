@@ -5,9 +5,10 @@ use super::to_bag::name_of;
 use super::types::{Cells, Column, Table};
 use crate::BagError;
 use crate::number_type::NumberType;
+use backdrive_plant::recording::separator_of;
 use std::path::Path;
 
-/// Reads a CSV file. A column with a cell that is no number holds none, unless it is asked for: then that is an error, as is an empty cell or `nan`.
+/// Reads a CSV file, whose cells are separated by commas, semicolons, tabs or spaces. A column with a cell that is no number holds none, unless it is asked for: then that is an error, as is an empty cell or `nan`.
 pub(crate) fn read(path: &Path, options: &ImportOptions) -> Result<Table, BagError> {
     let wrong = |line: u64, what: String| BagError::Table { path: path.to_owned(), line, what };
     let failed = |error: csv::Error| {
@@ -15,7 +16,10 @@ pub(crate) fn read(path: &Path, options: &ImportOptions) -> Result<Table, BagErr
         wrong(line, error.to_string())
     };
     let file = std::fs::File::open(path).map_err(BagError::io(path))?;
-    let mut csv = csv::ReaderBuilder::new().trim(csv::Trim::All).comment(Some(b'#')).from_reader(std::io::BufReader::new(file));
+    // What comes through a pipe cannot be looked at before it is read.
+    let separator = if path.is_file() { separator_of(path) } else { b',' };
+    let mut csv =
+        csv::ReaderBuilder::new().delimiter(separator).trim(csv::Trim::All).comment(Some(b'#')).from_reader(std::io::BufReader::new(file));
     let headings: Vec<String> =
         csv.headers().map_err(failed)?.iter().map(|heading| heading.trim_start_matches('\u{feff}').to_owned()).collect();
     let mut columns: Vec<Option<Vec<f64>>> = vec![Some(Vec::new()); headings.len()];

@@ -24,6 +24,10 @@ impl TableFormat {
     /// It cannot be read, or its ending promises what its bytes are not.
     pub fn of_file(path: &Path) -> Result<TableFormat, BagError> {
         let mut start = Vec::new();
+        // What comes through a pipe cannot be looked at before it is read.
+        if std::fs::metadata(path).is_ok_and(|about| !about.is_file() && !about.is_dir()) {
+            return Ok(TableFormat::Csv);
+        }
         std::fs::File::open(path).and_then(|file| file.take(128).read_to_end(&mut start)).map_err(BagError::io(path))?;
         let promised = TableFormat::of_ending(path);
         let wrong = |what: &str| Err(BagError::File { path: path.to_owned(), what: what.to_owned() });
