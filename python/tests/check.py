@@ -291,7 +291,7 @@ class Package(unittest.TestCase):
         """
         child = subprocess.Popen([sys.executable, "-c", textwrap.dedent(script)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
         self.assertEqual(child.stdout.readline(), "begins\n")
-        time.sleep(3.0)
+        time.sleep(0.8)
         child.send_signal(signal.SIGINT)
         began = time.monotonic()
         said, _ = child.communicate(timeout=30)
