@@ -48,10 +48,14 @@ pub(crate) fn write(table: &Table, out: &Path) -> Result<Vec<String>, BagError> 
         sink.write_all(&compressed(&text(NAMES, &lines)).map_err(failed)?).map_err(failed)?;
     }
     sink.flush().map_err(failed)?;
-    Ok(renamed
-        .into_iter()
-        .map(|(name, heading)| format!("{heading:?} is called {name}, for MATLAB takes letters, digits and _ alone"))
-        .collect())
+    Ok(match renamed.as_slice() {
+        [] => Vec::new(),
+        [(name, heading)] => vec![format!("{heading:?} is called {name}, for MATLAB takes letters, digits and _ alone")],
+        [(name, heading), ..] => vec![format!(
+            "{} columns have another name, for MATLAB takes letters, digits and _ alone: {heading:?} is called {name}; {NAMES} in the file keeps the headings",
+            renamed.len()
+        )],
+    })
 }
 
 /// The heading, or what of it MATLAB takes: a letter, then letters, digits and `_`.
