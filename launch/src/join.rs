@@ -73,7 +73,8 @@ where
     };
     if node.kind == NodeKind::Recorder {
         if graph.timing.clock == Clock::Realtime && !(graph.polls && realtime::is_throttled()) {
-            // Above nodes of the ordinary class it would take their processors even where another is idle. Before its writer's thread is made, which inherits it. What is refused here is refused to the other nodes
+            // Not above nodes that poll in the ordinary class: it would take their processors even where another is idle.
+            // Before its writer's thread is made, which inherits it. What is refused here is refused to the other nodes
             // too, and they say so.
             let _ = realtime::enter(&realtime::Options { priority: Some(RECORDER_PRIORITY), ..realtime::Options::default() });
         }

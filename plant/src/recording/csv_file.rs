@@ -78,8 +78,8 @@ pub fn read_signals_of(
 
 /// Reads the named signals of a CSV file, or all of its columns where `signals` is `None`.
 ///
-/// Cells are separated by commas, semicolons, tabs or spaces. The first line is the heading, `name` or `name [unit]`; time is the column `t` unless `columns` says otherwise. A unit that `columns` names
-/// goes before one in the heading, and so does a scale. Samples are in SI units. Cells of other
+/// Cells are separated by commas, semicolons, tabs or spaces. The first line is the heading, `name` or `name [unit]`; time is the column `t` unless
+/// `columns` says otherwise. A unit that `columns` names goes before one in the heading, and so does a scale. Samples are in SI units. Cells of other
 /// columns are not looked at. A cell that is no finite number, or a time that does not rise, is an error at its line.
 pub fn read_csv(path: &Path, signals: Option<&[&str]>, columns: &Columns, piece: &Piece) -> Result<Recording, FileError> {
     let name = path.display().to_string();
