@@ -2,7 +2,7 @@
 
 use crate::failure::Failure;
 use crate::set_checks;
-use backdrive_bags::Reader;
+use backdrive_bags::{Reader, is_lerobot, is_rosbag};
 use backdrive_diagnosis::audit;
 use backdrive_diagnosis::problem::{MOST_OF_A_BAG, Problem, ProblemError};
 use backdrive_plant::model::{Fragment, Model};
@@ -73,6 +73,9 @@ pub fn set_of(paths: &[PathBuf]) -> Result<(RecordingSet, bool), Failure> {
         [one] => {
             if !one.exists() {
                 return Err(Failure::input(format!("{}: there is no such file or folder", one.display())));
+            }
+            if let Some(command) = import_of(one) {
+                return Err(Failure::input(format!("{}: is no set of recordings yet: `{command}` makes it one", one.display())));
             }
             let told = !one.is_dir() || one.join("set.toml").exists();
             Ok((RecordingSet::open(one)?, told))
@@ -166,11 +169,28 @@ fn is_recording(path: &Path) -> bool {
     path.extension().is_some_and(|e| e.eq_ignore_ascii_case("csv") || e.eq_ignore_ascii_case("mcap"))
 }
 
+/// The command that makes a bag, or a folder of them, of a recording in another format; `None` where it is none.
+fn import_of(path: &Path) -> Option<String> {
+    let ending = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
+    let stem = path.file_stem()?.to_string_lossy().into_owned();
+    let is_table = path.is_file() && ["parquet", "mat", "tsv"].contains(&ending.as_str());
+    let bag = match (is_lerobot(path), is_table || (path.exists() && is_rosbag(path))) {
+        (true, _) => format!("{stem}-bags"),
+        (false, true) => format!("{stem}.mcap"),
+        (false, false) => return None,
+    };
+    Some(format!("backdrive bag import {} --bag {bag}", path.display()))
+}
+
 /// Single files as a set.
 fn of_files(paths: &[PathBuf]) -> Result<RecordingSet, Failure> {
     for path in paths {
         if !is_recording(path) {
-            return Err(Failure::input(format!("{}: is no recording (.csv or .mcap); give one set, or recordings only", path.display())));
+            let what = match import_of(path) {
+                Some(command) => format!("is read as a bag: `{command}` makes it one"),
+                None => "is no recording (.csv or .mcap); give one set, or recordings only".to_owned(),
+            };
+            return Err(Failure::input(format!("{}: {what}", path.display())));
         }
         if !path.is_file() {
             return Err(Failure::input(format!("{}: there is no such file", path.display())));

@@ -113,6 +113,15 @@ fn a_table_goes_through_every_format_and_comes_back() {
     {
         assert!((was - is).abs() <= 4e-16 * was.abs(), "{was} became {is}: degrees and back");
     }
+    // What is no recording as it is names the command that makes it one.
+    for (paths, command) in [
+        (&["arm.parquet"][..], "`backdrive bag import arm.parquet --bag arm.mcap` makes it one"),
+        (&["back.csv", "arm.mat"], "`backdrive bag import arm.mat --bag arm.mcap` makes it one"),
+        (&["set"], "`backdrive bag import set --bag set-bags` makes it one"),
+    ] {
+        let told = place.backdrive(&[&["fit", "m.toml"], paths].concat());
+        assert!(told.code == Some(3) && told.stderr.contains(command), "{told:?}");
+    }
     // A dataset is replaced only where that was asked for, and nothing else ever.
     let refused = place.backdrive(&["bag", "export", "arm.mcap", "--to", "lerobot", "--out", "set"]);
     assert!(refused.code == Some(3) && refused.stderr.contains("--overwrite"), "{refused:?}");

@@ -22,8 +22,8 @@ pub struct Uncertainty {
     pub correlation: DMatrix<f64>,
 }
 
-/// 97.5 % of a normal distribution.
-const NORMAL_975: f64 = 1.959_964;
+/// Half of a 95 % interval in standard deviations of a normal distribution.
+pub(crate) const NORMAL_975: f64 = 1.959_964;
 
 impl Uncertainty {
     /// From the curvature where the fit ended.

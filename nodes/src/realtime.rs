@@ -45,10 +45,13 @@ pub fn enter(options: &Options) -> Vec<String> {
         }
     }
     if let Some(priority) = options.priority {
-        let parameter = libc::sched_param { sched_priority: priority };
-        // SAFETY: reads the parameter; 0 is the calling thread.
-        if unsafe { libc::sched_setscheduler(0, libc::SCHED_FIFO, &parameter) } != 0 {
-            refused.push(format!("SCHED_FIFO {priority}: {} (see RLIMIT_RTPRIO)", nix::errno::Errno::last().desc()));
+        // SAFETY: integers, all of which may be 0; how many there are differs between C libraries.
+        let mut parameter: libc::sched_param = unsafe { std::mem::zeroed() };
+        parameter.sched_priority = priority;
+        // SAFETY: reads the parameter, of the calling thread. (musl refuses sched_setscheduler, whatever it is asked.)
+        let code = unsafe { libc::pthread_setschedparam(libc::pthread_self(), libc::SCHED_FIFO, &parameter) };
+        if code != 0 {
+            refused.push(format!("SCHED_FIFO {priority}: {} (see RLIMIT_RTPRIO)", nix::errno::Errno::from_raw(code).desc()));
         }
     }
     if options.lock_memory {

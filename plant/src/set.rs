@@ -207,7 +207,10 @@ fn read(mut top: Table, folder: PathBuf) -> Result<RecordingSet, FileError> {
         for (i, name) in names.iter().enumerate() {
             let source = source_of(&files, name);
             if !is_recording(source) {
-                return Err(top.error_at(key, format!("\"{source}\" is no recording; expected .csv or .mcap")));
+                return Err(top.error_at(
+                    key,
+                    format!("\"{source}\" is no recording; expected .csv or .mcap (`backdrive bag import` makes bags of other formats)"),
+                ));
             }
             exists(&top, key, source)?;
             if names[..i].contains(name) {

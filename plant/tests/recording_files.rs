@@ -310,7 +310,10 @@ fn wrong_sets_are_refused() {
         open("fit = ['a.csv']\nheld_out = ['a.csv']"),
         "set.toml:2: held_out: \"a.csv\" is in fit too; no fit may see what is held out"
     );
-    assert_eq!(open("fit = ['a.txt']"), "set.toml:1: fit: \"a.txt\" is no recording; expected .csv or .mcap");
+    assert_eq!(
+        open("fit = ['a.txt']"),
+        "set.toml:1: fit: \"a.txt\" is no recording; expected .csv or .mcap (`backdrive bag import` makes bags of other formats)"
+    );
     assert_eq!(open("held_uot = ['a.csv']\nfit=['b.csv']"), "set.toml:1: unknown key \"held_uot\"; did you mean \"held_out\"?");
     assert_eq!(open("fit = ['a.csv']\ninitial = 'moving'"), "set.toml:2: initial: unknown value \"moving\"; expected one of rest, free");
     assert_eq!(

@@ -3,6 +3,7 @@
 mod contract;
 mod info;
 mod read;
+mod statistics;
 mod write;
 
 pub use contract::{CommandedAt, Contract, PerJoint};

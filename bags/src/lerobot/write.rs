@@ -1,6 +1,7 @@
 //! Bags become the episodes of a dataset.
 
 use super::contract::{CommandedAt, Contract, Role};
+use super::statistics::{Feature, written};
 use crate::number_type::NumberType;
 use crate::parquet_writer::{Values, Written, write};
 use crate::table::{Cells, Table, table_of};
@@ -170,7 +171,7 @@ fn write_all(folder: &Path, contract: &Contract, joints: &[String], episodes: &[
         Ok::<_, BagError>(path)
     };
     let (meta, data, told) = (made("meta")?, made("data/chunk-000")?, made("meta/episodes/chunk-000")?);
-    let (mut features, mut stats, mut columns) = (Map::new(), Map::new(), Vec::new());
+    let (mut features, mut columns) = (Map::new(), Vec::new());
     let joined: Vec<(Role, Vec<f64>)> = Role::ALL
         .into_iter()
         .enumerate()
@@ -183,7 +184,6 @@ fn write_all(folder: &Path, contract: &Contract, joints: &[String], episodes: &[
         let of = if is_single(values) { NumberType::Single } else { NumberType::Double };
         let dtype = if of == NumberType::Single { "float32" } else { "float64" };
         features.insert(feature.to_owned(), json!({ "dtype": dtype, "shape": [joints.len()], "names": names }));
-        stats.insert(feature.to_owned(), statistics(values, joints.len()));
         columns.push(Written { name: feature.to_owned(), values: Values::Lists(values, joints.len(), of) });
     }
     let rows: Vec<usize> = episodes.iter().map(|episode| episode.rows).collect();
@@ -201,7 +201,9 @@ fn write_all(folder: &Path, contract: &Contract, joints: &[String], episodes: &[
         columns.push(Written { name: name.to_owned(), values: Values::Numbers(values, NumberType::Int64) });
     }
     write(&data.join("file-000.parquet"), &columns, &[])?;
-    write_episodes(&told.join("file-000.parquet"), &rows, task)?;
+    let described: Vec<Feature> = columns.iter().filter_map(feature_of).collect();
+    let stats: Map<String, Value> = described.iter().map(|feature| (feature.name.to_owned(), feature.of_dataset())).collect();
+    write_episodes(&told.join("file-000.parquet"), &rows, task, &described)?;
     write_tasks(&meta.join("tasks.parquet"), task)?;
     // A whole number of frames a second is written as one.
     let fps = if fps.fract() == 0.0 && fps < 1e9 { json!(fps as u64) } else { json!(fps) };
@@ -218,8 +220,18 @@ fn write_all(folder: &Path, contract: &Contract, joints: &[String], episodes: &[
     Ok(())
 }
 
-/// Which rows of the data are of which episode.
-fn write_episodes(out: &Path, rows: &[usize], task: &str) -> Result<(), BagError> {
+/// A column of the data as a feature that statistics are told of.
+fn feature_of<'a>(column: &'a Written) -> Option<Feature<'a>> {
+    let (values, width) = match column.values {
+        Values::Numbers(values, _) => (values, 1),
+        Values::Lists(values, width, _) => (values, width),
+        Values::Texts(_) | Values::TextLists(_) => return None,
+    };
+    Some(Feature { name: &column.name, values, width })
+}
+
+/// Which rows of the data are of which episode, and the statistics of each.
+fn write_episodes(out: &Path, rows: &[usize], task: &str, features: &[Feature]) -> Result<(), BagError> {
     let ends: Vec<f64> = rows
         .iter()
         .scan(0, |end, rows| {
@@ -231,7 +243,8 @@ fn write_episodes(out: &Path, rows: &[usize], task: &str) -> Result<(), BagError
     let starts: Vec<f64> = ends.iter().zip(&lengths).map(|(end, length)| end - length).collect();
     let (numbers, zeros): (Vec<f64>, Vec<f64>) = ((0..rows.len()).map(|episode| episode as f64).collect(), vec![0.0; rows.len()]);
     let whole = |name: &str, values| Written { name: name.to_owned(), values: Values::Numbers(values, NumberType::Int64) };
-    let columns = [
+    let stats: Vec<_> = features.iter().flat_map(|feature| feature.of_episodes(rows)).collect();
+    let mut columns = vec![
         whole("episode_index", &numbers),
         Written { name: "tasks".to_owned(), values: Values::TextLists(vec![task.to_owned(); rows.len()]) },
         whole("length", &lengths),
@@ -239,9 +252,9 @@ fn write_episodes(out: &Path, rows: &[usize], task: &str) -> Result<(), BagError
         whole("data/file_index", &zeros),
         whole("dataset_from_index", &starts),
         whole("dataset_to_index", &ends),
-        whole("meta/episodes/chunk_index", &zeros),
-        whole("meta/episodes/file_index", &zeros),
     ];
+    columns.extend(written(&stats));
+    columns.extend([whole("meta/episodes/chunk_index", &zeros), whole("meta/episodes/file_index", &zeros)]);
     write(out, &columns, &[])
 }
 
@@ -264,19 +277,4 @@ fn write_tasks(out: &Path, task: &str) -> Result<(), BagError> {
 /// Whether single precision loses nothing but what a change of units and back has left.
 fn is_single(values: &[f64]) -> bool {
     values.iter().all(|value| (f64::from(*value as f32) - value).abs() <= 4.0 * f64::EPSILON * value.abs())
-}
-
-/// What training normalises by: of each joint.
-fn statistics(values: &[f64], width: usize) -> Value {
-    let count = values.len() / width.max(1);
-    let of = |number: &dyn Fn(&mut dyn Iterator<Item = f64>) -> f64| -> Vec<f64> {
-        (0..width).map(|axis| number(&mut values.iter().skip(axis).step_by(width).copied())).collect()
-    };
-    let mean = of(&|axis| axis.sum::<f64>() / count as f64);
-    let squares = |axis: usize| values.iter().skip(axis).step_by(width).map(|value| (value - mean[axis]).powi(2)).sum::<f64>();
-    let deviation: Vec<f64> = (0..width).map(|axis| (squares(axis) / count as f64).sqrt()).collect();
-    json!({
-        "min": of(&|axis| axis.fold(f64::INFINITY, f64::min)), "max": of(&|axis| axis.fold(f64::NEG_INFINITY, f64::max)),
-        "mean": mean, "std": deviation, "count": [count],
-    })
 }

@@ -10,38 +10,42 @@ use crate::signal::rms;
 use crate::structure::{Role, Structure};
 use crate::tuning::tuning;
 use crate::work::Budget;
-use backdrive_plant::model::Model;
 
 /// The excitation that determines parameters of a structure which the recordings do not: `numbers` are places among
-/// [`Structure::free`], `model` the structure's model with `values`. What exceeds the budget is not tried.
+/// [`Structure::free`], `told` the standard deviation that is told of each number, in the fit's own unit. It is wider than
+/// that of the sensors' noise alone where residuals are correlated or models differ; an experiment is taken to lessen it as much as that. What exceeds the budget is not tried.
 ///
 /// # Errors
 /// Says why when no excitation would determine them.
 pub fn excite<'a>(
     problem: &'a Problem,
-    model: &Model,
     structure: &Structure,
     values: &[f64],
     numbers: &[usize],
+    told: &[f64],
     noise_sd: &[f64],
     budget: &Budget<'a>,
 ) -> Result<Experiment, Reason> {
     let numbers: Vec<usize> = numbers.iter().copied().filter(|j| structure.free.get(*j).is_some_and(|n| n.records.is_none())).collect();
-    if numbers.is_empty() || values.len() != structure.free.len() {
+    if numbers.is_empty() || values.len() != structure.free.len() || told.len() != values.len() {
         return Err(Reason("there is no number to determine".to_string()));
     }
+    let model = structure.model(problem, values).ok_or_else(|| Reason("the model cannot be simulated".to_string()))?;
     let planner = Planner::new(problem, noise_sd, budget)?;
     let mut evaluator = Evaluator::new(problem);
     (evaluator.noise_sd, evaluator.substeps) = (planner.setup.sensors.noise_sd.clone(), tuning().experiment.substeps[0]);
     let own: Vec<f64> = structure.free.iter().zip(values).map(|(n, v)| n.to_internal(*v)).collect();
     let residuals = evaluator.residuals(structure, values).ok_or_else(|| Reason("the model diverges on the recordings".to_string()))?;
     let known = Rival::with(structure, values, &evaluator.jacobian(structure, &own, &residuals), 1.0);
-    let before = known.deviations(None);
+    // What is told over what the sensors' noise alone makes of it.
+    let ratio = |(own, told): (&f64, &f64)| Some(told / own).filter(|ratio| ratio.is_finite() && *ratio > 0.0).unwrap_or(1.0);
+    let wider: Vec<f64> = known.deviations(None).iter().zip(told).map(ratio).collect();
+    let before = told;
     let whole = |j: usize| if structure.free[j].log { 1.0 } else { own[j].abs() };
     let numbers: Vec<usize> = numbers.into_iter().filter(|j| before[*j] > tuning().experiment.open * whole(*j)).collect();
     if numbers.is_empty() {
         return Err(Reason(format!(
-            "the recordings determine all of these numbers to {} % or better",
+            "the recordings determine all of these numbers with a standard deviation of {} % or less",
             short(100.0 * tuning().experiment.open)
         )));
     }
@@ -52,7 +56,7 @@ pub fn excite<'a>(
     let determined = planner.setup.budget.abreast(&places, |budget, s| {
         let case = &cases[*s];
         let jacobian = known.jacobian(&planner.setup.within(budget), &case.trial, &known.own, &case.predictions[0]);
-        let after = known.deviations(Some(&jacobian));
+        let after: Vec<f64> = known.deviations(Some(&jacobian)).iter().zip(&wider).map(|(after, wider)| after * wider).collect();
         let worst = numbers.iter().map(|j| size(*j) / after[*j]).fold(f64::INFINITY, f64::min);
         (*s, worst, after)
     });
@@ -79,7 +83,7 @@ pub fn excite<'a>(
     });
     let sentence = format!(
         "Play {}: it determines {}, which the recordings leave open.",
-        described(model, &case.trial),
+        described(&model, &case.trial),
         accuracy.collect::<Vec<_>>().join(", ")
     );
     let jacobian = known.jacobian(&planner.setup, &case.trial, &known.own, &case.predictions[0]);

@@ -6,6 +6,7 @@ use crate::candidate::{Candidate, candidate};
 use crate::evaluator::Evaluator;
 use crate::fit::Fit;
 use crate::hypothesis::{Hypothesis, Scales};
+use crate::intervals::Uncertainty;
 use crate::physics;
 use crate::problem::{Problem, Record};
 use crate::structure::{Role, Structure};
@@ -253,18 +254,30 @@ fn a_law_that_contains_another_is_told_from_it_by_what_the_other_cannot_imitate(
 fn what_slow_motion_hides_is_excited() {
     let problem = problem(MASS, MASS, sine(0.7, 0.4, 5.0), 3e-3);
     let (structure, fit) = fitted(&problem, &["damper@mass-ground"]);
-    let model = structure.model(&problem, &fit.values).unwrap();
     let mass = structure.free.iter().position(|n| matches!(n.role, Role::Stated(i) if problem.stated[i].path == "bodies.mass")).unwrap();
-    let found = excite(&problem, &model, &structure, &fit.values, &[mass], &problem.noise_sd, &soon()).unwrap();
+    let excited = |numbers: &[usize], told: &[f64]| excite(&problem, &structure, &fit.values, numbers, told, &problem.noise_sd, &soon());
+    let candidate = as_candidate(&problem, (structure.clone(), fit.clone()));
+    let told = Uncertainty::of(&candidate).deviation;
+    let found = excited(&[mass], &told).unwrap();
     println!("{found:#?}");
     assert!(found.separation > 8.0 && found.sentence.contains("bodies.mass"), "{found:?}");
+    // What is told decides whether a number is open, and how well an experiment would determine it.
+    let known = excited(&[mass], &vec![0.04; told.len()]).map(|plan| plan.sentence).unwrap_err();
+    assert!(known.to_string().contains("a standard deviation of 5 % or less"), "{known}");
+    let wider = excited(&[mass], &told.iter().map(|sd| 3.0 * sd).collect::<Vec<f64>>()).unwrap();
+    let percent = |plan: &Experiment| -> f64 {
+        let (before, _) = plan.sentence.split_once(" %").expect("an accuracy");
+        before.rsplit(' ').next().and_then(|number| number.parse().ok()).expect("a number")
+    };
+    assert_eq!(wider.excitation, found.excitation);
+    assert!((percent(&wider) / percent(&found) / 3.0 - 1.0).abs() < 0.1, "{} {}", wider.sentence, found.sentence);
     // A refit to it knows the mass as well as was said.
     let mut wider = problem.clone();
     wider.fit.push(record(&Model::from_toml(MASS, "").unwrap(), &problem.model, &columns(&found.text, &problem.model), 3e-3, 3));
     let again = fitted(&wider, &[]);
     let value = again.1.values[mass];
     assert!((value / 0.2 - 1.0).abs() < 4.0 / found.separation, "{value}");
-    assert!(excite(&problem, &model, &structure, &fit.values, &[], &problem.noise_sd, &soon()).is_err());
+    assert!(excited(&[], &told).is_err());
 }
 
 const MOVED: &str = r#"

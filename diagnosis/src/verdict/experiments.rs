@@ -7,6 +7,7 @@ use super::rounded::rounded;
 use super::types::{NextExperiment, Planned, Refused, Sensor, Word};
 use crate::candidate::Candidate;
 use crate::experiment::{Experiment, NewSensor, Reason, confirm, excite, separate};
+use crate::intervals::NORMAL_975;
 use crate::problem::Problem;
 use crate::search::Search;
 use crate::work::Budget;
@@ -68,11 +69,11 @@ fn planned<'a, 's>(
         return Err(reason);
     }
     match decision.word {
-        Word::Ambiguous | Word::CannotTell => determine(problem, search, best, budget),
+        Word::Ambiguous | Word::CannotTell => determine(problem, search, decision, budget),
         // Where something remains, what resembles it most is to be confirmed or ruled out; else what is not well known yet is to be measured.
         Word::Missing | Word::Unexplained | Word::Parameters | Word::NothingMissing => match next_effect(search, best) {
             Some(more) if !decision.at_floor => apart(&[more]),
-            _ => determine(problem, search, best, budget).map_err(|reason| match decision.at_floor {
+            _ => determine(problem, search, decision, budget).map_err(|reason| match decision.at_floor {
                 true => Reason(format!("{reason}: nothing more has to be recorded for this model")),
                 false => reason,
             }),
@@ -86,11 +87,12 @@ fn is_kin(best: &Candidate, other: &Candidate) -> bool {
     own.len() == rest.len() && own.iter().all(|h| rest.iter().any(|o| o.place.same(&h.place) && o.physics.family == h.physics.family))
 }
 
-/// The experiment that determines what the recordings leave open.
-fn determine<'a>(problem: &'a Problem, search: &Search, best: &Candidate, budget: &Budget<'a>) -> Result<Experiment, Reason> {
-    let model = best.structure.model(problem, &best.fit.values).ok_or_else(|| Reason("the model cannot be simulated".to_string()))?;
+/// The experiment that determines what the recordings leave open, by the intervals that the verdict tells.
+fn determine<'a>(problem: &'a Problem, search: &Search, decision: &Decision, budget: &Budget<'a>) -> Result<Experiment, Reason> {
+    let best = decision.best;
     let all: Vec<usize> = (0..best.structure.free.len()).collect();
-    excite(problem, &model, &best.structure, &best.fit.values, &all, &search.noise_sd, budget)
+    let told: Vec<f64> = all.iter().map(|number| decision.spread.half(*number) / NORMAL_975).collect();
+    excite(problem, &best.structure, &best.fit.values, &all, &told, &search.noise_sd, budget)
 }
 
 /// An experiment as the verdict has it; its file is written under [`EXPERIMENT_FILE`].
