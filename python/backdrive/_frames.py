@@ -37,10 +37,18 @@ def columns_of(frame: Any, name: str) -> dict[str, bytes]:
         pairs = list(frame.items())
     else:
         pairs = [(heading, frame[heading]) for heading in frame.columns]
+        index = getattr(frame, "index", None)  # pandas: a clock may stand there
+        if "t" not in frame.columns and (getattr(index, "name", None) == "t" or getattr(getattr(index, "dtype", None), "kind", "") in ("m", "M")):
+            pairs.insert(0, ("t", index))
     out: dict[str, bytes] = {}
     rows = None
     for heading, column in pairs:
-        values = column.to_numpy() if hasattr(column, "to_numpy") else numpy.asarray(column)
+        if str(getattr(column, "dtype", "")).startswith("datetime64"):  # with a time zone too
+            values = numpy.asarray(column, dtype="datetime64[ns]")
+        else:
+            values = column.to_numpy() if hasattr(column, "to_numpy") else numpy.asarray(column)
+        if values.dtype.kind in "mM":
+            values = seconds(values)
         if values.dtype.kind not in "fiub":
             if values.dtype.kind != "O":
                 continue
@@ -57,6 +65,14 @@ def columns_of(frame: Any, name: str) -> dict[str, bytes]:
     if not out:
         raise InputError(f"{name}: has no columns of numbers; a recording is a frame or a dictionary with a column t (s) and one for each signal")
     return out
+
+
+def seconds(values: Any) -> Any:
+    """Instants as s since the first of them, durations as s; what is no time is NaN. Differences of whole ns: seconds since 1970 would leave only 0.2 us of a double."""
+    import numpy
+
+    span = values - values[:1] if values.dtype.kind == "M" else values
+    return numpy.where(numpy.isnat(span), numpy.nan, span.astype("timedelta64[ns]").astype("i8") / 1e9)
 
 
 def write(frame: Any, path: str, name: str) -> None:

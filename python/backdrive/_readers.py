@@ -16,7 +16,7 @@ from typing import Any
 
 from . import _clock
 from ._errors import InputError, MachineError
-from ._frames import of_kind
+from ._frames import of_kind, seconds
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class Contract:
 
     def radians(self, joint: str) -> float:
         """rad in one unit of a joint's position."""
-        of = self.angle[joint] if isinstance(self.angle, Mapping) else self.angle
+        of = _of_joint(self.angle, joint, "angle")
         if isinstance(of, str):
             if of not in ("deg", "rad"):
                 raise InputError(f"contract: angle: is {of!r}, expected \"deg\", \"rad\" or a number of rad")
@@ -132,10 +132,18 @@ def _joints(feature: Mapping[str, Any], name: str) -> list[str]:
     return [str(n).rsplit(".", 1)[0] if "." in str(n) else str(n) for n in names]
 
 
+def _of_joint(given: Any, joint: str, key: str) -> Any:
+    """What is given for all joints, or for this one."""
+    if not isinstance(given, Mapping):
+        return given
+    if joint not in given:
+        raise InputError(f"contract: {key}: has nothing for {joint}; it has {', '.join(map(str, given))}")
+    return given[joint]
+
+
 def _scale(contract: Contract, role: str, joint: str) -> float:
     if role == "effort":
-        of = contract.effort_scale
-        return float(of[joint] if isinstance(of, Mapping) else of)
+        return float(_of_joint(contract.effort_scale, joint, "effort_scale"))
     return contract.radians(joint)
 
 
@@ -155,18 +163,25 @@ def _matrix(column: Any, rows: Any, file: Path, name: str) -> Any:
 
 
 def load_parquet(path: str | os.PathLike[str], *, time: str = "t", kind: str = "auto") -> Any:
-    """A table in parquet as a frame; `time` is its column of times, s. Columns that hold no numbers are left out."""
+    """A table in parquet as a frame; `time` is its column of times: s, or instants, which are counted from the first. Columns that hold no numbers are left out."""
     return _timed(_parquet(path), time, path, kind)
 
 
 def _parquet(path: Any) -> dict[str, Any]:
-    """The columns of numbers; what is missing in them is NaN."""
+    """The columns of numbers and of times, these in s (instants since the first of them); what is missing in them is NaN."""
     import numpy
 
     parquet = _module("pyarrow.parquet", "pyarrow")
     table = _read(lambda: parquet.read_table(os.fspath(path)), path)
-    numbers = ("float", "double", "halffloat", "int", "uint", "bool")
-    return {name: numpy.asarray(table[name].to_numpy(), dtype=float) for name in table.column_names if str(table[name].type).startswith(numbers)}
+    numbers, times = ("float", "double", "halffloat", "int", "uint", "bool"), ("timestamp", "duration")
+    out: dict[str, Any] = {}
+    for name in table.column_names:
+        kind = str(table[name].type)
+        if kind.startswith(times):
+            out[name] = seconds(table[name].to_numpy())
+        elif kind.startswith(numbers):
+            out[name] = numpy.asarray(table[name].to_numpy(), dtype=float)
+    return out
 
 
 def numbers_of(path: str) -> dict[str, Any] | None:

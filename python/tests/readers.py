@@ -77,6 +77,8 @@ class Readers(unittest.TestCase):
             numpy.testing.assert_array_equal(frame["t"], numpy.arange(len(state)) / 30)
         degrees = backdrive.load_lerobot(self.folder / "set", [1], kind="pandas")
         numpy.testing.assert_allclose(degrees["episode_000001"]["shoulder_pan.position"], numpy.radians(states[1][:, 0].astype(float)), rtol=1e-15)
+        with self.assertRaisesRegex(backdrive.InputError, "contract: angle: has nothing for elbow_flex; it has shoulder_pan"):
+            backdrive.load_lerobot(self.folder / "set", contract=backdrive.Contract(angle={"shoulder_pan": "deg"}))
         late = backdrive.Contract(angle={j: 0.5 for j in JOINTS}, commanded_at="next", joints={"elbow_flex": "elbow"})
         moved = backdrive.load_lerobot(self.folder / "set", [0], contract=late, kind="numpy")["episode_000000"]
         numpy.testing.assert_array_equal(moved["elbow.command"], 0.5 * (states[0] + 1.0)[:-1, 1].astype(float))
@@ -154,6 +156,35 @@ class Readers(unittest.TestCase):
         for suffix in ("parquet", "mat"):
             backdrive.save(log, self.folder / f"log.{suffix}")
             self.assertEqual(backdrive.fit(self.folder / f"log.{suffix}", model, progress=False).numbers, told)
+
+    def test_instants_and_durations_are_times(self):
+        import pandas
+        import polars
+
+        ns = numpy.arange(100) * 1_000_000
+        told = {"t": ns / 1e9, "f": self.random(100).astype(float)}
+        begin = numpy.datetime64("2026-01-31T12:00:00.123456789", "ns")
+        instants, spans = begin + ns.astype("timedelta64[ns]"), ns.astype("timedelta64[ns]")
+        frames = {
+            "instants": pandas.DataFrame({"t": instants, "f": told["f"]}),
+            "with a zone": pandas.DataFrame({"t": pandas.DatetimeIndex(instants).tz_localize("Europe/Berlin"), "f": told["f"]}),
+            "index": pandas.DataFrame({"f": told["f"]}, index=pandas.DatetimeIndex(instants)),
+            "index of numbers": pandas.DataFrame({"f": told["f"]}, index=pandas.Index(told["t"], name="t")),
+            "spans": pandas.DataFrame({"t": spans, "f": told["f"]}),
+            "polars": polars.DataFrame({"t": instants, "f": told["f"]}),
+            "arrays": {"t": instants.astype("datetime64[us]"), "f": told["f"]},
+        }
+        for name, frame in frames.items():
+            path = self.folder / f"{name}.parquet"
+            backdrive.save(frame, path)
+            back = backdrive.load_parquet(path, kind="numpy")
+            # Of microseconds each instant may be one off.
+            numpy.testing.assert_allclose(back["t"], told["t"], rtol=0, atol=1.1e-6 if name == "arrays" else 0, err_msg=name)
+            numpy.testing.assert_array_equal(back["f"], told["f"], err_msg=name)
+        path = self.folder / "stamps.parquet"
+        pyarrow.parquet.write_table(pyarrow.table({"when": instants, "since": spans, "f": told["f"]}), path)
+        for time in ("when", "since"):
+            numpy.testing.assert_array_equal(backdrive.load_parquet(path, time=time, kind="numpy")["t"], told["t"])
 
     def test_mat_files_give_vectors_matrices_and_structures(self):
         import scipy.io
