@@ -6,10 +6,10 @@
 import json
 import os
 import pathlib
+import resource
 import subprocess
 import sys
 import tempfile
-import time
 import unittest
 import warnings
 
@@ -53,6 +53,12 @@ def lerobot_v3(root, episodes, fps, *, features=("observation.state", "action"),
             pyarrow.parquet.write_table(pyarrow.concat_tables(part), root / f"data/chunk-000/file-{number:03d}.parquet", compression="snappy")
 
 
+def processor_time():
+    """Of the processes that this one has waited for, s: what other work on the machine does not lengthen."""
+    spent = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return spent.ru_utime + spent.ru_stime
+
+
 class Readers(unittest.TestCase):
     def setUp(self):
         self.home = tempfile.TemporaryDirectory()
@@ -90,11 +96,11 @@ class Readers(unittest.TestCase):
         examples = pathlib.Path(__file__).resolve().parents[1] / "examples"
         environment = os.environ | {"PYTHONPATH": PLACE}
         for script in ("so101_dataset.py", "so101_verdict.py"):
-            began = time.monotonic()
+            began = processor_time()
             done = subprocess.run([sys.executable, examples / script, self.folder], capture_output=True, text=True, env=environment)
             self.assertEqual(done.returncode, 0, done.stderr)
-        taken = time.monotonic() - began
-        print(f"from a LeRobot folder to a verdict: {taken:.1f} s")
+        taken = processor_time() - began
+        print(f"from a LeRobot folder to a verdict: {taken:.1f} s of processor time")
         self.assertIn("dry friction at the elbow_flex", done.stdout)
         self.assertIn("play of the gear between shoulder_pan", done.stdout)
         self.assertTrue((self.folder / "report.html").exists())
