@@ -11,6 +11,7 @@
 // Printing panics where the other end is full or gone.
 #![cfg_attr(not(test), warn(clippy::print_stdout, clippy::print_stderr))]
 
+mod arrow_schema;
 mod cdr;
 mod claim;
 mod clock_check;
