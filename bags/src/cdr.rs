@@ -34,13 +34,28 @@ pub(crate) enum Count {
     Sequence,
 }
 
-/// Where a number stands in a message: `effort[0]`, `wrench.force.x`, `header.stamp` (a time, in s).
+/// Where a number stands in a message: `effort[0]`, `effort[elbow]` (by the message's names of its joints), `wrench.force.x`, `header.stamp` (a time, in s).
 #[derive(Debug, Clone, PartialEq)]
 pub struct FieldPath {
     text: String,
-    /// Place of the field in its type, and index into it if it is a list.
-    steps: Vec<(usize, Option<usize>)>,
+    /// Place of the field in its type, and which entry of it if it is a list.
+    steps: Vec<(usize, Option<Entry>)>,
     is_time: bool,
+}
+
+/// Which entry of a list.
+#[derive(Debug, Clone, PartialEq)]
+enum Entry {
+    At(usize),
+    /// The one that stands where the message's list `name` has this name.
+    Named(String),
+}
+
+impl FieldPath {
+    /// Whether it takes an entry of a list of the message by its place.
+    pub(crate) fn is_by_place(&self) -> bool {
+        matches!(self.steps.first(), Some((_, Some(Entry::At(_)))))
+    }
 }
 
 /// Nesting beyond this is a definition that contains itself.
@@ -76,12 +91,23 @@ impl Schema {
     /// Errors: a sentence that says what there is instead.
     pub fn find(&self, path: &str) -> Result<FieldPath, String> {
         let (mut at, mut steps) = (0, Vec::new());
-        let mut parts = path.split('.').peekable();
+        let (mut inside, mut has_names) = (false, self.name_list().is_some());
+        // A dot in brackets is one of a joint's name.
+        let parting = |letter: char| {
+            inside = letter == '[' || (inside && letter != ']');
+            letter == '.' && !inside
+        };
+        let mut parts = path.split(parting).peekable();
         while let Some(part) = parts.next() {
             let (name, index) = match part.strip_suffix(']').and_then(|part| part.split_once('[')) {
-                Some((name, index)) => (name, Some(index.parse().map_err(|_| format!("{index:?} is not an index"))?)),
+                Some((name, entry)) => match entry.parse() {
+                    Ok(index) => (name, Some(Entry::At(index))),
+                    Err(_) if has_names && !entry.is_empty() => (name, Some(Entry::Named(entry.to_owned()))),
+                    Err(_) => return Err(format!("{entry:?} is not an index")),
+                },
                 None => (part, None),
             };
+            has_names = false;
             let fields = &self.types[at];
             let place = fields.iter().position(|field| field.name == name).ok_or_else(|| {
                 let names: Vec<&str> = fields.iter().map(|field| field.name.as_str()).collect();
@@ -91,8 +117,8 @@ impl Schema {
             match (field.count, index) {
                 (Count::One, Some(_)) => return Err(format!("{name:?} is not a list")),
                 (Count::Array(_) | Count::Sequence, None) => return Err(format!("{name:?} is a list: say which, as in {name}[0]")),
-                (Count::Array(len), Some(index)) if index >= len => return Err(format!("{name:?} has {len} entries")),
-                _ => steps.push((place, index)),
+                (Count::Array(len), Some(Entry::At(index))) if index >= len => return Err(format!("{name:?} has {len} entries")),
+                (_, entry) => steps.push((place, entry)),
             }
             match (field.of, parts.peek().is_some()) {
                 (Type::Message(inner), true) => at = inner,
@@ -136,6 +162,25 @@ impl Schema {
         if path.is_time { self.read_with(path, payload, |cdr, _| cdr.time_ns()) } else { Ok(None) }
     }
 
+    /// Where the messages have a list of the names of their joints, as a JointState has.
+    pub(crate) fn name_list(&self) -> Option<usize> {
+        self.types.first()?.iter().position(|field| field.name == "name" && field.of == Type::Text && field.count != Count::One)
+    }
+
+    /// The names of the joints in a message, in its order; none where it has no such list.
+    pub(crate) fn joint_names(&self, payload: &[u8]) -> Result<Vec<String>, String> {
+        let Some((place, fields)) = self.name_list().zip(self.types.first()) else { return Ok(Vec::new()) };
+        let mut cdr = Cdr::new(payload)?;
+        fields[..place].iter().try_for_each(|field| self.skip_field(&mut cdr, field, 0))?;
+        let count = cdr.count(fields[place].count)?;
+        let name = |_| {
+            let length = cdr.unsigned(4)? as usize;
+            let bytes = cdr.take(length)?;
+            Ok(String::from_utf8_lossy(bytes.strip_suffix(&[0]).unwrap_or(bytes)).into_owned())
+        };
+        (0..count).map(name).collect()
+    }
+
     fn read_with<T>(
         &self,
         path: &FieldPath,
@@ -144,18 +189,26 @@ impl Schema {
     ) -> Result<Option<T>, String> {
         let mut cdr = Cdr::new(payload)?;
         let mut at = 0;
-        for (depth, (place, index)) in path.steps.iter().enumerate() {
+        for (depth, (place, entry)) in path.steps.iter().enumerate() {
             let fields = self.types.get(at).ok_or("the path is of another schema")?;
             for field in fields.get(..*place).ok_or("the path is of another schema")? {
                 self.skip_field(&mut cdr, field, 0)?;
             }
             let field = fields.get(*place).ok_or("the path is of another schema")?;
             let len = cdr.count(field.count)?;
+            let index = match entry {
+                None => None,
+                Some(Entry::At(index)) => Some(*index),
+                Some(Entry::Named(name)) => match self.joint_names(payload)?.iter().position(|found| found == name) {
+                    None => return Ok(None),
+                    place => place,
+                },
+            };
             if let Some(index) = index {
-                if *index >= len {
+                if index >= len {
                     return Ok(None);
                 }
-                self.skip(&mut cdr, field.of, *index, 0)?;
+                self.skip(&mut cdr, field.of, index, 0)?;
             }
             match field.of {
                 Type::Message(inner) if depth + 1 < path.steps.len() => at = inner,
@@ -389,6 +442,7 @@ mod tests {
         assert_eq!(read("position[0]"), Some(0.5));
         assert!(read("velocity[0]").is_some_and(f64::is_nan), "not measured");
         assert_eq!(read("velocity[2]"), None, "the list is shorter");
+        assert_eq!((read("effort[bcd]"), read("effort[b.d]")), (Some(-3.25), None), "by the name of the joint");
         assert_eq!(read("header.stamp"), Some(2.5));
         assert_eq!(read("header.stamp.nanosec"), Some(5e8));
         let numbers = schema.numbers(&payload).expect("they can be listed");
@@ -405,7 +459,7 @@ mod tests {
             ("effort", "effort[0]"),
             ("header", "it has stamp, frame_id"),
             ("header.frame_id", "is text"),
-            ("effort[x]", "not an index"),
+            ("effort[]", "not an index"),
             ("header[0].stamp", "not a list"),
             ("effort[0].x", "has no fields"),
         ] {
