@@ -1,5 +1,7 @@
 //! Reads a number out of any ROS 2 message by the path of its field, guided by the schema in the bag.
 
+use crate::cdr_bytes::Cdr;
+pub(crate) use crate::cdr_bytes::{Count, Type};
 use std::collections::HashMap;
 
 /// A ROS 2 message definition with everything that it refers to.
@@ -13,25 +15,6 @@ pub(crate) struct Field {
     pub(crate) name: String,
     pub(crate) of: Type,
     pub(crate) count: Count,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum Type {
-    Bool,
-    Unsigned(u8),
-    Signed(u8),
-    Float(u8),
-    Text,
-    WideText,
-    /// Index into [`Schema::types`].
-    Message(usize),
-}
-
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum Count {
-    One,
-    Array(usize),
-    Sequence,
 }
 
 /// Where a number stands in a message: `effort[0]`, `effort[elbow]` (by the message's names of its joints), `wrench.force.x`, `header.stamp` (a time, in s).
@@ -53,8 +36,13 @@ enum Entry {
 
 impl FieldPath {
     /// Whether it takes an entry of a list of the message by its place.
-    pub(crate) fn is_by_place(&self) -> bool {
+    pub fn is_by_place(&self) -> bool {
         matches!(self.steps.first(), Some((_, Some(Entry::At(_)))))
+    }
+
+    /// Whether it takes an entry by the name of a joint, which a message need not have.
+    pub fn is_by_name(&self) -> bool {
+        matches!(self.steps.first(), Some((_, Some(Entry::Named(_)))))
     }
 }
 
@@ -168,7 +156,9 @@ impl Schema {
     }
 
     /// The names of the joints in a message, in its order; none where it has no such list.
-    pub(crate) fn joint_names(&self, payload: &[u8]) -> Result<Vec<String>, String> {
+    ///
+    /// Errors: a sentence, the message ends early.
+    pub fn joint_names(&self, payload: &[u8]) -> Result<Vec<String>, String> {
         let Some((place, fields)) = self.name_list().zip(self.types.first()) else { return Ok(Vec::new()) };
         let mut cdr = Cdr::new(payload)?;
         fields[..place].iter().try_for_each(|field| self.skip_field(&mut cdr, field, 0))?;
@@ -356,71 +346,6 @@ fn type_named(of: &str, name: &str, places: &HashMap<&str, usize>) -> Result<Typ
             Type::Message(*place.ok_or_else(|| format!("schema of {of}: type {name:?} is not defined in it"))?)
         }
     })
-}
-
-/// A place in a CDR payload.
-struct Cdr<'a> {
-    bytes: &'a [u8],
-    at: usize,
-    big_endian: bool,
-}
-
-impl<'a> Cdr<'a> {
-    fn new(payload: &'a [u8]) -> Result<Cdr<'a>, String> {
-        match payload {
-            [0, order @ (0 | 1), _, _, bytes @ ..] => Ok(Cdr { bytes, at: 0, big_endian: *order == 0 }),
-            _ => Err(format!("payload starts with {:02x?}, not with a plain CDR header", &payload[..payload.len().min(4)])),
-        }
-    }
-
-    fn align(&mut self, to: usize) {
-        self.at = self.at.next_multiple_of(to);
-    }
-
-    fn take(&mut self, len: usize) -> Result<&'a [u8], String> {
-        let end = self.at.checked_add(len).filter(|end| *end <= self.bytes.len());
-        let end = end.ok_or_else(|| format!("payload ends at byte {} of its CDR, {len} more are due at {}", self.bytes.len(), self.at))?;
-        let taken = &self.bytes[self.at..end];
-        self.at = end;
-        Ok(taken)
-    }
-
-    fn unsigned(&mut self, size: u8) -> Result<u64, String> {
-        self.align(size.into());
-        let bytes = self.take(size.into())?;
-        let join = |value: u64, byte: &u8| value << 8 | u64::from(*byte);
-        Ok(if self.big_endian { bytes.iter().fold(0, join) } else { bytes.iter().rev().fold(0, join) })
-    }
-
-    fn signed(&mut self, size: u8) -> Result<i64, String> {
-        let unused = 64 - 8 * u32::from(size);
-        Ok((self.unsigned(size)? << unused) as i64 >> unused)
-    }
-
-    /// `builtin_interfaces/Time`; 32 bits of seconds always fit.
-    fn time_ns(&mut self) -> Result<i64, String> {
-        let sec = self.signed(4)?;
-        Ok(sec * 1_000_000_000 + self.unsigned(4)? as i64)
-    }
-
-    fn number(&mut self, of: Type) -> Result<f64, String> {
-        Ok(match of {
-            Type::Bool => self.unsigned(1)? as f64,
-            Type::Unsigned(size) => self.unsigned(size)? as f64,
-            Type::Signed(size) => self.signed(size)? as f64,
-            Type::Float(4) => f32::from_bits(self.unsigned(4)? as u32).into(),
-            Type::Float(_) => f64::from_bits(self.unsigned(8)?),
-            Type::Text | Type::WideText | Type::Message(_) => return Err("not a number".to_owned()),
-        })
-    }
-
-    fn count(&mut self, count: Count) -> Result<usize, String> {
-        Ok(match count {
-            Count::One => 1,
-            Count::Array(len) => len,
-            Count::Sequence => self.unsigned(4)? as usize,
-        })
-    }
 }
 
 #[cfg(test)]

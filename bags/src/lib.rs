@@ -13,6 +13,7 @@
 
 mod arrow_schema;
 mod cdr;
+mod cdr_bytes;
 mod claim;
 mod clock_check;
 mod clock_offset;
