@@ -98,8 +98,8 @@ pub(crate) fn gather(reader: &Reader, wanted: &[Signal], trim: bool, most: usize
             std::collections::hash_map::Entry::Occupied(plan) => plan.into_mut(),
             std::collections::hash_map::Entry::Vacant(vacant) => {
                 let schema = topic.parse_schema()?;
-                // Ours have their axes in one order always.
-                let may_change = topic.kind.is_none() && schema.name_list().is_some();
+                // Where the bag tells the axes, they are the same in every message.
+                let may_change = topic.axes.is_empty() && schema.name_list().is_some();
                 let stamp = schema.find("header.stamp").ok();
                 vacant.insert(Plan { stamp, schema, fields: Vec::new(), joints: may_change.then(Vec::new) })
             }

@@ -122,7 +122,7 @@ def odd(folder):
         pq.write_table(pa.table(columns), folder / f"durations-{unit}.parquet")
     pq.write_table(pa.table({"a": ["x", "y"], "b": ["p", "q"]}), folder / "words.parquet")
     pq.write_table(pa.table([n / 100.0, n * 1.0, n * 2.0], names=["t", "x", "x"]), folder / "twice.parquet")
-    fields = {"decimal": pa.array(n).cast(pa.decimal128(9, 2)), "text": pa.array(["a", "b"] * 50).dictionary_encode()}
+    fields = {"decimal": pa.array(n).cast(pa.decimal128(21, 2)), "text": pa.array(["a", "b"] * 50).dictionary_encode()}
     fields |= {"when": pa.array(n, pa.timestamp("us")), "deep": pa.array([{"a": 1.0}] * 100), "few": pa.array([1.5, 2.5] * 50).dictionary_encode()}
     pq.write_table(pa.table({"t": n / 100.0} | fields), folder / "odd.parquet")
     # Two publishers of one topic, and one that changes the order of its joints.

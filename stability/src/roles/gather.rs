@@ -126,8 +126,8 @@ fn plan(
         };
         let field = plan.schema.find(&located.signal.field);
         let field = field.map_err(|what| roles.at(located, format!("{} ({}): {what}", topic.name, topic.type_name)))?;
-        // Ours have their axes in one order always.
-        if topic.kind.is_none() && field.is_by_place() {
+        // Where the bag tells the axes, they are the same in every message.
+        if topic.axes.is_empty() && field.is_by_place() {
             plan.joints.get_or_insert_default();
         }
         plan.fields.push((place, field));
