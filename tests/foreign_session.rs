@@ -368,7 +368,7 @@ fn write(path: &Path, truth: &Truth, rows: std::ops::Range<usize>, dress: Dress,
         cdr.count(2);
         let swapped = dress.swaps && k % 3 == 2;
         let (names, values) = (["other", "forward"], [99.0, truth.x_m[k]]);
-        [0, 1].map(|place| cdr.text(names[place ^ usize::from(swapped)]));
+        [0, 1].iter().for_each(|place| cdr.text(names[place ^ usize::from(swapped)]));
         cdr.count(2);
         cdr.numbers(&[0, 1].map(|place| values[place ^ usize::from(swapped)]));
         cdr.count(0);

@@ -95,7 +95,10 @@ pub fn comma_remark(cell: &str) -> &'static str {
 mod tests {
     use super::*;
 
-    fn read(text: &[u8]) -> Result<Vec<(u64, Vec<String>)>, (u64, String)> {
+    /// Lines and their cells.
+    type Rows = Vec<(u64, Vec<String>)>;
+
+    fn read(text: &[u8]) -> Result<Rows, (u64, String)> {
         let mut table = TextTable::new(text).expect("bytes can be read");
         let (mut row, mut rows) = (StringRecord::new(), Vec::new());
         while let Some(line) = table.next(&mut row)? {
