@@ -85,7 +85,7 @@ fn check(path: &Path, table: &Table, name: &str, times: &[f64]) -> Result<(), Ba
         return Err(table.wrong(
             path,
             row,
-            format!("{:?} is no time in s; if {name:?} is in another unit, {}", times[row], say_unit(name)),
+            format!("{:?} is no time in s; if the times are in another unit, {}", times[row], say_unit(name)),
         ));
     }
     if let Some(row) = times.windows(2).position(|pair| pair[1] <= pair[0]) {
