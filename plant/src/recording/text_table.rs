@@ -48,7 +48,7 @@ impl<R: BufRead> TextTable<R> {
             let line = self.rows.position().line().saturating_sub(1).max(1);
             match more.map_err(|error| (line, self.told(&error)))? {
                 false => return Ok(None),
-                true if row.len() == 1 && row[0].is_empty() && self.width.is_some() => {}
+                true if row.len() == 1 && row[0].is_empty() => {} // a line of spaces, or of a carriage return
                 true => {
                     let width = *self.width.get_or_insert(row.len());
                     return match row.len() == width {
