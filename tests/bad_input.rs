@@ -218,7 +218,7 @@ fn tables() {
     check(
         &place,
         &[
-            case(&["bag", "import", "absent.csv", "--bag", "x.mcap"], 3, &["absent.csv", "No such file"]),
+            case(&["bag", "import", "absent.csv", "--bag", "x.mcap"], 3, &["absent.csv", "there is no such file or folder"]),
             case(&["bag", "import", "empty.csv", "--bag", "x.mcap"], 3, &["empty.csv", "is empty", "heading"]),
             case(&["bag", "import", "heading.csv", "--bag", "x.mcap"], 3, &["heading.csv", "no rows"]),
             case(&["bag", "import", "back.csv", "--bag", "x.mcap"], 3, &["back.csv, line 4", "time goes back from 0.001 to 0.0005"]),
@@ -234,7 +234,7 @@ fn tables() {
             case(&["bag", "import", "text.bag", "--bag", "x.mcap"], 3, &["text.bag", "#ROSBAG V2.0"]),
             case(&["bag", "import", "text.db3", "--bag", "x.mcap"], 3, &["text.db3", "SQLite format 3"]),
             case(&["bag", "import", "stub.db3", "--bag", "x.mcap"], 3, &["stub.db3", "rosbag2"]),
-            case(&["bag", "import", "absent.bag", "--bag", "x.mcap"], 3, &["absent.bag", "No such file"]),
+            case(&["bag", "import", "absent.bag", "--bag", "x.mcap"], 3, &["absent.bag", "there is no such file"]),
             case(&["bag", "import", "nothing", "--bag", "x.mcap"], 3, &["nothing", "neither a LeRobot dataset"]),
             case(&["bag", "import", "nan.csv", "--bag", "x.mcap", "--episode", "1"], 2, &["--episode", "LeRobot"]),
             case(&["bag", "import", "nan.csv", "--bag", "x.mcap", "--variable", "log"], 3, &["nan.csv", "no MATLAB file"]),
@@ -271,7 +271,16 @@ fn bags() {
     check(
         &place,
         &[
-            case(&["bag", "info", "absent.mcap"], 3, &["absent.mcap", "No such file"]),
+            case(&["bag", "info", "absent.mcap"], 3, &["absent.mcap: there is no such file"]),
+            case(&["bag", "export", "absent.mcap", "--out", "x.csv"], 3, &["absent.mcap: there is no such file"]),
+            case(&["bag", "recover", "absent.mcap", "--bag", "x.mcap"], 3, &["absent.mcap: there is no such file"]),
+            case(&["bag", "merge", "good.mcap", "absent.mcap", "--bag", "x.mcap"], 3, &["absent.mcap: there is no such file"]),
+            case(&["bag", "diff", "good.mcap", "absent.mcap"], 3, &["absent.mcap: there is no such file"]),
+            case(&["bag", "play", "absent.mcap"], 3, &["absent.mcap: there is no such file"]),
+            case(&["replay", "absent.mcap"], 3, &["absent.mcap: there is no such file"]),
+            case(&["bag", "info", "."], 3, &["is a folder, expected a file"]),
+            case(&["bag", "export", "good.mcap", "--out", "good.mcap", "--overwrite"], 3, &["good.mcap", "which is read"]),
+            case(&["bag", "import", "table.csv", "absent.csv", "--bag", "x"], 3, &["absent.csv: there is no such file"]),
             case(&["bag", "info", "graph.toml"], 3, no_bag),
             case(&["replay", "graph.toml"], 3, no_bag),
             case(&["bag", "export", "graph.toml", "--csv", "x.csv"], 3, no_bag),

@@ -335,9 +335,11 @@ struct Dress {
     lost: (usize, usize),
     /// Sign with which the sensor counts.
     sensor_sign: f64,
+    /// Every third message has its joints in the other order.
+    swaps: bool,
 }
 
-const EVEN: Dress = Dress { sensor_clock: 0, sensor_every: 1, jitter: 0, lost: (0, 0), sensor_sign: 1.0 };
+const EVEN: Dress = Dress { sensor_clock: 0, sensor_every: 1, jitter: 0, lost: (0, 0), sensor_sign: 1.0, swaps: false };
 
 /// Writes steps `rows` of a run under other people's names and types.
 fn write(path: &Path, truth: &Truth, rows: std::ops::Range<usize>, dress: Dress, options: mcap::WriteOptions) {
@@ -364,10 +366,11 @@ fn write(path: &Path, truth: &Truth, rows: std::ops::Range<usize>, dress: Dress,
         };
         let mut cdr = Cdr::header(jittery);
         cdr.count(2);
-        cdr.text("other");
-        cdr.text("forward");
+        let swapped = dress.swaps && k % 3 == 2;
+        let (names, values) = (["other", "forward"], [99.0, truth.x_m[k]]);
+        [0, 1].iter().for_each(|place| cdr.text(names[place ^ usize::from(swapped)]));
         cdr.count(2);
-        cdr.numbers(&[99.0, truth.x_m[k]]);
+        cdr.numbers(&[0, 1].map(|place| values[place ^ usize::from(swapped)]));
         cdr.count(0);
         cdr.count(0);
         send(joints, stamp, &cdr.0);
@@ -453,6 +456,21 @@ fn the_same_run_in_other_peoples_dress_gives_the_same_session() {
         let (theirs, ours) = (error(&found), error(&own));
         assert!((theirs.error - ours.error).abs() < 1e-9 && theirs.against == "dither", "{} {}", theirs.error, ours.error);
     }
+}
+
+#[test]
+fn a_joint_that_changes_its_place_is_refused_by_its_place_and_found_by_its_name() {
+    let dir = tempfile::tempdir().unwrap();
+    let truth = Truth::of(&run(&graph(true, 0.3, 0.05)));
+    let (even, swapped) = (dir.path().join("even.mcap"), dir.path().join("swapped.mcap"));
+    write(&even, &truth, 0..12_000, EVEN, mcap::WriteOptions::new());
+    write(&swapped, &truth, 0..12_000, Dress { swaps: true, ..EVEN }, mcap::WriteOptions::new());
+    let roles = Roles::from_toml(ROLES, "roles.toml").unwrap();
+    let error = Session::from_roles(&swapped, &roles).unwrap_err().to_string();
+    assert!(error.contains("has the joints forward, other, messages before it other, forward") && error.contains("roles.toml"), "{error}");
+    let named = Roles::from_toml(&ROLES.replace("position[1]", "position[forward]"), "roles.toml").unwrap();
+    let (by_place, by_name) = (Session::from_roles(&even, &roles).unwrap(), Session::from_roles(&swapped, &named).unwrap());
+    assert_eq!((by_place.axes, by_place.mu), (by_name.axes, by_name.mu));
 }
 
 #[test]

@@ -1,5 +1,7 @@
 //! Reads a number out of any ROS 2 message by the path of its field, guided by the schema in the bag.
 
+use crate::cdr_bytes::Cdr;
+pub(crate) use crate::cdr_bytes::{Count, Type};
 use std::collections::HashMap;
 
 /// A ROS 2 message definition with everything that it refers to.
@@ -15,32 +17,33 @@ pub(crate) struct Field {
     pub(crate) count: Count,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum Type {
-    Bool,
-    Unsigned(u8),
-    Signed(u8),
-    Float(u8),
-    Text,
-    WideText,
-    /// Index into [`Schema::types`].
-    Message(usize),
-}
-
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum Count {
-    One,
-    Array(usize),
-    Sequence,
-}
-
-/// Where a number stands in a message: `effort[0]`, `wrench.force.x`, `header.stamp` (a time, in s).
+/// Where a number stands in a message: `effort[0]`, `effort[elbow]` (by the message's names of its joints), `wrench.force.x`, `header.stamp` (a time, in s).
 #[derive(Debug, Clone, PartialEq)]
 pub struct FieldPath {
     text: String,
-    /// Place of the field in its type, and index into it if it is a list.
-    steps: Vec<(usize, Option<usize>)>,
+    /// Place of the field in its type, and which entry of it if it is a list.
+    steps: Vec<(usize, Option<Entry>)>,
     is_time: bool,
+}
+
+/// Which entry of a list.
+#[derive(Debug, Clone, PartialEq)]
+enum Entry {
+    At(usize),
+    /// The one that stands where the message's list `name` has this name.
+    Named(String),
+}
+
+impl FieldPath {
+    /// Whether it takes an entry of a list of the message by its place.
+    pub fn is_by_place(&self) -> bool {
+        matches!(self.steps.first(), Some((_, Some(Entry::At(_)))))
+    }
+
+    /// Whether it takes an entry by the name of a joint, which a message need not have.
+    pub fn is_by_name(&self) -> bool {
+        matches!(self.steps.first(), Some((_, Some(Entry::Named(_)))))
+    }
 }
 
 /// Nesting beyond this is a definition that contains itself.
@@ -76,12 +79,23 @@ impl Schema {
     /// Errors: a sentence that says what there is instead.
     pub fn find(&self, path: &str) -> Result<FieldPath, String> {
         let (mut at, mut steps) = (0, Vec::new());
-        let mut parts = path.split('.').peekable();
+        let (mut inside, mut has_names) = (false, self.name_list().is_some());
+        // A dot in brackets is one of a joint's name.
+        let parting = |letter: char| {
+            inside = letter == '[' || (inside && letter != ']');
+            letter == '.' && !inside
+        };
+        let mut parts = path.split(parting).peekable();
         while let Some(part) = parts.next() {
             let (name, index) = match part.strip_suffix(']').and_then(|part| part.split_once('[')) {
-                Some((name, index)) => (name, Some(index.parse().map_err(|_| format!("{index:?} is not an index"))?)),
+                Some((name, entry)) => match entry.parse() {
+                    Ok(index) => (name, Some(Entry::At(index))),
+                    Err(_) if has_names && !entry.is_empty() => (name, Some(Entry::Named(entry.to_owned()))),
+                    Err(_) => return Err(format!("{entry:?} is not an index")),
+                },
                 None => (part, None),
             };
+            has_names = false;
             let fields = &self.types[at];
             let place = fields.iter().position(|field| field.name == name).ok_or_else(|| {
                 let names: Vec<&str> = fields.iter().map(|field| field.name.as_str()).collect();
@@ -91,8 +105,8 @@ impl Schema {
             match (field.count, index) {
                 (Count::One, Some(_)) => return Err(format!("{name:?} is not a list")),
                 (Count::Array(_) | Count::Sequence, None) => return Err(format!("{name:?} is a list: say which, as in {name}[0]")),
-                (Count::Array(len), Some(index)) if index >= len => return Err(format!("{name:?} has {len} entries")),
-                _ => steps.push((place, index)),
+                (Count::Array(len), Some(Entry::At(index))) if index >= len => return Err(format!("{name:?} has {len} entries")),
+                (_, entry) => steps.push((place, entry)),
             }
             match (field.of, parts.peek().is_some()) {
                 (Type::Message(inner), true) => at = inner,
@@ -136,6 +150,27 @@ impl Schema {
         if path.is_time { self.read_with(path, payload, |cdr, _| cdr.time_ns()) } else { Ok(None) }
     }
 
+    /// Where the messages have a list of the names of their joints, as a JointState has.
+    pub(crate) fn name_list(&self) -> Option<usize> {
+        self.types.first()?.iter().position(|field| field.name == "name" && field.of == Type::Text && field.count != Count::One)
+    }
+
+    /// The names of the joints in a message, in its order; none where it has no such list.
+    ///
+    /// Errors: a sentence, the message ends early.
+    pub fn joint_names(&self, payload: &[u8]) -> Result<Vec<String>, String> {
+        let Some((place, fields)) = self.name_list().zip(self.types.first()) else { return Ok(Vec::new()) };
+        let mut cdr = Cdr::new(payload)?;
+        fields[..place].iter().try_for_each(|field| self.skip_field(&mut cdr, field, 0))?;
+        let count = cdr.count(fields[place].count)?;
+        let name = |_| {
+            let length = cdr.unsigned(4)? as usize;
+            let bytes = cdr.take(length)?;
+            Ok(String::from_utf8_lossy(bytes.strip_suffix(&[0]).unwrap_or(bytes)).into_owned())
+        };
+        (0..count).map(name).collect()
+    }
+
     fn read_with<T>(
         &self,
         path: &FieldPath,
@@ -144,18 +179,26 @@ impl Schema {
     ) -> Result<Option<T>, String> {
         let mut cdr = Cdr::new(payload)?;
         let mut at = 0;
-        for (depth, (place, index)) in path.steps.iter().enumerate() {
+        for (depth, (place, entry)) in path.steps.iter().enumerate() {
             let fields = self.types.get(at).ok_or("the path is of another schema")?;
             for field in fields.get(..*place).ok_or("the path is of another schema")? {
                 self.skip_field(&mut cdr, field, 0)?;
             }
             let field = fields.get(*place).ok_or("the path is of another schema")?;
             let len = cdr.count(field.count)?;
+            let index = match entry {
+                None => None,
+                Some(Entry::At(index)) => Some(*index),
+                Some(Entry::Named(name)) => match self.joint_names(payload)?.iter().position(|found| found == name) {
+                    None => return Ok(None),
+                    place => place,
+                },
+            };
             if let Some(index) = index {
-                if *index >= len {
+                if index >= len {
                     return Ok(None);
                 }
-                self.skip(&mut cdr, field.of, *index, 0)?;
+                self.skip(&mut cdr, field.of, index, 0)?;
             }
             match field.of {
                 Type::Message(inner) if depth + 1 < path.steps.len() => at = inner,
@@ -305,71 +348,6 @@ fn type_named(of: &str, name: &str, places: &HashMap<&str, usize>) -> Result<Typ
     })
 }
 
-/// A place in a CDR payload.
-struct Cdr<'a> {
-    bytes: &'a [u8],
-    at: usize,
-    big_endian: bool,
-}
-
-impl<'a> Cdr<'a> {
-    fn new(payload: &'a [u8]) -> Result<Cdr<'a>, String> {
-        match payload {
-            [0, order @ (0 | 1), _, _, bytes @ ..] => Ok(Cdr { bytes, at: 0, big_endian: *order == 0 }),
-            _ => Err(format!("payload starts with {:02x?}, not with a plain CDR header", &payload[..payload.len().min(4)])),
-        }
-    }
-
-    fn align(&mut self, to: usize) {
-        self.at = self.at.next_multiple_of(to);
-    }
-
-    fn take(&mut self, len: usize) -> Result<&'a [u8], String> {
-        let end = self.at.checked_add(len).filter(|end| *end <= self.bytes.len());
-        let end = end.ok_or_else(|| format!("payload ends at byte {} of its CDR, {len} more are due at {}", self.bytes.len(), self.at))?;
-        let taken = &self.bytes[self.at..end];
-        self.at = end;
-        Ok(taken)
-    }
-
-    fn unsigned(&mut self, size: u8) -> Result<u64, String> {
-        self.align(size.into());
-        let bytes = self.take(size.into())?;
-        let join = |value: u64, byte: &u8| value << 8 | u64::from(*byte);
-        Ok(if self.big_endian { bytes.iter().fold(0, join) } else { bytes.iter().rev().fold(0, join) })
-    }
-
-    fn signed(&mut self, size: u8) -> Result<i64, String> {
-        let unused = 64 - 8 * u32::from(size);
-        Ok((self.unsigned(size)? << unused) as i64 >> unused)
-    }
-
-    /// `builtin_interfaces/Time`; 32 bits of seconds always fit.
-    fn time_ns(&mut self) -> Result<i64, String> {
-        let sec = self.signed(4)?;
-        Ok(sec * 1_000_000_000 + self.unsigned(4)? as i64)
-    }
-
-    fn number(&mut self, of: Type) -> Result<f64, String> {
-        Ok(match of {
-            Type::Bool => self.unsigned(1)? as f64,
-            Type::Unsigned(size) => self.unsigned(size)? as f64,
-            Type::Signed(size) => self.signed(size)? as f64,
-            Type::Float(4) => f32::from_bits(self.unsigned(4)? as u32).into(),
-            Type::Float(_) => f64::from_bits(self.unsigned(8)?),
-            Type::Text | Type::WideText | Type::Message(_) => return Err("not a number".to_owned()),
-        })
-    }
-
-    fn count(&mut self, count: Count) -> Result<usize, String> {
-        Ok(match count {
-            Count::One => 1,
-            Count::Array(len) => len,
-            Count::Sequence => self.unsigned(4)? as usize,
-        })
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -389,6 +367,7 @@ mod tests {
         assert_eq!(read("position[0]"), Some(0.5));
         assert!(read("velocity[0]").is_some_and(f64::is_nan), "not measured");
         assert_eq!(read("velocity[2]"), None, "the list is shorter");
+        assert_eq!((read("effort[bcd]"), read("effort[b.d]")), (Some(-3.25), None), "by the name of the joint");
         assert_eq!(read("header.stamp"), Some(2.5));
         assert_eq!(read("header.stamp.nanosec"), Some(5e8));
         let numbers = schema.numbers(&payload).expect("they can be listed");
@@ -405,7 +384,7 @@ mod tests {
             ("effort", "effort[0]"),
             ("header", "it has stamp, frame_id"),
             ("header.frame_id", "is text"),
-            ("effort[x]", "not an index"),
+            ("effort[]", "not an index"),
             ("header[0].stamp", "not a list"),
             ("effort[0].x", "has no fields"),
         ] {

@@ -1,13 +1,14 @@
 //! What can go wrong with a bag.
 
 use backdrive_msgs::ros::RosError;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 /// What can go wrong with a bag or a table.
 #[derive(Debug, thiserror::Error)]
 pub enum BagError {
-    /// The operating system refused.
-    #[error("{}: {source}", path.display())]
+    /// The operating system refused to read it.
+    #[error("{}: {}", path.display(), unreadable(source))]
     Io {
         /// The file.
         path: PathBuf,
@@ -146,7 +147,22 @@ pub enum BagError {
     Usage(String),
 }
 
+/// Why a file cannot be read, in the words that are used for every file.
+fn unreadable(error: &std::io::Error) -> String {
+    match error.kind() {
+        ErrorKind::NotFound => "there is no such file".to_owned(),
+        ErrorKind::PermissionDenied => "may not be read: permission denied".to_owned(),
+        ErrorKind::IsADirectory => "is a folder, expected a file".to_owned(),
+        _ => format!("cannot be read: {error}"),
+    }
+}
+
 impl BagError {
+    pub(crate) fn create(path: &Path) -> impl FnOnce(std::io::Error) -> BagError + use<> {
+        let path = path.to_owned();
+        move |source| BagError::Create { path, source }
+    }
+
     pub(crate) fn io(path: &Path) -> impl FnOnce(std::io::Error) -> BagError + use<> {
         let path = path.to_owned();
         move |source| BagError::Io { path, source }

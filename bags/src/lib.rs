@@ -11,7 +11,9 @@
 // Printing panics where the other end is full or gone.
 #![cfg_attr(not(test), warn(clippy::print_stdout, clippy::print_stderr))]
 
+mod arrow_schema;
 mod cdr;
+mod cdr_bytes;
 mod claim;
 mod clock_check;
 mod clock_offset;

@@ -1,6 +1,7 @@
 //! Columns of numbers out of a parquet file. The format is the crate's; what its types mean to a recording is told here.
 
 use crate::BagError;
+use crate::arrow_schema::durations;
 use crate::number_type::{LARGEST_WHOLE, NumberType};
 use parquet::basic::{ConvertedType, LogicalType, TimeUnit, Type as Physical};
 use parquet::column::reader::{ColumnReader, ColumnReaderImpl};
@@ -8,6 +9,7 @@ use parquet::data_type::DataType;
 use parquet::errors::ParquetError;
 use parquet::file::reader::{FileReader, SerializedFileReader};
 use parquet::schema::types::ColumnDescriptor;
+use std::collections::HashMap;
 use std::fs::File;
 use std::path::{Path, PathBuf};
 
@@ -15,6 +17,8 @@ use std::path::{Path, PathBuf};
 pub(crate) struct ParquetFile {
     path: PathBuf,
     reader: SerializedFileReader<File>,
+    /// Of columns that are durations, which parquet has no type for, how many of their units make a second.
+    durations: HashMap<String, f64>,
 }
 
 /// What a column of single values holds.
@@ -23,7 +27,7 @@ pub(crate) enum Values {
     Numbers(Vec<f64>, NumberType),
     /// Whole numbers of which some are beyond 2⁵³.
     Whole(Vec<i64>),
-    /// Points in time, and how many of their units make a second.
+    /// Points in time or durations, and how many of their units make a second.
     Instants(Vec<i64>, f64),
     /// None of these; what it is, in the plural.
     Other(&'static str),
@@ -58,7 +62,10 @@ impl ParquetFile {
             let what = format!("is not a whole parquet file: {}; if it was cut off, it has to be written again", told(&error));
             BagError::File { path: path.to_owned(), what }
         })?;
-        let file = ParquetFile { path: path.to_owned(), reader };
+        let said = reader.metadata().file_metadata().key_value_metadata();
+        let schema = said.into_iter().flatten().find(|pair| pair.key == "ARROW:schema").and_then(|pair| pair.value.as_deref());
+        let durations = schema.map(durations).unwrap_or_default();
+        let file = ParquetFile { path: path.to_owned(), reader, durations };
         file.check_extents(size)?;
         Ok(file)
     }
@@ -93,7 +100,7 @@ impl ParquetFile {
         let column = self.reader.metadata().file_metadata().schema_descr().column(place);
         let meaning = meaning(&column);
         let (of, per_second) = match meaning {
-            Meaning::Numbers(of) => (of, None),
+            Meaning::Numbers(of) => (of, self.durations.get(column.name()).copied()),
             Meaning::Instants(per_second) => (NumberType::Int64, Some(per_second)),
             Meaning::Other(what) => return Ok(Values::Other(what)),
         };

@@ -37,7 +37,7 @@ const GROUP: usize = 1 << 20;
 
 /// Writes columns of equal length, with what else is said of the file. The compression is Snappy, which every reader has.
 pub(crate) fn write(out: &Path, columns: &[Written], said: &[(&str, String)]) -> Result<(), BagError> {
-    let file = File::create_new(out).map_err(BagError::io(out))?;
+    let file = File::create_new(out).map_err(BagError::create(out))?;
     let failed = |error: ParquetError| BagError::Write { name: out.display().to_string(), what: error.to_string() };
     write_to(BufWriter::new(file), columns, said).map_err(failed)
 }

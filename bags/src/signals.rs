@@ -18,7 +18,7 @@ pub struct Signal {
     pub name: String,
     /// The topic that has it.
     pub topic: String,
-    /// Where in a message of the topic: `effort[0]`, `wrench.force.x`.
+    /// Where in a message of the topic: `effort[0]`, `effort[elbow]`, `wrench.force.x`.
     pub field: String,
     /// Factor.
     pub scale: f64,
@@ -98,7 +98,10 @@ pub(crate) fn gather(reader: &Reader, wanted: &[Signal], trim: bool, most: usize
             std::collections::hash_map::Entry::Occupied(plan) => plan.into_mut(),
             std::collections::hash_map::Entry::Vacant(vacant) => {
                 let schema = topic.parse_schema()?;
-                vacant.insert(Plan { stamp: schema.find("header.stamp").ok(), schema, fields: Vec::new() })
+                // Where the bag tells the axes, they are the same in every message.
+                let may_change = topic.axes.is_empty() && schema.name_list().is_some();
+                let stamp = schema.find("header.stamp").ok();
+                vacant.insert(Plan { stamp, schema, fields: Vec::new(), joints: may_change.then(Vec::new) })
             }
         };
         let field = plan.schema.find(&signal.field);
@@ -112,9 +115,17 @@ pub(crate) fn gather(reader: &Reader, wanted: &[Signal], trim: bool, most: usize
     let (mut begin, mut full) = (None, false);
     for entry in reader.messages()? {
         let entry = entry?;
-        let Some(plan) = plans.get(&entry.topic.channel) else { continue };
+        let Some(plan) = plans.get_mut(&entry.topic.channel) else { continue };
         let step = entry.message(reader.path())?.map(|message| message.step());
         let wrong = |field: &FieldPath, what| BagError::Field { topic: entry.topic.name.clone(), field: field.to_string(), what };
+        if let Some((before, (_, path))) = plan.joints.as_mut().zip(plan.fields.iter().find(|(_, path)| path.is_by_place())) {
+            let joints = plan.schema.joint_names(&entry.payload).map_err(|what| wrong(path, what))?;
+            if before.is_empty() {
+                *before = joints;
+            } else if !joints.is_empty() && joints != *before {
+                return Err(wrong(path, joints_change(before, &joints, path)));
+            }
+        }
         let stamp = match &plan.stamp {
             Some(path) => plan.schema.read_time_ns(path, &entry.payload).map_err(|what| wrong(path, what))?,
             None => None,
@@ -167,6 +178,15 @@ struct Plan {
     stamp: Option<FieldPath>,
     /// Place of the signal, and where it stands in a message.
     fields: Vec<(usize, FieldPath)>,
+    /// The joints of its first message, where they may be others in the next.
+    joints: Option<Vec<String>>,
+}
+
+fn joints_change(before: &[String], now: &[String], path: &FieldPath) -> String {
+    let list = path.to_string().split('[').next().unwrap_or_default().to_owned();
+    let first = before.first().map_or("", String::as_str);
+    let (before, now) = (before.join(", "), now.join(", "));
+    format!("its messages have their joints in different places ({before}; {now}): name the joint, as in {list}[{first}]")
 }
 
 fn by_step(series: &[Series], sparse: &[bool], trim: bool, rate_hz: f64, clock: Option<Series>) -> Signals {

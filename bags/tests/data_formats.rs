@@ -147,6 +147,52 @@ fn odd_columns_of_parquet_are_told() {
 }
 
 #[test]
+fn what_is_easily_taken_for_something_else_is_not() {
+    let Some(written) = Written::new() else { return };
+    let bag = written.path("odd.mcap");
+    let import = |name: &str| import_table(&written.path(name), &bag, &ImportOptions { overwrite: true, ..ImportOptions::default() });
+    for unit in ["ns", "us", "ms"] {
+        // Parquet has whole numbers for durations; what makes them such stands in Arrow's schema.
+        let report = import(&format!("durations-{unit}.parquet")).expect(unit);
+        assert_eq!((report.rows, report.skipped.as_slice()), (100, &["words".to_owned()][..]));
+        let found = columns(&bag);
+        assert_eq!((found[0].1[99], found[1].1[99]), (0.198, 49.5), "{unit}");
+    }
+    let says = |name: &str| import(name).expect_err(name).to_string();
+    assert!(says("words.parquet").contains("words.parquet: there is no column \"t\", and none with numbers; there is a, b"));
+    assert!(says("twice.parquet").contains("both go to"));
+    let report = import("odd.parquet").expect("it is imported");
+    assert_eq!((report.topics.as_slice(), report.skipped.len()), (&["/recording/few".to_owned()][..], 4), "{report:?}");
+    assert!(
+        report.notes[0].contains("\"decimal\" holds decimal fractions") && report.notes[2].contains("\"when\" holds points in time"),
+        "{report:?}"
+    );
+    assert_eq!(columns(&bag)[1].1[..2], [1.5, 2.5], "a dictionary of numbers");
+}
+
+#[test]
+fn joints_that_change_their_places_are_told_and_read_by_their_names() {
+    let Some(written) = Written::new() else { return };
+    // The folder has lost what describes it.
+    std::fs::remove_file(written.path("joints/metadata.yaml")).expect("it is there");
+    let bag = written.path("joints.mcap");
+    let report = import_rosbag(&written.path("joints"), &bag, false).expect("it is imported");
+    assert!(
+        report.topics[0].notes[0].contains("message 2 has other joints") && report.topics[0].notes[0].contains("position[pan]"),
+        "{report:?}"
+    );
+    let reader = Reader::open(&bag).expect("it opens");
+    let of = |field: &str| signals(&reader, &[Signal::new("x", "/joint_states", field)]);
+    let error = of("position[0]").expect_err("it is now one, now the other").to_string();
+    assert!(error.contains("pan, l.elbow; gripper") && error.contains("position[pan]"), "{error}");
+    let elbow = of("position[l.elbow]").expect("it is there");
+    assert_eq!(elbow.columns[0], (0..30).map(|row| -2.0 * f64::from(row)).collect::<Vec<_>>());
+    assert_eq!(of("position[gripper]").expect("it is there").columns[0][3], 107.0);
+    let names: Vec<String> = columns_of(&reader, None).expect("it is read").into_iter().map(|signal| signal.field).collect();
+    assert_eq!(names, ["position[pan]", "position[l.elbow]", "position[gripper]"]);
+}
+
+#[test]
 fn the_fields_of_a_structure_are_columns() {
     let Some(written) = Written::new() else { return };
     let options = ImportOptions { time: "time".to_owned(), variable: Some("log".to_owned()), ..ImportOptions::default() };
@@ -228,6 +274,7 @@ fn a_wrong_dataset_is_told_with_its_file() {
         ("\"v3.0\"", "\"v2.1\"", "codebase_version: is \"v2.1\", expected v3.0"),
         ("\"fps\": 50", "\"fps\": 0", "fps: expected a number above 0"),
         ("[2]", "[3]", "names: has 2 names, the shape says 3"),
+        ("[2]", "[1000000000000000]", "shape: expected one number, a value a joint, from 1 to 10000"),
         ("{", "", "meta/info.json"),
     ] {
         std::fs::write(dataset.join("meta/info.json"), info.replacen(from, to, 1)).expect("it writes");

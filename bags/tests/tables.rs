@@ -3,8 +3,8 @@
 mod common;
 
 use backdrive_bags::{
-    BagError, ColumnMap, ImportOptions, Quantity, Reader, Recorder, RecorderOptions, Signal, export_csv, import_csv, recording,
-    recording_up_to, signals,
+    BagError, ColumnMap, ImportOptions, Quantity, Reader, Recorder, RecorderOptions, Signal, export_csv, import_csv, import_table,
+    recording, recording_up_to, signals,
 };
 use backdrive_plant::model::Hold;
 use backdrive_plant::recording::{ColumnRule, Piece, Source};
@@ -209,12 +209,112 @@ fn a_bad_table_is_told_with_its_line() {
         ("x,y\n0,1\n", "there is no column \"t\"; there is x, y"),
         ("t,x\n0,1\n1,2,3\n", "line 3"),
         ("t,x\n1e300,1\n", "no time"),
+        // Comments, empty lines and carriage returns count.
+        ("# by hand\n\nt,x\n0,1\n# a pause\n0.2,2\n0.1,3\n", "line 7: time goes back"),
+        ("t,x\r\n0,1\r\n0.2,2\r\n0.1,3\r\n", "line 4: time goes back"),
+        ("t,x\r\n0,1\r\n1,2,3\r\n", "line 3: expected 2 cells, as the heading has, found 3"),
+        ("t;x\n0,1;1\n0,2;2\n", "line 2: column \"t\": \"0,1\" is not a number; write decimal points"),
+        (
+            "t;x\n0;1,5\n1;2,5\n",
+            "no column of numbers beside the times; column \"x\" holds something that is no number, first in line 2: \"1,5\"; write decimal points",
+        ),
+        ("time, s;x, mm\n0,1;1,5\n0,2;2,5\n", "there is no column \"t\", and none with numbers; there is time, s, x, mm"),
+        ("# t x\n0 1\n1 2\n", "there is no heading"),
+        ("t,x,t\n0,1,5\n1,2,6\n", "line 1: two columns are called \"t\""),
+        ("t,q[0],q(0)\n0,1,5\n1,2,6\n", "both go to position[0] of /recording/q_0_; say with --map"),
+        ("t [mm],x\n0,1\n1,2\n", "is in mm, a length"),
+        (
+            "t,x\n0,1\n1000000,2\n2000000,3\n",
+            "1000000.0 s apart as a rule, which no recording is: say their unit, in the heading or as --time \"t [ns]\"",
+        ),
+        ("t,x\n3e9,1\n", "no time"),
     ] {
         write(&table, text);
         let error = import_csv(&table, &bag, &ImportOptions::default()).expect_err(text).to_string();
         assert!(error.contains(says), "{error}");
         assert!(!bag.exists(), "no bag is begun");
     }
+}
+
+#[test]
+fn a_table_that_is_no_utf_8_is_told_with_its_line() {
+    let dir = tempfile::tempdir().expect("a directory");
+    let (table, bag) = (dir.path().join("x.csv"), dir.path().join("x.mcap"));
+    let utf16: Vec<u8> = "\u{feff}t,x\n0,1\n".encode_utf16().flat_map(u16::to_le_bytes).collect();
+    let cases: [(&[u8], &str); 5] = [
+        (b"t;Gr\xf6\xdfe [mm]\n0;1\n", "line 1: is not UTF-8 text; save the table as UTF-8"),
+        (b"t,x,note\n0,1,a\n1,2,\xb5\n", "line 3: is not UTF-8 text"),
+        (&utf16, "line 1: is text in UTF-16; save the table as UTF-8"),
+        (b"PK\x03\x04\x14\0", "is a zip archive; of a workbook of Excel, save the table as CSV"),
+        (b"\x28\xb5\x2f\xfd\0\0", "is compressed by zstd; unpack it with `zstd -d`"),
+    ];
+    for (bytes, says) in cases {
+        std::fs::write(&table, bytes).expect("it writes");
+        let error = import_table(&table, &bag, &ImportOptions::default()).expect_err(says).to_string();
+        assert!(error.contains(says) && error.contains("x.csv"), "{error}");
+    }
+    write(&table, "\u{feff}t,x\n0,1\n1,2\n");
+    assert_eq!(import_table(&table, &bag, &ImportOptions::default()).expect("a mark is none of the heading").rows, 2);
+}
+
+#[test]
+fn a_heading_that_is_asked_for_whole_names_its_unit_all_the_same() {
+    let dir = tempfile::tempdir().expect("a directory");
+    let (table, bag) = (dir.path().join("x.csv"), dir.path().join("x.mcap"));
+    write(&table, "time [ms],x [mm],y\n0,1,nan\n2,2,\n4,3,1\n");
+    let map = |column: &str, scale| ColumnMap {
+        column: column.to_owned(),
+        topic: "/m".to_owned(),
+        quantity: Quantity::Position,
+        axis: 0,
+        scale,
+        offset: 0.0,
+    };
+    for (time, column, scale, last) in
+        [("time [ms]", "x [mm]", 1.0, 3.0 * 1e-3), ("time", "x", 1.0, 3.0 * 1e-3), ("time", "x [mm]", 0.5, 1.5), ("time", "x", 0.5, 1.5)]
+    {
+        // What is not asked for, y, may hold anything.
+        let options =
+            ImportOptions { time: time.to_owned(), columns: vec![map(column, scale)], overwrite: true, ..ImportOptions::default() };
+        import_csv(&table, &bag, &options).expect("it imports");
+        let found = signals(&Reader::open(&bag).expect("it opens"), &[Signal::new("x", "/m", "position[0]")]).expect("it is there");
+        assert_eq!((found.t[2], found.columns[0][2]), (4.0 * 1e-3, last), "{time} {column} {scale}");
+    }
+    // A unit may be said where the heading has none.
+    write(&table, "t,x\n0,1\n1000000,2\n2000000,3\n");
+    import_csv(&table, &bag, &ImportOptions { time: "t [ns]".to_owned(), overwrite: true, ..ImportOptions::default() })
+        .expect("it imports");
+    let found = signals(&Reader::open(&bag).expect("it opens"), &[Signal::new("x", "/recording/x", "position[0]")]).expect("it is there");
+    assert_eq!(found.t, [0.0, 1e6 * 1e-9, 2e6 * 1e-9]);
+}
+
+/// As MATLAB writes a table or a string: an object, which has no size, and at the end what it holds, which has no name.
+#[test]
+fn objects_in_a_matlab_file_do_not_hide_its_vectors() {
+    fn element(kind: u32, data: &[u8]) -> Vec<u8> {
+        let mut bytes = [kind.to_le_bytes(), (data.len() as u32).to_le_bytes()].concat();
+        bytes.extend(data);
+        bytes.resize(bytes.len().next_multiple_of(8), 0);
+        bytes
+    }
+    let flags = |class: u8| element(6, &[class, 0, 0, 0, 0, 0, 0, 0]);
+    let size = |rows: u32| element(5, &[rows.to_le_bytes(), 1_u32.to_le_bytes()].concat());
+    let vector = |name: &str, kind: u8, stored: u32, data: &[u8], rows| {
+        element(14, &[flags(kind), size(rows), element(1, name.as_bytes()), element(stored, data)].concat())
+    };
+    let times: Vec<u8> = [0.0_f64, 0.5].iter().flat_map(|time| time.to_le_bytes()).collect();
+    let object =
+        [flags(17), element(1, b"remark"), element(1, b"MCOS"), element(1, b"string"), vector("", 13, 6, &[1, 0, 0, 0], 1)].concat();
+    let mut file = b"MATLAB 5.0 MAT-file".to_vec();
+    file.resize(124, b' ');
+    file.extend([0, 1, b'I', b'M']);
+    file.extend([vector("t", 6, 9, &times, 2), element(14, &object), vector("x", 6, 9, &times, 2), vector("", 9, 2, &[7, 7], 2)].concat());
+    let dir = tempfile::tempdir().expect("a directory");
+    let (table, bag) = (dir.path().join("x.mat"), dir.path().join("x.mcap"));
+    std::fs::write(&table, file).expect("it writes");
+    let report = import_table(&table, &bag, &ImportOptions::default()).expect("it imports");
+    assert_eq!((report.rows, report.topics.as_slice()), (2, &["/recording/x".to_owned()][..]));
+    assert_eq!(report.notes, ["left out, for they are no numbers as long as t: remark (an object such as a table, a string or a date)"]);
 }
 
 #[test]

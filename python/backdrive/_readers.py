@@ -129,7 +129,9 @@ def _joints(feature: Mapping[str, Any], name: str) -> list[str]:
         names = [f"joint{number}" for number in range(1, int(feature["shape"][0]) + 1)]
     if len(names) != int(feature["shape"][0]):
         raise InputError(f"meta/info.json: features.{name}.names: has {len(names)} names, the shape says {feature['shape'][0]}")
-    return [str(n).rsplit(".", 1)[0] if "." in str(n) else str(n) for n in names]
+    joints = [str(n).rsplit(".", 1)[0] for n in names]
+    # Where nothing but the end tells joints apart it is no name of a quantity: arm.1, arm.2.
+    return joints if len(set(joints)) == len(joints) else [str(n) for n in names]
 
 
 def _of_joint(given: Any, joint: str, key: str) -> Any:

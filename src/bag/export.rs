@@ -20,6 +20,7 @@ pub fn export(asked: &BagExport) -> Result<u8, Failure> {
     if asked.contract.is_some() || asked.task.is_some() {
         return Err(usage("--contract and --task are for --to lerobot"));
     }
+    apart(&asked.out, bag)?;
     output::may_replace(&asked.out, asked.overwrite)?;
     let reader = Reader::open(bag).map_err(Failure::input)?;
     let topics = (!asked.topic.is_empty()).then_some(asked.topic.as_slice());
@@ -31,6 +32,16 @@ pub fn export(asked: &BagExport) -> Result<u8, Failure> {
     }
     output::line(format_args!("{}: {rows} rows", asked.out.display()))?;
     Ok(0)
+}
+
+/// What is written replaces what is there: no bag that is read may be it, or in it.
+fn apart(out: &Path, bag: &Path) -> Result<(), Failure> {
+    match (out.canonicalize(), bag.canonicalize()) {
+        (Ok(there), Ok(read)) if read.starts_with(&there) => {
+            Err(Failure::input(format!("{}: would replace {}, which is read; name another place", out.display(), bag.display())))
+        }
+        _ => Ok(()),
+    }
 }
 
 fn ending(out: &Path) -> Option<ExportTo> {
@@ -54,6 +65,7 @@ fn dataset(asked: &BagExport) -> Result<u8, Failure> {
     if !is_free && !asked.overwrite {
         return Err(Failure::input(format!("{}: exists already; --overwrite replaces it, or name another", out.display())));
     }
+    asked.bags.iter().try_for_each(|bag| apart(out, bag))?;
     let contract = asked.contract.as_deref().map(Contract::read).transpose()?.unwrap_or_default();
     let readers = asked.bags.iter().map(|bag| Reader::open(bag).map_err(Failure::input)).collect::<Result<Vec<_>, _>>()?;
     let task = asked.task.clone().unwrap_or_else(|| "not told".to_owned());

@@ -99,11 +99,15 @@ fn warn(name: &str, notes: &[String], clock: &[String]) {
 
 /// What a recording is; an option that is for another kind is wrong usage.
 fn kind_of(from: &Path, asked: &BagImport) -> Result<Kind, Failure> {
+    if !from.exists() {
+        return Err(Failure::input(format!("{}: there is no such file or folder", from.display())));
+    }
     let kind = match from {
         from if is_lerobot(from) => Kind::Lerobot,
         from if is_rosbag(from) => Kind::Rosbag,
         from if from.is_dir() => {
-            let what = "is a folder, but neither a LeRobot dataset (meta/info.json) nor a rosbag2 (metadata.yaml)";
+            let what =
+                "is a folder, but neither a LeRobot dataset (meta/info.json) nor a rosbag2 (metadata.yaml, .db3); name the files in it";
             return Err(Failure::input(format!("{}: {what}", from.display())));
         }
         _ => Kind::Table,

@@ -112,7 +112,7 @@ pub struct BagImport {
     /// Of a table: which column is what, as `motor_position=/master/measured_js.position[0]`; repeatable. Without one each becomes a topic of its own.
     #[arg(long, value_name = "COLUMN=TOPIC.FIELD[AXIS]")]
     pub map: Vec<String>,
-    /// Of a table: the column with the times, s.
+    /// Of a table: the column with the times, s, or in the unit of its heading; `t [ns]` says the unit of a column t.
     #[arg(long, default_value = "t", value_name = "COLUMN")]
     pub time: String,
     /// Of a MATLAB file: the structure whose fields the columns are.

@@ -114,7 +114,37 @@ def rosbag(path, ros1, version):
     return told({"position[1]": q[:, 1], "velocity[0]": q[:, 0] * 2.0, "wrench.torque.x": q[:, 1], "data": q[:, 0], "gain": np.arange(20) * 0.5})
 
 
+def odd(folder):
+    """What is easily taken for something else."""
+    n = np.arange(100)
+    for unit, step in (("ns", 2_000_000), ("us", 2_000), ("ms", 2)):
+        columns = {"t": pa.array(n * step, pa.duration(unit)), "words": pa.array(["a"] * 100), "x": pa.array(n * 0.5)}
+        pq.write_table(pa.table(columns), folder / f"durations-{unit}.parquet")
+    pq.write_table(pa.table({"a": ["x", "y"], "b": ["p", "q"]}), folder / "words.parquet")
+    pq.write_table(pa.table([n / 100.0, n * 1.0, n * 2.0], names=["t", "x", "x"]), folder / "twice.parquet")
+    fields = {"decimal": pa.array(n).cast(pa.decimal128(21, 2)), "text": pa.array(["a", "b"] * 50).dictionary_encode()}
+    fields |= {"when": pa.array(n, pa.timestamp("us")), "deep": pa.array([{"a": 1.0}] * 100), "few": pa.array([1.5, 2.5] * 50).dictionary_encode()}
+    pq.write_table(pa.table({"t": n / 100.0} | fields), folder / "odd.parquet")
+    # Two publishers of one topic, and one that changes the order of its joints.
+    from rosbags.rosbag2 import StoragePlugin, Writer
+    from rosbags.typesys import Stores, get_typestore
+
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    kinds, kind = store.types, "sensor_msgs/msg/JointState"
+    with Writer(folder / "joints", version=9, storage_plugin=StoragePlugin.SQLITE3) as writer:
+        topic = writer.add_connection("/joint_states", kind, typestore=store)
+        for row in range(60):
+            ns = BEGIN + row * 5_000_000
+            stamp = kinds["builtin_interfaces/msg/Time"](sec=ns // 10**9, nanosec=ns % 10**9)
+            values = {"pan": float(row), "l.elbow": -float(row)} if row % 2 == 0 else {"gripper": 100.0 + row}
+            names = list(values) if row % 4 == 0 else list(values)[::-1]
+            header = kinds["std_msgs/msg/Header"](stamp=stamp, frame_id="")
+            message = kinds[kind](header, names, np.array([values[name] for name in names]), np.array([]), np.array([]))
+            writer.write(topic, ns, bytes(store.serialize_cdr(message, kind)))
+
+
 def write(folder):
+    odd(folder)
     expected = {}
     columns = typed(3_000)
     table = pa.table(columns)

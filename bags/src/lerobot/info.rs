@@ -4,6 +4,9 @@ use crate::BagError;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 
+/// A feature of more numbers is none of joints; the file may say anything.
+const MOST_JOINTS: usize = 10_000;
+
 /// What a dataset says of itself.
 pub(crate) struct Info {
     path: PathBuf,
@@ -22,7 +25,7 @@ impl Info {
         let version = info.get("codebase_version").and_then(Value::as_str).unwrap_or_default();
         if !version.starts_with("v3") {
             return Err(wrong(format!(
-                "codebase_version: is {version:?}, expected v3.0; lerobot's own converter brings older datasets there"
+                "codebase_version: is {version:?}, expected v3.0; lerobot converts older datasets: python -m lerobot.datasets.v30.convert_dataset_v21_to_v30 --repo-id=..."
             )));
         }
         let fps = info.get("fps").and_then(Value::as_f64).filter(|fps| *fps > 0.0 && fps.is_finite());
@@ -50,7 +53,8 @@ impl Info {
             Some([count]) => count.as_u64().and_then(|count| usize::try_from(count).ok()),
             _ => None,
         };
-        let count = count.ok_or_else(|| wrong("shape: expected one number, a value a joint".to_owned()))?;
+        let count = count.filter(|count| (1..=MOST_JOINTS).contains(count));
+        let count = count.ok_or_else(|| wrong(format!("shape: expected one number, a value a joint, from 1 to {MOST_JOINTS}")))?;
         // Some datasets group them: {"motors": [...]}.
         let names = match of.get("names") {
             Some(Value::Object(groups)) => groups.values().next().and_then(Value::as_array),
@@ -62,6 +66,11 @@ impl Info {
             return Err(wrong(format!("names: has {} names, the shape says {count}", names.len())));
         }
         let plain = |name: &Value| name.as_str().map_or_else(|| name.to_string(), str::to_owned);
-        Ok(names.iter().map(plain).map(|name| name.rsplit_once('.').map_or(name.clone(), |(joint, _)| joint.to_owned())).collect())
+        let names: Vec<String> = names.iter().map(plain).collect();
+        let joints: Vec<String> =
+            names.iter().map(|name| name.rsplit_once('.').map_or(name.as_str(), |(joint, _)| joint).to_owned()).collect();
+        // Where nothing but the end tells joints apart it is no name of a quantity: arm.1, arm.2.
+        let is_told_apart = |place: usize| !joints[..place].contains(&joints[place]);
+        Ok(if (0..count).all(is_told_apart) { joints } else { names })
     }
 }

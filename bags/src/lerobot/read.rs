@@ -73,7 +73,7 @@ pub fn import_lerobot(folder: &Path, into: &Path, options: &LerobotOptions) -> R
     for episode in episodes.keys() {
         check_target(&bag_of(*episode), options.overwrite)?;
     }
-    let mut done = Vec::with_capacity(episodes.len());
+    let mut done: Vec<Episode> = Vec::with_capacity(episodes.len());
     for (episode, rows) in episodes {
         let name = format!("episode_{episode:06}");
         let mut table = Table { columns: vec![Column::new("t", times(&rows, info.fps), NumberType::Double)], ..Table::default() };
@@ -96,7 +96,9 @@ pub fn import_lerobot(folder: &Path, into: &Path, options: &LerobotOptions) -> R
         }
         let import = ImportOptions { overwrite: options.overwrite, ..ImportOptions::default() };
         let bag = bag_of(episode);
-        let report = write_bag(&folder.join(&name), &table, &bag, &import)?;
+        // All episodes or none: some of them would look like all.
+        let undo = |_: &BagError| done.iter().for_each(|episode| drop(std::fs::remove_file(&episode.bag)));
+        let report = write_bag(&folder.join(&name), &table, &bag, &import).inspect_err(undo)?;
         done.push(Episode { name, bag, report });
     }
     Ok(done)
@@ -174,7 +176,8 @@ fn data_files(folder: &Path) -> Result<Vec<PathBuf>, BagError> {
             path.file_name().and_then(|name| name.to_str()).is_some_and(|name| name.starts_with(begins) && name.ends_with(ends))
         };
         let mut found: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).filter(is_one).collect();
-        found.sort();
+        // file-1000 comes behind file-999.
+        found.sort_by_key(|path| (path.as_os_str().len(), path.clone()));
         Ok(found)
     };
     let mut files = Vec::new();

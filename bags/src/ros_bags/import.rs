@@ -10,12 +10,18 @@ use std::path::{Path, PathBuf};
 const ROS1: &[u8] = b"#ROSBAG V";
 const SQLITE: &[u8] = b"SQLite format 3\0";
 
-/// Whether a path is a ROS 1 bag, or a rosbag2: its folder, or a sqlite3 file of it.
+/// Whether a path is a ROS 1 bag, or a rosbag2: its folder, which may have lost its `metadata.yaml`, or a sqlite3 file of it.
 pub fn is_rosbag(path: &Path) -> bool {
     path.join("metadata.yaml").is_file()
+        || std::fs::read_dir(path).is_ok_and(|entries| entries.flatten().any(|entry| has_ending(&entry.path(), "db3")))
         || begins(path, ROS1)
         || begins(path, SQLITE)
-        || path.extension().is_some_and(|ending| ending == "db3" || ending == "bag")
+        || has_ending(path, "db3")
+        || has_ending(path, "bag")
+}
+
+fn has_ending(path: &Path, ending: &str) -> bool {
+    path.extension().is_some_and(|found| found == ending)
 }
 
 fn begins(path: &Path, with: &[u8]) -> bool {
@@ -66,17 +72,17 @@ pub fn import_rosbag(from: &Path, bag: &Path, overwrite: bool) -> Result<RosbagR
 fn files_of(folder: &Path) -> Result<Vec<PathBuf>, BagError> {
     let wrong = |what: String| BagError::File { path: folder.to_owned(), what };
     let entries = std::fs::read_dir(folder).map_err(BagError::io(folder))?;
-    let paths: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).collect();
-    let ending = |path: &PathBuf, ending: &str| path.extension().is_some_and(|found| found == ending);
-    let mut files: Vec<PathBuf> = paths.iter().filter(|path| ending(path, "db3")).cloned().collect();
-    if let Some(packed) = paths.iter().find(|path| ending(path, "zstd") || ending(path, "zst")) {
+    let mut paths: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).collect();
+    paths.sort();
+    let mut files: Vec<PathBuf> = paths.iter().filter(|path| has_ending(path, "db3")).cloned().collect();
+    if let Some(packed) = paths.iter().find(|path| has_ending(path, "zstd") || has_ending(path, "zst")) {
         return Err(BagError::File {
             path: packed.clone(),
             what: "is compressed; unpack it with `zstd -d`, or convert the bag with `ros2 bag convert`".to_owned(),
         });
     }
     if files.is_empty() {
-        return Err(match paths.iter().find(|path| ending(path, "mcap")) {
+        return Err(match paths.iter().find(|path| has_ending(path, "mcap")) {
             Some(mcap) => wrong(format!("is a rosbag2 in MCAP already: every command takes {}", mcap.display())),
             None => wrong("is a rosbag2 without a sqlite3 file (.db3)".to_owned()),
         });

@@ -57,8 +57,13 @@ pub(crate) struct Target {
 struct Topic {
     channel: u16,
     sequence: u32,
+    /// Of messages whose numbers can be read.
+    schema: Option<Schema>,
     /// Where its header has its stamp.
-    stamp: Option<(Schema, FieldPath)>,
+    stamp: Option<FieldPath>,
+    /// The joints of its first message, and the number of the first that has others, or in other places.
+    joints: Vec<String>,
+    changed: Option<u64>,
     stamps: Vec<i64>,
     logged: Vec<i64>,
     told: RosbagTopic,
@@ -89,25 +94,40 @@ impl Target {
             false => BTreeMap::from([("offered_qos_profiles".to_owned(), form.qos.to_owned())]),
         };
         let channel = schema.and_then(|schema| self.mcap.add_channel(schema, name, form.encoding, &metadata)).map_err(failed)?;
-        let schema = (form.encoding == "cdr").then(|| Schema::parse(form.type_name, form.definition).ok()).flatten();
-        let stamp = schema.and_then(|schema| schema.find("header.stamp").ok().map(|path| (schema, path)));
+        let parsed = (form.encoding == "cdr" && !form.schema_encoding.is_empty())
+            .then(|| Schema::parse(form.type_name, form.definition))
+            .transpose();
+        let (schema, note) = match parsed {
+            Ok(schema) => (schema, note),
+            Err(what) => (None, Some(format!("no numbers of it are read, its messages are kept as they are: {what}"))),
+        };
+        let stamp = schema.as_ref().and_then(|schema| schema.find("header.stamp").ok());
         let told = RosbagTopic {
             name: name.to_owned(),
             type_name: form.type_name.to_owned(),
             notes: note.into_iter().collect(),
             ..RosbagTopic::default()
         };
-        self.topics.push(Topic { channel, sequence: 0, stamp, stamps: Vec::new(), logged: Vec::new(), told });
+        let (joints, changed) = (Vec::new(), None);
+        self.topics.push(Topic { channel, sequence: 0, schema, stamp, joints, changed, stamps: Vec::new(), logged: Vec::new(), told });
         Ok(self.topics.len() - 1)
     }
 
     /// Writes a message of a topic; `logged_ns` is when it was recorded.
     pub(crate) fn push(&mut self, topic: usize, logged_ns: i64, payload: &[u8]) -> Result<(), BagError> {
         let Some(topic) = self.topics.get_mut(topic) else { return Ok(()) };
-        let stamp = match &topic.stamp {
-            Some((schema, path)) => schema.read_time_ns(path, payload).ok().flatten().unwrap_or(0),
-            None => 0,
+        let stamp = match (&topic.schema, &topic.stamp) {
+            (Some(schema), Some(path)) => schema.read_time_ns(path, payload).ok().flatten().unwrap_or(0),
+            _ => 0,
         };
+        if let Some(joints) = topic.schema.as_ref().filter(|_| topic.changed.is_none()).and_then(|schema| schema.joint_names(payload).ok())
+        {
+            match topic.joints.is_empty() {
+                true => topic.joints = joints,
+                false if joints.is_empty() || joints == topic.joints => {}
+                false => topic.changed = Some(topic.told.messages + 1),
+            }
+        }
         let log_time = u64::try_from(logged_ns).unwrap_or(0);
         let publish_time = u64::try_from(stamp).ok().filter(|stamp| *stamp != 0).unwrap_or(log_time);
         let header = MessageHeader { channel_id: topic.channel, sequence: topic.sequence, log_time, publish_time };
@@ -127,6 +147,10 @@ impl Target {
             // Differences of whole ns: seconds since 1970 would leave only 0.2 us of a double.
             let times: Vec<f64> = times.iter().map(|time| time.wrapping_sub(first) as f64 / 1e9).collect();
             topic.told.clock = clock_remarks(&times);
+            topic.told.notes.extend(topic.changed.map(|message| {
+                let joint = topic.joints.first().map_or("", String::as_str);
+                format!("message {message} has other joints, or in other places, than the first: name them in place of numbers, as in position[{joint}]")
+            }));
             topic.told
         });
         let topics: Vec<RosbagTopic> = topics.collect();

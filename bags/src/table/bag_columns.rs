@@ -1,11 +1,13 @@
 //! Which columns a table of a bag has.
 
 use super::mapping::{Quantity, topic_of};
+use crate::cdr::Schema;
 use crate::header::Clock;
 use crate::signals::TIME_TOPIC;
 use crate::{BagError, Reader, Signal};
 use backdrive_msgs::{MAX_AXES, Message};
 use backdrive_plant::model::Hold;
+use std::collections::BTreeSet;
 
 /// The signals of all topics that have numbers: those of ours that were measured at least once, of others every number.
 ///
@@ -15,7 +17,7 @@ pub fn columns_of(reader: &Reader, topics: Option<&[String]>) -> Result<Vec<Sign
     let listed = |name: &str| topics.is_none_or(|topics| topics.iter().any(|topic| topic == name));
     let count = reader.topics().len();
     let mut measured = vec![[[false; MAX_AXES]; 3]; count];
-    let mut foreign: Vec<Option<Vec<String>>> = vec![None; count];
+    let mut foreign: Vec<Option<Foreign>> = vec![None; count];
     let mut gains = vec![false; count];
     for entry in reader.messages()? {
         let entry = entry?;
@@ -32,11 +34,7 @@ pub fn columns_of(reader: &Reader, topics: Option<&[String]>) -> Result<Vec<Sign
             Some(Message::Gains(_)) => gains[index] = true,
             Some(Message::Event(_) | Message::Status(_) | Message::Margin(_)) => {}
             // A topic whose fields cannot be read has no columns.
-            None if foreign[index].is_none() => {
-                let numbers = entry.topic.parse_schema().ok().and_then(|schema| schema.numbers(&entry.payload).ok());
-                foreign[index] = Some(numbers.unwrap_or_default());
-            }
-            None => {}
+            None => foreign[index].get_or_insert_with(|| Foreign::new(entry.topic.parse_schema().ok())).see(&entry.payload),
         }
     }
     let mut wanted = Vec::new();
@@ -54,11 +52,71 @@ pub fn columns_of(reader: &Reader, topics: Option<&[String]>) -> Result<Vec<Sign
         for field in ["mu", "lambda"].iter().filter(|_| gains[topic.index]) {
             wanted.push(Signal { hold: Hold::Zero, ..Signal::new(&format!("{}.{field}", topic.name), &topic.name, field) });
         }
-        for field in foreign[topic.index].iter().flatten().filter(|field| !field.starts_with("header.")) {
-            wanted.push(Signal::new(&format!("{}.{field}", topic.name), &topic.name, field));
+        for field in foreign[topic.index].iter().flat_map(Foreign::fields).filter(|field| !field.starts_with("header.")) {
+            wanted.push(Signal::new(&format!("{}.{field}", topic.name), &topic.name, &field));
         }
     }
     Ok(wanted)
+}
+
+/// The numbers of somebody else's topic, as its messages show them.
+#[derive(Debug, Clone, Default)]
+struct Foreign {
+    schema: Option<Schema>,
+    /// Sizes of messages that were looked at: those of another size may have longer lists.
+    sizes: BTreeSet<usize>,
+    numbers: Vec<String>,
+    /// Joints of all messages, and whether some message has others, or in other places, than the first.
+    joints: Vec<String>,
+    first: Vec<String>,
+    changes: bool,
+}
+
+/// Messages of so many sizes are looked at; text in them makes every one of another size.
+const MOST_SIZES: usize = 64;
+
+impl Foreign {
+    fn new(schema: Option<Schema>) -> Foreign {
+        Foreign { schema, ..Foreign::default() }
+    }
+
+    fn see(&mut self, payload: &[u8]) {
+        let Some(schema) = &self.schema else { return };
+        if self.sizes.len() < MOST_SIZES && self.sizes.insert(payload.len()) {
+            let found = schema.numbers(payload).unwrap_or_default();
+            let new: Vec<String> = found.into_iter().filter(|field| !self.numbers.contains(field)).collect();
+            self.numbers.extend(new);
+        }
+        if schema.name_list().is_none() {
+            return;
+        }
+        let joints = schema.joint_names(payload).unwrap_or_default();
+        if self.first.is_empty() {
+            self.first.clone_from(&joints);
+        }
+        if joints != self.first {
+            self.changes |= !joints.is_empty();
+        } else if !self.joints.is_empty() {
+            return;
+        }
+        let new: Vec<String> = joints.into_iter().filter(|joint| !self.joints.contains(joint)).collect();
+        self.joints.extend(new);
+    }
+
+    /// Its fields; entries of lists by the names of the joints, where their places change.
+    fn fields(&self) -> Vec<String> {
+        let list =
+            |field: &String| field.split_once('[').filter(|(list, _)| self.changes && !list.contains('.')).map(|(list, _)| list.to_owned());
+        let mut fields: Vec<String> = Vec::new();
+        for field in &self.numbers {
+            match list(field) {
+                None => fields.push(field.clone()),
+                Some(list) if fields.iter().any(|known| known.starts_with(&format!("{list}["))) => {}
+                Some(list) => fields.extend(self.joints.iter().map(|joint| format!("{list}[{joint}]"))),
+            }
+        }
+        fields
+    }
 }
 
 /// Whether a bag was made of a table.

@@ -1,58 +1,88 @@
 //! Tables as CSV.
 
 use super::mapping::ImportOptions;
-use super::to_bag::name_of;
-use super::types::{Cells, Column, Table};
+use super::types::{Cells, Column, Lines, Table, name_of};
 use crate::BagError;
 use crate::number_type::NumberType;
-use backdrive_plant::recording::separator_of;
+use backdrive_plant::recording::{TextTable, comma_remark};
 use std::path::Path;
 
-/// Reads a CSV file, whose cells are separated by commas, semicolons, tabs or spaces. A column with a cell that is no number holds none, unless it is asked for: then that is an error, as is an empty cell or `nan`.
+/// Reads a CSV file, whose cells are separated by commas, semicolons, tabs or spaces. A column with a cell that is no number holds none, unless it is asked for: then that is an
+/// error, as is an empty cell or `nan` of a column that goes into the bag.
 pub(crate) fn read(path: &Path, options: &ImportOptions) -> Result<Table, BagError> {
-    let wrong = |line: u64, what: String| BagError::Table { path: path.to_owned(), line, what };
-    let failed = |error: csv::Error| {
-        let line = error.position().map_or(1, csv::Position::line);
-        wrong(line, error.to_string())
-    };
+    let wrong = |(line, what): (u64, String)| BagError::Table { path: path.to_owned(), line, what };
     let file = std::fs::File::open(path).map_err(BagError::io(path))?;
-    // What comes through a pipe cannot be looked at before it is read.
-    let separator = if path.is_file() { separator_of(path) } else { b',' };
-    let mut csv =
-        csv::ReaderBuilder::new().delimiter(separator).trim(csv::Trim::All).comment(Some(b'#')).from_reader(std::io::BufReader::new(file));
-    let headings: Vec<String> =
-        csv.headers().map_err(failed)?.iter().map(|heading| heading.trim_start_matches('\u{feff}').to_owned()).collect();
-    let mut columns: Vec<Option<Vec<f64>>> = vec![Some(Vec::new()); headings.len()];
-    let needed = |heading: &str| heading == options.time || options.columns.iter().any(|map| map.column == heading);
+    let mut table = TextTable::new(std::io::BufReader::new(file)).map_err(BagError::io(path))?;
     let mut record = csv::StringRecord::new();
-    while csv.read_record(&mut record).map_err(failed)? {
-        for ((cell, column), heading) in record.iter().zip(&mut columns).zip(&headings) {
-            let Some(values) = column else { continue };
-            let heading = name_of(heading, options);
-            let line = || record.position().map_or(0, csv::Position::line);
-            match cell.parse::<f64>() {
-                Ok(value) if value.is_finite() => values.push(value),
-                Ok(_) => {
-                    return Err(wrong(line(), format!("column {heading:?}: expected a number, found {cell:?}; leave such rows out")));
-                }
-                Err(_) if cell.is_empty() && !values.is_empty() => {
-                    return Err(wrong(line(), format!("column {heading:?}: expected a number, found an empty cell; leave such rows out")));
-                }
-                Err(_) if needed(heading) => return Err(wrong(line(), format!("column {heading:?}: {cell:?} is not a number"))),
-                Err(_) => *column = None,
-            }
+    let heading = table.next(&mut record).map_err(wrong)?.unwrap_or(1);
+    let mut columns: Vec<Read> = record.iter().map(|heading| Read::new(heading, options)).collect();
+    let mut lines = Vec::new();
+    while let Some(line) = table.next(&mut record).map_err(wrong)? {
+        lines.push(line);
+        for (cell, column) in record.iter().zip(&mut columns) {
+            column.take(line, cell).map_err(|what| wrong((line, what)))?;
         }
     }
-    let column = |(name, values): (String, Option<Vec<f64>>)| match values {
-        Some(values) => Column::new(name, values, NumberType::Double),
-        None => Column::other(name, "something that is no number"),
-    };
-    Ok(Table { columns: headings.into_iter().zip(columns).map(column).collect(), notes: Vec::new(), is_text: true })
+    Ok(Table { columns: columns.into_iter().map(Read::column).collect(), notes: Vec::new(), lines: Some(Lines { heading, rows: lines }) })
+}
+
+/// A column that is being read.
+struct Read {
+    heading: String,
+    /// What it is called in the bag.
+    name: String,
+    /// It goes into the bag if it holds numbers.
+    is_wanted: bool,
+    /// Somebody asked for it: it has to hold numbers.
+    is_asked_for: bool,
+    values: Vec<f64>,
+    /// What of it is no number, once there is something.
+    other: Option<String>,
+}
+
+impl Read {
+    fn new(heading: &str, options: &ImportOptions) -> Read {
+        let name = name_of(heading).to_owned();
+        let is = |asked: &str| asked == name || asked == heading;
+        let is_asked_for = is(&options.time) || options.columns.iter().any(|map| is(&map.column));
+        let is_wanted = is_asked_for || options.columns.is_empty();
+        Read { heading: heading.to_owned(), name, is_wanted, is_asked_for, values: Vec::new(), other: None }
+    }
+
+    fn take(&mut self, line: u64, cell: &str) -> Result<(), String> {
+        if self.other.is_some() {
+            return Ok(());
+        }
+        let shown = if cell.is_empty() { "an empty cell".to_owned() } else { format!("{cell:?}") };
+        match cell.parse::<f64>() {
+            Ok(value) if value.is_finite() || !self.is_wanted => self.values.push(value),
+            Err(_) if cell.is_empty() && !self.is_wanted => self.values.push(f64::NAN),
+            Err(_) if !cell.is_empty() && self.is_asked_for => {
+                return Err(format!("column {:?}: {shown} is not a number{}", self.name, comma_remark(cell)));
+            }
+            Err(_) if !cell.is_empty() || (self.values.is_empty() && !self.is_asked_for) => {
+                self.values = Vec::new();
+                self.other = Some(format!("something that is no number, first in line {line}: {shown}{},", comma_remark(cell)));
+            }
+            _ => {
+                let advice = "leave such rows out, or name the columns that count with --map";
+                return Err(format!("column {:?}: expected a number, found {shown}; {advice}", self.name));
+            }
+        }
+        Ok(())
+    }
+
+    fn column(self) -> Column {
+        match self.other {
+            Some(other) => Column::other(self.heading, other),
+            None => Column::new(self.heading, self.values, NumberType::Double),
+        }
+    }
 }
 
 /// Writes a table; numbers have the shortest digits that read back to the same bits, and what was not measured is `nan`.
 pub(crate) fn write(table: &Table, out: &Path) -> Result<(), BagError> {
-    let file = std::fs::File::create_new(out).map_err(BagError::io(out))?;
+    let file = std::fs::File::create_new(out).map_err(BagError::create(out))?;
     let mut csv = csv::Writer::from_writer(std::io::BufWriter::new(file));
     let failed = |error: csv::Error| BagError::Write { name: out.display().to_string(), what: error.to_string() };
     csv.write_record(table.columns.iter().map(|column| &column.name)).map_err(failed)?;
@@ -70,7 +100,7 @@ pub(crate) fn write(table: &Table, out: &Path) -> Result<(), BagError> {
         row.extend(columns.iter().map(|(values, of)| digits(values[index], *of)));
         csv.write_record(&row).map_err(failed)?;
     }
-    csv.flush().map_err(BagError::io(out))
+    csv.flush().map_err(BagError::create(out))
 }
 
 fn digits(value: f64, of: NumberType) -> String {

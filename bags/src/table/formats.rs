@@ -37,17 +37,34 @@ impl TableFormat {
         if start.starts_with(b"MATLAB 5.0 MAT-file") {
             return Ok(TableFormat::Mat);
         }
-        if start.starts_with(b"\x89HDF\r\n\x1a\n") || start.starts_with(b"MATLAB 7.3 MAT-file") {
+        let is_hdf5 = start.starts_with(b"\x89HDF\r\n\x1a\n");
+        if start.starts_with(b"MATLAB 7.3 MAT-file") || (is_hdf5 && promised == Some(TableFormat::Mat)) {
             return wrong("is a MATLAB file of version 7.3 (HDF5); save it again with save(..., '-v7')");
+        }
+        if is_hdf5 {
+            return wrong("is an HDF5 file, which is not read; write its columns as CSV or parquet (pandas: read_hdf, to_parquet)");
         }
         if start.starts_with(&mcap::MAGIC[..6]) {
             return wrong("is an MCAP file already: every command takes it as it is");
+        }
+        let packed: [(&[u8], &str); 4] = [
+            (b"\x28\xb5\x2f\xfd", "is compressed by zstd; unpack it with `zstd -d`"),
+            (b"\x1f\x8b", "is compressed by gzip; unpack it with `gunzip`"),
+            (b"BZh", "is compressed by bzip2; unpack it with `bunzip2`"),
+            (b"PK\x03\x04", "is a zip archive; of a workbook of Excel, save the table as CSV UTF-8, else unpack it"),
+        ];
+        if let Some((_, what)) = packed.iter().find(|(magic, _)| start.starts_with(magic)) {
+            return wrong(what);
         }
         match promised {
             Some(TableFormat::Parquet) => wrong("is not a parquet file: it does not start with the bytes PAR1"),
             Some(TableFormat::Mat) => wrong(
                 "is not a MATLAB file of version 5: it does not start with \"MATLAB 5.0 MAT-file\"; save it again with save(..., '-v7')",
             ),
+            // Text in UTF-16 has zeros too, and is told as such where its rows are read.
+            _ if start.contains(&0) && !start.starts_with(b"\xff\xfe") && !start.starts_with(b"\xfe\xff") => {
+                wrong("is neither text nor a file of another format that is known (parquet, MATLAB, ROS bag)")
+            }
             _ => Ok(TableFormat::Csv),
         }
     }

@@ -36,5 +36,5 @@ pub(crate) fn table_of(reader: &Reader, topics: Option<&[String]>) -> Result<Tab
     if let Cells::Numbers(values, _) = &mut columns[0].cells {
         *values = found.t;
     }
-    Ok(Table { columns, notes: Vec::new(), is_text: false })
+    Ok(Table { columns, notes: Vec::new(), lines: None })
 }

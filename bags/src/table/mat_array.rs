@@ -1,8 +1,8 @@
 //! The arrays of a MAT file of version 5: their tags, sizes and values, in either byte order, compressed or not.
 
 use super::mat_format::{
-    CLASS_STRUCTURE, CLASS_TEXT, CLASSES, COMPRESSED, DOUBLE, FLAG_COMPLEX, FLAG_LOGICAL, HEADER, INT8, INT16, INT32, INT64, MATRIX,
-    SINGLE, UINT8, UINT16, UINT32, UINT64, UTF8, UTF16,
+    CLASS_OPAQUE, CLASS_STRUCTURE, CLASS_TEXT, CLASSES, COMPRESSED, DOUBLE, FLAG_COMPLEX, FLAG_LOGICAL, HEADER, INT8, INT16, INT32, INT64,
+    MATRIX, SINGLE, UINT8, UINT16, UINT32, UINT64, UTF8, UTF16,
 };
 use crate::number_type::{LARGEST_WHOLE, NumberType};
 use flate2::read::ZlibDecoder;
@@ -133,6 +133,12 @@ impl<'a> Bytes<'a> {
         let (start, _, mut flags) = self.element()?;
         let flags = flags.word()?;
         let (class, marks) = (flags as u8, (flags >> 8) as u8);
+        if class == CLASS_OPAQUE {
+            // It has no size; what it holds is told nowhere.
+            let (_, _, name) = self.element()?;
+            let name = String::from_utf8_lossy(name.bytes).into_owned();
+            return Ok(Array { name, size: Vec::new(), held: Held::Other("an object such as a table, a string or a date") });
+        }
         let (_, kind, size) = self.element()?;
         let size = size.numbers(kind)?;
         let size: Vec<usize> = size.whole().iter().map(|side| usize::try_from(*side).unwrap_or(0)).collect();

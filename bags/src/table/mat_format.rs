@@ -24,6 +24,7 @@ pub(crate) const UTF16: u32 = 17;
 /// Classes of arrays.
 pub(crate) const CLASS_STRUCTURE: u8 = 2;
 pub(crate) const CLASS_TEXT: u8 = 4;
+pub(crate) const CLASS_OPAQUE: u8 = 17;
 
 /// Flags of arrays, beside their class.
 pub(crate) const FLAG_LOGICAL: u8 = 2;

@@ -15,7 +15,8 @@ pub(crate) fn read(path: &Path, options: &ImportOptions) -> Result<Table, BagErr
     let file = std::fs::read(path).map_err(BagError::io(path))?;
     let mut arrays = variables(&file).map_err(wrong)?;
     let names = names(&arrays);
-    arrays.retain(|array| array.name != NAMES);
+    // What objects hold stands at the end, without a name.
+    arrays.retain(|array| array.name != NAMES && !array.name.is_empty());
     if let Some(variable) = &options.variable {
         let there = || arrays.iter().map(|array| array.name.clone()).collect::<Vec<_>>().join(", ");
         match arrays.iter().position(|array| array.name == *variable) {
@@ -59,7 +60,7 @@ pub(crate) fn read(path: &Path, options: &ImportOptions) -> Result<Table, BagErr
         true => Vec::new(),
         false => vec![format!("left out, for they are no numbers as long as {}: {}", options.time, others.join(", "))],
     };
-    Ok(Table { columns, notes, is_text: false })
+    Ok(Table { columns, notes, lines: None })
 }
 
 /// Headings by the names that stand for them.

@@ -17,7 +17,7 @@ const LONGEST_NAME: usize = 63;
 /// Writes the columns of numbers as standing vectors, each with its class. Headings that are no names for MATLAB are changed, and told; the file has them in
 /// `backdrive_names`, by which an import gives them back.
 pub(crate) fn write(table: &Table, out: &Path) -> Result<Vec<String>, BagError> {
-    let file = File::create_new(out).map_err(BagError::io(out))?;
+    let file = File::create_new(out).map_err(BagError::create(out))?;
     let failed = |error: std::io::Error| BagError::Write { name: out.display().to_string(), what: error.to_string() };
     let mut sink = BufWriter::new(file);
     let mut header = format!("MATLAB 5.0 MAT-file, written by backdrive {}", env!("CARGO_PKG_VERSION")).into_bytes();

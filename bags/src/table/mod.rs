@@ -11,6 +11,7 @@ mod mat_in;
 mod mat_out;
 mod parquet_in;
 mod parquet_out;
+mod time_column;
 mod to_bag;
 mod types;
 

@@ -19,7 +19,7 @@ pub(crate) fn read(path: &Path) -> Result<Table, BagError> {
         };
         columns.push(column);
     }
-    Ok(Table { columns, notes: Vec::new(), is_text: false })
+    Ok(Table { columns, notes: Vec::new(), lines: None })
 }
 
 fn cells(values: Values) -> Cells {

@@ -1,83 +1,58 @@
 //! A table becomes a bag: the one way of all formats, with units, places of columns, and what is wrong with the clock.
 
 use super::mapping::{ColumnMap, ImportOptions, ImportReport, Quantity, topic_of};
-use super::types::{Cells, Table};
+use super::time_column::times_of;
+use super::types::{Cells, Table, name_of, unit_of};
 use crate::header::{BagHeader, Clock};
 use crate::number_type::NumberType;
 use crate::signals::TIME_TOPIC;
 use crate::{BagError, Recorder, RecorderOptions, TopicInfo, clock_remarks};
 use backdrive_msgs::topic::{Kind, Topic};
 use backdrive_msgs::{MAX_AXES, Message, Sample, source_id};
-use backdrive_plant::recording::units::{self, Unit};
-use std::borrow::Cow;
 use std::collections::{BTreeMap, HashMap};
 use std::path::Path;
 
-/// The unit that a heading names, where it is known and the heading is not asked for whole: then the column is called by its name, in SI units.
-pub(crate) fn unit_of(heading: &str, options: &ImportOptions) -> Option<Unit> {
-    let asked = heading == options.time || options.columns.iter().any(|map| map.column == heading);
-    units::split(heading).1.and_then(|unit| units::parse(unit).ok()).filter(|_| !asked)
-}
-
-/// What a column is called in the bag.
-pub(crate) fn name_of<'a>(heading: &'a str, options: &ImportOptions) -> &'a str {
-    unit_of(heading, options).map_or(heading, |_| units::split(heading).0)
-}
-
-/// A column in SI units.
+/// A column of numbers that may go into a bag.
 struct Known<'a> {
+    /// What it is called there.
     name: &'a str,
-    values: Cow<'a, [f64]>,
+    /// As they stand in the table.
+    values: &'a [f64],
+    /// Its unit in SI units.
+    factor: f64,
     of: NumberType,
+}
+
+/// What goes where: the place of its topic, how it gets there, its numbers.
+struct Source<'a> {
+    topic: usize,
+    quantity: Quantity,
+    axis: usize,
+    /// `scale * value + offset`; `None` where numbers stay as they are, their bits included.
+    scaled: Option<(f64, f64)>,
+    values: &'a [f64],
 }
 
 /// Writes a table, which is one experiment, as a bag; `path` is the file that it came from.
 pub(crate) fn write_bag(path: &Path, table: &Table, bag: &Path, options: &ImportOptions) -> Result<ImportReport, BagError> {
-    let mut notes = table.notes.clone();
-    let mut known: Vec<Known> = Vec::with_capacity(table.columns.len());
-    let mut skipped: Vec<(&str, Cow<str>)> = Vec::new();
-    for column in &table.columns {
-        let (name, unit) = (name_of(&column.name, options), unit_of(&column.name, options));
+    let clock = times_of(path, table, options)?;
+    let times = &clock.values;
+    let mut notes: Vec<String> = table.notes.iter().cloned().chain(clock.note).collect();
+    let mut known: HashMap<usize, Known> = HashMap::new();
+    let mut skipped: Vec<(&str, &str)> = Vec::new();
+    for (place, column) in table.columns.iter().enumerate() {
+        let name = name_of(&column.name);
         match &column.cells {
-            Cells::Numbers(values, of) => known.push(match unit.map_or(1.0, |unit| unit.factor) {
-                1.0 => Known { name, values: values.into(), of: *of },
-                factor => Known { name, values: values.iter().map(|value| value * factor).collect(), of: NumberType::Double },
-            }),
-            Cells::Large { values, per_second } if name == options.time => {
-                let unit = unit.filter(|unit| unit.kind == units::Kind::Time).map(|unit| (1.0 / unit.factor).round());
-                let Some(per_second) = per_second.or(unit) else {
-                    let what = format!(
-                        "the times in {name:?} are whole numbers beyond 2^53: say their unit in the heading, as in \"{name} [ns]\""
-                    );
-                    return Err(table.wrong_columns(path, what));
-                };
-                let first = values.first().copied().unwrap_or(0);
-                // Differences of whole numbers: seconds since 1970 would leave only 0.2 us of a double.
-                let times = values.iter().map(|value| (i128::from(*value) - i128::from(first)) as f64 / per_second).collect();
-                notes.push(format!("times are counted from the first row, whose {name:?} is {first}"));
-                known.push(Known { name, values: times, of: NumberType::Double });
+            Cells::Numbers(values, of) => {
+                let factor = unit_of(&column.name).map_or(1.0, |unit| unit.factor);
+                known.insert(place, Known { name, values, factor, of: *of });
             }
-            Cells::Large { .. } => skipped.push((name, "whole numbers beyond 2^53, which a bag does not hold exactly,".into())),
-            Cells::Other(holds) => skipped.push((name, holds.into())),
+            Cells::Large { .. } if place == clock.place => {}
+            Cells::Large { per_second: Some(_), .. } => skipped.push((name, "points in time, of which a bag has one column,")),
+            Cells::Large { .. } => skipped.push((name, "whole numbers beyond 2^53, which a bag does not hold exactly,")),
+            Cells::Other(holds) => skipped.push((name, holds)),
         }
     }
-    let names: Vec<&str> = known.iter().map(|column| column.name).collect();
-    let missing = |heading: &str| {
-        let what = match skipped.iter().find(|skipped| skipped.0 == heading) {
-            Some((_, holds)) => format!("column {heading:?} holds {holds}"),
-            None if names.iter().all(|name| name.is_empty()) => "is empty, expected a heading such as t,force,position".to_owned(),
-            None => format!("there is no column {heading:?}; there is {}", names.join(", ")),
-        };
-        table.wrong_columns(path, what)
-    };
-    let find = |heading: &str| known.iter().find(|column| column.name == heading).ok_or_else(|| missing(heading));
-    let clock = find(&options.time)?;
-    let times = &clock.values;
-    if times.is_empty() {
-        return Err(table.wrong_columns(path, "there are no rows below the heading".to_owned()));
-    }
-    check_times(path, table, times)?;
-    let maps = if options.columns.is_empty() { default_maps(&names, &options.time) } else { options.columns.clone() };
     let mut info = vec![topic_info(TIME_TOPIC, "t")];
     let mut types = BTreeMap::new();
     let mut remember = |topic: &str, quantity: Quantity, axis: usize, of: NumberType| {
@@ -86,17 +61,18 @@ pub(crate) fn write_bag(path: &Path, table: &Table, bag: &Path, options: &Import
         }
     };
     remember(TIME_TOPIC, Quantity::Position, 0, clock.of);
-    let mut sources: Vec<(usize, &ColumnMap, &[f64])> = Vec::with_capacity(maps.len());
+    let maps = placed(path, table, &known, &skipped, clock.place, options)?;
+    let mut sources: Vec<Source> = Vec::with_capacity(maps.len());
     let mut taken = HashMap::new();
-    for map in &maps {
+    for (column, map) in &maps {
         if map.axis >= MAX_AXES {
             return Err(BagError::Usage(format!("column {:?}: axis {} is beyond the last, {}", map.column, map.axis, MAX_AXES - 1)));
         }
         if let Some(other) = taken.insert((&map.topic, map.quantity.field(), map.axis), &map.column) {
             let place = format!("{}[{}] of {}", map.quantity.field(), map.axis, map.topic);
-            return Err(BagError::Usage(format!("columns {other:?} and {:?} both go to {place}", map.column)));
+            let what = format!("columns {other:?} and {:?} both go to {place}; say with --map where each goes", map.column);
+            return Err(table.wrong_columns(path, what));
         }
-        let column = find(&map.column)?;
         if let Some(row) = column.values.iter().position(|value| !value.is_finite()) {
             let found = if column.values[row].is_nan() { "none (NaN)".to_owned() } else { format!("{:?}", column.values[row]) };
             let what = format!(
@@ -112,11 +88,13 @@ pub(crate) fn write_bag(path: &Path, table: &Table, bag: &Path, options: &Import
         for axis in info[place].axes.len()..=map.axis {
             info[place].axes.push(format!("axis{axis}"));
         }
-        // Unscaled cells keep their type, and their bits, the sign of a zero included.
-        if (map.scale, map.offset) == (1.0, 0.0) {
+        // A scale that somebody gives goes before the unit of the heading.
+        let (scale, offset) = if (map.scale, map.offset) == (1.0, 0.0) { (column.factor, 0.0) } else { (map.scale, map.offset) };
+        let scaled = Some((scale, offset)).filter(|scaled| *scaled != (1.0, 0.0));
+        if scaled.is_none() {
             remember(&map.topic, map.quantity, map.axis, column.of);
         }
-        sources.push((place, map, &column.values));
+        sources.push(Source { topic: place, quantity: map.quantity, axis: map.axis, scaled, values: column.values });
     }
     let span = times.last().zip(times.first()).map_or(0.0, |(last, first)| last - first);
     let header = BagHeader {
@@ -135,39 +113,60 @@ pub(crate) fn write_bag(path: &Path, table: &Table, bag: &Path, options: &Import
     Ok(ImportReport { rows: times.len() as u64, topics, skipped, notes, clock: clock_remarks(times) })
 }
 
-/// Times have to grow: every step in a bag has one.
-fn check_times(path: &Path, table: &Table, times: &[f64]) -> Result<(), BagError> {
-    if let Some(row) = times.iter().position(|time| time.is_nan() || time.abs() > 9.2e9) {
-        return Err(table.wrong(path, row, format!("{:?} is no time in s", times[row])));
+/// Which column goes where: as was asked for, or each as a topic of its own.
+fn placed<'a, 'b>(
+    path: &Path,
+    table: &Table,
+    known: &'b HashMap<usize, Known<'a>>,
+    skipped: &[(&str, &str)],
+    time: usize,
+    options: &ImportOptions,
+) -> Result<Vec<(&'b Known<'a>, ColumnMap)>, BagError> {
+    if options.columns.is_empty() {
+        let own = |column: &'b Known<'a>| {
+            let (name, topic) = (column.name.to_owned(), topic_of(column.name));
+            (column, ColumnMap { column: name, topic, quantity: Quantity::Position, axis: 0, scale: 1.0, offset: 0.0 })
+        };
+        let own: Vec<_> = (0..table.columns.len()).filter(|place| *place != time).filter_map(|place| known.get(&place)).map(own).collect();
+        return match own.is_empty() {
+            false => Ok(own),
+            true => {
+                let why: String =
+                    skipped.iter().map(|(name, holds)| format!("; column {name:?} holds {}", holds.trim_end_matches(','))).collect();
+                Err(table.wrong_columns(path, format!("there is no column of numbers beside the times{why}")))
+            }
+        };
     }
-    match times.windows(2).position(|pair| pair[1] <= pair[0]) {
-        Some(row) => {
-            let (before, now) = (times[row], times[row + 1]);
-            let what = match now == before {
-                true => format!("the time {now:?} s stands in two rows; leave out what was recorded twice"),
-                false => format!("time goes back from {before:?} to {now:?} s; cut the recording there"),
-            };
-            Err(table.wrong(path, row + 1, what))
-        }
-        None => Ok(()),
-    }
+    let find = |map: &ColumnMap| {
+        let place = table.find(path, &map.column)?.ok_or_else(|| table.no_column(path, &map.column, ""))?;
+        let holds = || skipped.iter().find(|(name, _)| *name == name_of(&table.columns[place].name)).map_or("times", |(_, holds)| *holds);
+        let column = known
+            .get(&place)
+            .ok_or_else(|| table.wrong_columns(path, format!("column {:?} holds {}", map.column, holds().trim_end_matches(','))))?;
+        Ok((column, map.clone()))
+    };
+    options.columns.iter().map(find).collect()
 }
 
-/// A row is a step.
-fn record(bag: &Path, header: &BagHeader, times: &[f64], sources: &[(usize, &ColumnMap, &[f64])], overwrite: bool) -> Result<(), BagError> {
-    let mut recorder = Recorder::create(bag, header, &RecorderOptions { overwrite, ..RecorderOptions::lockstep() })?;
+/// A row is a step. Half a bag would look like a whole one, so none is left behind.
+fn record(bag: &Path, header: &BagHeader, times: &[f64], sources: &[Source], overwrite: bool) -> Result<(), BagError> {
+    let recorder = Recorder::create(bag, header, &RecorderOptions { overwrite, ..RecorderOptions::lockstep() })?;
+    fill(recorder, header, times, sources).inspect_err(|_| drop(std::fs::remove_file(bag)))
+}
+
+fn fill(mut recorder: Recorder, header: &BagHeader, times: &[f64], sources: &[Source]) -> Result<(), BagError> {
     for (row, time) in times.iter().enumerate() {
         let mut samples: Vec<Sample> = header.topics.iter().map(|info| Sample::new(info.axes.len())).collect();
         samples[0].position[0] = *time;
-        for (place, map, column) in sources {
-            let sample = &mut samples[*place];
-            let values = match map.quantity {
+        for source in sources {
+            let sample = &mut samples[source.topic];
+            let values = match source.quantity {
                 Quantity::Position => &mut sample.position,
                 Quantity::Velocity => &mut sample.velocity,
                 Quantity::Effort => &mut sample.effort,
             };
-            let unscaled = (map.scale, map.offset) == (1.0, 0.0);
-            values[map.axis] = if unscaled { column[row] } else { map.scale * column[row] + map.offset };
+            let value = source.values[row];
+            values[source.axis] = source.scaled.map_or(value, |(scale, offset)| scale * value + offset);
         }
         for (index, mut sample) in samples.into_iter().enumerate() {
             (sample.step, sample.sequence, sample.source) = (row as u64, row as u64, source_id("import"));
@@ -182,12 +181,4 @@ fn record(bag: &Path, header: &BagHeader, times: &[f64], sources: &[(usize, &Col
 fn topic_info(name: &str, axis: &str) -> TopicInfo {
     let topic = Topic { name: name.to_owned(), kind: Kind::Sample };
     TopicInfo { topic, axes: vec![axis.to_owned()], publisher: "import".to_owned() }
-}
-
-fn default_maps(names: &[&str], time: &str) -> Vec<ColumnMap> {
-    let map = |column: &&str| {
-        let (column, topic) = ((*column).to_owned(), topic_of(column));
-        ColumnMap { column, topic, quantity: Quantity::Position, axis: 0, scale: 1.0, offset: 0.0 }
-    };
-    names.iter().filter(|name| **name != time).map(map).collect()
 }

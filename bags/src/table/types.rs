@@ -2,7 +2,18 @@
 
 use crate::BagError;
 use crate::number_type::{LARGEST_WHOLE, NumberType};
+use backdrive_plant::recording::units::{self, Unit};
 use std::path::Path;
+
+/// The unit that a heading names, where it is known.
+pub(crate) fn unit_of(heading: &str) -> Option<Unit> {
+    units::split(heading).1.and_then(|unit| units::parse(unit).ok())
+}
+
+/// What a column is called in the bag: its heading without the unit, where that is known.
+pub(crate) fn name_of(heading: &str) -> &str {
+    unit_of(heading).map_or(heading, |_| units::split(heading).0)
+}
 
 /// Columns of equal length, in the order of their file.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -11,8 +22,15 @@ pub(crate) struct Table {
     pub(crate) columns: Vec<Column>,
     /// What else a person should know of the file: a sentence each.
     pub(crate) notes: Vec<String>,
-    /// Whether it is text, whose places are lines; the heading is the first.
-    pub(crate) is_text: bool,
+    /// Of text, in which lines it stands.
+    pub(crate) lines: Option<Lines>,
+}
+
+/// Lines of a file of text, from 1.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(crate) struct Lines {
+    pub(crate) heading: u64,
+    pub(crate) rows: Vec<u64>,
 }
 
 /// A column of a table.
@@ -83,19 +101,51 @@ impl Table {
         }
     }
 
+    /// The place of the column with this heading, else of the one that is called so without its unit.
+    pub(crate) fn find(&self, path: &Path, asked: &str) -> Result<Option<usize>, BagError> {
+        let of = |is: &dyn Fn(&Column) -> bool| (0..self.columns.len()).filter(|place| is(&self.columns[*place])).collect::<Vec<_>>();
+        let exact = of(&|column| column.name == asked);
+        let found = if exact.is_empty() { of(&|column| name_of(&column.name) == asked) } else { exact };
+        match found.as_slice() {
+            [_, _, ..] => Err(self.wrong_columns(path, format!("two columns are called {asked:?}; give one another heading"))),
+            found => Ok(found.first().copied()),
+        }
+    }
+
+    /// An error that lists the columns in place of the one that is not there.
+    pub(crate) fn no_column(&self, path: &Path, asked: &str, advice: &str) -> BagError {
+        let (mut numbers, mut others) = (Vec::new(), Vec::new());
+        for column in &self.columns {
+            let of = if matches!(column.cells, Cells::Other(_)) { &mut others } else { &mut numbers };
+            of.push(name_of(&column.name));
+        }
+        let is_number = |name: &&str| name.parse::<f64>().is_ok();
+        let what = if self.columns.iter().all(|column| column.name.is_empty()) {
+            "is empty, expected a heading such as t,force,position".to_owned()
+        } else if self.lines.is_some() && numbers.iter().chain(&others).all(is_number) {
+            "there is no heading: expected names of columns such as t,force,position, found numbers; a line that begins with # is a comment"
+                .to_owned()
+        } else if numbers.is_empty() {
+            format!("there is no column {asked:?}, and none with numbers; there is {}", others.join(", "))
+        } else {
+            format!("there is no column {asked:?}; there is {}{advice}", numbers.join(", "))
+        };
+        self.wrong_columns(path, what)
+    }
+
     /// An error at a row (from 0), told as a person counts in such a file.
     pub(crate) fn wrong(&self, path: &Path, row: usize, what: String) -> BagError {
-        match self.is_text {
-            true => BagError::Table { path: path.to_owned(), line: row as u64 + 2, what },
-            false => BagError::File { path: path.to_owned(), what: format!("row {}: {what}", row + 1) },
+        match &self.lines {
+            Some(lines) => BagError::Table { path: path.to_owned(), line: lines.rows.get(row).copied().unwrap_or(lines.heading), what },
+            None => BagError::File { path: path.to_owned(), what: format!("row {}: {what}", row + 1) },
         }
     }
 
     /// An error about its columns as such.
     pub(crate) fn wrong_columns(&self, path: &Path, what: String) -> BagError {
-        match self.is_text {
-            true => BagError::Table { path: path.to_owned(), line: 1, what },
-            false => BagError::File { path: path.to_owned(), what },
+        match &self.lines {
+            Some(lines) => BagError::Table { path: path.to_owned(), line: lines.heading, what },
+            None => BagError::File { path: path.to_owned(), what },
         }
     }
 }

@@ -2,12 +2,13 @@
 
 use super::columns::{Columns, Piece, Source};
 use super::record::{Recording, RecordingError, signals_of};
-use super::separator::{separator_in, separator_of};
+use super::text_table::{TextTable, comma_remark};
 use super::units::{self, Kind, Unit};
 use crate::model::Model;
 use crate::tomlfile::{self, FileError};
-use csv::{ReaderBuilder, StringRecord, Trim};
+use csv::StringRecord;
 use std::fs::File;
+use std::io::{BufRead, BufReader};
 use std::path::Path;
 
 /// A column to be read.
@@ -28,23 +29,17 @@ struct Wanted {
 pub fn read_headings(path: &Path) -> Result<Vec<String>, FileError> {
     let name = path.display().to_string();
     let file = File::open(path).map_err(|e| tomlfile::unreadable(path, &e))?;
-    let mut reader = table(separator_of(path)).from_reader(file);
-    let headings = heading_of(&mut reader, &name)?;
-    Ok(headings.iter().map(|heading| heading.trim_start_matches('\u{feff}').to_string()).collect())
+    let mut table = TextTable::new(BufReader::new(file)).map_err(|e| tomlfile::unreadable(path, &e))?;
+    Ok(heading_of(&mut table, &name)?.1.iter().map(str::to_string).collect())
 }
 
-/// How a table is read.
-fn table(separator: u8) -> ReaderBuilder {
-    let mut table = ReaderBuilder::new();
-    table.delimiter(separator).trim(Trim::All).flexible(true).comment(Some(b'#'));
-    table
-}
-
-fn heading_of<R: std::io::Read>(reader: &mut csv::Reader<R>, name: &str) -> Result<StringRecord, FileError> {
-    let headings = reader.headers().map_err(|e| FileError::at(name, 1, "", e.to_string()))?.clone();
-    match headings.iter().all(str::is_empty) {
-        true => Err(FileError::at(name, 1, "", "is empty, expected a heading such as t,force,position")),
-        false => Ok(headings),
+/// The heading, and its line.
+fn heading_of<R: BufRead>(table: &mut TextTable<R>, name: &str) -> Result<(usize, StringRecord), FileError> {
+    let mut heading = StringRecord::new();
+    let line = table.next(&mut heading).map_err(|(line, what)| FileError::at(name, line as usize, "", what))?;
+    match heading.iter().all(str::is_empty) {
+        true => Err(FileError::at(name, line.unwrap_or(1) as usize, "", "is empty, expected a heading such as t,force,position")),
+        false => Ok((line.unwrap_or(1) as usize, heading)),
     }
 }
 
@@ -84,15 +79,14 @@ pub fn read_signals_of(
 pub fn read_csv(path: &Path, signals: Option<&[&str]>, columns: &Columns, piece: &Piece) -> Result<Recording, FileError> {
     let name = path.display().to_string();
     let text = tomlfile::read_text(path)?;
-    let text = text.strip_prefix('\u{feff}').unwrap_or(&text);
-    let mut reader = table(separator_in(text.as_bytes())).from_reader(text.as_bytes());
-    let headings = heading_of(&mut reader, &name)?;
-    let file = Headings { name: &name, headings: &headings };
+    let mut table = TextTable::new(text.as_bytes()).map_err(|e| tomlfile::unreadable(path, &e))?;
+    let (heading_line, headings) = heading_of(&mut table, &name)?;
+    let file = Headings { name: &name, line: heading_line, headings: &headings };
     let time = file.find("t", columns)?;
     if let Some(unit) = time.unit.filter(|unit| unit.kind != Kind::Time) {
         return Err(FileError::at(
             &name,
-            1,
+            heading_line,
             &time.heading,
             format!("is in {}, {}, expected a time such as s or ms", unit.name, unit.kind.text()),
         ));
@@ -114,18 +108,9 @@ pub fn read_csv(path: &Path, signals: Option<&[&str]>, columns: &Columns, piece:
     let mut row = 0;
     let [from, to] = piece.rows.unwrap_or([0, usize::MAX]);
     loop {
-        let more = reader.read_record(&mut record).map_err(|e| {
-            let line = e.position().map_or(1, |p| p.line() as usize);
-            FileError::at(&name, line, "", e.to_string())
-        })?;
-        if !more || row >= to {
-            break;
-        }
-        let line = record.position().map_or(row + 2, |p| p.line() as usize);
-        if record.len() != headings.len() {
-            let message = format!("expected {} cells, as the heading has, found {}", headings.len(), record.len());
-            return Err(FileError::at(&name, line, "", message));
-        }
+        let next = if row >= to { Ok(None) } else { table.next(&mut record) };
+        let Some(line) = next.map_err(|(line, what)| FileError::at(&name, line as usize, "", what))? else { break };
+        let line = line as usize;
         row += 1;
         if row <= from || !chosen.iter().all(|(index, cell)| cell.matches(&record[*index])) {
             continue;
@@ -161,7 +146,9 @@ pub fn read_csv(path: &Path, signals: Option<&[&str]>, columns: &Columns, piece:
 fn number(name: &str, line: usize, record: &StringRecord, column: &Wanted) -> Result<f64, FileError> {
     let cell = &record[column.index];
     let wrong = |found: String| FileError::at(name, line, &column.heading, format!("expected a number, found {found}"));
-    let value: f64 = cell.parse().map_err(|_| wrong(if cell.is_empty() { "an empty cell".into() } else { format!("\"{cell}\"") }))?;
+    let value: f64 = cell
+        .parse()
+        .map_err(|_| wrong(if cell.is_empty() { "an empty cell".into() } else { format!("\"{cell}\"{}", comma_remark(cell)) }))?;
     if !value.is_finite() {
         return Err(wrong(format!("\"{cell}\"; leave such rows out, or give a piece without them with rows")));
     }
@@ -170,6 +157,8 @@ fn number(name: &str, line: usize, record: &StringRecord, column: &Wanted) -> Re
 
 struct Headings<'a> {
     name: &'a str,
+    /// Where the heading stands.
+    line: usize,
     headings: &'a StringRecord,
 }
 
@@ -181,13 +170,13 @@ impl Headings<'_> {
         let pair = (found.next(), found.next());
         match if pair.0.is_some() { pair } else { (bare.next(), bare.next()) } {
             (Some(index), None) => Ok(index),
-            (Some(_), Some(_)) => Err(FileError::at(self.name, 1, heading, "two columns have this heading")),
+            (Some(_), Some(_)) => Err(FileError::at(self.name, self.line, heading, "two columns have this heading")),
             (None, _) => {
                 let mut message = tomlfile::unknown("column", heading, self.headings.iter());
                 if heading == signal && asked_by.is_empty() {
                     message.push_str(&format!(" ([columns] {signal} = \"...\" says which column it is)"));
                 }
-                Err(FileError::at(self.name, 1, asked_by, message))
+                Err(FileError::at(self.name, self.line, asked_by, message))
             }
         }
     }
@@ -199,7 +188,7 @@ impl Headings<'_> {
             Some(Source::Column(heading)) => heading,
             Some(Source::Topic { topic, .. }) => {
                 let message = format!("[columns] takes \"{signal}\" from the topic {topic}, and a CSV file has columns");
-                return Err(FileError::at(self.name, 1, "", message));
+                return Err(FileError::at(self.name, self.line, "", message));
             }
         };
         let asked_by = if rule.is_some() && heading != signal { format!("[columns] {signal}") } else { String::new() };
@@ -210,7 +199,12 @@ impl Headings<'_> {
             None => {
                 let unit = units::split(&heading).1.map(units::parse).transpose();
                 let unit = unit.map_err(|message| {
-                    FileError::at(self.name, 1, &heading, format!("{message}; or say scale for \"{signal}\" under [columns] of set.toml"))
+                    FileError::at(
+                        self.name,
+                        self.line,
+                        &heading,
+                        format!("{message}; or say scale for \"{signal}\" under [columns] of set.toml"),
+                    )
                 })?;
                 (unit.map_or(1.0, |u| u.factor), unit)
             }

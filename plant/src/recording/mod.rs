@@ -6,6 +6,7 @@ mod hold;
 mod joints;
 mod record;
 mod separator;
+mod text_table;
 pub mod units;
 
 pub use columns::{Cell, ColumnRule, Columns, Piece, Source, read_columns};
@@ -14,4 +15,4 @@ pub use hold::{resample, segments};
 pub use joints::JointColumns;
 pub(crate) use joints::read_joints;
 pub use record::{Gap, Jitter, Recording, RecordingError, signals_of};
-pub use separator::separator_of;
+pub use text_table::{TextTable, comma_remark};

@@ -15,6 +15,24 @@ struct Plan {
     /// Seconds and ns of the header's stamp, where there is one.
     stamp: Option<[FieldPath; 2]>,
     fields: Vec<(usize, FieldPath)>,
+    /// The joints of the first message, where a field is one of them by its place.
+    joints: Option<Vec<String>>,
+}
+
+impl Plan {
+    /// A place is that of one joint only as long as the messages have the same joints in the same order.
+    fn check_joints(&mut self, payload: &[u8]) -> Result<(), String> {
+        let Some(before) = &mut self.joints else { return Ok(()) };
+        let joints = self.schema.joint_names(payload)?;
+        if before.is_empty() {
+            *before = joints;
+        } else if !joints.is_empty() && joints != *before {
+            let first = before.first().map_or("", String::as_str);
+            let what = format!("has the joints {}, messages before it {}", joints.join(", "), before.join(", "));
+            return Err(format!("{what}: name them in place of numbers, as in position[{first}]"));
+        }
+        Ok(())
+    }
 }
 
 /// Reads every wanted signal in one pass over each file.
@@ -31,15 +49,16 @@ pub(super) fn gather(path: &Path, roles: &Roles, wanted: &[(SignalRole, &Located
         let reader = Reader::open(&file)?;
         closed &= reader.ended_cleanly();
         available.extend(reader.topics().iter().map(|t| t.name.clone()));
-        let plans = plan(&reader, roles, wanted, &mut seen)?;
+        let mut plans = plan(&reader, roles, wanted, &mut seen)?;
         for entry in reader.messages()? {
             let entry = entry?;
-            let Some(plan) = plans.get(&entry.topic.index) else { continue };
+            let Some(plan) = plans.get_mut(&entry.topic.index) else { continue };
             let first = plan.fields.first().and_then(|(place, _)| wanted.get(*place));
             let damaged = |what: String| match first {
                 Some((_, located)) => roles.at(located, format!("{}, byte {}: {what}", file.display(), entry.offset)),
                 None => SessionError::Rows { path: file.clone(), what },
             };
+            plan.check_joints(&entry.payload).map_err(&damaged)?;
             let read = |field: &FieldPath| plan.schema.read(field, &entry.payload).map_err(&damaged);
             let logged = entry.log_time_ns as i64;
             let stamp = match &plan.stamp {
@@ -53,7 +72,11 @@ pub(super) fn gather(path: &Path, roles: &Roles, wanted: &[(SignalRole, &Located
                 None => None,
             };
             for (place, field) in &plan.fields {
-                let value = read(field)?.unwrap_or(f64::NAN);
+                // A message without the joint that is named says nothing of it.
+                let value = match read(field)? {
+                    None if field.is_by_name() => continue,
+                    value => value.unwrap_or(f64::NAN),
+                };
                 let (Some(series), Some((_, located))) = (series.get_mut(*place), wanted.get(*place)) else { continue };
                 series.stamped &= stamp.is_some();
                 series.stamps.push(stamp.unwrap_or(logged));
@@ -98,11 +121,15 @@ fn plan(
             std::collections::hash_map::Entry::Vacant(vacant) => {
                 let schema = topic.parse_schema().map_err(|e| roles.at(located, e.to_string()))?;
                 let stamp = schema.find("header.stamp.sec").ok().zip(schema.find("header.stamp.nanosec").ok());
-                vacant.insert(Plan { stamp: stamp.map(|(s, ns)| [s, ns]), schema, fields: Vec::new() })
+                vacant.insert(Plan { stamp: stamp.map(|(s, ns)| [s, ns]), schema, fields: Vec::new(), joints: None })
             }
         };
         let field = plan.schema.find(&located.signal.field);
         let field = field.map_err(|what| roles.at(located, format!("{} ({}): {what}", topic.name, topic.type_name)))?;
+        // Where the bag tells the axes, they are the same in every message.
+        if topic.axes.is_empty() && field.is_by_place() {
+            plan.joints.get_or_insert_default();
+        }
         plan.fields.push((place, field));
     }
     Ok(plans)
