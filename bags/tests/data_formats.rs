@@ -268,6 +268,9 @@ fn a_wrong_dataset_is_told_with_its_file() {
         told.contains("meta/info.json: features: has no \"observation.joints\"; it has") && told.contains("observation.state"),
         "{told}"
     );
+    let renamed = Contract { joints: [("elbow".to_owned(), "elbow_flex".to_owned())].into(), ..Contract::default() };
+    let told = says(&LerobotOptions { contract: renamed, ..LerobotOptions::default() });
+    assert!(told.contains("contract: joints: the dataset has no joint \"elbow\"; it has elbow_flex, shoulder_pan"), "{told}");
     assert!(says(&LerobotOptions { episodes: Some(vec![1, 9]), ..LerobotOptions::default() }).contains("has no episode 9"));
     let info = std::fs::read_to_string(dataset.join("meta/info.json")).expect("it is there");
     for (from, to, expected) in [

@@ -70,6 +70,10 @@ def load_lerobot(
     if "position" not in there:
         raise InputError(f"{root / 'meta/info.json'}: features: has no {contract.measured!r}; it has {', '.join(features)}: name one with Contract(measured=...)")
     names = {role: _joints(features[feature], feature) for role, feature in there.items()}
+    known = {joint for of in names.values() for joint in of}
+    for key, given in (("angle", contract.angle), ("effort_scale", contract.effort_scale), ("joints", contract.joints)):
+        if isinstance(given, Mapping) and (unknown := [joint for joint in given if joint not in known]):
+            raise InputError(f"contract: {key}: the dataset has no joint {unknown[0]}; it has {', '.join(sorted(known))}")
     wanted = None if episodes is None else set(episodes)
     columns = ["timestamp", "frame_index", "episode_index", *there.values()]
     parts: dict[int, list[Any]] = {}

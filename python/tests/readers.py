@@ -85,6 +85,8 @@ class Readers(unittest.TestCase):
         numpy.testing.assert_allclose(degrees["episode_000001"]["shoulder_pan.position"], numpy.radians(states[1][:, 0].astype(float)), rtol=1e-15)
         with self.assertRaisesRegex(backdrive.InputError, "contract: angle: has nothing for elbow_flex; it has shoulder_pan"):
             backdrive.load_lerobot(self.folder / "set", contract=backdrive.Contract(angle={"shoulder_pan": "deg"}))
+        with self.assertRaisesRegex(backdrive.InputError, "contract: joints: the dataset has no joint elbow; it has elbow_flex, shoulder_pan"):
+            backdrive.load_lerobot(self.folder / "set", contract=backdrive.Contract(joints={"elbow": "elbow_flex"}))
         late = backdrive.Contract(angle={j: 0.5 for j in JOINTS}, commanded_at="next", joints={"elbow_flex": "elbow"})
         moved = backdrive.load_lerobot(self.folder / "set", [0], contract=late, kind="numpy")["episode_000000"]
         numpy.testing.assert_array_equal(moved["elbow.command"], 0.5 * (states[0] + 1.0)[:-1, 1].astype(float))

@@ -134,6 +134,20 @@ impl Contract {
         feature.as_deref()
     }
 
+    /// What it says of a joint that is none of the dataset's, which would be without effect: a sentence.
+    pub(crate) fn unknown_joint(&self, joints: &[String]) -> Option<String> {
+        let each = |of: &PerJoint| match of {
+            PerJoint::All(_) => Vec::new(),
+            PerJoint::Each(by) => by.keys().cloned().collect(),
+        };
+        let told =
+            [("angle", each(&self.angle)), ("effort_scale", each(&self.effort_scale)), ("joints", self.joints.keys().cloned().collect())];
+        told.into_iter().find_map(|(key, named)| {
+            let unknown = named.into_iter().find(|joint| !joints.contains(joint))?;
+            Some(format!("contract: {key}: the dataset has no joint {unknown:?}; it has {}", joints.join(", ")))
+        })
+    }
+
     /// SI units in one of the dataset's.
     ///
     /// # Errors

@@ -67,6 +67,10 @@ pub fn import_lerobot(folder: &Path, into: &Path, options: &LerobotOptions) -> R
     for (role, joints) in there.iter().zip(&joints) {
         joints.iter().try_for_each(|joint| contract.scale(*role, joint).map(drop)).map_err(BagError::Usage)?;
     }
+    let all: BTreeSet<&String> = joints.iter().flatten().collect();
+    if let Some(unknown) = contract.unknown_joint(&all.into_iter().cloned().collect::<Vec<String>>()) {
+        return Err(BagError::Usage(unknown));
+    }
     let (episodes, types) = read_episodes(folder, &features, &widths, options.episodes.as_deref())?;
     std::fs::create_dir_all(into).map_err(|source| BagError::Create { path: into.to_owned(), source })?;
     let bag_of = |episode: u64| into.join(format!("episode_{episode:06}.mcap"));
