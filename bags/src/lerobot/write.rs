@@ -184,7 +184,9 @@ fn write_all(folder: &Path, contract: &Contract, joints: &[String], episodes: &[
         let of = if is_single(values) { NumberType::Single } else { NumberType::Double };
         let dtype = if of == NumberType::Single { "float32" } else { "float64" };
         features.insert(feature.to_owned(), json!({ "dtype": dtype, "shape": [joints.len()], "names": names }));
-        columns.push(Written { name: feature.to_owned(), values: Values::Lists(values, joints.len(), of) });
+        // lerobot reads a list of one as a number.
+        let values = if joints.len() == 1 { Values::Numbers(values, of) } else { Values::Lists(values, joints.len(), of) };
+        columns.push(Written { name: feature.to_owned(), values });
     }
     let rows: Vec<usize> = episodes.iter().map(|episode| episode.rows).collect();
     let total: usize = rows.iter().sum();
