@@ -7,7 +7,7 @@ use crate::error::ArmError;
 use crate::excitation::RATE;
 use crate::experiment::{Plan, REPEATS, plan, same_load};
 use crate::fit::Fit;
-use crate::judge::{AGAINST, Judged, each, judge};
+use crate::judge::{AGAINST, Judged, each, gains, judge};
 use crate::problem::Problem;
 use crate::regression::Data;
 use crate::search::{MOST, Search, added, search};
@@ -16,6 +16,7 @@ use crate::written::{Reading, model_of};
 use backdrive_diagnosis::audit::Weight;
 use backdrive_diagnosis::hypothesis::Place;
 use backdrive_diagnosis::verdict::{NextExperiment, Planned, PlannedPayload, Remark, Verdict};
+use backdrive_plant::model::Model;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -98,8 +99,10 @@ pub fn diagnose(problem: &Problem, settings: &Settings) -> Result<Found, ArmErro
     let (model, mut notes) = model_of(&data, &found.best)?;
     let (nominal, _) = model_of(&data, &found.refit)?;
     notes.extend(problem.notes.iter().cloned());
-    let loops = [judge(&data, &nominal, &Reading::of(&data, &found.refit)), judge(&data, &model, &Reading::of(&data, &found.best))];
-    let judged = each(&data, &found, loops[1].as_ref());
+    let gains = gains(&data, &model).unwrap_or_default();
+    let simulated = |model: &Model, fit: &Fit| judge(&data, model, &Reading::of(&data, fit), &gains);
+    let loops = [simulated(&nominal, &found.refit), simulated(&model, &found.best)];
+    let judged = each(&data, &found, &gains, loops[1].as_ref());
     for (index, judged) in added(&found.best.structure).into_iter().zip(&judged) {
         let Some(ratio) = judged.as_ref().map(Judged::ratio).filter(|r| *r > AGAINST) else { continue };
         let term = &found.best.structure.terms[index];

@@ -18,10 +18,38 @@ use std::f64::consts::TAU;
 const LOOP_HZ: f64 = 4.0;
 /// Time that the loop is given to settle, s.
 const SETTLING: f64 = 0.5;
+/// Share of its speed that the loop may take of a body within a sample: beyond 2 it would swing up.
+const MOST_A_SAMPLE: f64 = 0.5;
+
+/// Gains of the loop at each joint, N m/rad and N m s/rad: as stiff as [`LOOP_HZ`] says on what the joint weighs while the others are free, in the pose where that is least (a loop that is
+/// stable there is so everywhere), and no stiffer than the rotor alone bears, which is all that it holds while a gear with play is between its flanks. The models that are compared have
+/// the same loop, that of the one with most in it. `None` where the model is no arm.
+pub fn gains(data: &Data, model: &Model) -> Option<Vec<[f64; 2]>> {
+    let arm = model.arm.as_ref()?;
+    let period = data.rates.period();
+    let w = loop_rate(period);
+    let of = |(j, least): (usize, f64)| {
+        let rotor = rotor_of(data, model, j).map_or(f64::INFINITY, |body| model.bodies[body].inertia);
+        let own = least.min(MOST_A_SAMPLE * rotor / (2.0 * w * period));
+        [own * w * w, 2.0 * own * w]
+    };
+    Some(least_inertia(arm, model).into_iter().enumerate().map(of).collect())
+}
+
+/// Natural frequency of the loop, rad/s.
+fn loop_rate(period: f64) -> f64 {
+    (TAU * LOOP_HZ).min(0.2 / period)
+}
+
+/// The body of the motor before a gear that gives way.
+fn rotor_of(data: &Data, model: &Model, joint: usize) -> Option<usize> {
+    let rotor = format!("{}.rotor", data.problem.joints[joint]);
+    model.bodies.iter().position(|b| b.name == rotor)
+}
 
 /// Root mean square of the loop's torque at each joint over the held-out logs (or all, where none is held out), as a share of the rms of the measured
-/// torque; `None` where the model cannot be simulated.
-pub fn judge(data: &Data, model: &Model, reading: &Reading) -> Option<Vec<f64>> {
+/// torque, with these [`gains`]; `None` where the model cannot be simulated.
+pub fn judge(data: &Data, model: &Model, reading: &Reading, gains: &[[f64; 2]]) -> Option<Vec<f64>> {
     let joints = data.problem.joints.len();
     let held_out = data.fit_count..data.motions.len();
     let motions = if held_out.is_empty() { 0..data.fit_count } else { held_out };
@@ -32,15 +60,10 @@ pub fn judge(data: &Data, model: &Model, reading: &Reading) -> Option<Vec<f64>> 
     let arm = model.arm.as_ref()?;
     for (j, body) in arm.bodies.iter().enumerate() {
         // Behind a rotor the motor acts on that.
-        let rotor = format!("{}.rotor", data.problem.joints[j]);
-        let on = driven.bodies.iter().position(|b| b.name == rotor).unwrap_or(*body);
+        let on = rotor_of(data, &driven, j).unwrap_or(*body);
         driven.inputs.push(Input::ideal(&format!("loop_{j}"), InputKind::Force, on, Hold::Linear));
     }
     let period = data.rates.period();
-    let w = (TAU * LOOP_HZ).min(0.2 / period);
-    // By what a joint weighs while the others are free, in the pose where that is least: a loop that is stable there is so everywhere.
-    let weight = least_inertia(arm, &driven);
-    let gains: Vec<[f64; 2]> = weight.iter().map(|own| [own * w * w, 2.0 * own * w]).collect();
     let (mut added, mut torque, mut count) = (vec![0.0; joints], vec![0.0; joints], 0usize);
     for m in motions {
         let motion = &data.motions[m];
@@ -108,7 +131,7 @@ impl Judged {
 }
 
 /// Judges every term that a search has added by a simulation without it; `None` where the model file cannot say it, or a model cannot be simulated.
-pub fn each(data: &Data, search: &Search, with: Option<&Vec<f64>>) -> Vec<Option<Judged>> {
+pub fn each(data: &Data, search: &Search, gains: &[[f64; 2]], with: Option<&Vec<f64>>) -> Vec<Option<Judged>> {
     let of = |index: usize| {
         let term = &search.best.structure.terms[index];
         let is_said = match term.physics {
@@ -124,7 +147,7 @@ pub fn each(data: &Data, search: &Search, with: Option<&Vec<f64>>) -> Vec<Option
         structure.terms.remove(index);
         let less = consistent(data, &data.fit(&structure, &search.weights)?, &search.weights)?;
         let (model, _) = model_of(data, &less).ok()?;
-        Some(Judged { without: judge(data, &model, &Reading::of(data, &less))?, with })
+        Some(Judged { without: judge(data, &model, &Reading::of(data, &less), gains)?, with })
     };
     added(&search.best.structure).into_iter().map(of).collect()
 }

@@ -3,7 +3,7 @@
 mod common;
 
 use backdrive_arms::diagnose::{Found, Settings, diagnose};
-use backdrive_arms::judge::{AGAINST, each, judge};
+use backdrive_arms::judge::{AGAINST, each, gains, judge};
 use backdrive_arms::physics::Physics;
 use backdrive_arms::problem::Problem;
 use backdrive_arms::regression::Data;
@@ -98,8 +98,9 @@ fn a_simulation_in_closed_loop_speaks_against_what_is_wrong() {
     let mut found = search(&mut data, &[], 8, &AtomicBool::new(false)).unwrap();
     let ratio = |found: &Search| {
         let (model, _) = model_of(&data, &found.best).unwrap();
-        let with = judge(&data, &model, &Reading::of(&data, &found.best)).unwrap();
-        each(&data, found, Some(&with))[0].as_ref().unwrap().ratio()
+        let gains = gains(&data, &model).unwrap();
+        let with = judge(&data, &model, &Reading::of(&data, &found.best), &gains).unwrap();
+        each(&data, found, &gains, Some(&with))[0].as_ref().unwrap().ratio()
     };
     let right = ratio(&found);
     assert!(right < 0.5, "{right}");
@@ -110,6 +111,27 @@ fn a_simulation_in_closed_loop_speaks_against_what_is_wrong() {
     found.best.values[place] *= 3.0;
     let wrong = ratio(&found);
     assert!(wrong > AGAINST, "{wrong}");
+}
+
+#[test]
+fn the_loop_of_the_judge_is_no_stiffer_than_a_rotor_alone_bears() {
+    let folder = tempfile::tempdir().unwrap();
+    set(folder.path(), &Beside { soft: [0.0, 1.0 / 12.0], ..AS_STATED }, "", |_| {});
+    let problem = Problem::open(&RecordingSet::open(folder.path()).unwrap(), None).unwrap();
+    let mut data = Data::new(&problem, None, false).unwrap();
+    let found = search(&mut data, &[], 8, &AtomicBool::new(false)).unwrap();
+    let (mut model, _) = model_of(&data, &found.best).unwrap();
+    let rotor = model.bodies.iter().position(|body| body.name == "elbow.rotor").expect("a motor before the soft gear");
+    let mut of = |inertia: f64| {
+        model.bodies[rotor].inertia = inertia;
+        gains(&data, &model).unwrap()
+    };
+    // A heavy rotor bears what the link bears; of a light one the loop takes half the speed within a sample, at most.
+    let (heavy, light) = (of(10.0), of(1e-4));
+    assert_eq!(heavy[0], light[0]);
+    let share = light[1][1] * data.rates.period() / 1e-4;
+    assert!((share - 0.5).abs() < 1e-9 && light[1][1] < 0.1 * heavy[1][1], "{share}: {light:?} {heavy:?}");
+    assert!((light[1][0] / light[1][1] - heavy[1][0] / heavy[1][1]).abs() < 1e-9, "the same natural frequency of the loop's own");
 }
 
 #[test]
