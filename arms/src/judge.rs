@@ -21,7 +21,7 @@ const SETTLING: f64 = 0.5;
 /// Share of its speed that the loop may take of a body within a sample: beyond 2 it would swing up.
 const MOST_A_SAMPLE: f64 = 0.5;
 
-/// Gains of the loop at each joint, N m/rad and N m s/rad: as stiff as [`LOOP_HZ`] says on what the joint weighs while the others are free, in the pose where that is least (a loop that is
+/// Gains of the loop at each joint, N m/rad and N m s/rad: critically damped at 4 Hz at most on what the joint weighs while the others are free, in the pose where that is least (a loop that is
 /// stable there is so everywhere), and no stiffer than the rotor alone bears, which is all that it holds while a gear with play is between its flanks. The models that are compared have
 /// the same loop, that of the one with most in it. `None` where the model is no arm.
 pub fn gains(data: &Data, model: &Model) -> Option<Vec<[f64; 2]>> {
