@@ -8,7 +8,6 @@ use backdrive_nodes::graph::{Graph, NodeKind, Overrides};
 use backdrive_nodes::sequence::Sequence;
 use std::path::Path;
 
-// One test: others in this program would be counted too.
 #[test]
 fn a_loop_allocates_nothing_while_it_runs() {
     for (file, steps) in [("launch/contact.toml", 10_000), ("launch/leader-follower.toml", 1000)] {

@@ -10,7 +10,6 @@ use counting::asked;
 use nalgebra::{DMatrix, Vector3};
 use robot_common::{Draw, rods_urdf};
 
-// One test: others in this program would be counted too.
 #[test]
 fn nothing_is_allocated_on_the_way() {
     let tree = Tree::new(&Draw::new(4).robot(14)).unwrap();

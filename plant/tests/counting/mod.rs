@@ -1,16 +1,19 @@
-//! Counts how often a test program asks for memory. Of such a program only one test may run at a time: others would be counted, too.
+//! Counts how often a thread of a test program asks for memory. What others ask for does not count: the harness, too, works beside its tests.
 
 use std::alloc::{GlobalAlloc, Layout, System};
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::cell::Cell;
 
-static ASKED: AtomicUsize = AtomicUsize::new(0);
+thread_local! {
+    // Known when compiled and without an end of its own, so that it asks for no memory itself.
+    static ASKED: Cell<usize> = const { Cell::new(0) };
+}
 
 struct Counting;
 
 // SAFETY: every call is handed to the system's allocator as it is.
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        ASKED.fetch_add(1, Ordering::Relaxed);
+        ASKED.with(|asked| asked.set(asked.get() + 1));
         // SAFETY: the caller's promises are passed on.
         unsafe { System.alloc(layout) }
     }
@@ -24,9 +27,9 @@ unsafe impl GlobalAlloc for Counting {
 #[global_allocator]
 static COUNTING: Counting = Counting;
 
-/// How often memory is asked for.
+/// How often this thread asks for memory while it works.
 pub fn asked(work: impl FnOnce()) -> usize {
-    let before = ASKED.load(Ordering::Relaxed);
+    let before = ASKED.get();
     work();
-    ASKED.load(Ordering::Relaxed) - before
+    ASKED.get() - before
 }
