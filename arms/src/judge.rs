@@ -48,7 +48,7 @@ fn rotor_of(data: &Data, model: &Model, joint: usize) -> Option<usize> {
 }
 
 /// Root mean square of the loop's torque at each joint over the held-out logs (or all, where none is held out), as a share of the rms of the measured
-/// torque, with these [`gains`]; `None` where the model cannot be simulated.
+/// torque, with these [`gains`], one of each joint; `None` where the model cannot be simulated.
 pub fn judge(data: &Data, model: &Model, reading: &Reading, gains: &[[f64; 2]]) -> Option<Vec<f64>> {
     let joints = data.problem.joints.len();
     let held_out = data.fit_count..data.motions.len();
@@ -57,7 +57,7 @@ pub fn judge(data: &Data, model: &Model, reading: &Reading, gains: &[[f64; 2]]) 
     driven.outputs.clear();
     driven.axes.clear();
     driven.inputs.clear();
-    let arm = model.arm.as_ref()?;
+    let arm = model.arm.as_ref().filter(|_| gains.len() == joints)?;
     for (j, body) in arm.bodies.iter().enumerate() {
         // Behind a rotor the motor acts on that.
         let on = rotor_of(data, &driven, j).unwrap_or(*body);
