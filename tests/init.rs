@@ -231,3 +231,19 @@ fn what_diagnose_would_refuse_and_an_inertia_that_cannot_be_are_told() {
     assert_eq!(done.code, Some(3), "{done:?}");
     assert!(done.stderr.contains("diagnose would refuse them") && done.stderr.contains("mixed_rates"), "{done:?}");
 }
+
+#[test]
+fn a_number_that_nothing_measures_is_an_error_with_its_line_and_column() {
+    let place = Place::new();
+    recorded(&place, MOTOR, &TWO, "t [s],i [A],enc [counts]");
+    let text = std::fs::read_to_string(place.path("mine/weak.csv")).unwrap();
+    for number in ["-1e308", "3.4028235e38", "1e31"] {
+        let mut lines: Vec<String> = text.lines().map(str::to_string).collect();
+        let row = lines[45].rsplit_once(',').unwrap().0.to_string();
+        lines[45] = format!("{row},{number}");
+        place.write("mine/weak.csv", &(lines.join("\n") + "\n"));
+        let done = init(&place, &[&OF_A_MOTOR[..], &["--yes"]].concat());
+        assert_eq!(done.code, Some(3), "{done:?}");
+        assert!(done.stderr.contains("weak.csv:46") && done.stderr.contains("enc") && done.stderr.contains(number), "{done:?}");
+    }
+}

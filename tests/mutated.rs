@@ -1,10 +1,13 @@
 //! Files that are damaged at random, through every verb that reads them: an answer or an error with a documented exit code, within seconds
 //! and a gigabyte, and never a panic. BACKDRIVE_LONG=1 tries 2000 of them.
 
+#[path = "common/mutation.rs"]
+mod mutation;
 mod system;
 
+use mutation::mutate;
 use nix::sys::resource::{Resource, setrlimit};
-use rand::{RngExt, SeedableRng};
+use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use std::os::unix::process::CommandExt;
 use std::path::Path;
@@ -117,53 +120,6 @@ fn kinds(place: &Place) -> Vec<Kind> {
             ],
         ),
     ]
-}
-
-/// One to three injuries.
-fn mutate(whole: &[u8], is_text: bool, random: &mut ChaCha8Rng) -> Vec<u8> {
-    let mut bytes = whole.to_vec();
-    for _ in 0..random.random_range(1..=3) {
-        if bytes.is_empty() {
-            break;
-        }
-        let place = random.random_range(0..bytes.len());
-        match random.random_range(0..if is_text { 6 } else { 2 }) {
-            0 => bytes[place] ^= 1 << random.random_range(0..8),
-            1 => bytes.truncate(place),
-            kind => bytes = edit(&String::from_utf8_lossy(&bytes), kind, random).into_bytes(),
-        }
-    }
-    bytes
-}
-
-fn edit(text: &str, kind: i32, random: &mut ChaCha8Rng) -> String {
-    let mut lines: Vec<String> = text.lines().map(str::to_string).collect();
-    if lines.is_empty() {
-        return String::new();
-    }
-    let line = random.random_range(0..lines.len());
-    match kind {
-        // A number gives way to what is none, or to one that nothing has.
-        2 | 3 => {
-            let others = ["1e308", "-1e308", "nan", "inf", "-1", "0", "", "1e-308", "\"x\"", "99999999999999999999"];
-            let other = others[random.random_range(0..others.len())];
-            let is_number = |c: char| c.is_ascii_digit() || matches!(c, '.' | '-' | '+' | 'e');
-            let chars = &lines[line];
-            if let Some(from) = chars.find(|c: char| c.is_ascii_digit()) {
-                let rest = &chars[from..];
-                let until = from + rest.find(|c: char| !is_number(c)).unwrap_or(rest.len());
-                lines[line] = format!("{}{other}{}", &chars[..from], &chars[until..]);
-            }
-        }
-        4 => drop(lines.remove(line)),
-        // A section twice.
-        _ => {
-            let end = (line + random.random_range(1..12)).min(lines.len());
-            let section = lines[line..end].to_vec();
-            lines.splice(end..end, section);
-        }
-    }
-    lines.join("\n") + "\n"
 }
 
 /// Peak of the memory in use, KiB, of a process that lives.

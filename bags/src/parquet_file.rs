@@ -2,6 +2,8 @@
 
 use crate::BagError;
 use crate::arrow_schema::durations;
+use crate::foreign_code::guarded;
+use crate::memory::Memory;
 use crate::number_type::{LARGEST_WHOLE, NumberType};
 use parquet::basic::{ConvertedType, LogicalType, TimeUnit, Type as Physical};
 use parquet::column::reader::{ColumnReader, ColumnReaderImpl};
@@ -12,6 +14,7 @@ use parquet::schema::types::ColumnDescriptor;
 use std::collections::HashMap;
 use std::fs::File;
 use std::path::{Path, PathBuf};
+use std::rc::Rc;
 
 /// An open parquet file.
 pub(crate) struct ParquetFile {
@@ -19,6 +22,8 @@ pub(crate) struct ParquetFile {
     reader: SerializedFileReader<File>,
     /// Of columns that are durations, which parquet has no type for, how many of their units make a second.
     durations: HashMap<String, f64>,
+    /// What its numbers may take.
+    memory: Rc<Memory>,
 }
 
 /// What a column of single values holds.
@@ -55,17 +60,18 @@ impl Default for Numbers {
 }
 
 impl ParquetFile {
-    pub(crate) fn open(path: &Path) -> Result<ParquetFile, BagError> {
+    pub(crate) fn open(path: &Path, memory: &Rc<Memory>) -> Result<ParquetFile, BagError> {
         let file = File::open(path).map_err(BagError::io(path))?;
         let size = file.metadata().map_err(BagError::io(path))?.len();
-        let reader = SerializedFileReader::new(file).map_err(|error| {
-            let what = format!("is not a whole parquet file: {}; if it was cut off, it has to be written again", told(&error));
+        let opened = guarded(|| SerializedFileReader::new(file)).and_then(|opened| opened.map_err(|error| told(&error)));
+        let reader = opened.map_err(|why| {
+            let what = format!("is not a whole parquet file: {why}; if it was cut off, it has to be written again");
             BagError::File { path: path.to_owned(), what }
         })?;
         let said = reader.metadata().file_metadata().key_value_metadata();
         let schema = said.into_iter().flatten().find(|pair| pair.key == "ARROW:schema").and_then(|pair| pair.value.as_deref());
         let durations = schema.map(durations).unwrap_or_default();
-        let file = ParquetFile { path: path.to_owned(), reader, durations };
+        let file = ParquetFile { path: path.to_owned(), reader, durations, memory: Rc::clone(memory) };
         file.check_extents(size)?;
         Ok(file)
     }
@@ -170,20 +176,26 @@ impl ParquetFile {
         let (mut days, mut bytes) = (Vec::new(), Vec::new());
         for (index, group) in self.reader.metadata().row_groups().iter().enumerate() {
             let rows = usize::try_from(group.num_rows()).unwrap_or(0);
-            let reader = self.reader.get_row_group(index).and_then(|group| group.get_column_reader(place)).map_err(failed)?;
-            let read = match reader {
-                ColumnReader::BoolColumnReader(of) => read_all(of, rows, &mut found, &mut flags),
-                ColumnReader::Int32ColumnReader(of) => read_all(of, rows, &mut found, &mut small),
-                ColumnReader::Int64ColumnReader(of) => read_all(of, rows, &mut found, &mut whole),
-                ColumnReader::Int96ColumnReader(of) => read_all(of, rows, &mut found, &mut days),
-                ColumnReader::FloatColumnReader(of) => read_all(of, rows, &mut found, &mut single),
-                ColumnReader::DoubleColumnReader(of) => read_all(of, rows, &mut found, &mut double),
-                ColumnReader::FixedLenByteArrayColumnReader(of) => read_all(of, rows, &mut found, &mut bytes),
+            // The file's own counts first, so that what is too large is refused before anything of it is unpacked.
+            let values = group.columns().get(place).map_or(0, |of| u64::try_from(of.num_values()).unwrap_or(0)).max(rows as u64);
+            self.memory.check_numbers(values).map_err(|what| self.wrong(column, what))?;
+            let memory = &self.memory;
+            let read = guarded(|| {
+                let reader = self.reader.get_row_group(index)?.get_column_reader(place)?;
+                match reader {
+                ColumnReader::BoolColumnReader(of) => read_all(of, rows, memory, &mut found, &mut flags),
+                ColumnReader::Int32ColumnReader(of) => read_all(of, rows, memory, &mut found, &mut small),
+                ColumnReader::Int64ColumnReader(of) => read_all(of, rows, memory, &mut found, &mut whole),
+                ColumnReader::Int96ColumnReader(of) => read_all(of, rows, memory, &mut found, &mut days),
+                ColumnReader::FloatColumnReader(of) => read_all(of, rows, memory, &mut found, &mut single),
+                ColumnReader::DoubleColumnReader(of) => read_all(of, rows, memory, &mut found, &mut double),
+                ColumnReader::FixedLenByteArrayColumnReader(of) => read_all(of, rows, memory, &mut found, &mut bytes),
                 ColumnReader::ByteArrayColumnReader(_) => {
                     Err(ParquetError::General("it holds bytes where numbers were expected".to_owned()))
                 }
-            };
-            read.map_err(failed)?;
+                }
+            });
+            read.map_err(|why| self.wrong(column, format!("cannot be read: {why}; it is damaged")))?.map_err(failed)?;
         }
         let unsigned = matches!(meaning(column), Meaning::Numbers(NumberType::Uint8 | NumberType::Uint16 | NumberType::Uint32));
         found.numbers = match column.physical_type() {
@@ -205,18 +217,30 @@ impl ParquetFile {
     }
 }
 
+/// Rows that are read between two looks at the memory: a damaged file may hold more values than it says.
+const BATCH: usize = 1 << 16;
+
 /// All values of a column in a row group, behind what is there.
 fn read_all<T: DataType>(
     mut reader: ColumnReaderImpl<T>,
     rows: usize,
+    memory: &Memory,
     found: &mut Stored,
     into: &mut Vec<T::T>,
 ) -> Result<(), ParquetError> {
-    let (read, _, _) = reader.read_records(rows, Some(&mut found.defined), Some(&mut found.repeated), into)?;
-    match read == rows {
-        true => Ok(()),
-        false => Err(ParquetError::EOF(format!("it ends after {read} of {rows} rows"))),
+    let mut done = 0;
+    while done < rows {
+        let before = into.len().max(found.defined.len());
+        let batch = BATCH.min(rows - done);
+        let (read, _, _) = reader.read_records(batch, Some(&mut found.defined), Some(&mut found.repeated), into)?;
+        let values = into.len().max(found.defined.len()).saturating_sub(before);
+        memory.take_numbers(values as u64).map_err(ParquetError::General)?;
+        if read == 0 {
+            return Err(ParquetError::EOF(format!("it ends after {done} of {rows} rows")));
+        }
+        done += read;
     }
+    Ok(())
 }
 
 /// Values at the places where there is one, NaN at the others.

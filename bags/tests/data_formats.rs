@@ -176,7 +176,7 @@ fn joints_that_change_their_places_are_told_and_read_by_their_names() {
     // The folder has lost what describes it.
     std::fs::remove_file(written.path("joints/metadata.yaml")).expect("it is there");
     let bag = written.path("joints.mcap");
-    let report = import_rosbag(&written.path("joints"), &bag, false).expect("it is imported");
+    let report = import_rosbag(&written.path("joints"), &bag, false, MOST_BYTES).expect("it is imported");
     assert!(
         report.topics[0].notes[0].contains("message 2 has other joints") && report.topics[0].notes[0].contains("position[pan]"),
         "{report:?}"
@@ -300,7 +300,7 @@ fn ros_bags_of_both_generations_are_read() {
     {
         let (from, bag) = (written.path(name), written.path(&format!("{name}.mcap")));
         assert!(is_rosbag(&from), "{name}");
-        let report = import_rosbag(&from, &bag, false).unwrap_or_else(|error| panic!("{name}: {error}"));
+        let report = import_rosbag(&from, &bag, false, MOST_BYTES).unwrap_or_else(|error| panic!("{name}: {error}"));
         assert_eq!((report.messages, report.topics.len()), (80, 4), "{name}: {report:?}");
         for topic in &report.topics {
             assert_eq!(topic.messages, 20);
@@ -362,7 +362,7 @@ fn a_file_that_was_cut_off_is_an_error_and_leaves_no_bag() {
         for share in [0.0, 0.001, 0.01, 0.3, 0.7, 0.999] {
             std::fs::write(&cut, &bytes[..(bytes.len() as f64 * share) as usize]).expect("it writes");
             let error = match name.ends_with(".bag") {
-                true => import_rosbag(&cut, &bag, false).map(|report| report.messages).err(),
+                true => import_rosbag(&cut, &bag, false, MOST_BYTES).map(|report| report.messages).err(),
                 false => import_table(&cut, &bag, &ImportOptions::default()).map(|report| report.rows).err(),
             };
             // A ROS bag of which only the index is cut off has all its messages.
@@ -407,7 +407,7 @@ fn damage_is_an_error_and_no_panic() {
             }
             std::fs::write(&damaged, &changed).expect("it writes");
             let _ = match is_rosbag(&damaged) {
-                true => import_rosbag(&damaged, &bag, true).map(|report| report.messages),
+                true => import_rosbag(&damaged, &bag, true, MOST_BYTES).map(|report| report.messages),
                 false => {
                     import_table(&damaged, &bag, &ImportOptions { overwrite: true, ..ImportOptions::default() }).map(|report| report.rows)
                 }

@@ -46,10 +46,12 @@ pub fn import(asked: &BagImport) -> Result<u8, Failure> {
     for (from, kind) in kinds.iter().filter(|(_, kind)| *kind != Kind::Lerobot) {
         check_target(&into(from, *kind), asked.overwrite).map_err(Failure::bag)?;
     }
-    let table = ImportOptions { time: asked.time.clone(), columns, variable: asked.variable.clone(), overwrite: asked.overwrite };
+    let most_bytes = asked.memory << 20;
+    let (time, variable, overwrite) = (asked.time.clone(), asked.variable.clone(), asked.overwrite);
+    let table = ImportOptions { time, columns, variable, overwrite, most_bytes };
     let contract = asked.contract.as_deref().map(Contract::read).transpose()?.unwrap_or_default();
     let episodes = (!asked.episode.is_empty()).then(|| asked.episode.clone());
-    let dataset = LerobotOptions { contract, episodes, overwrite: asked.overwrite };
+    let dataset = LerobotOptions { contract, episodes, overwrite, most_bytes };
     for (from, kind) in kinds {
         let to = into(from, kind);
         let importing = format!("importing {}", from.display());
@@ -73,7 +75,7 @@ pub fn import(asked: &BagImport) -> Result<u8, Failure> {
                 }
             }
             Kind::Rosbag => {
-                let report = busy(&importing, || import_rosbag(from, &to, asked.overwrite)).map_err(Failure::bag)?;
+                let report = busy(&importing, || import_rosbag(from, &to, overwrite, most_bytes)).map_err(Failure::bag)?;
                 warn(&from.display().to_string(), &report.notes, &[]);
                 for topic in &report.topics {
                     warn(&format!("{}: {}", from.display(), topic.name), &topic.notes, &topic.clock);

@@ -124,6 +124,9 @@ pub struct BagImport {
     /// Of a LeRobot dataset: only this episode; repeatable.
     #[arg(long, value_name = "NUMBER")]
     pub episode: Vec<u64>,
+    /// Memory that the unpacked numbers of a recording may take, MiB; the peak is at most three times as much.
+    #[arg(long, value_name = "MIB", default_value_t = backdrive_bags::MOST_BYTES >> 20, value_parser = clap::value_parser!(u64).range(1..=1 << 30))]
+    pub memory: u64,
 }
 
 /// `backdrive bag export`

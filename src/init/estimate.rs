@@ -89,7 +89,8 @@ fn at_width(shown: &[Shown], width: usize, with_spring: bool) -> Option<(f64, Nu
             right.push(integral(&bump.value, one.force));
         }
     }
-    if right.len() < 3 * unknowns {
+    // The decomposition below does not end on what is not finite.
+    if right.len() < 3 * unknowns || !rows.iter().chain(&right).all(|x| x.is_finite()) {
         return None;
     }
     let mut matrix = DMatrix::from_row_slice(right.len(), unknowns, &rows);

@@ -2,15 +2,17 @@
 
 use super::contract::{CommandedAt, Contract, Role};
 use super::info::Info;
+use crate::memory::{MOST_BYTES, Memory};
 use crate::number_type::NumberType;
 use crate::parquet_file::ParquetFile;
 use crate::table::{Column, ImportOptions, ImportReport, Table, write_bag};
 use crate::{BagError, check_target};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
+use std::rc::Rc;
 
 /// How a dataset becomes bags.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct LerobotOptions {
     /// What its features are.
     pub contract: Contract,
@@ -18,6 +20,14 @@ pub struct LerobotOptions {
     pub episodes: Option<Vec<u64>>,
     /// Replace bags that exist.
     pub overwrite: bool,
+    /// Bytes that the unpacked numbers of the dataset may take, see [`crate::MOST_BYTES`].
+    pub most_bytes: u64,
+}
+
+impl Default for LerobotOptions {
+    fn default() -> LerobotOptions {
+        LerobotOptions { contract: Contract::default(), episodes: None, overwrite: false, most_bytes: MOST_BYTES }
+    }
 }
 
 /// An episode that was imported.
@@ -71,7 +81,7 @@ pub fn import_lerobot(folder: &Path, into: &Path, options: &LerobotOptions) -> R
     if let Some(unknown) = contract.unknown_joint(&all.into_iter().cloned().collect::<Vec<String>>()) {
         return Err(BagError::Usage(unknown));
     }
-    let (episodes, types) = read_episodes(folder, &features, &widths, options.episodes.as_deref())?;
+    let (episodes, types) = read_episodes(folder, (&features, &widths), options.episodes.as_deref(), options.most_bytes)?;
     std::fs::create_dir_all(into).map_err(|source| BagError::Create { path: into.to_owned(), source })?;
     let bag_of = |episode: u64| into.join(format!("episode_{episode:06}.mcap"));
     for episode in episodes.keys() {
@@ -111,15 +121,16 @@ pub fn import_lerobot(folder: &Path, into: &Path, options: &LerobotOptions) -> R
 /// Rows by episode, and what the numbers of each feature are in the files.
 fn read_episodes(
     folder: &Path,
-    features: &[&str],
-    widths: &[usize],
+    (features, widths): (&[&str], &[usize]),
     wanted: Option<&[u64]>,
+    most_bytes: u64,
 ) -> Result<(BTreeMap<u64, Rows>, Vec<NumberType>), BagError> {
     let wanted: Option<BTreeSet<u64>> = wanted.map(|wanted| wanted.iter().copied().collect());
     let mut episodes: BTreeMap<u64, Rows> = BTreeMap::new();
     let mut types = vec![NumberType::Single; features.len()];
+    let memory = Rc::new(Memory::new(most_bytes));
     for path in data_files(folder)? {
-        let file = ParquetFile::open(&path)?;
+        let file = ParquetFile::open(&path, &memory)?;
         let column = |name: &str, width: usize| -> Result<(Vec<f64>, NumberType), BagError> {
             let wrong = |what: String| BagError::File { path: path.clone(), what };
             let place = file.columns().find(|(_, found, _)| *found == name).map(|(place, _, _)| place);

@@ -3,6 +3,7 @@
 use super::target::{RosbagReport, Target};
 use super::{ros1, sqlite};
 use crate::BagError;
+use crate::foreign_code::guarded;
 use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -32,9 +33,11 @@ fn begins(path: &Path, with: &[u8]) -> bool {
 /// Copies the messages of a ROS bag into an MCAP file that any ROS 2 tool opens: those of rosbag2 verbatim, those of ROS 1 in the form of ROS 2. A topic whose
 /// definition cannot be read is kept as it is, and told.
 ///
+/// `most_bytes` is what one chunk of a ROS 1 bag may unpack to, see [`crate::MOST_BYTES`].
+///
 /// # Errors
 /// It is neither, is damaged or compressed as a whole; the bag exists or cannot be written.
-pub fn import_rosbag(from: &Path, bag: &Path, overwrite: bool) -> Result<RosbagReport, BagError> {
+pub fn import_rosbag(from: &Path, bag: &Path, overwrite: bool, most_bytes: u64) -> Result<RosbagReport, BagError> {
     let wrong = |what: &str| BagError::File { path: from.to_owned(), what: what.to_owned() };
     let files = if from.is_dir() { files_of(from)? } else { vec![from.to_owned()] };
     let is_ros1 = begins(from, ROS1);
@@ -50,7 +53,8 @@ pub fn import_rosbag(from: &Path, bag: &Path, overwrite: bool) -> Result<RosbagR
     }
     let mut target = Target::create(bag, overwrite)?;
     let done = match is_ros1 {
-        true => ros1::copy(from, &mut target),
+        true => guarded(|| ros1::copy(from, &mut target, most_bytes))
+            .unwrap_or_else(|why| Err(wrong(&format!("cannot be read as a ROS 1 bag: {why}; it is damaged")))),
         false => files.iter().try_for_each(|file| sqlite::copy(file, &mut target)),
     };
     let finished = done.and_then(|()| target.finish());

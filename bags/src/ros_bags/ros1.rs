@@ -3,11 +3,12 @@
 use super::ros1_message::Converter;
 use super::target::{Form, Target};
 use crate::BagError;
+use crate::memory::Memory;
 use rosbag::{ChunkRecord, MessageRecord, RosBag};
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;
 use std::fs::File;
-use std::io::Read;
+use std::io::{BufReader, Read, Seek, SeekFrom};
 use std::path::Path;
 
 /// Where the messages of a connection go.
@@ -19,9 +20,10 @@ struct Topic {
 }
 
 /// Copies the messages of a bag, chunk by chunk.
-pub(crate) fn copy(file: &Path, target: &mut Target) -> Result<(), BagError> {
+pub(crate) fn copy(file: &Path, target: &mut Target, most_bytes: u64) -> Result<(), BagError> {
     let wrong = |what: String| BagError::File { path: file.to_owned(), what };
     check_extent(file)?;
+    check_chunks(file, most_bytes).map_err(wrong)?;
     let failed =
         |error: rosbag::Error| wrong(format!("cannot be read as a ROS 1 bag: {error}; `rosbag reindex` may save one that was cut off"));
     let bag = RosBag::new(file).map_err(|error| wrong(format!("cannot be read as a ROS 1 bag: {error}")))?;
@@ -84,6 +86,39 @@ fn check_extent(file: &Path) -> Result<(), BagError> {
         _ => wrong("byte 13: its header cannot be read; it was cut off or is damaged"),
     }
 }
+
+/// The reader unpacks a chunk whole, and makes room for what the chunk says of its size. Only the heads of records are read here.
+fn check_chunks(file: &Path, most_bytes: u64) -> Result<(), String> {
+    let Ok(open) = File::open(file) else { return Ok(()) };
+    let mut bytes = BufReader::new(open);
+    let mut at = MAGIC as u64;
+    // What is cut off or damaged is the reader's to report.
+    while bytes.seek(SeekFrom::Start(at)).is_ok() {
+        let mut word = [0; 4];
+        let mut header = Vec::new();
+        if bytes.read_exact(&mut word).is_err() {
+            break;
+        }
+        let head = u32::from_le_bytes(word);
+        if bytes.by_ref().take(head.into()).read_to_end(&mut header).is_err() || bytes.read_exact(&mut word).is_err() {
+            break;
+        }
+        let field = |name: &[u8]| {
+            let place = header.windows(name.len()).position(|found| found == name)?;
+            header.get(place + name.len()..)
+        };
+        let is_chunk = field(b"op=").and_then(|value| value.first()) == Some(&CHUNK);
+        let size = field(b"size=").and_then(|value| value.first_chunk()).map_or(0, |size| u32::from_le_bytes(*size).into());
+        if is_chunk {
+            Memory::new(most_bytes).take(size).map_err(|what| format!("byte {at}: a chunk {what}"))?;
+        }
+        at += 8 + u64::from(head) + u64::from(u32::from_le_bytes(word));
+    }
+    Ok(())
+}
+
+/// Kind of a record that holds messages.
+const CHUNK: u8 = 5;
 
 /// Bytes of `#ROSBAG V2.0` and a line feed.
 const MAGIC: usize = 13;

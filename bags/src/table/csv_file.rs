@@ -3,6 +3,7 @@
 use super::mapping::ImportOptions;
 use super::types::{Cells, Column, Lines, Table, name_of};
 use crate::BagError;
+use crate::memory::Memory;
 use crate::number_type::NumberType;
 use backdrive_plant::recording::{TextTable, comma_remark};
 use std::path::Path;
@@ -16,8 +17,9 @@ pub(crate) fn read(path: &Path, options: &ImportOptions) -> Result<Table, BagErr
     let mut record = csv::StringRecord::new();
     let heading = table.next(&mut record).map_err(wrong)?.unwrap_or(1);
     let mut columns: Vec<Read> = record.iter().map(|heading| Read::new(heading, options)).collect();
-    let mut lines = Vec::new();
+    let (mut lines, memory) = (Vec::new(), Memory::new(options.most_bytes));
     while let Some(line) = table.next(&mut record).map_err(wrong)? {
+        memory.take_numbers(record.len() as u64 + 1).map_err(|what| wrong((line, what)))?;
         lines.push(line);
         for (cell, column) in record.iter().zip(&mut columns) {
             column.take(line, cell).map_err(|what| wrong((line, what)))?;

@@ -2,6 +2,7 @@
 
 use super::mapping::{ImportOptions, ImportReport};
 use super::{csv_file, from_bag, mat_in, mat_out, parquet_in, parquet_out, to_bag};
+use crate::memory::Memory;
 use crate::{BagError, Reader};
 use std::io::Read;
 use std::path::Path;
@@ -93,7 +94,7 @@ pub fn import_table(table: &Path, bag: &Path, options: &ImportOptions) -> Result
     }
     let read = match format {
         TableFormat::Csv => csv_file::read(table, options)?,
-        TableFormat::Parquet => parquet_in::read(table)?,
+        TableFormat::Parquet => parquet_in::read(table, Memory::new(options.most_bytes))?,
         TableFormat::Mat => mat_in::read(table, options)?,
     };
     to_bag::write_bag(table, &read, bag, options)

@@ -1,5 +1,6 @@
 //! Which column of a table goes where in a bag.
 
+use crate::memory::MOST_BYTES;
 use serde::Serialize;
 
 /// What a column is of an axis.
@@ -56,11 +57,13 @@ pub struct ImportOptions {
     pub variable: Option<String>,
     /// Replace a bag that exists.
     pub overwrite: bool,
+    /// Bytes that the unpacked numbers may take, see [`crate::MOST_BYTES`].
+    pub most_bytes: u64,
 }
 
 impl Default for ImportOptions {
     fn default() -> ImportOptions {
-        ImportOptions { time: "t".to_owned(), columns: Vec::new(), variable: None, overwrite: false }
+        ImportOptions { time: "t".to_owned(), columns: Vec::new(), variable: None, overwrite: false, most_bytes: MOST_BYTES }
     }
 }
 

@@ -4,6 +4,7 @@ use super::mat_format::{
     CLASS_OPAQUE, CLASS_STRUCTURE, CLASS_TEXT, CLASSES, COMPRESSED, DOUBLE, FLAG_COMPLEX, FLAG_LOGICAL, HEADER, INT8, INT16, INT32, INT64,
     MATRIX, SINGLE, UINT8, UINT16, UINT32, UINT64, UTF8, UTF16,
 };
+use crate::memory::Memory;
 use crate::number_type::{LARGEST_WHOLE, NumberType};
 use flate2::read::ZlibDecoder;
 use std::io::Read;
@@ -31,14 +32,11 @@ pub(crate) enum Held {
 /// Structures inside structures beyond this are damage.
 const MOST_NESTED: usize = 8;
 
-/// Most bytes of one variable: what a size of 32 bits can tell.
-const MOST_BYTES: u64 = u32::MAX as u64;
-
 /// The variables of a file, which begins with its header.
 ///
 /// # Errors
 /// A sentence with the byte.
-pub(crate) fn variables(file: &[u8]) -> Result<Vec<Array>, String> {
+pub(crate) fn variables(file: &[u8], memory: &Memory) -> Result<Vec<Array>, String> {
     let header =
         file.get(..HEADER).ok_or_else(|| format!("ends at byte {}, within its header of {HEADER} bytes; it was cut off", file.len()))?;
     let big_endian = match &header[126..128] {
@@ -50,7 +48,7 @@ pub(crate) fn variables(file: &[u8]) -> Result<Vec<Array>, String> {
     if version != 1 {
         return Err(format!("byte 124: is of version {version}, expected 1; save it again with save(..., '-v7')"));
     }
-    let mut bytes = Bytes { bytes: file, at: HEADER, from: 0, big_endian };
+    let mut bytes = Bytes { bytes: file, at: HEADER, from: 0, big_endian, memory };
     let mut found = Vec::new();
     while bytes.at < file.len() {
         let (start, kind, data) = bytes.element()?;
@@ -58,10 +56,13 @@ pub(crate) fn variables(file: &[u8]) -> Result<Vec<Array>, String> {
             MATRIX => data.array(0)?,
             COMPRESSED => {
                 let mut plain = Vec::new();
-                let read = ZlibDecoder::new(data.bytes).take(MOST_BYTES).read_to_end(&mut plain);
+                let read = ZlibDecoder::new(data.bytes).take(memory.left().saturating_add(1)).read_to_end(&mut plain);
                 read.map_err(|error| format!("byte {start}: a compressed variable cannot be unpacked: {error}"))?;
+                if plain.len() as u64 > memory.left() {
+                    return Err(format!("byte {start}: a compressed variable {}", memory.refuse(plain.len() as u64)));
+                }
                 let within = |what: String| format!("byte {start}, a compressed variable, unpacked {what}");
-                let mut plain = Bytes { bytes: &plain, at: 0, from: 0, big_endian };
+                let mut plain = Bytes { bytes: &plain, at: 0, from: 0, big_endian, memory };
                 match plain.element().map_err(within)? {
                     (_, MATRIX, data) => data.array(0).map_err(within)?,
                     (_, kind, _) => return Err(within(format!("byte 0: is an element of type {kind}, expected an array, {MATRIX}"))),
@@ -80,6 +81,7 @@ struct Bytes<'a> {
     at: usize,
     from: usize,
     big_endian: bool,
+    memory: &'a Memory,
 }
 
 impl<'a> Bytes<'a> {
@@ -119,7 +121,7 @@ impl<'a> Bytes<'a> {
         };
         // The last element of a file need not be filled up.
         self.at = (self.at + fill).min(self.bytes.len());
-        Ok((start, kind, Bytes { bytes: data, at: 0, from, big_endian: self.big_endian }))
+        Ok((start, kind, Bytes { bytes: data, at: 0, from, big_endian: self.big_endian, memory: self.memory }))
     }
 
     /// The array that an element of type [`MATRIX`] holds.
@@ -194,6 +196,14 @@ impl<'a> Bytes<'a> {
 
     /// Values as they are stored, which may be smaller than the class of the array: 1.0, 2.0 as bytes.
     fn numbers(&self, kind: u32) -> Result<Stored, String> {
+        // Numbers of one byte become eight.
+        let size = match kind {
+            INT8 | UINT8 => 1,
+            INT16 | UINT16 => 2,
+            INT32 | UINT32 | SINGLE => 4,
+            _ => 8,
+        };
+        self.memory.take_numbers((self.bytes.len() / size) as u64).map_err(|what| format!("byte {}: a variable {what}", self.from))?;
         let floats = |size: usize, value: fn(u64) -> f64| {
             Stored::Floats(self.bytes.chunks_exact(size).map(|bytes| value(number(bytes, self.big_endian))).collect())
         };

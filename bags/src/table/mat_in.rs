@@ -5,6 +5,7 @@ use super::mat_array::{Array, Held, variables};
 use super::mat_format::NAMES;
 use super::types::{Cells, Column, Table};
 use crate::BagError;
+use crate::memory::Memory;
 use crate::number_type::NumberType;
 use std::collections::HashMap;
 use std::path::Path;
@@ -13,7 +14,7 @@ use std::path::Path;
 pub(crate) fn read(path: &Path, options: &ImportOptions) -> Result<Table, BagError> {
     let wrong = |what: String| BagError::File { path: path.to_owned(), what };
     let file = std::fs::read(path).map_err(BagError::io(path))?;
-    let mut arrays = variables(&file).map_err(wrong)?;
+    let mut arrays = variables(&file, &Memory::new(options.most_bytes)).map_err(wrong)?;
     let names = names(&arrays);
     // What objects hold stands at the end, without a name.
     arrays.retain(|array| array.name != NAMES && !array.name.is_empty());

@@ -2,12 +2,14 @@
 
 use super::types::{Cells, Column, Table};
 use crate::BagError;
+use crate::memory::Memory;
 use crate::parquet_file::{ParquetFile, Values};
 use std::path::Path;
+use std::rc::Rc;
 
 /// Reads the columns of a parquet file that hold one value a row.
-pub(crate) fn read(path: &Path) -> Result<Table, BagError> {
-    let file = ParquetFile::open(path)?;
+pub(crate) fn read(path: &Path, memory: Memory) -> Result<Table, BagError> {
+    let file = ParquetFile::open(path, &Rc::new(memory))?;
     let mut columns: Vec<Column> = Vec::new();
     for (place, name, is_single) in file.columns() {
         let deeper = || Column::other(name, "lists or structures");

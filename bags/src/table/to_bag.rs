@@ -12,6 +12,9 @@ use backdrive_msgs::{MAX_AXES, Message, Sample, source_id};
 use std::collections::{BTreeMap, HashMap};
 use std::path::Path;
 
+/// Columns that a bag can hold: MCAP numbers channels with 16 bits, and some are the bag's own.
+const MOST_COLUMNS: usize = 65_000;
+
 /// A column of numbers that may go into a bag.
 struct Known<'a> {
     /// What it is called there.
@@ -54,6 +57,7 @@ pub(crate) fn write_bag(path: &Path, table: &Table, bag: &Path, options: &Import
         }
     }
     let mut info = vec![topic_info(TIME_TOPIC, "t")];
+    let mut places = HashMap::from([(TIME_TOPIC.to_owned(), 0)]);
     let mut types = BTreeMap::new();
     let mut remember = |topic: &str, quantity: Quantity, axis: usize, of: NumberType| {
         if of != NumberType::Double {
@@ -62,6 +66,10 @@ pub(crate) fn write_bag(path: &Path, table: &Table, bag: &Path, options: &Import
     };
     remember(TIME_TOPIC, Quantity::Position, 0, clock.of);
     let maps = placed(path, table, &known, &skipped, clock.place, options)?;
+    if maps.len() > MOST_COLUMNS {
+        let what = format!("has {} columns of numbers, and a bag holds at most {MOST_COLUMNS}; name those that count with --map", maps.len());
+        return Err(table.wrong_columns(path, what));
+    }
     let mut sources: Vec<Source> = Vec::with_capacity(maps.len());
     let mut taken = HashMap::new();
     for (column, map) in &maps {
@@ -81,7 +89,7 @@ pub(crate) fn write_bag(path: &Path, table: &Table, bag: &Path, options: &Import
             );
             return Err(table.wrong(path, row, what));
         }
-        let place = info.iter().position(|info| info.topic.name == map.topic).unwrap_or_else(|| {
+        let place = *places.entry(map.topic.clone()).or_insert_with(|| {
             info.push(topic_info(&map.topic, if options.columns.is_empty() { &map.column } else { "axis0" }));
             info.len() - 1
         });

@@ -1,7 +1,7 @@
 //! CSV recordings.
 
 use super::columns::{Columns, Piece, Source};
-use super::record::{Recording, RecordingError, signals_of};
+use super::record::{LARGEST, Recording, RecordingError, signals_of};
 use super::text_table::{TextTable, comma_remark};
 use super::units::{self, Kind, Unit};
 use crate::model::Model;
@@ -152,7 +152,11 @@ fn number(name: &str, line: usize, record: &StringRecord, column: &Wanted) -> Re
     if !value.is_finite() {
         return Err(wrong(format!("\"{cell}\"; leave such rows out, or give a piece without them with rows")));
     }
-    Ok(value * column.factor + column.offset)
+    let value = value * column.factor + column.offset;
+    if value.abs() > LARGEST {
+        return Err(wrong(format!("\"{cell}\", which nothing measures: a mark for a missing value? Leave such rows out")));
+    }
+    Ok(value)
 }
 
 struct Headings<'a> {

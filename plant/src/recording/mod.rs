@@ -14,5 +14,5 @@ pub use csv_file::{read_csv, read_headings, read_signals_of, write_csv};
 pub use hold::{resample, segments};
 pub use joints::JointColumns;
 pub(crate) use joints::read_joints;
-pub use record::{Gap, Jitter, Recording, RecordingError, signals_of};
+pub use record::{Gap, Jitter, LARGEST, Recording, RecordingError, signals_of};
 pub use text_table::{TextTable, comma_remark};

@@ -90,6 +90,18 @@ pub enum RecordingError {
         /// NaN or infinite.
         value: f64,
     },
+    /// A sample beyond [`LARGEST`].
+    #[error("{name}: sample {index} of \"{signal}\" is {value:e}, which nothing measures: a mark for a missing value? Leave such rows out")]
+    TooLarge {
+        /// The recording.
+        name: String,
+        /// The signal.
+        signal: String,
+        /// The sample, from 0.
+        index: usize,
+        /// In the signal's SI unit.
+        value: f64,
+    },
     /// The file names a unit that the signal cannot have.
     #[error(
         "{name}: \"{signal}\" is in {unit}, {is}; the model's signal is {expected}: name another column or unit, or say scale under [columns]"
@@ -118,6 +130,9 @@ pub enum RecordingError {
     },
 }
 
+/// Largest magnitude of a sample in SI units. No sensor measures as much, and with it squares and products of samples stay finite.
+pub const LARGEST: f64 = 1e30;
+
 impl Recording {
     /// Whether the units that the file names go with the model's signals.
     ///
@@ -138,7 +153,12 @@ impl Recording {
         let count = t.len();
         let finite = |signal: &str, samples: &[f64]| match samples.iter().position(|x| !x.is_finite()) {
             Some(index) => Err(RecordingError::NotFinite { name: name.clone(), signal: signal.to_string(), index, value: samples[index] }),
-            None => Ok(()),
+            None => match samples.iter().position(|x| x.abs() > LARGEST) {
+                Some(index) => {
+                    Err(RecordingError::TooLarge { name: name.clone(), signal: signal.to_string(), index, value: samples[index] })
+                }
+                None => Ok(()),
+            },
         };
         finite("t", &t)?;
         for (signal, samples) in &signals {

@@ -116,7 +116,9 @@ impl<'a> Ready<'a> {
         let scale: Vec<f64> = (0..n).map(|i| normal[(i, i)].sqrt()).map(|s| if s > 0.0 { s } else { 1.0 }).collect();
         let matrix = DMatrix::from_fn(n, n, |i, j| normal[(i, j)] / (scale[i] * scale[j]));
         let right = DVector::from_fn(n, |i, _| right[i] / scale[i]);
-        let solved = matrix.svd(true, true).solve(&right, 1e-13).ok()?;
+        // The decomposition does not end on what is not finite.
+        let finite = matrix.iter().all(|x| x.is_finite());
+        let solved = finite.then(|| matrix.svd(true, true).solve(&right, 1e-13).ok())??;
         let coefficients: Vec<f64> = solved.iter().zip(&scale).map(|(c, s)| c / s).collect();
         let loss = mean_square(&self.left(columns, &coefficients), rows);
         loss.is_finite().then_some((coefficients, loss))
@@ -186,6 +188,9 @@ impl<'a> Ready<'a> {
             let slopes: Vec<Vec<f64>> = moved.iter().map(|n| self.slope(&fit, *n)).collect();
             let all: Vec<&[f64]> = columns.iter().chain(&slopes).map(Vec::as_slice).collect();
             let (normal, right) = normal_equations(&all, &left, rows);
+            if !normal.iter().all(|x| x.is_finite()) {
+                break;
+            }
             let mut better = None;
             while damping < 1e4 {
                 let mut damped = normal.clone();

@@ -243,7 +243,9 @@ fn autoregression(samples: &[f64], order: usize) -> Option<Vec<f64>> {
         right += &past * next.first().copied()?;
         normal += &past * past.transpose();
     }
-    let solved = normal.svd(true, true).solve(&right, 1e-14).ok()?;
+    // The decomposition does not end on what is not finite.
+    let finite = normal.iter().all(|x| x.is_finite());
+    let solved = finite.then(|| normal.svd(true, true).solve(&right, 1e-14).ok())??;
     Some(solved.iter().copied().collect())
 }
 
