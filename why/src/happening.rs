@@ -1,7 +1,7 @@
 //! What happens in a recording, before any question of why.
 
 use backdrive_stability::judgement::frequency_hz;
-use backdrive_stability::oscillation::{Oscillation, oscillation};
+use backdrive_stability::oscillation::oscillation;
 use backdrive_stability::outcome::{Outcome, Trace, Unit};
 use backdrive_stability::resimulate::Run;
 use backdrive_stability::session::Session;
@@ -85,20 +85,6 @@ impl Happening {
         for trace in &mut traces {
             trace.position.truncate(rows);
             trace.contact.truncate(rows);
-        }
-        // Where nobody recorded the hand, what is slow is the hand's own.
-        if traces.iter().all(|t| t.intent.is_empty()) && !matches!(outcome, Outcome::NotJudged { .. } | Outcome::Limited { .. }) {
-            let fast = traces.iter().filter_map(oscillates_on).max_by(|a, b| a.amplitude.total_cmp(&b.amplitude));
-            return match fast {
-                Some(found) if found.growth_per_s > GROWS => {
-                    Happening::RunAway { growth_per_s: found.growth_per_s, frequency_hz: found.frequency_hz }
-                }
-                Some(found) => {
-                    let unit = traces.first().map_or(Unit::Unknown, |t| t.unit);
-                    Happening::LimitCycle { amplitude_m: found.amplitude, frequency_hz: found.frequency_hz, unit }
-                }
-                None => Happening::of_outcome(Outcome::Stable, &traces),
-            };
         }
         Happening::of_outcome(outcome, &traces)
     }
@@ -185,33 +171,6 @@ fn ringing(trace: &Trace) -> Option<(f64, f64)> {
     let periods = found.frequency_hz / -found.growth_per_s;
     (found.amplitude_before > floor && found.growth_per_s < 0.0 && periods > RINGS && found.frequency_hz > 1.5 * LOWEST_HZ)
         .then_some((found.frequency_hz, periods))
-}
-
-/// An envelope that rises faster than this grows, 1/s.
-const GROWS: f64 = 1.0;
-
-/// The strongest oscillation in contact that does not die, over half a second at least.
-fn oscillates_on(trace: &Trace) -> Option<Oscillation> {
-    let least = (AFTER_TOUCH_S / trace.period_s) as usize;
-    let rows = trace.position.len().min(trace.contact.len());
-    let floor = FELT.max(8.0 * trace.resolution) + 10.0 * trace.noise;
-    // A loop that bounces off the wall touches it at least once in a twentieth of a second.
-    let bridged = (0.05 / trace.period_s) as usize;
-    let touched: Vec<usize> = (0..rows).filter(|r| trace.contact[*r] != 0.0).collect();
-    let mut pieces: Vec<(usize, usize)> = Vec::new();
-    for row in touched {
-        match pieces.last_mut() {
-            Some((_, end)) if row - *end <= bridged => *end = row,
-            _ => pieces.push((row, row)),
-        }
-    }
-    let found = pieces.into_iter().filter(|(from, to)| to - from >= 2 * least).filter_map(|(from, to)| {
-        let found = oscillation(&trace.position[from + least / 2..to], trace.period_s, LOWEST_HZ)?;
-        let dies = found.amplitude < 0.5 * found.amplitude_before;
-        // The hand's own motion has lines at the lowest frequency that is looked at.
-        (found.amplitude > floor && !dies && found.frequency_hz > 1.3 * LOWEST_HZ).then_some(found)
-    });
-    found.max_by(|a, b| a.amplitude.total_cmp(&b.amplitude))
 }
 
 /// Whether the master stands still most of the time and goes on in jumps.

@@ -9,6 +9,22 @@ pub(super) const LEAST_HOLD_S: f64 = 0.3;
 /// And hold this many samples: each of its quarters then has more than one period of an oscillation at a third of the rate.
 const LEAST_SAMPLES: usize = 16;
 
+/// A loop that bounces off what it touches touches it again within this, s.
+const BRIDGED_S: f64 = 0.05;
+
+/// Where nobody recorded what the hand wants, it counts as holding on while the slave is in contact; pieces of rows, short losses of contact bridged.
+fn in_contact(trace: &Trace, rows: usize) -> Vec<bool> {
+    let bridged = (BRIDGED_S / trace.period_s) as usize;
+    let mut held = vec![trace.closes == Closes::Always; rows];
+    let mut before: Option<usize> = None;
+    for row in (0..rows).filter(|row| trace.contact[*row] != 0.0) {
+        let from = before.filter(|b| row - b <= bridged).unwrap_or(row);
+        held[from..=row].fill(true);
+        before = Some(row);
+    }
+    held
+}
+
 /// Pieces in which the hand holds still, the loop is closed at least now and then, and no sample is missing for longer than the loop
 /// bridges; transients cut off.
 pub(super) fn holds(trace: &Trace) -> Vec<(usize, usize)> {
@@ -17,7 +33,8 @@ pub(super) fn holds(trace: &Trace) -> Vec<(usize, usize)> {
     for gap in trace.gaps.long(trace.period_s) {
         open[gap.start.min(n)..gap.end.min(n)].fill(true);
     }
-    let still = |i: usize| !open[i] && hand_still(trace, i);
+    let touching = trace.intent.is_empty().then(|| in_contact(trace, n));
+    let still = |i: usize| !open[i] && touching.as_ref().map_or_else(|| hand_still(trace, i), |held| held[i]);
     let (transient, least) = ((TRANSIENT_S / trace.period_s) as usize, ((LEAST_HOLD_S / trace.period_s) as usize).max(LEAST_SAMPLES));
     let mut holds = Vec::new();
     let mut start = None;
@@ -39,5 +56,5 @@ pub(super) fn holds(trace: &Trace) -> Vec<(usize, usize)> {
 }
 
 fn hand_still(trace: &Trace, i: usize) -> bool {
-    trace.intent.is_empty() || i == 0 || i >= trace.intent.len() || trace.intent[i] == trace.intent[i - 1]
+    i == 0 || i >= trace.intent.len() || trace.intent[i] == trace.intent[i - 1]
 }

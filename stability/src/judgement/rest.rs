@@ -7,6 +7,8 @@ use crate::outcome::{LEAST_AMPLITUDE, LOWEST_HZ, NOISE, Outcome, Trace, Unit};
 
 /// A master that moves less than this while the hand holds still is at rest, m or rad.
 pub(super) const WANDER: f64 = 20e-6;
+/// A line this far above the lowest frequency is none of a quick hand's.
+const BEYOND_THE_HAND: f64 = 1.3;
 /// A motion of less than this many steps of the sensor may be its rounding.
 const STEPS: f64 = 4.0;
 /// A force that swings by less than this share of its largest in the hold is not felt to (differences of force that are just noticed: 7 %; Pang, Tan
@@ -26,6 +28,12 @@ pub(super) fn judge_hold(trace: &Trace, from: usize, to: usize) -> Option<Outcom
     }
     let found = oscillation(&trace.position[from..to], trace.period_s, LOWEST_HZ);
     let fast = found.as_ref().map_or(Outcome::Stable, |found| judge_fast(found, trace));
+    // Where nobody recorded what the hand wants, what is slow is the hand's own, and a quick hand has lines at the lowest frequency looked at.
+    if trace.intent.is_empty() {
+        let by_hand = found?.frequency_hz < BEYOND_THE_HAND * LOWEST_HZ;
+        let by_position = if by_hand { Outcome::Stable } else { fast };
+        return Some(if by_position == Outcome::Stable { judge_force(trace, from, to) } else { by_position });
+    }
     let slow = judge_slow(trace, from, to);
     // The edges of a slow wandering have lines at every frequency, the strongest of them at the lowest.
     let spills_over = found.is_some_and(|f| f.frequency_hz < 1.5 * LOWEST_HZ) && slow != Outcome::Stable;
