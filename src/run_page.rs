@@ -133,15 +133,16 @@ fn headline(done: &Done) -> (Tone, String) {
     let fault = fault.or((done.lost > 0).then(|| format!(" {} messages were lost.", done.lost))).unwrap_or_default();
     let Some(outcome) = done.summary.as_ref().and_then(|s| s.outcome) else {
         let tone = if fault.is_empty() { Tone::Neutral } else { Tone::Bad };
-        return (tone, format!("The run has no loop with a contact, so nothing is said of its stability.{fault}"));
+        let why = done.summary.as_ref().and_then(|s| s.no_loop).map_or(String::new(), |why| format!(": {why}"));
+        return (tone, format!("There is no loop whose stability could be judged{why}.{fault}"));
     };
     let (tone, text) = match outcome {
         Outcome::Stable => (Tone::Good, format!("Stable{gain}: what oscillates in contact dies out.")),
-        Outcome::LimitCycle { amplitude_m, frequency_hz } => (
+        Outcome::LimitCycle { amplitude_m, frequency_hz, unit } => (
             Tone::Warning,
             format!(
-                "Not stable{gain}: a limit cycle of {} at {} stays while the hand holds still.",
-                si(amplitude_m, "m"),
+                "Not stable{gain}: a limit cycle of ±{} at {} stays while the hand holds still.",
+                si(amplitude_m, unit.symbol()),
                 si(frequency_hz, "Hz")
             ),
         ),
@@ -208,14 +209,15 @@ fn facts(done: &Done, graph: &Graph) -> Table {
         };
         row("gain", format!("μλ = {} (μ {}, λ {}){later}", number(s.loop_gain), number(graph.gains.mu), number(graph.gains.lambda)));
         match (s.first_contact_s, s.peak_contact_force) {
-            (Some(first), Some(peak)) => {
-                row("contact", format!("first at {}, {} in all, force up to {}", si(first, "s"), si(s.contact_s, "s"), si(peak, "N")))
-            }
+            (Some(first), Some(peak)) => row(
+                "contact",
+                format!("first at {}, {} in all, force up to {}", si(first, "s"), si(s.contact_s, "s"), si(peak, s.force_units[0])),
+            ),
             (None, Some(_)) => row("contact", "none".to_string()),
             _ => {}
         }
         if let Some(peak) = s.peak_feedback_force {
-            row("reflected force", format!("up to {}", si(peak, "N")));
+            row("reflected force", format!("up to {}", si(peak, s.force_units[1])));
         }
     }
     if let Some(bag) = &done.bag {

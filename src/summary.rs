@@ -3,7 +3,8 @@
 use crate::failure::Failure;
 use backdrive_bags::Reader;
 use backdrive_msgs::Message;
-use backdrive_nodes::graph::{Files, Graph, Overrides};
+use backdrive_nodes::graph::{Files, Graph, NodeKind, Overrides, Settings};
+use backdrive_plant::model::Motion;
 use backdrive_stability::collect::Collector;
 use backdrive_stability::outcome::{Outcome, Trace};
 use backdrive_stability::unjudged::Unjudged;
@@ -17,9 +18,12 @@ pub struct Summary {
     pub loop_gain: f64,
     /// The same at the end: a scheduled change or the guard may have moved it.
     pub last_loop_gain: f64,
-    /// What the loop did; `None` where nothing was asked of it: the graph has no master, scaling and slave (an experiment that identifies a device),
-    /// or its slave has nothing to touch.
+    /// What the loop did; `None` where there is no loop: `no_loop` says why.
     pub outcome: Option<Outcome>,
+    /// Why there is no loop that could be judged, where there is none.
+    pub no_loop: Option<&'static str>,
+    /// Units of the force on the slave and of that on the master: N, or N m.
+    pub force_units: [&'static str; 2],
     /// Largest magnitude of the environment's force on the slave, N or N m.
     pub peak_contact_force: Option<f64>,
     /// Largest magnitude of the force applied to the master, N or N m.
@@ -38,6 +42,15 @@ pub fn graph_of(reader: &Reader, changes: &Overrides) -> Result<Graph, Failure> 
         return Err(Failure::input(format!("{}: holds recordings, but no graph to run", path.display())));
     }
     Ok(Graph::from_text(&header.graph_toml, path, changes, &Files::Bag(&header.files))?)
+}
+
+/// Unit of a force on a device.
+fn force_unit(graph: &Graph, kind: NodeKind) -> &'static str {
+    let motion = graph.node_of(kind).and_then(|node| match &node.settings {
+        Settings::Master(files) | Settings::Slave(files) => files.model.as_ref().map(|model| model.motion),
+        _ => None,
+    });
+    if motion == Some(Motion::Rotation) { "N m" } else { "N" }
 }
 
 /// Reads a bag and says what happened.
@@ -84,6 +97,8 @@ impl Traces {
             loop_gain: graph.gains.mu * graph.gains.lambda,
             last_loop_gain: self.0.last_loop_gain(),
             outcome: self.0.outcome(),
+            no_loop: self.0.no_loop(),
+            force_units: [NodeKind::Slave, NodeKind::Master].map(|kind| force_unit(graph, kind)),
             peak_contact_force: peak(|t| &t.contact),
             peak_feedback_force: peak(|t| &t.feedback),
             first_contact_s: touching.first().map(|i| *i as f64 * graph.period_s()),
@@ -102,12 +117,15 @@ impl Summary {
     pub fn text(&self) -> String {
         let mut lines = Vec::new();
         if let (Some(start), Some(peak)) = (self.first_contact_s, self.peak_contact_force) {
-            lines.push(format!("contact  first at {start:.3} s, {:.3} s in all, force up to {peak:.3} N", self.contact_s));
+            lines.push(format!(
+                "contact  first at {start:.3} s, {:.3} s in all, force up to {peak:.3} {}",
+                self.contact_s, self.force_units[0]
+            ));
         } else if self.peak_contact_force.is_some() {
             lines.push("contact  none".to_string());
         }
         if let Some(peak) = self.peak_feedback_force {
-            lines.push(format!("master   reflected force up to {peak:.3} N"));
+            lines.push(format!("master   reflected force up to {peak:.3} {}", self.force_units[1]));
         }
         if let Some(outcome) = &self.outcome {
             let moved = (self.last_loop_gain - self.loop_gain).abs() > 1e-9 * self.loop_gain.abs();
@@ -120,6 +138,9 @@ impl Summary {
                 }
                 outcome => lines.push(format!("loop     {outcome} {gain}")),
             }
+        }
+        if let Some(why) = self.no_loop {
+            lines.push(format!("loop     none to judge: {why}"));
         }
         lines.join("\n")
     }

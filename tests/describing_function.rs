@@ -153,7 +153,7 @@ fn assert_close(what: &str, found: f64, known: f64, tolerance: f64) {
 }
 
 fn limit_cycle(outcome: Outcome) -> (f64, f64) {
-    let Outcome::LimitCycle { amplitude_m, frequency_hz } = outcome else { panic!("not a limit cycle: {outcome:?}") };
+    let Outcome::LimitCycle { amplitude_m, frequency_hz, .. } = outcome else { panic!("not a limit cycle: {outcome:?}") };
     (amplitude_m, frequency_hz)
 }
 

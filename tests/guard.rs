@@ -7,7 +7,8 @@ use backdrive_msgs::{Message, margin};
 use backdrive_nodes::build::plan;
 use backdrive_nodes::graph::{Graph, NodeKind, Overrides, Settings};
 use backdrive_nodes::sequence::Sequence;
-use backdrive_stability::outcome::{Outcome, Trace, judge};
+use backdrive_stability::judgement::judge;
+use backdrive_stability::outcome::{Outcome, Trace};
 use common::{contact, file};
 
 const PERIOD: f64 = 1.0 / 5000.0;
@@ -118,12 +119,8 @@ impl Guarded {
             position: self.trace.position[from..].to_vec(),
             contact: self.trace.contact[from..].to_vec(),
             feedback: self.trace.feedback[from..].to_vec(),
-            dither: Vec::new(),
             clamped: self.trace.clamped[from..].to_vec(),
-            travel: None,
-            resolution: 0.0,
-            noise: 0.0,
-            gaps: Default::default(),
+            ..Trace::default()
         })
     }
 }

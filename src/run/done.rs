@@ -30,7 +30,7 @@ pub struct Done {
 }
 
 impl Done {
-    /// 0 stable, or nothing was asked of a loop; 1 not stable, 7 it cannot be told; before these, of a run that did not go as it should:
+    /// 0 judged and stable, or there is no loop, which its text says; 1 not stable, 7 it cannot be told; before these, of a run that did not go as it should:
     /// 4 lost data, 6 a node failed, 130 interrupted.
     pub fn exit_code(&self) -> u8 {
         match (self.fault_code(), self.summary.as_ref().and_then(|s| s.outcome)) {
@@ -128,6 +128,7 @@ impl Done {
             "peak_feedback_force_n": summary.and_then(|s| s.peak_feedback_force),
             "first_contact_s": summary.and_then(|s| s.first_contact_s),
             "contact_s": summary.map(|s| s.contact_s),
+            "no_loop": summary.and_then(|s| s.no_loop),
             "outcome": summary.and_then(|s| s.outcome).map(|o| o.word()),
             "outcome_detail": summary.and_then(|s| s.outcome),
             "run": report,

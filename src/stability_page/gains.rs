@@ -174,7 +174,7 @@ mod tests {
 
     #[test]
     fn verdicts_hold_half_way_to_their_neighbours() {
-        let cycle = Outcome::LimitCycle { amplitude_m: 1e-3, frequency_hz: 20.0 };
+        let cycle = Outcome::LimitCycle { amplitude_m: 1e-3, frequency_hz: 20.0, unit: Default::default() };
         let spans = verdict_spans(&[(4.0, cycle), (1.0, Outcome::Stable), (f64::NAN, Outcome::Stable)]);
         assert_eq!(spans, [(1.0, 2.0, Word::Stable), (2.0, 4.0, Word::LimitCycle)]);
         assert!(verdict_spans(&[]).is_empty());

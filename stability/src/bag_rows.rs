@@ -1,5 +1,7 @@
 //! The rows of a session from the messages of a bag.
 
+use crate::collect::closes;
+use crate::outcome::Unit;
 use crate::session::{AxisSignals, Session};
 use crate::signal_role::{SessionError, SignalRole, cut_short, required};
 use backdrive_bags::{Entry, Reader};
@@ -210,6 +212,8 @@ fn blank(graph: &Graph, master: usize, axis: usize, rows: usize) -> AxisSignals 
         travel: known.and_then(|(axis, _)| axis.travel),
         resolution: known.map_or(0.0, |(axis, output)| axis.scale.abs() * output.resolution),
         noise: known.map_or(0.0, |(axis, output)| axis.scale.abs() * output.noise),
+        unit: model.map_or(Unit::Unknown, |m| Unit::of(m.motion)),
+        closes: closes(graph),
         ..AxisSignals::default()
     }
 }

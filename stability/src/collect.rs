@@ -1,8 +1,10 @@
 //! Collects what the answers need while messages go by, from a live run, a replay or a bag.
 
-use crate::outcome::{Outcome, Trace, judge};
+use crate::judgement::judge;
+use crate::outcome::{Closes, Outcome, Trace, Unit};
 use crate::session::{AxisSignals, Session};
 use crate::unjudged::{Gaps, Unjudged};
+use backdrive_control::coupling::Law;
 use backdrive_msgs::{Gains, Message, Sample, flag};
 use backdrive_nodes::graph::{DeviceFiles, Graph, NodeKind, Settings};
 
@@ -55,31 +57,41 @@ pub struct Collector {
     origin: Option<u64>,
     /// Rows that the graph asks for; 0 where it runs until it is stopped.
     planned: usize,
-    /// How a loop could be closed.
-    closes: Closes,
+    /// Whether there is a loop to ask about.
+    has: HasLoop,
 }
 
 /// Whether a graph has a loop whose stability can be asked about.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Closes {
+enum HasLoop {
     /// No master, nothing that closes the loop, or no slave: there is none.
-    Never,
-    /// The slave meets nothing that the graph knows of.
+    No,
+    /// Only contact closes it, and the slave meets nothing that the graph knows of.
     OnlyIfTouched,
-    /// There is something to touch.
+    /// There is something that closes it.
     Yes,
 }
 
-impl Closes {
-    fn of(graph: &Graph) -> Closes {
+impl HasLoop {
+    fn of(graph: &Graph) -> HasLoop {
         let [master, slave] = [NodeKind::Master, NodeKind::Slave].map(|kind| graph.node_of(kind));
         match (master, graph.loop_node(), slave.map(|n| (&n.settings, n.command.is_some()))) {
-            (Some(_), Some(_), Some((Settings::Slave(files), false))) if files.fragment.is_none() && !touches(files) => {
-                Closes::OnlyIfTouched
+            (Some(_), Some(_), Some((Settings::Slave(files), false)))
+                if closes(graph) == Closes::InContact && files.fragment.is_none() && !touches(files) =>
+            {
+                HasLoop::OnlyIfTouched
             }
-            (Some(_), Some(_), Some(_)) => Closes::Yes,
-            _ => Closes::Never,
+            (Some(_), Some(_), Some(_)) => HasLoop::Yes,
+            _ => HasLoop::No,
         }
+    }
+}
+
+/// What closes the loop of a graph: of all laws only position forward and force back leaves it open in free motion.
+pub(crate) fn closes(graph: &Graph) -> Closes {
+    match graph.loop_node().map(|node| &node.settings) {
+        Some(Settings::Coupling { law, .. }) if *law != Law::Direct => Closes::Always,
+        _ => Closes::InContact,
     }
 }
 
@@ -92,13 +104,13 @@ impl Collector {
     /// Ready for the messages of a graph; `name` is for messages about what was collected.
     pub fn of(graph: &Graph, name: &str) -> Collector {
         let node = |kind: NodeKind| graph.nodes.iter().position(|n| n.kind == kind);
-        let closes = graph.loop_node().map_or(NodeKind::Scaling, |n| n.kind);
+        let coupler = graph.loop_node().map_or(NodeKind::Scaling, |n| n.kind);
         let ports = [
             (NodeKind::Operator, "intent", Signal::Intent),
             (NodeKind::Master, "measured", Signal::Master),
             (NodeKind::Canceller, "induced", Signal::Induced),
             (NodeKind::Scaling, "dither", Signal::Dither),
-            (closes, "command", Signal::Command),
+            (coupler, "command", Signal::Command),
             (NodeKind::Slave, "measured", Signal::Slave),
         ];
         let spoken = |signal: Signal, node: usize| match (&graph.nodes[node].settings, signal) {
@@ -123,13 +135,15 @@ impl Collector {
                 travel: axis.and_then(|a| a.travel),
                 resolution: axis.zip(output).map_or(0.0, |(a, o)| a.scale.abs() * o.resolution),
                 noise: axis.zip(output).map_or(0.0, |(a, o)| a.scale.abs() * o.noise),
+                unit: model.map_or(Unit::Unknown, |m| Unit::of(m.motion)),
+                closes: closes(graph),
                 ..AxisSignals::default()
             }
         });
         let axes: Vec<AxisSignals> = axes.collect();
         Collector {
             topics: topics.collect(),
-            gains_topic: node(closes).map(|n| format!("/{}/gains", graph.nodes[n].name)),
+            gains_topic: node(coupler).map(|n| format!("/{}/gains", graph.nodes[n].name)),
             axes: vec![Columns::default(); axes.len()],
             blank: Session {
                 name: name.to_string(),
@@ -144,7 +158,7 @@ impl Collector {
                 bridged_s: graph.stale_after_s,
             },
             planned: graph.timing.steps.unwrap_or(0) as usize,
-            closes: Closes::of(graph),
+            has: HasLoop::of(graph),
             flags: Vec::new(),
             gains: vec![(0, graph.gains.mu, graph.gains.lambda)],
             origin: None,
@@ -241,6 +255,10 @@ impl Collector {
             position: held(&columns.master, rows),
             contact: held(&columns.contact, rows),
             feedback: held(&columns.force, rows),
+            slave: held(&columns.slave, columns.slave.len().min(rows)),
+            mu: self.gains.last().map_or(1.0, |(_, mu, _)| *mu),
+            closes: axis.closes,
+            unit: axis.unit,
             dither: held(&columns.dither, columns.dither.len().min(rows)),
             clamped: clamped.clone(),
             travel: axis.travel,
@@ -265,11 +283,25 @@ impl Collector {
         Gaps { at: (0..rows).map(lacks).collect(), bridged_s: self.blank.bridged_s, planned: self.planned }
     }
 
-    /// The verdict on what went by: the worst of the axes. `None` where nothing was asked of it: the graph has no loop, or its slave has
-    /// nothing to touch and touched nothing.
-    pub fn outcome(&self) -> Option<Outcome> {
+    /// Why there is no loop whose stability could be asked about; `None` where there is one.
+    pub fn no_loop(&self) -> Option<&'static str> {
         let touched = || self.axes.iter().any(|c| c.contact.iter().any(|f| f.is_finite() && *f != 0.0));
-        if self.closes == Closes::Never || (self.closes == Closes::OnlyIfTouched && !touched()) {
+        let one_way = self.gains.iter().all(|(_, _, lambda)| *lambda == 0.0);
+        match self.has {
+            HasLoop::No => Some("the graph has no master, slave and coupling between them that could form one"),
+            HasLoop::OnlyIfTouched | HasLoop::Yes if one_way => {
+                Some("lambda is 0: no force comes back to the hand, so there is no force feedback that could be unstable")
+            }
+            HasLoop::OnlyIfTouched if !touched() => {
+                Some("the slave has nothing to touch, and this law reflects nothing but the force of contact")
+            }
+            HasLoop::OnlyIfTouched | HasLoop::Yes => None,
+        }
+    }
+
+    /// The verdict on what went by: the worst of the axes. `None` where there is no loop.
+    pub fn outcome(&self) -> Option<Outcome> {
+        if self.no_loop().is_some() {
             return None;
         }
         Some(Outcome::worst(self.traces().iter().map(judge)).unwrap_or(Outcome::NotJudged { why: Unjudged::Empty }))

@@ -11,6 +11,7 @@ pub mod energy;
 pub mod frequency;
 pub mod from_bag;
 mod grid;
+pub mod judgement;
 mod long_bag;
 mod master_run;
 mod model_check;

@@ -52,6 +52,12 @@ fn half_window(rows: usize, period_s: f64, lowest_hz: f64) -> usize {
     ((0.5 / (lowest_hz * period_s)).round() as usize).clamp(1, (rows - 1) / 4)
 }
 
+/// What of a signal is faster than `lowest_hz`; a signal too short for it has nothing faster.
+pub(crate) fn without_slow_motion(signal: &[f64], period_s: f64, lowest_hz: f64) -> Vec<f64> {
+    let half = half_window(signal.len().max(5), period_s, lowest_hz);
+    if signal.len() > 2 * half { without_slow(signal, half) } else { Vec::new() }
+}
+
 /// The signal less its moving average, cut to where that average is whole.
 fn without_slow(signal: &[f64], half: usize) -> Vec<f64> {
     let window = 2 * half + 1;

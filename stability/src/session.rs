@@ -1,6 +1,6 @@
 //! The signals of a recorded loop, one value per step: what every answer is drawn from.
 
-use crate::outcome::Outcome;
+use crate::outcome::{Closes, Outcome, Unit};
 use crate::sensors::SensorFault;
 use crate::unjudged::Unjudged;
 
@@ -67,6 +67,10 @@ pub struct AxisSignals {
     pub resolution: f64,
     /// Standard deviation of that sensor's noise, m or rad; 0 where there is none or nobody says.
     pub noise: f64,
+    /// In what positions are counted.
+    pub unit: Unit,
+    /// What closes the loop, as the graph says.
+    pub closes: Closes,
 }
 
 impl Session {
@@ -78,6 +82,11 @@ impl Session {
     /// Whether it holds no row.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
+    }
+
+    /// Whether lambda is 0 throughout, so that no force comes back to the hand.
+    pub fn is_one_way(&self) -> bool {
+        !self.lambda.is_empty() && self.lambda.iter().all(|lambda| *lambda == 0.0)
     }
 
     /// mu*lambda at a row.

@@ -8,9 +8,11 @@ use serde::Serialize;
 pub enum Unjudged {
     /// There is no sample of the master, or none of what the slave touches.
     Empty,
-    /// The slave never touched anything, so the loop was never closed.
+    /// No force comes back to the hand: there is no loop that could be unstable.
+    NoFeedback,
+    /// The slave never touched anything, so a loop that only contact closes never was.
     NoContact,
-    /// The slave touched something, but never while the hand held still for 0.45 s.
+    /// The loop was closed, but never while the hand held still for long enough.
     NoHold,
     /// Nothing stirs the coupled pair above the frequencies of a hand, so nothing shows that a disturbance dies.
     NotShaken,
@@ -50,7 +52,11 @@ impl Unjudged {
                 "Record a push: let the hand bring the slave against what it shall touch and hold still there for a second (launch/contact.toml \
                  does), or make the run longer."
             }
-            Unjudged::NoHold => "Let the hand hold still in contact for at least half a second, better a second or two.",
+            Unjudged::NoFeedback => "Ask at a gain above 0 (`backdrive stability BAG --gain 0.3`), or run with --lambda above 0.",
+            Unjudged::NoHold => {
+                "Let the hand hold still while the loop is closed (in contact, where only contact closes it) for a second or two: half a second at \
+                 least, and 16 steps beyond the first 0.15 s."
+            }
             Unjudged::NotShaken => "Move faster, turn round sharply and touch something, so that the pair is stirred above 8 Hz.",
             Unjudged::NoDecay => "Record longer, with more sharp contacts: ten seconds or more.",
             Unjudged::Gaps { .. } => {
@@ -69,7 +75,7 @@ impl Unjudged {
     /// Whether something is missing that there should be: then what is left may look stable and prove nothing. Without contact or a hold
     /// nothing is missing, but nothing was shown either.
     pub fn is_loss(&self) -> bool {
-        !matches!(self, Unjudged::NoContact | Unjudged::NoHold | Unjudged::NotShaken | Unjudged::NoDecay)
+        !matches!(self, Unjudged::NoFeedback | Unjudged::NoContact | Unjudged::NoHold | Unjudged::NotShaken | Unjudged::NoDecay)
     }
 }
 
@@ -78,7 +84,8 @@ impl std::fmt::Display for Unjudged {
         match self {
             Unjudged::Empty => write!(f, "there is no sample of the master and of what the slave touches together"),
             Unjudged::NoContact => write!(f, "the slave never touched anything, so the loop was never closed"),
-            Unjudged::NoHold => write!(f, "the slave touched something, but never while the hand held still for 0.45 s"),
+            Unjudged::NoFeedback => write!(f, "lambda is 0: no force comes back to the hand, so there is no loop that could be unstable"),
+            Unjudged::NoHold => write!(f, "the loop was closed, but never while the hand held still for 0.45 s and 16 steps"),
             Unjudged::NotShaken => write!(f, "nothing stirs the pair above 8 Hz, so nothing shows that an oscillation dies"),
             Unjudged::NoDecay => {
                 write!(f, "how fast the slowest oscillation of the pair dies is not known well enough to say that it does")

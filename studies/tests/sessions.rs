@@ -5,10 +5,11 @@
 mod skipped;
 
 use backdrive_stability::coupling::{Kind, Signals, Term, identify};
-use backdrive_stability::moving::judge;
+use backdrive_stability::judgement::judge_with_decay;
 use backdrive_stability::outcome::Outcome;
 use backdrive_stability::roles::Roles;
 use backdrive_stability::session::Session;
+use backdrive_stability::verdict::recorded_traces;
 use backdrive_studies::data::Data;
 use backdrive_studies::study_named;
 use std::path::Path;
@@ -24,7 +25,7 @@ fn one_record_of_each_gains_is_stable_and_tells_its_law() {
         let session = Session::from_roles(&folder.join(file), &roles).unwrap();
         let dead: Vec<&str> = session.sensors.iter().map(|s| s.signal.as_str()).collect();
         assert_eq!(dead, ["master_gauge_a"], "{file}");
-        let (outcome, mode) = judge(&session.axes[0], 1.0, session.period_s);
+        let (outcome, mode) = judge_with_decay(&recorded_traces(&session)[0]);
         assert_eq!(outcome, Outcome::Stable, "{file}: {mode:?}");
         let found = identify(&Signals::of(&session, 0).unwrap()).unwrap();
         assert_eq!(found.kind, Kind::PositionError, "{file}");

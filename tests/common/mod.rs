@@ -7,7 +7,8 @@ use backdrive_nodes::build::plan;
 use backdrive_nodes::graph::{Graph, NodeKind, Overrides, Settings};
 use backdrive_nodes::sequence::Sequence;
 use backdrive_plant::linear::{LinearModel, Operating};
-use backdrive_stability::outcome::{Outcome, Trace, judge};
+use backdrive_stability::judgement::judge;
+use backdrive_stability::outcome::{Outcome, Trace};
 use std::path::PathBuf;
 
 /// A file of the workspace.

@@ -191,6 +191,10 @@ fn closer(
 /// Runs the loop again: as it was, without each suspect, with each remedy.
 fn again(question: &Question, answer: &mut Answer, hear: &(dyn Fn(&str) + Sync), cancel: &AtomicBool) -> Result<(), ResimulateError> {
     let Question { session, graph, gain, .. } = question;
+    if gain.product() == 0.0 {
+        answer.not_again = Some("mu*lambda is 0, so there is no loop to run without one thing or another".to_string());
+        return Ok(());
+    }
     let steps = session.len().min(MOST_STEPS) as u64;
     let hand = Hand { intents: question.intents.clone(), steps, rate_hz: graph.timing.rate_hz };
     let was: Trial = as_it_was(graph, &answer.differences);

@@ -1,7 +1,8 @@
 //! What happens in a recording, before any question of why.
 
-use backdrive_stability::oscillation::{Oscillation, oscillation};
-use backdrive_stability::outcome::{Outcome, Trace, frequency_hz};
+use backdrive_stability::judgement::frequency_hz;
+use backdrive_stability::oscillation::oscillation;
+use backdrive_stability::outcome::{Outcome, Trace, Unit};
 use backdrive_stability::resimulate::Run;
 use backdrive_stability::session::Session;
 use backdrive_stability::unjudged::Unjudged;
@@ -42,6 +43,8 @@ pub enum Happening {
         amplitude_m: f64,
         /// Hz.
         frequency_hz: f64,
+        /// Unit of the amplitude.
+        unit: Unit,
     },
     /// It grows.
     RunAway {
@@ -56,6 +59,8 @@ pub enum Happening {
         amplitude_m: f64,
         /// Steps per second.
         frequency_hz: f64,
+        /// Unit of the amplitude.
+        unit: Unit,
     },
     /// A clamp acts, or the device leaves its travel.
     Saturation {
@@ -81,17 +86,6 @@ impl Happening {
             trace.position.truncate(rows);
             trace.contact.truncate(rows);
         }
-        // Where nobody recorded the hand, what is slow is the hand's own.
-        if traces.iter().all(|t| t.intent.is_empty()) && !matches!(outcome, Outcome::NotJudged { .. } | Outcome::Limited { .. }) {
-            let fast = traces.iter().filter_map(oscillates_on).max_by(|a, b| a.amplitude.total_cmp(&b.amplitude));
-            return match fast {
-                Some(found) if found.growth_per_s > GROWS => {
-                    Happening::RunAway { growth_per_s: found.growth_per_s, frequency_hz: found.frequency_hz }
-                }
-                Some(found) => Happening::LimitCycle { amplitude_m: found.amplitude, frequency_hz: found.frequency_hz },
-                None => Happening::of_outcome(Outcome::Stable, &traces),
-            };
-        }
         Happening::of_outcome(outcome, &traces)
     }
 
@@ -104,10 +98,10 @@ impl Happening {
                 .filter_map(ringing)
                 .max_by(|a, b| a.1.total_cmp(&b.1))
                 .map_or(Happening::Nothing, |(frequency_hz, periods)| Happening::Ringing { frequency_hz, periods }),
-            Outcome::LimitCycle { amplitude_m, frequency_hz } if frequency_hz < LOWEST_HZ && traces.iter().any(in_stairs) => {
-                Happening::Stairs { amplitude_m, frequency_hz }
+            Outcome::LimitCycle { amplitude_m, frequency_hz, unit } if frequency_hz < LOWEST_HZ && traces.iter().any(in_stairs) => {
+                Happening::Stairs { amplitude_m, frequency_hz, unit }
             }
-            Outcome::LimitCycle { amplitude_m, frequency_hz } => Happening::LimitCycle { amplitude_m, frequency_hz },
+            Outcome::LimitCycle { amplitude_m, frequency_hz, unit } => Happening::LimitCycle { amplitude_m, frequency_hz, unit },
             Outcome::Unstable { growth_per_s } => Happening::RunAway { growth_per_s, frequency_hz: frequency() },
             Outcome::Limited { clamped_share, beyond_travel } => Happening::Saturation { clamped_share, beyond_travel },
             Outcome::NotJudged { why } => Happening::NotJudged { why },
@@ -143,24 +137,25 @@ impl Happening {
 impl std::fmt::Display for Happening {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
-            Happening::Nothing => write!(f, "nothing shakes: what oscillates in contact dies at once"),
+            Happening::Nothing => write!(f, "nothing shakes: what oscillates dies at once"),
             Happening::Ringing { frequency_hz, periods } => {
                 write!(f, "it rings at {frequency_hz:.0} Hz after a touch, and needs {periods:.0} periods to fall to a third")
             }
-            Happening::LimitCycle { amplitude_m, frequency_hz } => {
-                write!(f, "a limit cycle of {:.3} mm at {frequency_hz:.1} Hz, in contact with the hand at rest", 1e3 * amplitude_m)
+            Happening::LimitCycle { amplitude_m, frequency_hz, unit } => {
+                write!(f, "a limit cycle of ±{} at {frequency_hz:.1} Hz", unit.text(*amplitude_m))
             }
             Happening::RunAway { growth_per_s, frequency_hz } if *frequency_hz > 0.0 => {
                 write!(f, "it runs away: an oscillation of {frequency_hz:.1} Hz grows by {growth_per_s:.2} per second")
             }
             Happening::RunAway { growth_per_s, .. } => write!(f, "it runs away without oscillating, by {growth_per_s:.2} per second"),
-            Happening::Stairs { amplitude_m, frequency_hz } => {
-                write!(f, "it creeps in stairs of stick and slip, {:.3} mm wide, {frequency_hz:.1} a second", 1e3 * amplitude_m)
+            Happening::Stairs { amplitude_m, frequency_hz, unit } => {
+                write!(f, "it creeps in stairs of stick and slip, ±{}, {frequency_hz:.1} a second", unit.text(*amplitude_m))
             }
             Happening::Saturation { clamped_share, beyond_travel } => {
                 let travel = if *beyond_travel { ", and the master leaves its travel" } else { "" };
                 write!(f, "a limit acts in {:.1} % of the contact{travel}", 100.0 * clamped_share)
             }
+            Happening::NotJudged { why: why @ Unjudged::NoFeedback } => write!(f, "nothing to judge: {why}"),
             Happening::NotJudged { why } => write!(f, "it cannot be told whether it shakes: {why}"),
         }
     }
@@ -178,36 +173,13 @@ fn ringing(trace: &Trace) -> Option<(f64, f64)> {
         .then_some((found.frequency_hz, periods))
 }
 
-/// An envelope that rises faster than this grows, 1/s.
-const GROWS: f64 = 1.0;
-
-/// The strongest oscillation in contact that does not die, over half a second at least.
-fn oscillates_on(trace: &Trace) -> Option<Oscillation> {
-    let least = (AFTER_TOUCH_S / trace.period_s) as usize;
-    let rows = trace.position.len().min(trace.contact.len());
-    let floor = FELT.max(8.0 * trace.resolution) + 10.0 * trace.noise;
-    // A loop that bounces off the wall touches it at least once in a twentieth of a second.
-    let bridged = (0.05 / trace.period_s) as usize;
-    let touched: Vec<usize> = (0..rows).filter(|r| trace.contact[*r] != 0.0).collect();
-    let mut pieces: Vec<(usize, usize)> = Vec::new();
-    for row in touched {
-        match pieces.last_mut() {
-            Some((_, end)) if row - *end <= bridged => *end = row,
-            _ => pieces.push((row, row)),
-        }
-    }
-    let found = pieces.into_iter().filter(|(from, to)| to - from >= 2 * least).filter_map(|(from, to)| {
-        let found = oscillation(&trace.position[from + least / 2..to], trace.period_s, LOWEST_HZ)?;
-        let dies = found.amplitude < 0.5 * found.amplitude_before;
-        // The hand's own motion has lines at the lowest frequency that is looked at.
-        (found.amplitude > floor && !dies && found.frequency_hz > 1.3 * LOWEST_HZ).then_some(found)
-    });
-    found.max_by(|a, b| a.amplitude.total_cmp(&b.amplitude))
-}
-
 /// Whether the master stands still most of the time and goes on in jumps.
 fn in_stairs(trace: &Trace) -> bool {
-    let window = ((0.02 / trace.period_s) as usize).max(1);
+    let window = (0.02 / trace.period_s) as usize;
+    // A few samples a step of the stairs say nothing of how it is climbed.
+    if window < 4 {
+        return false;
+    }
     let touched: Vec<f64> = trace.position.iter().zip(&trace.contact).filter(|(_, f)| **f != 0.0).map(|(x, _)| *x).collect();
     let span = |piece: &[f64]| piece.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(*x), h.max(*x)));
     let (low, high) = span(&touched);

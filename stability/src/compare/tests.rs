@@ -49,7 +49,7 @@ fn measures_are_those_computed_by_hand() {
     assert!((found.drag.unwrap() - 3.0).abs() < 1e-9, "{found:?}");
     assert!((found.tracking_free.unwrap() - 1e-3).abs() < 1e-12, "{found:?}");
     assert!((found.effort.unwrap() - 2.4).abs() < 1e-12 && (found.contact_peak.unwrap() - 6.0).abs() < 1e-12);
-    let cycling = Outcome::LimitCycle { amplitude_m: 1e-3, frequency_hz: 20.0 };
+    let cycling = Outcome::LimitCycle { amplitude_m: 1e-3, frequency_hz: 20.0, unit: Default::default() };
     assert!(Measures::of(&session(), &cycling).stiffness_share.is_none(), "what does not rest shows no stiffness");
 }
 

@@ -24,7 +24,7 @@ const IN_A_ROW: usize = 4;
 /// Chance that a piece without a line shows one, over all of its frequencies.
 const CHANCE: f64 = 0.05;
 /// It may wander so far from piece to piece, Hz: the resolution of a piece.
-const WANDERS_HZ: f64 = 2.0;
+pub(super) const WANDERS_HZ: f64 = 2.0;
 
 /// The strongest line above a frequency, Hz, whose amplitude is above a floor.
 pub(super) fn line(signal: &[f64], period_s: f64, above_hz: f64, floor: f64) -> Option<Line> {

@@ -16,10 +16,9 @@
 mod line;
 
 use crate::coupling::BothWays;
-use crate::outcome::{LEAST_AMPLITUDE, LOWEST_HZ, NOISE, Outcome};
-use crate::session::AxisSignals;
+use crate::outcome::{LEAST_AMPLITUDE, LOWEST_HZ, NOISE, Outcome, Unit};
 use crate::unjudged::Unjudged;
-use line::line;
+use line::{Line, WANDERS_HZ, line};
 use nalgebra::{Complex, DMatrix, DVector};
 use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, StudentsT};
@@ -55,20 +54,45 @@ const STEP: f64 = 4.0;
 /// Fewest samples of a band.
 const LEAST_SAMPLES: usize = 200;
 
-/// What a pair did whose slave is at `mu` times the master, from rows `period_s` apart, and the mode that is least sure to die where one was seen.
-pub fn judge(axis: &AxisSignals, mu: f64, period_s: f64) -> (Outcome, Option<Decay>) {
+/// The motions of a pair, rows `period_s` apart.
+#[derive(Debug, Clone, Copy)]
+pub struct Pair<'a> {
+    /// x_m, m or rad.
+    pub master: &'a [f64],
+    /// x_s, m or rad.
+    pub slave: &'a [f64],
+    /// Position scale: the slave is at `mu` times the master.
+    pub mu: f64,
+    /// Time of one row, s.
+    pub period_s: f64,
+    /// Step of the master's position sensor, m or rad.
+    pub resolution: f64,
+    /// Standard deviation of its noise, m or rad.
+    pub noise: f64,
+    /// In what positions are counted.
+    pub unit: Unit,
+}
+
+/// What a pair did, and the mode that is least sure to die where one was seen.
+pub fn judge(pair: &Pair) -> (Outcome, Option<Decay>) {
+    let Pair { mu, period_s, unit, .. } = *pair;
     let no = |why: Unjudged| (Outcome::NotJudged { why }, None);
-    let Some(slave) = &axis.slave else { return no(Unjudged::Empty) };
-    let master = without_holes(&axis.master);
-    let error: Vec<f64> = master.iter().zip(without_holes(slave)).map(|(m, s)| mu * m - s).collect();
+    let master = without_holes(pair.master);
+    let error: Vec<f64> = master.iter().zip(without_holes(pair.slave)).map(|(m, s)| mu * m - s).collect();
     if master.iter().chain(&error).any(|x| !x.is_finite()) || master.is_empty() {
         return no(Unjudged::Empty);
     }
-    let floor = LEAST_AMPLITUDE.max(4.0 * axis.resolution) + NOISE * axis.noise;
+    let floor = LEAST_AMPLITUDE.max(4.0 * pair.resolution) + NOISE * pair.noise;
     let mut seen: Vec<Decay> = Vec::new();
     let mut shaken = false;
-    let lines = [&error, &master].into_iter().filter_map(|signal| line(signal, period_s, LOWEST_HZ, floor));
-    let line = lines.max_by(|a, b| a.amplitude.total_cmp(&b.amplitude));
+    let of_master = line(&master, period_s, LOWEST_HZ, floor);
+    let of_error = line(&error, period_s, LOWEST_HZ, floor);
+    // An amplitude is the master's, where the same line is seen in it.
+    let same = |a: &Line, b: &Line| (a.frequency_hz - b.frequency_hz).abs() <= WANDERS_HZ;
+    let line = match (of_error, of_master) {
+        (Some(error), Some(master)) if same(&error, &master) || master.amplitude > error.amplitude => Some(master),
+        (error, master) => error.or(master),
+    };
     for (signal, of_error) in [(&error, true), (&master, false)] {
         for band in bands(period_s) {
             let samples = decimated(signal, band.every);
@@ -87,7 +111,7 @@ pub fn judge(axis: &AxisSignals, mu: f64, period_s: f64) -> (Outcome, Option<Dec
     if let Some(line) = line {
         let outcome = match line.growth_per_s > GROWS {
             true => Outcome::Unstable { growth_per_s: line.growth_per_s },
-            false => Outcome::LimitCycle { amplitude_m: line.amplitude, frequency_hz: line.frequency_hz },
+            false => Outcome::LimitCycle { amplitude_m: line.amplitude, frequency_hz: line.frequency_hz, unit },
         };
         return (outcome, None);
     }
@@ -107,7 +131,7 @@ pub fn judge(axis: &AxisSignals, mu: f64, period_s: f64) -> (Outcome, Option<Dec
     } else if grows(&worst) {
         Outcome::Unstable { growth_per_s: -worst.per_s }
     } else if goes_on(&worst) {
-        Outcome::LimitCycle { amplitude_m: worst.amplitude, frequency_hz: worst.frequency_hz }
+        Outcome::LimitCycle { amplitude_m: worst.amplitude, frequency_hz: worst.frequency_hz, unit }
     } else {
         Outcome::NotJudged { why: Unjudged::NoDecay }
     };
@@ -278,7 +302,7 @@ mod tests {
     const PERIOD: f64 = 5e-4;
 
     /// A coupled pair whose difference has one mode, driven by a hand that moves all the time and by what it touches.
-    fn pair(hz: f64, decay: f64, seconds: f64, more: impl Fn(f64) -> f64) -> AxisSignals {
+    fn pair(hz: f64, decay: f64, seconds: f64, more: impl Fn(f64) -> f64) -> [Vec<f64>; 2] {
         let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(7);
         let w = std::f64::consts::TAU * hz;
         let (mut x, mut v, mut hand) = (0.0, 0.0, 0.0);
@@ -295,13 +319,17 @@ mod tests {
             master.push(round(m));
             slave.push(round(m - x - more(t)));
         }
-        AxisSignals { master, slave: Some(slave), resolution: 2e-5, ..AxisSignals::default() }
+        [master, slave]
+    }
+
+    fn judged([master, slave]: [Vec<f64>; 2]) -> (Outcome, Option<Decay>) {
+        judge(&Pair { master: &master, slave: &slave, mu: 1.0, period_s: PERIOD, resolution: 2e-5, noise: 0.0, unit: Unit::Metre })
     }
 
     #[test]
     fn the_decay_of_a_known_mode_is_found_while_the_hand_moves() {
         for (hz, decay) in [(16.0, 25.0), (28.0, 40.0), (45.0, 15.0)] {
-            let (outcome, found) = judge(&pair(hz, decay, 5.0, |_| 0.0), 1.0, PERIOD);
+            let (outcome, found) = judged(pair(hz, decay, 5.0, |_| 0.0));
             let found = found.unwrap();
             assert_eq!(outcome, Outcome::Stable, "{found:?}");
             assert!(found.ci95[0] > DIES, "{found:?}");
@@ -314,20 +342,20 @@ mod tests {
     fn a_limit_cycle_and_a_growing_oscillation_are_told_in_any_band() {
         for hz in [14.0, 40.0, 110.0, 330.0] {
             let line = move |t: f64| 1e-3 * (std::f64::consts::TAU * hz * t).sin();
-            let (outcome, found) = judge(&pair(20.0, 40.0, 5.0, line), 1.0, PERIOD);
+            let (outcome, found) = judged(pair(20.0, 40.0, 5.0, line));
             let Outcome::LimitCycle { frequency_hz, .. } = outcome else { panic!("{hz}: {outcome:?} {found:?}") };
             assert!((frequency_hz - hz).abs() < 0.05 * hz, "{frequency_hz}");
         }
         let grows = |t: f64| 1e-6 * (2.0 * t).exp() * (std::f64::consts::TAU * 30.0 * t).sin();
-        let (outcome, found) = judge(&pair(20.0, 40.0, 5.0, grows), 1.0, PERIOD);
+        let (outcome, found) = judged(pair(20.0, 40.0, 5.0, grows));
         assert!(outcome.is_unstable(), "{outcome:?} {found:?}");
     }
 
     #[test]
     fn what_nothing_shakes_is_not_judged() {
         let n = 10_000;
-        let still = AxisSignals { master: vec![0.1; n], slave: Some(vec![0.1; n]), resolution: 2e-5, ..AxisSignals::default() };
-        assert_eq!(judge(&still, 1.0, PERIOD).0, Outcome::NotJudged { why: Unjudged::NotShaken });
-        assert_eq!(judge(&AxisSignals::default(), 1.0, PERIOD).0, Outcome::NotJudged { why: Unjudged::Empty });
+        let still = || [vec![0.1; n], vec![0.1; n]];
+        assert_eq!(judged(still()).0, Outcome::NotJudged { why: Unjudged::NotShaken });
+        assert_eq!(judged([Vec::new(), Vec::new()]).0, Outcome::NotJudged { why: Unjudged::Empty });
     }
 }

@@ -2,7 +2,8 @@
 
 use super::types::{Gain, ResimulateError, Run, RunOptions};
 use crate::collect::{Collector, Signal};
-use crate::outcome::{Outcome, Trace, frequency_hz, judge};
+use crate::judgement::{frequency_hz, judge};
+use crate::outcome::{Outcome, Trace};
 use crate::resimulate::grip;
 use crate::unjudged::Unjudged;
 use backdrive_control::core::Core;

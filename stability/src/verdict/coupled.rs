@@ -1,24 +1,24 @@
 //! The answer for a recording with the forces of both motors: what the pair did at its own gains, and which law couples it.
 
 use super::question::Question;
+use super::recorded::{is_pair, recorded_traces};
 use super::types::{Answer, CoupledAxis};
 use super::warn::of_what_was_read;
 use super::warning::Warning;
 use super::word::{Method, Word};
 use crate::coupling::{Signals, identify};
 use crate::energy::energy;
-use crate::moving::judge;
-use crate::outcome::Outcome;
-use crate::session::{AxisSignals, Session};
+use crate::judgement::judge_with_decay;
+use crate::outcome::{Outcome, Trace};
+use crate::session::Session;
 use crate::transparency::transparency;
-use crate::unjudged::{Gaps, Unjudged};
 
 /// More of the rows than this at the clamp of a motor, and the clamp decides, as in `outcome`.
 const MOST_CLAMPED: f64 = 0.01;
 
 /// Whether the forces of both motors of an axis were recorded.
 pub fn is_coupled(session: &Session) -> bool {
-    session.axes.iter().any(|a| a.slave_force.is_some() && a.slave.is_some())
+    session.axes.iter().any(is_pair)
 }
 
 impl Answer {
@@ -80,7 +80,8 @@ fn axis(session: &Session, index: usize) -> Option<CoupledAxis> {
     let signals = Signals::of(session, index)?;
     let axis = session.axes.get(index)?;
     let found = identify(&signals);
-    let (outcome, slowest_mode) = judge(axis, signals.mu, session.period_s);
+    let trace = recorded_traces(session).into_iter().nth(index)?;
+    let (outcome, slowest_mode) = judge_with_decay(&Trace { mu: signals.mu, ..trace });
     let share =
         |force: &[f64], limit: f64| force.iter().filter(|f| f.abs() >= limit * (1.0 - 1e-6)).count() as f64 / force.len().max(1) as f64;
     let sides = found.as_ref().ok().map(|c| [(signals.master_force, c.master.limit), (signals.slave_force, c.slave.limit)]);
@@ -93,17 +94,9 @@ fn axis(session: &Session, index: usize) -> Option<CoupledAxis> {
         why_not: found.as_ref().err().map(ToString::to_string),
         coupling: found.ok(),
         slowest_mode,
-        outcome: outcome.held_back(fault(session, axis)),
+        outcome: outcome.held_back(session.cut_short),
         largest_contact: finite.fold(0.0, |m, f| m.max(f.abs())),
     })
-}
-
-/// What is missing in the recording, so that nothing in it proves that the pair is stable.
-fn fault(session: &Session, axis: &AxisSignals) -> Option<Unjudged> {
-    let columns = [Some(&axis.master), axis.slave.as_ref(), Some(&axis.force), axis.slave_force.as_ref()];
-    let lacks = |row: usize| columns.iter().flatten().any(|c| c.get(row).is_none_or(|x| x.is_nan()));
-    let gaps = Gaps { at: (0..session.len()).map(lacks).collect(), bridged_s: session.bridged_s, planned: 0 };
-    session.cut_short.or_else(|| gaps.fault(session.len(), session.period_s))
 }
 
 fn reason(coupled: &[CoupledAxis], outcome: Option<Outcome>) -> String {

@@ -15,8 +15,8 @@ impl Answer {
         let cycle = again.filter(|_| self.from == Method::Resimulation).map(|a| a.outcome);
         let cycle = if self.from == Method::Recording { self.recorded_outcome } else { cycle };
         let (limit_cycle, growth) = match cycle {
-            Some(Outcome::LimitCycle { amplitude_m, frequency_hz }) => {
-                (json!({ "amplitude_m": amplitude_m, "frequency_hz": frequency_hz }), Value::Null)
+            Some(Outcome::LimitCycle { amplitude_m, frequency_hz, unit }) => {
+                (json!({ "amplitude_m": amplitude_m, "frequency_hz": frequency_hz, "unit": unit }), Value::Null)
             }
             Some(Outcome::Unstable { growth_per_s }) => (Value::Null, json!(growth_per_s)),
             Some(Outcome::Stable | Outcome::Limited { .. } | Outcome::NotJudged { .. }) | None => (Value::Null, Value::Null),

@@ -1,13 +1,17 @@
 //! What the recording itself did.
 
 use crate::collect::way;
-use crate::outcome::{Outcome, Trace, judge};
+use crate::judgement::judge;
+use crate::outcome::{Closes, Outcome, Trace};
 use crate::phases::contacts;
-use crate::session::Session;
-use crate::unjudged::Gaps;
+use crate::session::{AxisSignals, Session};
+use crate::unjudged::{Gaps, Unjudged};
 
 /// What the recording itself did: the same function as for a live run. What is missing in a recording is no run-away.
 pub fn recorded_outcome(session: &Session) -> Option<Outcome> {
+    if session.is_one_way() {
+        return Some(Outcome::NotJudged { why: Unjudged::NoFeedback });
+    }
     let here = recorded_traces(session).into_iter().map(|trace| judge(&trace));
     Outcome::worst(here.chain(session.elsewhere).map(|outcome| outcome.held_back(session.cut_short)))
 }
@@ -19,7 +23,13 @@ pub fn recorded_traces(session: &Session) -> Vec<Trace> {
     let traced = session.axes.iter().map(|axis| {
         let stale = |row: usize| axis.stale.get(row).copied().unwrap_or(false);
         let intent = axis.intent.as_ref().filter(|x| x.iter().any(|x| x.is_finite()));
-        let loops = || [Some(&axis.master), Some(&axis.contact), Some(&axis.command), intent].into_iter().flatten();
+        let coupled = is_pair(axis);
+        let signals = if coupled {
+            [Some(&axis.master), axis.slave.as_ref(), Some(&axis.force), axis.slave_force.as_ref(), intent]
+        } else {
+            [Some(&axis.master), Some(&axis.contact), Some(&axis.command), intent, None]
+        };
+        let loops = || signals.into_iter().flatten();
         let lacks = |row: usize| stale(row) || loops().any(|c| c.get(row).is_none_or(|x| x.is_nan()));
         let touched = !contacts(axis, session.period_s).is_empty();
         Trace {
@@ -27,6 +37,10 @@ pub fn recorded_traces(session: &Session) -> Vec<Trace> {
             intent: way.clone().unwrap_or_else(|| axis.intent.as_deref().map(held).unwrap_or_default()),
             position: held(&axis.master),
             contact: if touched { held(&axis.contact) } else { vec![0.0; axis.contact.len()] },
+            slave: axis.slave.as_deref().map(held).unwrap_or_default(),
+            mu: session.mu.iter().rev().copied().find(|mu| mu.is_finite()).unwrap_or(1.0),
+            closes: if coupled { Closes::Always } else { axis.closes },
+            unit: axis.unit,
             feedback: held(&axis.force),
             dither: axis.dither.clone().unwrap_or_default(),
             // A stale input opens the loop and limits nothing.
@@ -38,6 +52,11 @@ pub fn recorded_traces(session: &Session) -> Vec<Trace> {
         }
     });
     traced.collect()
+}
+
+/// Whether both motors' forces were recorded, so that the two act on each other's motion.
+pub(super) fn is_pair(axis: &AxisSignals) -> bool {
+    axis.slave_force.is_some() && axis.slave.is_some()
 }
 
 /// The column with what is missing in it filled by the value before it.

@@ -74,7 +74,7 @@ mod tests {
             critical_gain: Some(edge),
             at_least: Some(0.99 * edge),
             frequency_hz: Some(60.0),
-            beyond: Some(Outcome::LimitCycle { amplitude_m: 1e-3, frequency_hz: 60.0 }),
+            beyond: Some(Outcome::LimitCycle { amplitude_m: 1e-3, frequency_hz: 60.0, unit: Default::default() }),
         }
     }
 
