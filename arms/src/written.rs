@@ -106,7 +106,16 @@ pub fn model_of(data: &Data, fit: &Fit) -> Result<(Model, Vec<String>), ArmError
             robot.gravity = gravity_of(data, fit);
             arm.xml.clone()
         }
-        (false, false) => backdrive_export::urdf::robot_as_urdf(&robot).0,
+        (false, false) if is_urdf(&arm.xml) => {
+            backdrive_export::urdf::with_inertias(&arm.xml, &problem.robot, &robot).map_err(|e| ArmError::Robot(e.to_string()))?
+        }
+        (false, false) => {
+            notes.push(
+                "the robot is written as a URDF, for its inertias are others: geoms, sites and what else its MJCF has besides bodies and joints are not in it"
+                    .to_string(),
+            );
+            backdrive_export::urdf::robot_as_urdf(&robot)
+        }
     };
     let mut new = Arm::new(xml, robot, 0).map_err(|e| ArmError::Robot(e.to_string()))?;
     new.bodies.clone_from(&arm.bodies);
@@ -114,6 +123,10 @@ pub fn model_of(data: &Data, fit: &Fit) -> Result<(Model, Vec<String>), ArmError
     model.arm = Some(Box::new(new));
     elements(data, fit, &reading, &mut model, &mut notes);
     Ok((model, notes))
+}
+
+fn is_urdf(xml: &str) -> bool {
+    backdrive_plant::robot::RobotFile::is_urdf(xml)
 }
 
 /// Numbers of terms at a joint: the sum of the first value of each of this physics, in torques of the joint.

@@ -27,9 +27,11 @@ pub fn export(model: &Model) -> Result<Exported, ExportError> {
             "Isaac's parameters are those of a robot's joints, and this model has no [robot]; --to mjcf takes networks of one axis",
         ));
     };
-    let mut notes = of_robot(model)?;
+    let held = of_robot(model)?;
+    let mut notes = Vec::new();
     let knows = Knows { target: "Isaac", armature: true, rest: true };
     let (terms, mut left_out) = joint_terms(model, arm, knows);
+    left_out.extend(held);
     for left in left_out.iter_mut().filter(|left| left.kind == "delay") {
         left.why = "an implicit actuator has no delay; a DelayedPDActuatorCfg has one, in physics steps".to_owned();
     }

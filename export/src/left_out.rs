@@ -2,6 +2,8 @@
 
 use backdrive_plant::elements::{Damper, Law};
 use backdrive_plant::model::{Model, OutputKind};
+use backdrive_plant::robot::{Robot, Tree};
+use nalgebra::{Matrix3, Vector3};
 use serde::Serialize;
 
 /// What of a model it is about.
@@ -16,6 +18,8 @@ pub enum Part {
     Input,
     /// An output.
     Output,
+    /// The robot file: links, and what the file holds besides.
+    Robot,
 }
 
 /// Something of a model that is not in the exported text.
@@ -58,6 +62,12 @@ pub enum Change {
     NoOutputDelay(usize),
     /// An output is read without its offset.
     NoOffset(usize),
+    /// A link of the robot has this inertia about its centre of mass, kg m².
+    LinkInertia(usize, Matrix3<f64>),
+    /// Free fall is this, m/s².
+    Gravity(Vector3<f64>),
+    /// The motors do not hold the weight of the links.
+    NotCompensated,
 }
 
 impl Change {
@@ -75,7 +85,25 @@ impl Change {
             Change::NoGain(output) => set(&mut model.outputs, *output, |o| o.gain = 1.0),
             Change::NoOutputDelay(output) => set(&mut model.outputs, *output, |o| o.delay = 0.0),
             Change::NoOffset(output) => set(&mut model.outputs, *output, |o| o.offset = 0.0),
+            Change::LinkInertia(link, about_centre) => of_the_robot(model, |robot| {
+                if let Some(inertia) = robot.links.get_mut(*link).and_then(|link| link.inertia.as_mut()) {
+                    inertia.about_centre = *about_centre;
+                }
+            }),
+            Change::Gravity(gravity) => of_the_robot(model, |robot| robot.gravity = *gravity),
+            Change::NotCompensated => model.arm.iter_mut().for_each(|arm| arm.gravity_compensated = false),
         }
+    }
+}
+
+/// A robot that cannot be computed with the change stays as it was.
+fn of_the_robot(model: &mut Model, change: impl FnOnce(&mut Robot)) {
+    let Some(arm) = model.arm.as_mut() else { return };
+    let mut robot = arm.robot.clone();
+    change(&mut robot);
+    if let Ok(mut tree) = Tree::new(&robot) {
+        (0..tree.len()).for_each(|coordinate| tree.set_armature(coordinate, 0.0));
+        (arm.robot, arm.tree) = (robot, tree);
     }
 }
 
@@ -114,6 +142,11 @@ pub fn change_all(model: &Model, left_out: &[LeftOut]) -> Model {
 }
 
 impl LeftOut {
+    /// Whether the model moves differently without it. What a robot file has besides its mechanics, such as meshes, does not move.
+    pub fn matters(&self) -> bool {
+        self.part != Part::Robot || !self.changes.is_empty()
+    }
+
     /// An element of which nothing is left, or another law.
     pub(crate) fn element(model: &Model, index: usize, why: impl Into<String>, instead: Option<(Law, String)>) -> LeftOut {
         let (name, kind) = model.elements.get(index).map_or_else(Default::default, |e| (e.name.clone(), e.law.kind().name.to_owned()));

@@ -38,11 +38,11 @@ pub struct Exported {
 #[error("{0}")]
 pub struct ExportError(pub String);
 
-/// What every writer has to know of a robot: it writes joints and what acts on them. Notes of what else the model's controller does.
+/// What every writer has to know of a robot: it writes joints and what acts on them. Returned is what the model's controller does besides.
 ///
 /// # Errors
 /// Where the model has points of links: what acts there acts on all joints at once, through a Jacobian that changes with the pose.
-fn of_robot(model: &Model) -> Result<Vec<String>, ExportError> {
+fn of_robot(model: &Model) -> Result<Vec<LeftOut>, ExportError> {
     let Some(arm) = &model.arm else { return Ok(Vec::new()) };
     if !arm.points.is_empty() {
         let names: Vec<&str> = arm.points.iter().map(|point| model.place_name(Some(point.body))).collect();
@@ -52,8 +52,9 @@ fn of_robot(model: &Model) -> Result<Vec<String>, ExportError> {
             names.join(", ")
         )));
     }
-    let held = "the weight of the links that gravity_compensated has the motors hold is not in it: that is the controller's; in MuJoCo gravcomp=\"1\" of a body is the same";
-    Ok(if arm.gravity_compensated { vec![held.to_owned()] } else { Vec::new() })
+    let why = "holding the weight of the links is the controller's; in MuJoCo gravcomp=\"1\" of a body is the same";
+    let held = LeftOut::key(Part::Robot, "gravity_compensated", "controller", why, Some(Change::NotCompensated));
+    Ok(if arm.gravity_compensated { vec![held] } else { Vec::new() })
 }
 
 impl ExportError {

@@ -38,7 +38,7 @@ pub fn export(options: &cli::Export) -> Result<u8, Failure> {
     } else {
         told(options, &exported, errors.as_ref())?;
     }
-    Ok(if exported.left_out.is_empty() { 0 } else { code::NEGATIVE })
+    Ok(if !exported.left_out.iter().any(LeftOut::matters) { 0 } else { code::NEGATIVE })
 }
 
 fn written(model: &Model, options: &cli::Export) -> Result<Exported, backdrive_export::ExportError> {
@@ -95,6 +95,7 @@ fn list(options: &cli::Export, left_out: &[LeftOut], errors: Option<&Errors>) ->
             let all = errors.as_exported.map_or("cannot be simulated".to_string(), percent);
             text += &format!("nrmse on {}: {} with everything, {all} as exported\n", errors.of, percent(errors.with_all));
         }
+        None if !left_out.iter().any(LeftOut::matters) => {}
         None => {
             text += &format!(
                 "the error that this makes on recordings: backdrive export {} --to {} --on SET\n",

@@ -26,7 +26,7 @@ pub enum Language {
 /// # Errors
 /// Where nothing can be compensated.
 pub fn export(model: &Model, language: Language, width: Option<f64>) -> Result<Exported, ExportError> {
-    let (joints, left_out) = terms::joints(model, width);
+    let (joints, mut left_out) = terms::joints(model, width);
     if joints.is_empty() {
         return Err(ExportError::new(
             "it has nothing to compensate: no friction, damper, spring, cogging or bias acts between a body and ground",
@@ -37,7 +37,8 @@ pub fn export(model: &Model, language: Language, width: Option<f64>) -> Result<E
         Language::Python => code::python(model, &joints),
         Language::Yaml => yaml::yaml(model, &joints),
     };
-    let mut notes = of_robot(model)?;
+    left_out.extend(of_robot(model)?);
+    let mut notes = Vec::new();
     if model.arm.is_some() {
         notes.push(
             "the links' own gravity and inertia are not in it: they depend on the pose, and the controller's model of the arm has them"

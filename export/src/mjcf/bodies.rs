@@ -3,16 +3,23 @@
 use super::attributes::{Integration, of_joint, text};
 use super::layout::Layout;
 use super::network::{Network, OnJoint};
+use crate::left_out::{Change, LeftOut, Part};
 use crate::names::unlike;
 use crate::xml::{escaped, number, numbers};
-use backdrive_plant::robot::{Joint, JointKind, LinkInertia, Placement, Robot};
-use nalgebra::{Rotation3, UnitQuaternion};
+use backdrive_plant::robot::{Joint, JointKind, Link, LinkInertia, Placement, Robot};
+use nalgebra::{Matrix3, Rotation3, UnitQuaternion};
 use std::collections::BTreeSet;
 
 /// Mass of a body whose inertia is its joint's armature, as a share of the least of these: MuJoCo wants one that is not 0.
 const NEXT_TO_NOTHING: f64 = 1e-9;
 /// What a principal moment is raised to, as a share of the largest: MuJoCo wants all of them above 0, and none above the sum of the others.
 const THIN: f64 = 1e-9;
+/// The least principal moment that MuJoCo reads from a whole matrix is 1e-14 kg m².
+const LEAST_MOMENT: f64 = 2e-14;
+/// Mass, kg, and inertia, kg m², of a link that moves and has none: MuJoCo wants some.
+const NO_MASS: [f64; 2] = [1e-9, 1e-12];
+/// MuJoCo's name for what does not move, which no other body may have.
+const WORLD: &str = "world";
 
 /// What hangs on a body's joint.
 pub(super) fn on_joint(layout: &Layout, network: &Network, body: usize) -> OnJoint {
@@ -81,20 +88,52 @@ pub(super) fn next_to_nothing(layout: &Layout, network: &Network, integration: I
     all + &closed
 }
 
-/// The bodies of a robot, from its description.
-pub(super) fn of_robot(robot: &Robot, layout: &Layout, network: &Network, integration: Integration) -> String {
-    let writer = Writer { robot, layout, network, integration };
+/// The bodies of a robot, from its description. A base of the name `world` is MuJoCo's own; what else had to change is told in `notes`.
+pub(super) fn of_robot(robot: &Robot, layout: &Layout, network: &Network, integration: Integration, notes: &mut Vec<String>) -> String {
+    let mut taken: BTreeSet<String> = robot.links.iter().map(|link| link.name.clone()).chain([WORLD.to_owned()]).collect();
+    let mut named = |link: &Link| if link.name == WORLD { unlike(WORLD.to_owned(), &mut taken) } else { link.name.clone() };
+    let names: Vec<String> = robot.links.iter().enumerate().map(|(i, link)| if i == 0 { link.name.clone() } else { named(link) }).collect();
+    for (link, name) in robot.links.iter().zip(&names).filter(|(link, name)| link.name != **name) {
+        notes.push(format!("link \"{}\" is body \"{name}\" in the MJCF, where that name is the world's", link.name));
+    }
+    let writer = Writer { robot, layout, network, integration, names };
     let mut out = String::new();
     match robot.links.first() {
+        Some(base) if base.name == WORLD => {
+            notes.push("the base is called \"world\", which is MuJoCo's own name: what it carries stands in <worldbody>".to_owned());
+            writer.children(0, 2, &mut out);
+        }
         Some(base) => {
             out += &format!("    <body name=\"{}\">\n", escaped(&base.name));
-            base.inertia.iter().for_each(|inertia| out += &inertial(inertia, 3));
+            weight(base).iter().for_each(|inertia| out += &inertial(inertia, 3));
             writer.children(0, 3, &mut out);
             out += "    </body>\n";
         }
         None => debug_assert!(false, "a robot has a base"),
     }
+    let light: Vec<&str> = writer.massless().filter_map(|link| robot.links.get(link)).map(|link| link.name.as_str()).collect();
+    if !light.is_empty() {
+        notes.push(format!("MuJoCo wants a mass of what moves: {} has {} kg", light.join(", "), number(NO_MASS[0])));
+    }
     out
+}
+
+/// The inertia of a link that has any.
+fn weight(link: &Link) -> Option<&LinkInertia> {
+    link.inertia.as_ref().filter(|of| of.mass > 0.0 || of.about_centre.amax() > 0.0)
+}
+
+/// Links whose moments of inertia no body can have, and MuJoCo refuses: what they are raised to.
+pub(super) fn impossible(robot: &Robot) -> Vec<LeftOut> {
+    let one = |(index, link): (usize, &Link)| {
+        let doubt = link.doubt()?;
+        let of = weight(link)?;
+        let raised = of.about_centre + Matrix3::identity() * missing(of);
+        let instead = format!("the same and {} kg m² about every axis", number(missing(of)));
+        let left = LeftOut::key(Part::Robot, &link.name, "inertia", doubt, Some(Change::LinkInertia(index, raised)));
+        Some(left.replaced_by(instead))
+    };
+    robot.links.iter().enumerate().filter_map(one).collect()
 }
 
 struct Writer<'a> {
@@ -102,21 +141,51 @@ struct Writer<'a> {
     layout: &'a Layout,
     network: &'a Network,
     integration: Integration,
+    /// Names of the bodies, by link.
+    names: Vec<String>,
 }
 
 impl Writer<'_> {
     fn children(&self, link: usize, depth: usize, out: &mut String) {
         for (index, joint) in self.robot.joints.iter().enumerate().filter(|(_, joint)| joint.parent == link) {
-            let Some(child) = self.robot.links.get(joint.child) else { continue };
+            let (Some(child), Some(name)) = (self.robot.links.get(joint.child), self.names.get(joint.child)) else { continue };
             let indent = "  ".repeat(depth);
-            *out += &format!("{indent}<body name=\"{}\"{}>\n", escaped(&child.name), place(&joint.origin));
+            *out += &format!("{indent}<body name=\"{}\"{}>\n", escaped(name), place(&joint.origin));
             if joint.kind != JointKind::Fixed {
                 *out += &format!("{indent}  {}\n", self.joint(index, joint));
             }
-            child.inertia.iter().for_each(|inertia| *out += &inertial(inertia, depth + 1));
+            match weight(child) {
+                Some(inertia) => {
+                    // A moving body may not have moments without a mass.
+                    let least = if joint.kind == JointKind::Fixed { 0.0 } else { NO_MASS[0] };
+                    *out += &inertial(&LinkInertia { mass: inertia.mass.max(least), ..*inertia }, depth + 1);
+                }
+                None if joint.kind != JointKind::Fixed && !self.carries_mass(joint.child) => {
+                    let [mass, moment] = NO_MASS.map(number);
+                    let moments = format!("{moment} {moment} {moment}");
+                    *out += &format!("{indent}  <inertial pos=\"0 0 0\" mass=\"{mass}\" diaginertia=\"{moments}\"/>\n");
+                }
+                None => {}
+            }
             self.children(joint.child, depth + 1, out);
             *out += &format!("{indent}</body>\n");
         }
+    }
+
+    /// Links that move and have no mass, nor carry any that is fixed to them.
+    fn massless(&self) -> impl Iterator<Item = usize> + '_ {
+        let moving = self.robot.joints.iter().filter(|joint| joint.kind != JointKind::Fixed).map(|joint| joint.child);
+        moving.filter(|link| {
+            self.robot.links.get(*link).is_some_and(|own| own.inertia.is_none_or(|of| of.mass == 0.0) && !self.carries_mass(*link))
+        })
+    }
+
+    /// Whether something that is fixed to a link has mass.
+    fn carries_mass(&self, link: usize) -> bool {
+        let fixed = self.robot.joints.iter().filter(|joint| joint.parent == link && joint.kind == JointKind::Fixed);
+        fixed.map(|joint| joint.child).any(|child| {
+            self.robot.links.get(child).is_some_and(|own| own.inertia.is_some_and(|of| of.mass > 0.0)) || self.carries_mass(child)
+        })
     }
 
     fn joint(&self, index: usize, joint: &Joint) -> String {
@@ -162,11 +231,16 @@ fn place(at: &Placement) -> String {
     text
 }
 
-fn inertial(of: &LinkInertia, depth: usize) -> String {
+/// By how much the principal moments have to be raised for MuJoCo to read them, kg m².
+fn missing(of: &LinkInertia) -> f64 {
     let mut moments: [f64; 3] = of.about_centre.symmetric_eigenvalues().into();
     moments.sort_by(f64::total_cmp);
-    let least = THIN * moments[2].abs().max(1e-6 * of.mass);
-    let raised = if moments[0] < least || moments[0] + moments[1] < moments[2] + least { least } else { 0.0 };
+    let least = (THIN * moments[2].abs().max(1e-6 * of.mass)).max(LEAST_MOMENT);
+    (least - moments[0]).max(moments[2] - moments[1] - moments[0] + least).max(0.0)
+}
+
+fn inertial(of: &LinkInertia, depth: usize) -> String {
+    let raised = missing(of);
     let m = of.about_centre;
     format!(
         "{}<inertial pos=\"{}\" mass=\"{}\" fullinertia=\"{}\"/>\n",

@@ -9,6 +9,7 @@ mod passive;
 mod patch;
 mod signals;
 
+use crate::left_out::{LeftOut, Part};
 use crate::xml::{comment, escaped, number, numbers};
 use crate::{ExportError, Exported, of_robot};
 use attributes::{Integration, tendons};
@@ -28,15 +29,17 @@ pub fn export(model: &Model, step: Option<f64>) -> Result<Exported, ExportError>
     if model.bodies.is_empty() {
         return Err(ExportError::new("it is the model of nothing: it has no bodies"));
     }
-    let mut notes = of_robot(model)?;
+    let mut notes = Vec::new();
+    let held = of_robot(model)?;
     let layout = Layout::of(model);
     let (network, mut left_out) = network(model, &layout.pose, names_in(model, "tendon"));
     let integration = integration::integration(model, &layout, &network, step)?;
     let mut signals = signals(model, &network, &layout.names, integration, names_in(model, "actuator"));
     left_out.append(&mut signals.left_out);
+    left_out.extend(held);
     let text = match &model.arm {
         None => of_network(model, &layout, &network, &signals, integration),
-        Some(arm) => of_arm(model, arm, &layout, &network, &signals, integration, &mut notes)?,
+        Some(arm) => of_arm(model, arm, &layout, &network, &signals, integration, (&mut notes, &mut left_out))?,
     };
     notes.extend(of_commands(model));
     Ok(Exported { text, left_out, notes })
@@ -88,10 +91,10 @@ fn of_arm(
     network: &Network,
     signals: &Signals,
     integration: Integration,
-    notes: &mut Vec<String>,
+    (notes, left_out): (&mut Vec<String>, &mut Vec<LeftOut>),
 ) -> Result<String, ExportError> {
     let robot = &arm.robot;
-    let is_mjcf = roxmltree::Document::parse(&arm.xml).is_ok_and(|d| d.root_element().has_tag_name("mujoco"));
+    let is_mjcf = is_mjcf(arm);
     let mut taken: BTreeSet<String> = robot.links.iter().map(|link| link.name.clone()).collect();
     let beside = bodies::next_to_nothing(layout, network, integration, &mut taken);
     let mut others = sections(network, signals, layout, integration);
@@ -108,21 +111,17 @@ fn of_arm(
         let sections = Sections { bodies: beside, others };
         return patched(&arm.xml, model, (robot, layout, network), integration, &sections, notes);
     }
-    notes.push("what a URDF has besides links, joints and their inertia (meshes, collision shapes) is not in the MJCF".to_owned());
-    notes.extend(doubts(robot));
-    let massless =
-        robot.joints.iter().filter(|j| j.kind != JointKind::Fixed).any(|j| robot.links.get(j.child).is_some_and(|l| l.inertia.is_none()));
-    // A link of no mass that moves: MuJoCo wants some.
-    let bound = if massless { " boundmass=\"1e-9\" boundinertia=\"1e-12\"" } else { "" };
+    left_out.extend(of_urdf(arm));
+    left_out.extend(bodies::impossible(robot));
+    let bodies = bodies::of_robot(robot, layout, network, integration, notes);
     Ok(format!(
-        "<mujoco model=\"{}\">\n{}  <compiler angle=\"radian\"{bound}/>\n  <option timestep=\"{}\" integrator=\"{}\" gravity=\"{}\"/>\n  <worldbody>\n{}{beside}  \
+        "<mujoco model=\"{}\">\n{}  <compiler angle=\"radian\"/>\n  <option timestep=\"{}\" integrator=\"{}\" gravity=\"{}\"/>\n  <worldbody>\n{bodies}{beside}  \
          </worldbody>\n{others}</mujoco>\n",
         escaped(if model.name.is_empty() { &robot.name } else { &model.name }),
         head(model),
         number(integration.step),
         integration.integrator,
         numbers(robot.gravity.as_slice()),
-        bodies::of_robot(robot, layout, network, integration),
     ))
 }
 
@@ -146,12 +145,29 @@ fn follow(robot: &Robot, link: usize, order: &mut Vec<usize>) {
     }
 }
 
-fn doubts(robot: &Robot) -> impl Iterator<Item = String> + '_ {
-    let doubt = |link: &backdrive_plant::robot::Link| {
-        link.doubt()
-            .map(|doubt| format!("link \"{}\" {doubt}; MuJoCo refuses it unless the compiler has balanceinertia=\"true\"", link.name))
-    };
-    robot.links.iter().filter_map(doubt)
+fn is_mjcf(arm: &Arm) -> bool {
+    roxmltree::Document::parse(&arm.xml).is_ok_and(|d| d.root_element().has_tag_name("mujoco"))
+}
+
+/// What a URDF has besides links, joints and their inertia, and an MJCF written from these does not.
+fn of_urdf(arm: &Arm) -> Vec<LeftOut> {
+    let why = "the MJCF is written from links, joints and their inertia";
+    let times = |times: usize| if times == 1 { "once".to_owned() } else { format!("{times} times") };
+    let of_file = arm.remarks.iter().filter(|remark| remark.about.starts_with('<') && remark.about != "<limit>");
+    let mut out: Vec<LeftOut> = of_file.map(|remark| LeftOut::key(Part::Robot, &remark.about, &times(remark.times), why, None)).collect();
+    let moving = arm.robot.joints.iter().filter(|joint| joint.kind != JointKind::Fixed);
+    let of_speed: Vec<&str> = moving.clone().filter(|joint| joint.limits.velocity.is_some()).map(|joint| joint.name.as_str()).collect();
+    if !of_speed.is_empty() {
+        let name = format!("largest speed of {}", of_speed.join(", "));
+        out.push(LeftOut::key(Part::Robot, &name, "velocity", "MuJoCo has no limit of a joint's speed", None));
+    }
+    let locked: Vec<&str> =
+        moving.filter(|joint| joint.limits.range.is_some_and(|[low, high]| low >= high)).map(|joint| joint.name.as_str()).collect();
+    if !locked.is_empty() {
+        let name = format!("range of {}", locked.join(", "));
+        out.push(LeftOut::key(Part::Robot, &name, "limit", "its ends are the same, and MuJoCo wants a range of some width", None));
+    }
+    out
 }
 
 fn of_commands(model: &Model) -> Option<String> {

@@ -6,6 +6,7 @@ use crate::left_out::{Change, LeftOut, Part};
 use crate::names::unlike;
 use crate::xml::{escaped, number};
 use backdrive_plant::model::{Input, InputKind, Model, OutputKind};
+use backdrive_plant::robot::Limits;
 use std::collections::BTreeSet;
 use std::f64::consts::TAU;
 use std::fmt::Write;
@@ -42,6 +43,7 @@ pub(super) fn signals(
             }
         }
     }
+    signals.motors(model, joints, &mut names);
     for constant in &network.constants {
         signals.constant(constant, joints, &mut names);
     }
@@ -61,7 +63,8 @@ fn actuator(model: &Model, index: usize, input: &Input, joint: &str, integration
         escaped(joint),
         number(input.gain)
     );
-    let limit = input.saturation.min(force_limit(model, index).unwrap_or(f64::INFINITY)) / input.gain.abs();
+    let of_joint = limits_of(model, input.on).and_then(|limits| limits.effort).filter(|effort| *effort > 0.0).unwrap_or(f64::INFINITY);
+    let limit = input.saturation.min(force_limit(model, index).unwrap_or(f64::INFINITY)).min(of_joint) / input.gain.abs();
     // Writing to a String cannot fail.
     let _ = match limit.is_finite() {
         true => write!(text, " ctrllimited=\"true\" ctrlrange=\"{} {}\"", number(-limit), number(limit)),
@@ -77,6 +80,13 @@ fn actuator(model: &Model, index: usize, input: &Input, joint: &str, integration
     }
     text += &delay(input.delay, integration.step, "zoh");
     text + "/>\n"
+}
+
+/// What the robot file says of a body that is a joint of the robot.
+fn limits_of(model: &Model, body: usize) -> Option<Limits> {
+    let arm = model.arm.as_ref()?;
+    let coordinate = arm.tree.coordinates().get(arm.bodies.iter().position(|b| *b == body)?)?;
+    Some(arm.robot.joints.get(coordinate.joint)?.limits)
 }
 
 /// What the axis says of its motor, N or N m.
@@ -97,6 +107,28 @@ fn delay(delay: f64, step: f64, whole: &str) -> String {
 }
 
 impl Signals {
+    /// A motor on every joint of a robot, where the model itself has none at all and the robot's own file, as a URDF, cannot have any. A joint without effort
+    /// has no motor. Where the model has inputs, a joint without one is passive.
+    fn motors(&mut self, model: &Model, joints: &[String], names: &mut BTreeSet<String>) {
+        let Some(arm) = model.arm.as_ref().filter(|arm| !super::is_mjcf(arm)) else { return };
+        if model.inputs.iter().any(|input| input.kind == InputKind::Force) {
+            return;
+        }
+        for body in arm.bodies.iter().filter(|body| !model.inputs.iter().any(|input| input.on == **body)) {
+            let effort = limits_of(model, *body).and_then(|limits| limits.effort);
+            let Some(joint) = joints.get(*body).filter(|_| effort != Some(0.0)) else { continue };
+            let limits = match effort.filter(|effort| effort.is_finite()) {
+                Some(effort) => {
+                    let range = format!("\"{} {}\"", number(-effort), number(effort));
+                    format!(" ctrllimited=\"true\" ctrlrange={range} forcelimited=\"true\" forcerange={range}")
+                }
+                None => " ctrllimited=\"false\" forcelimited=\"false\"".to_owned(),
+            };
+            let name = escaped(&unlike(joint.clone(), names));
+            self.actuators += &format!("    <motor name=\"{name}\" joint=\"{}\" gear=\"1\"{limits}/>\n", escaped(joint));
+        }
+    }
+
     /// An actuator that pushes without a command.
     fn constant(&mut self, constant: &Constant, joints: &[String], names: &mut BTreeSet<String>) {
         let name = escaped(&unlike(constant.name.clone(), names));

@@ -24,6 +24,11 @@ impl RobotFile {
         RobotFile::from_xml(&read_text(path)?, &path.display().to_string())
     }
 
+    /// Whether a text is a URDF, by its root element.
+    pub fn is_urdf(text: &str) -> bool {
+        xml::parse(text, "").is_ok_and(|document| document.root_element().has_tag_name("robot"))
+    }
+
     /// Reads the text of such a file; `name` stands for it in errors.
     pub fn from_xml(text: &str, name: &str) -> Result<RobotFile, FileError> {
         let document = xml::parse(text, name)?;
