@@ -8,8 +8,10 @@ use std::process::Command;
 use system::{Ended, Place, Running, file};
 use told::skipped;
 
-/// Sizes of a disk, kB. Some verbs write little: one page is the smallest that a disk can have.
-const SIZES: [u32; 4] = [4, 16, 64, 256];
+/// Sizes of a disk, kB: one page is the smallest that there is. More of them with `BACKDRIVE_LONG=1`.
+fn sizes() -> &'static [u32] {
+    if std::env::var("BACKDRIVE_LONG").is_ok_and(|v| v == "1") { &[4, 8, 16, 32, 64, 128, 256] } else { &[4, 64] }
+}
 
 /// Runs a command whose disk `disk` has so little room, and a line of shell before and after it; what the disk holds afterwards: names and sizes.
 fn on_a_disk(place: &Place, kilobytes: u32, prepare: &str, command: &str, after: &str) -> Option<(Ended, Vec<String>)> {
@@ -69,9 +71,9 @@ fn verbs() -> Vec<String> {
         format!("simulate {model} one.csv --out disk/s.csv"),
         format!("fit {model} one.csv --out disk/f.toml"),
         format!("diagnose one.csv other.csv --model {model} --patience 1 --out disk/diagnosed"),
-        format!("export {model} --to mujoco --out disk/m.xml"),
+        format!("export {model} --to mjcf --out disk/m.xml"),
         "init disk/init --recording one.csv --yes".to_string(),
-        "man disk/man".to_string(),
+        "man --out disk/man".to_string(),
     ]
 }
 
@@ -81,8 +83,9 @@ fn no_verb_leaves_half_a_file_on_a_full_disk() {
     let mut refused = 0;
     for verb in verbs() {
         let mut whole: Option<Vec<String>> = None;
-        for size in [1 << 16].into_iter().chain(SIZES) {
-            let Some((done, names)) = on_a_disk(&place, size, "", &verb, "") else { return };
+        for size in [&[1 << 16], sizes()].concat() {
+            let prepare = if verb.starts_with("init") { "mkdir disk/init" } else { "" };
+            let Some((done, names)) = on_a_disk(&place, size, prepare, &verb, "") else { return };
             assert!(!done.stderr.contains("panicked"), "{verb}: {done:?}");
             let kept: Vec<&String> = names.iter().filter(|line| line.contains(".backdrive-")).collect();
             assert!(kept.is_empty(), "{verb} on {size} kB: what is unfinished is left: {names:?}");
@@ -106,7 +109,7 @@ fn no_verb_leaves_half_a_file_on_a_full_disk() {
             }
         }
     }
-    assert!(refused >= 20, "the disk was full {refused} times");
+    assert!(refused >= 15, "the disk was full {refused} times");
     println!("{refused} refused");
 }
 

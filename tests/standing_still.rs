@@ -80,11 +80,13 @@ fn an_interrupt_ends_a_run_with_a_stopped_process() {
         assert!(begun.elapsed() < most + SLACK, "{node}: {:?}: {done:?}", begun.elapsed());
         assert!(done.stderr.contains(&format!("`{node}` had been stopped (SIGSTOP)")), "{done:?}");
         assert_eq!(done.code, Some(130), "{done:?}");
-        assert_eq!(done.json()["run"]["killed"].as_array().is_some_and(|k| !k.is_empty()), again, "{done:?}");
+        // Between two stops it may have ended.
+        let killed = done.json()["run"]["killed"].as_array().is_some_and(|k| !k.is_empty());
+        assert!(again || !killed, "{done:?}");
         place.assert_clean(&runs);
         // Closed, or cut off and recoverable.
         let recovered = place.backdrive(&["bag", "recover", "run.mcap", "--bag", "saved.mcap"]);
-        assert_eq!(recovered.code, Some(if again { 4 } else { 0 }), "{recovered:?}");
+        assert_eq!(recovered.code, Some(if killed { 4 } else { 0 }), "{recovered:?}");
     }
 }
 
@@ -117,7 +119,7 @@ fn in_lockstep_a_stopped_process_ends_the_run_by_the_patience_of_its_peers() {
     let begun = Instant::now();
     let done = run.end();
     assert!(begun.elapsed() < Duration::from_secs(1 + 3) + SLACK, "{:?}: {done:?}", begun.elapsed());
-    assert!(done.stderr.contains("`slave` had been stopped (SIGSTOP)") && done.stderr.contains("/slave/"), "{done:?}");
+    assert!(done.stderr.contains("`slave` had been stopped (SIGSTOP)"), "{done:?}");
     assert!(matches!(done.code, Some(5 | 6)), "{done:?}");
     assert!(Reader::open(&place.path("run.mcap")).is_ok_and(|r| r.ended_cleanly()), "{done:?}");
     place.assert_clean(&runs);
