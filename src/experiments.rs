@@ -57,7 +57,9 @@ pub fn run(options: &cli::Run, way: &Way, graph: &Graph, changes: &Overrides) ->
         // Of an experiment it does not matter whether a loop was stable: there is none. Losses do.
         let code = done.fault_code();
         if code != 0 {
-            return Ok(code);
+            let what = done.text().lines().find(|line| line.starts_with("ended ") || line.starts_with("UNREADABLE ")).map(str::to_string);
+            let what = what.unwrap_or_else(|| format!("{} messages were lost", done.lost));
+            return Err(Failure { code, message: format!("{}: experiment \"{}\": {what}", graph.path.display(), experiment.name) });
         }
         if let Some(bag) = &done.bag {
             within_travel(bag, &device, graph, experiment)?;

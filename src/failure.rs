@@ -33,6 +33,27 @@ pub mod code {
     pub const CANNOT_TELL: u8 = 7;
     /// Interrupted by the user.
     pub const INTERRUPTED: u8 = 130;
+
+    /// The word for a code, such as `bad_input`.
+    pub fn word(code: u8) -> &'static str {
+        match code {
+            NEGATIVE => "negative",
+            USAGE => "usage",
+            BAD_INPUT => "bad_input",
+            LOST_DATA => "lost_data",
+            MACHINE => "machine",
+            NODE => "node",
+            CANNOT_TELL => "cannot_tell",
+            INTERRUPTED => "interrupted",
+            _ => "failed",
+        }
+    }
+}
+
+/// The commands of a message, which stand between backticks.
+fn commands_in(message: &str) -> Vec<&str> {
+    let quoted = message.split('`').skip(1).step_by(2);
+    quoted.filter(|text| text.starts_with("backdrive ") || text.starts_with("kill ")).collect()
 }
 
 impl Failure {
@@ -69,6 +90,13 @@ impl Failure {
         Failure { code, message: error.to_string() }
     }
 
+    /// For programs, where a verb was asked for JSON and has none to give: what was wrong, and the commands that the message offers.
+    pub fn json(&self) -> serde_json::Value {
+        serde_json::json!({
+            "error": { "code": self.code, "kind": code::word(self.code), "message": self.message, "hints": commands_in(&self.message) }
+        })
+    }
+
     /// A file of ours cannot be written.
     pub fn write(path: &std::path::Path, error: std::io::Error) -> Failure {
         Failure::machine(format!("{}: cannot be written: {error}", path.display()))
@@ -99,5 +127,19 @@ impl From<LaunchError> for Failure {
             LaunchError::Stopped { .. } => code::INTERRUPTED,
         };
         Failure { code, message: error.to_string() }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_failure_as_json_has_its_code_a_word_for_it_and_the_commands_of_its_message() {
+        let failure = Failure::machine("/dev/shm is nearly full: run `backdrive clean`, or see `ls`; `backdrive doctor` says more");
+        let error = &failure.json()["error"];
+        assert_eq!((&error["code"], &error["kind"]), (&5.into(), &"machine".into()));
+        assert_eq!(error["hints"], serde_json::json!(["backdrive clean", "backdrive doctor"]));
+        assert_eq!(error["message"], failure.message);
     }
 }

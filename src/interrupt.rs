@@ -2,6 +2,7 @@
 
 use crate::caller;
 use crate::failure::{Failure, code};
+use crate::output;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -14,6 +15,7 @@ pub fn heard() -> Result<Arc<AtomicBool>, Failure> {
     let heard = stop.clone();
     let handler = move || {
         if heard.swap(true, Ordering::SeqCst) {
+            output::fail(&Failure { code: code::INTERRUPTED, message: "interrupted".to_string() });
             std::process::exit(i32::from(code::INTERRUPTED))
         }
     };

@@ -65,7 +65,7 @@ pub fn main() -> ExitCode {
         command => call::dispatch(command),
     };
     match result {
-        Ok(code) => ExitCode::from(code),
+        Ok(code) => output::ended(code),
         Err(failure) => output::fail(&failure),
     }
 }

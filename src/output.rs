@@ -2,18 +2,21 @@
 //!
 //! Results go to standard output. One that cannot be written ends the verb with exit code 5 and a sentence; a reader who has enough
 //! (`| head`) is no error. Everything else goes to standard error, where nobody can be told that it failed. A file that was asked for is
-//! there whole or not at all: it is written beside its place and then moved there.
+//! there whole or not at all: it is written beside its place and then moved there
+//! (`move_into_place` of the bags, which are written in the same way).
 
 #![allow(clippy::print_stdout, clippy::print_stderr)]
 
 use crate::caller;
 use crate::failure::{Failure, code};
+use backdrive_bags::move_into_place;
 use clap::Parser;
 use std::fmt::Display;
 use std::fs::File;
 use std::io::{self, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// A result on standard output, with a line feed behind it.
 ///
@@ -33,6 +36,7 @@ pub fn text(result: impl Display) -> Result<(), Failure> {
     if caller::kept(&bytes) {
         return Ok(());
     }
+    SAID.store(true, Ordering::SeqCst);
     let mut stdout = io::stdout().lock();
     written(stdout.write_all(bytes.as_bytes()).and_then(|()| stdout.flush()))
 }
@@ -61,10 +65,35 @@ pub fn note(told: impl Display) {
     let _ = io::stderr().lock().write_all(line.as_bytes());
 }
 
-/// How a program ends that fails: its one message, and its exit code.
+/// Whether a result was printed.
+static SAID: AtomicBool = AtomicBool::new(false);
+
+/// How a program ends that fails: its one message, for a program that asked for JSON as JSON too, and its exit code.
 pub fn fail(failure: &Failure) -> ExitCode {
     note(format_args!("error: {}", failure.message));
+    tell_program(failure);
     ExitCode::from(failure.code)
+}
+
+/// How a verb ends that gives a code. Where JSON was asked for there is some, whatever the code.
+pub fn ended(code: u8) -> ExitCode {
+    if code != 0 {
+        tell_program(&Failure { code, message: "ended without a result; standard error says why".to_string() });
+    }
+    ExitCode::from(code)
+}
+
+/// A failure as JSON, if that was asked for and no result was printed before.
+fn tell_program(failure: &Failure) {
+    if wants_json() && !SAID.load(Ordering::SeqCst) {
+        // Where standard output takes nothing the message on standard error is all there is.
+        let _ = json(&failure.json());
+    }
+}
+
+/// Whether the command line asks for JSON. Of wrong usage nothing else is known.
+fn wants_json() -> bool {
+    std::env::args_os().skip(1).take_while(|argument| argument != "--").any(|argument| argument == "--json")
 }
 
 /// The command line of this program, or how it ends: wrong usage with 2, help and version with 0.
@@ -76,7 +105,12 @@ pub fn parsed<P: Parser>() -> Result<P, ExitCode> {
         let printed = told.print().and_then(|()| io::stdout().flush());
         match written(printed) {
             Err(failure) if !told.use_stderr() => fail(&failure),
-            _ => ExitCode::from(if told.use_stderr() { 2 } else { 0 }),
+            _ if !told.use_stderr() => ExitCode::SUCCESS,
+            _ => {
+                let message = told.render().to_string();
+                tell_program(&Failure { code: code::USAGE, message: message.trim_start_matches("error: ").trim_end().to_string() });
+                ExitCode::from(code::USAGE)
+            }
         }
     })
 }
@@ -113,7 +147,7 @@ pub fn replace<T>(path: &Path, write: impl FnOnce(&Path) -> Result<T, Failure>) 
     let result = write(&made).map_err(|failure| about(failure, &made, path))?;
     let moved = match stream {
         true => copy(&made, path),
-        false => finish(&made, &place),
+        false => move_into_place(&made, &place),
     };
     moved.map(|()| result).map_err(failed)
 }
@@ -179,16 +213,6 @@ fn about(failure: Failure, made: &Path, path: &Path) -> Failure {
         true => Failure { code: code::MACHINE, message: failure.message.replace(&ours, &path.display().to_string()) },
         false => failure,
     }
-}
-
-fn finish(made: &Path, place: &Path) -> io::Result<()> {
-    let file = File::open(made)?;
-    if let Ok(before) = std::fs::metadata(place) {
-        file.set_permissions(before.permissions())?;
-    }
-    // What a disk refuses late it refuses here, and the file of before is still there.
-    file.sync_all()?;
-    std::fs::rename(made, place)
 }
 
 fn copy(made: &Path, stream: &Path) -> io::Result<()> {

@@ -4,7 +4,7 @@ use crate::cli;
 use crate::failure::Failure;
 use crate::output;
 use crate::progress::busy;
-use crate::run::run_here;
+use crate::run::repeat_here;
 use crate::run_page::{Heard, page};
 use crate::summary::graph_of;
 use backdrive_bags::Reader;
@@ -70,7 +70,7 @@ pub fn replay(options: &cli::Replay) -> Result<u8, Failure> {
     }
     let mut heard = Heard::of(&graph);
     let drawn = options.result.html.is_some();
-    let mut done = run_here(&graph, &mut |topic, message| {
+    let mut done = repeat_here(&graph, &mut |topic, message| {
         if drawn {
             heard.take(topic, message);
         }

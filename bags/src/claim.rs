@@ -4,7 +4,7 @@ use crate::BagError;
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{ErrorKind, Read, Seek, SeekFrom, Write};
 use std::os::unix::fs::{FileTypeExt, MetadataExt};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Opens a file for a bag, empty and locked for as long as it is open: a second writer is refused, whatever it was told.
 ///
@@ -20,16 +20,17 @@ pub(crate) fn claim(path: &Path, overwrite: bool) -> Result<File, BagError> {
 ///
 /// Whoever writes it later may still be refused, when another was faster.
 pub fn check_target(path: &Path, overwrite: bool) -> Result<(), BagError> {
-    let existed = path.exists();
-    let _file = lock(path, overwrite)?;
-    // Removed while the lock is held: one that has opened it meanwhile sees that it is gone, and begins again.
-    if !existed {
-        let _ = std::fs::remove_file(path);
+    match std::fs::symlink_metadata(path) {
+        // Nothing under its name, not even for a moment: a process that is killed just then would leave it.
+        Err(e) if e.kind() == ErrorKind::NotFound && path.file_name().is_some() => {
+            tempfile::tempfile_in(folder_of(path)).map(drop).map_err(|e| failed(path)(nameless(&e)))
+        }
+        _ => lock(path, overwrite).map(drop),
     }
-    Ok(())
 }
 
-fn lock(path: &Path, overwrite: bool) -> Result<File, BagError> {
+/// Opens what is at a path, or makes it, and locks it.
+pub(crate) fn lock(path: &Path, overwrite: bool) -> Result<File, BagError> {
     loop {
         let mut file = OpenOptions::new().read(true).write(true).create(true).truncate(false).open(path);
         if file.as_ref().is_err_and(|e| e.kind() == ErrorKind::PermissionDenied) {
@@ -69,9 +70,19 @@ fn no_file(path: &Path, mut file: File, kind: std::fs::FileType) -> BagError {
     failed(path)(refused.unwrap_or_else(|| std::io::Error::new(ErrorKind::InvalidInput, why)))
 }
 
-fn failed(path: &Path) -> impl FnOnce(std::io::Error) -> BagError + use<> {
+pub(crate) fn failed(path: &Path) -> impl FnOnce(std::io::Error) -> BagError + use<> {
     let path = path.to_owned();
     move |source| BagError::Create { path, source }
+}
+
+/// The folder of a file.
+pub(crate) fn folder_of(path: &Path) -> PathBuf {
+    path.parent().filter(|f| !f.as_os_str().is_empty()).map_or_else(|| PathBuf::from("."), Path::to_path_buf)
+}
+
+/// The same error without the name of a temporary file, which nobody knows.
+pub(crate) fn nameless(error: &std::io::Error) -> std::io::Error {
+    error.raw_os_error().map_or_else(|| std::io::Error::from(error.kind()), std::io::Error::from_raw_os_error)
 }
 
 /// A bag that is made of another is not written over it.

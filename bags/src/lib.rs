@@ -42,6 +42,7 @@ mod signals;
 mod span;
 mod steps;
 mod table;
+mod whole;
 mod without;
 mod writer;
 
@@ -68,4 +69,5 @@ pub use signals::{Alignment, Signal, Signals, signals};
 pub use table::{
     ColumnMap, ImportOptions, ImportReport, Quantity, TableFormat, columns_of, export_csv, export_table, import_csv, import_table, topic_of,
 };
+pub use whole::move_into_place;
 pub use without::without;

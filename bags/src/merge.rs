@@ -102,7 +102,7 @@ pub fn merge(first: &Path, second: &Path, to: &Path, offset_s: Option<f64>, over
     let mut all: Vec<(i64, usize, Message)> =
         held.into_iter().map(|((topic, ..), (log_ns, message, _))| (log_ns, topic, message)).collect();
     all.sort_by_key(|(log_ns, topic, message)| (*log_ns, message.step(), *topic, message.sequence()));
-    let options = RecorderOptions { when_full: WhenFull::Wait, overwrite, ..RecorderOptions::default() };
+    let options = RecorderOptions { when_full: WhenFull::Wait, overwrite, whole: true, ..RecorderOptions::default() };
     let mut recorder = Recorder::create(to, &merged, &options)?;
     for (log_ns, topic, message) in all {
         recorder.push(topic, message, log_ns)?;

@@ -4,6 +4,7 @@ use crate::claim::claim;
 use crate::completeness::{Completeness, Tracker};
 use crate::header::BagHeader;
 use crate::order::{Arrived, MOST_HELD, Order, Ordered};
+use crate::whole::Whole;
 use crate::writer::{BagWriter, Store, WriteError};
 use crate::{BagError, TopicInfo};
 use backdrive_msgs::Message;
@@ -45,12 +46,15 @@ pub struct RecorderOptions {
     pub ordered: bool,
     /// Replace a bag that exists; otherwise it is an error. One that is being written is never replaced.
     pub overwrite: bool,
+    /// The bag has its name once it is whole, and otherwise not at all: for what is made of something that is still there. A run records
+    /// under the bag's own name, so that what it has recorded survives it.
+    pub whole: bool,
 }
 
 impl Default for RecorderOptions {
     fn default() -> RecorderOptions {
         let (queue, flush, chunk_bytes) = (32_768, Duration::from_millis(80), 1 << 20);
-        RecorderOptions { queue, when_full: WhenFull::Refuse, flush, chunk_bytes, ordered: false, overwrite: false }
+        RecorderOptions { queue, when_full: WhenFull::Refuse, flush, chunk_bytes, ordered: false, overwrite: false, whole: false }
     }
 }
 
@@ -76,7 +80,7 @@ pub struct Health {
 
 /// Writes a bag on a thread of its own.
 ///
-/// Dropping it finishes the bag too, but then nobody hears what was lost.
+/// Dropping it finishes the bag too, but then nobody hears what was lost; one that is to be whole is removed.
 pub struct Recorder {
     name: String,
     queue: Option<SyncSender<Item>>,
@@ -85,6 +89,8 @@ pub struct Recorder {
     /// Messages per topic that the queue or a dead writer refused.
     refused: Vec<u64>,
     when_full: WhenFull,
+    /// Where the file is put once it is whole.
+    whole: Option<Whole>,
     shared: Arc<Shared>,
 }
 
@@ -109,8 +115,11 @@ impl Recorder {
     /// The file is locked until the bag is finished. Errors: it exists and may not be overwritten, is being written by
     /// somebody else, or cannot be written.
     pub fn create(path: &Path, header: &BagHeader, options: &RecorderOptions) -> Result<Recorder, BagError> {
-        let file = claim(path, options.overwrite)?;
-        Recorder::to_store(Box::new(file), path.display().to_string(), header, options)
+        let whole = options.whole.then(|| Whole::begin(path, options.overwrite)).transpose()?;
+        let file = whole.as_ref().map_or_else(|| claim(path, options.overwrite), Whole::file)?;
+        let mut recorder = Recorder::to_store(Box::new(file), path.display().to_string(), header, options)?;
+        recorder.whole = whole;
+        Ok(recorder)
     }
 
     /// Writes to something else than a file; `name` stands in error messages.
@@ -139,6 +148,7 @@ impl Recorder {
             trackers: header.topics.iter().map(|info| Tracker::new(&info.topic.name)).collect(),
             refused: vec![0; header.topics.len()],
             when_full: options.when_full,
+            whole: None,
             shared,
         })
     }
@@ -194,8 +204,8 @@ impl Recorder {
 
     /// Writes what is queued, the verdict and the summary.
     ///
-    /// Errors: the bag could not be written to its end; it then holds what had been written before, and
-    /// [`Recorder::health`], asked before, has the counts.
+    /// Errors: the bag could not be written to its end; it then holds what had been written before, or is not there if it was to be
+    /// whole, and [`Recorder::health`], asked before, has the counts.
     pub fn finish(mut self) -> Result<Completeness, BagError> {
         self.close()
     }
@@ -213,7 +223,7 @@ impl Recorder {
             let _ = queue.send(Item::Finish(completeness));
         }
         match self.thread.take().map(JoinHandle::join) {
-            Some(Ok(Some(completeness))) => Ok(completeness),
+            Some(Ok(Some(completeness))) => self.whole.take().map_or(Ok(()), Whole::commit).map(|()| completeness),
             _ => Err(self.stopped()),
         }
     }
@@ -227,6 +237,8 @@ impl Recorder {
 impl Drop for Recorder {
     fn drop(&mut self) {
         if self.thread.is_some() {
+            // Without a word about its end it is not whole.
+            self.whole = None;
             let _ = self.close();
         }
     }

@@ -1,6 +1,6 @@
 //! Saves what a killed recorder, a full disk or a broken copy left behind.
 
-use crate::claim::{claim, not_itself};
+use crate::claim::not_itself;
 use crate::completeness::{COMPLETENESS, Completeness, Tracker};
 use crate::framing::{Frame, Frames};
 use crate::header::{BagHeader, RUN};
@@ -10,6 +10,7 @@ use crate::reader::entry::decode;
 use crate::reader::records::{parse, records, salvage};
 use crate::span::SPANS;
 use crate::steps::Said;
+use crate::whole::Whole;
 use crate::writer::{completeness_record, options, reason};
 use crate::{BagError, Reader};
 use backdrive_msgs::Message;
@@ -64,13 +65,11 @@ pub struct RecoverReport {
 pub fn recover(from: &Path, to: &Path, overwrite: bool) -> Result<RecoverReport, BagError> {
     not_itself(from, to)?;
     let mut frames = Frames::open(from)?;
-    let file = claim(to, overwrite)?;
-    let copied = copy(from, &mut frames, to, file);
-    if copied.is_err() {
-        // Half a copy would only be mistaken for a whole one.
-        let _ = std::fs::remove_file(to);
-    }
-    copied
+    // Half a copy would only be mistaken for a whole one.
+    let whole = Whole::begin(to, overwrite)?;
+    let report = copy(from, &mut frames, to, whole.file()?)?;
+    whole.commit()?;
+    Ok(report)
 }
 
 fn copy(from: &Path, frames: &mut Frames, to: &Path, file: File) -> Result<RecoverReport, BagError> {

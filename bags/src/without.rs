@@ -17,7 +17,7 @@ pub fn without(from: &Path, to: &Path, leave_out: &dyn Fn(&str) -> bool, change:
     let mut header = header.clone();
     header.topics.retain(|info| !leave_out(&info.topic.name));
     change(&mut header);
-    let options = RecorderOptions { when_full: WhenFull::Wait, ..RecorderOptions::default() };
+    let options = RecorderOptions { when_full: WhenFull::Wait, whole: true, ..RecorderOptions::default() };
     let mut recorder = Recorder::create(to, &header, &options)?;
     let mut count = 0;
     for entry in reader.messages()? {

@@ -34,8 +34,20 @@ impl Freshness {
     }
 }
 
-/// The share of a commanded force that is applied: 1 while samples come; from `hold_steps` after the last
-/// one it falls to 0 within as many steps, and rises again as fast when they are back.
+/// Steps without a new sample that a node bridges: at the next one the input is stale, `stale_after_s` after its last sample.
+///
+/// A single missing step is always bridged, because a living sender may be late by one: at low rates `stale_after_s` is two periods at least.
+pub(crate) fn bridged_steps(stale_after_s: f64, period_s: f64) -> u64 {
+    // A quotient just below a whole number is that number.
+    let steps = (stale_after_s / period_s + 1e-6).floor() as u64;
+    steps.max(2) - 1
+}
+
+/// The share of a commanded force that is applied: 1 while samples come. It begins to fall `stale_after_s` after the last one, reaches 0
+/// within two periods less than twice that time, and rises again as fast when samples are back.
+///
+/// The two periods are for what precedes it: a step of delay in the loop, and in real time a step of waiting for the sample. So the force is
+/// gone at most `2 * stale_after_s` after the last sample of a node that died, wherever in the loop that was.
 #[derive(Debug, Clone)]
 pub struct Authority {
     hold_steps: u64,
@@ -43,9 +55,9 @@ pub struct Authority {
 }
 
 impl Authority {
-    /// `stale_after_s` is the time from the last sample to the start of the decay, and the time the decay takes.
+    /// `stale_after_s` is the time from the last sample to the start of the decay, and longer than the decay takes.
     pub fn new(stale_after_s: f64, period_s: f64) -> Authority {
-        Authority { hold_steps: ((stale_after_s / period_s).round() as u64).max(1), steps_down: 0 }
+        Authority { hold_steps: bridged_steps(stale_after_s, period_s), steps_down: 0 }
     }
 
     /// The share at this step, given the steps since the last new sample.
@@ -67,15 +79,33 @@ mod tests {
 
     #[test]
     fn force_holds_then_is_zero_within_as_long_again_and_comes_back() {
-        let mut authority = Authority::new(0.020, 0.001);
+        let mut authority = Authority::new(0.010, 0.001);
         let shares: Vec<f64> = (0..60).map(|stale| authority.share(stale)).collect();
-        assert!(shares[..=20].iter().all(|s| *s == 1.0));
-        assert!(shares[21] < 1.0);
-        assert_eq!(shares[40], 0.0);
-        assert!(shares[40..].iter().all(|s| *s == 0.0));
-        let back: Vec<f64> = (0..21).map(|_| authority.share(0)).collect();
+        assert!(shares[..=9].iter().all(|s| *s == 1.0));
+        assert!(shares[10] < 1.0, "stale after 10 ms");
+        assert!(shares[17] > 0.0);
+        assert!(shares[18..].iter().all(|s| *s == 0.0), "two steps are left for the loop");
+        let back: Vec<f64> = (0..10).map(|_| authority.share(0)).collect();
         assert!(back.windows(2).all(|w| w[1] >= w[0]));
-        assert_eq!(back[20], 1.0);
+        assert_eq!(back[9], 1.0);
+    }
+
+    #[test]
+    fn at_every_rate_the_force_is_gone_in_twice_the_time_or_in_two_periods() {
+        for stale_after_s in [0.004, 0.01, 0.05, 0.1] {
+            for rate_hz in [15.0, 30.0, 60.0, 75.0, 100.0, 150.0, 200.0, 300.0, 350.0, 500.0, 999.0, 1000.0, 4000.0, 10_000.0] {
+                let period_s: f64 = 1.0 / rate_hz;
+                let mut authority = Authority::new(stale_after_s, period_s);
+                assert_eq!(
+                    (authority.share(0), authority.share(1)),
+                    (1.0, 1.0),
+                    "{rate_hz} Hz: a sender that is late by a step is bridged"
+                );
+                let zero = (2..).find(|stale| authority.share(*stale) == 0.0).unwrap() as f64;
+                let most = (2.0 * stale_after_s - 2.0 * period_s).max(2.0 * period_s);
+                assert!(zero * period_s <= most + 1e-9, "{rate_hz} Hz, {stale_after_s} s: zero after {} s", zero * period_s);
+            }
+        }
     }
 
     #[test]

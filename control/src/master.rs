@@ -17,7 +17,7 @@ pub struct Master {
     force: Freshness,
     intent: Freshness,
     last_force: [f64; MAX_AXES],
-    /// The newest force came of a slave that no command reaches any more.
+    /// The newest force is of a slave that no command reaches any more, or of a link that is silent: the sender has waited already.
     outdated: bool,
     /// Steps without a force, at most, since it began to decay.
     gap_steps: u64,
@@ -82,10 +82,13 @@ impl Core for Master {
                 self.last_force[axis] = if force.effort[axis].is_finite() { force.effort[axis] } else { 0.0 };
             }
         }
+        // A sender that bridged a gap in vain has no force to send, and says so.
+        if inputs[1].sample.as_ref().is_some_and(|s| s.flags & flag::STALE != 0 && !s.effort[0].is_finite()) {
+            self.outdated = true;
+        }
         let share = self.authority.share(match (self.force.begun(), self.outdated) {
             (false, _) => 0,
             (true, false) => self.force.stale_steps,
-            // The slave has waited its time already.
             (true, true) => u64::MAX,
         });
         let decaying = self.authority.is_decaying();

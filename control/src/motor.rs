@@ -11,6 +11,8 @@ pub struct Motor {
     authority: Authority,
     force: Freshness,
     asked: [f64; MAX_AXES],
+    /// The newest force is of a controller that no command reaches any more.
+    outdated: bool,
     applied: [f64; MAX_AXES],
     gap_steps: u64,
     was_decaying: bool,
@@ -23,6 +25,7 @@ impl Motor {
             authority: Authority::new(stale_after_s, period_s),
             force: Freshness::default(),
             asked: [0.0; MAX_AXES],
+            outdated: false,
             applied: [0.0; MAX_AXES],
             gap_steps: 0,
             was_decaying: false,
@@ -37,6 +40,7 @@ impl Motor {
     /// Hears a port and sets the force; gives the bits of [`flag`].
     pub fn step<'a>(&mut self, port: &Port, period_s: f64, events: &mut Events, axis_of: impl Fn(usize) -> &'a Axis, axes: usize) -> u32 {
         if let Some(force) = self.force.new_sample(port, |s| s.effort[0]) {
+            self.outdated = force.flags & flag::STALE != 0;
             for axis in 0..axes {
                 // What is not measured on a further axis is not commanded there.
                 self.asked[axis] = if force.effort[axis].is_finite() { force.effort[axis] } else { 0.0 };
@@ -52,7 +56,7 @@ impl Motor {
         }
         self.gap_steps = self.gap_steps.max(self.force.stale_steps);
         self.was_decaying = decaying;
-        let mut flags = if decaying { flag::STALE } else { 0 };
+        let mut flags = if decaying || self.outdated { flag::STALE } else { 0 };
         for axis in 0..axes {
             let limits = axis_of(axis);
             let most = limits.force.unwrap_or(f64::INFINITY);

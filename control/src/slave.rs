@@ -2,7 +2,7 @@
 
 use crate::core::{Core, Events, Port, Tick};
 use crate::device::Device;
-use crate::freshness::Freshness;
+use crate::freshness::{Freshness, bridged_steps};
 use crate::motor::Motor;
 use backdrive_msgs::{MAX_AXES, Sample, flag};
 
@@ -32,7 +32,7 @@ impl Slave {
             device,
             command: Freshness::default(),
             target: [0.0; MAX_AXES],
-            stale_steps: ((stale_after_s / period_s).round() as u64).max(1),
+            stale_steps: bridged_steps(stale_after_s, period_s),
             started: false,
             was_holding: false,
             was_finite: true,

@@ -1,5 +1,6 @@
 //! How a process becomes a node of a running graph: ours and a user's own alike.
 
+use crate::orphaned;
 use crate::paths::RunPaths;
 use crate::place::{Place, Wire};
 use backdrive_bags::{BagError, BagHeader, Recorder, RecorderOptions, TopicInfo};
@@ -52,6 +53,9 @@ where
         Ok(paths) => paths,
         Err(e) => return fail(e.to_string(), 5),
     };
+    if let Err(e) = orphaned::take_part(&paths) {
+        return fail(e, 5);
+    }
     let place = match Place::read(&paths) {
         Ok(place) => place,
         Err(e) => return fail(e, 5),

@@ -10,8 +10,8 @@
 //! - `report`: what is known afterwards
 //!
 //! A run is three things on the machine: its directory, the files `/dev/shm/bd<id>_*`, and its processes.
-//! The supervisor holds a lock in the directory for as long as it lives. A run whose lock is free is dead,
-//! and whoever starts next removes it.
+//! The supervisor holds a lock in the directory for as long as it lives. A run whose lock is free is dead: the last of
+//! its processes removes it (`orphaned`), or whoever starts next.
 
 // Printing panics where the other end is full or gone.
 #![cfg_attr(not(test), warn(clippy::print_stdout, clippy::print_stderr))]
@@ -22,10 +22,12 @@ mod hosts;
 pub mod join;
 mod member;
 mod options;
+mod orphaned;
 mod pace;
 mod paths;
 mod place;
 mod plan;
+mod proc_stat;
 mod remains;
 mod report;
 mod rundir;

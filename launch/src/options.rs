@@ -14,9 +14,11 @@ pub struct SuperviseOptions {
     pub home: RunHome,
     /// How long nodes may take to find each other. Default 15 s.
     pub ready_timeout: Duration,
-    /// How long a node may take to end at each step of asking it: `Stop`, SIGTERM, SIGKILL. Default 3 s.
+    /// How long a node may take to end after `Stop`, before SIGTERM; SIGKILL follows 1 s later. Default 3 s. One that was stopped by a signal
+    /// is continued first, and killed if it is stopped again.
     pub grace: Duration,
-    /// The same for the recorder, counted from its last progress: it finishes its file. Default 20 s.
+    /// The same for a recorder that works, counted from its last progress: it finishes its file. Default 20 s. One that does nothing for
+    /// 3 s has no more time than a node.
     pub recorder_grace: Duration,
     /// What the death of a node means for the others.
     pub on_death: OnDeath,

@@ -5,6 +5,7 @@
 //!     graph.toml         the graph as every process of the run reads it
 //!     place.json         where its nodes meet, if that is not shared memory alone
 //!     supervisor.lock    locked for as long as the supervisor lives
+//!     processes.lock     locked, shared, by each process of the run
 //!     pids               who was started, for the case that the supervisor is killed
 //!     middleware/        the transport's files
 //! /dev/shm/bd<id>_*      shared memory
@@ -12,12 +13,14 @@
 //!
 //! A process id can be reused and a process can be in another container; a lock belongs to whoever holds
 //! it and is free the moment that process is gone. So the lock alone says whether a run is alive.
+//! It is made first and removed last, so that wherever a supervisor is killed, what it leaves is seen to be dead.
 
 use crate::error::LaunchError;
 use crate::paths::GRAPH;
 use crate::paths::MIDDLEWARE;
 use crate::paths::RunPaths;
 use crate::paths::failed;
+use crate::remains::{remove_file, remove_run, shm_files, start_time};
 use nix::errno::Errno;
 use nix::fcntl::{Flock, FlockArg};
 use std::fs::{DirBuilder, File, OpenOptions};
@@ -29,12 +32,16 @@ use std::time::{SystemTime, UNIX_EPOCH};
 
 pub(crate) const LOCK: &str = "supervisor.lock";
 pub(crate) const PIDS: &str = "pids";
+pub(crate) const PROCESSES: &str = "processes.lock";
 
 /// A run gets its directory under this name and takes its lock before it gets the name that others look at.
 pub(crate) const UNBORN: &str = ".new-";
 
 /// Shared memory that is there in every case, per node, bytes: its topics' segments as far as they are touched at the start.
 const SHM_PER_NODE: u64 = 2 << 20;
+
+/// How often a directory is tried to be made, where a sweep takes a new one for a dead one before it is locked.
+const TRIES: usize = 5;
 
 /// Longest root, bytes: the middleware's paths begin with it and may have 255.
 const LONGEST_ROOT: usize = 120;
@@ -68,40 +75,59 @@ impl RunHome {
     /// The directory cannot be made, is not this user's, or shared memory cannot be used or is nearly full.
     pub fn create(&self, graph: &str, nodes: usize) -> Result<RunDir, LaunchError> {
         self.make_home()?;
-        let id = new_id();
+        let mut tries = 0;
+        loop {
+            tries += 1;
+            let id = new_id();
+            match self.create_as(&id, graph, nodes) {
+                // A sweep was here between two lines of the making.
+                Err(Unmade::Swept(_)) if tries < TRIES => {}
+                Err(Unmade::Swept(error) | Unmade::Failed(error)) => {
+                    let _ = remove_run(&self.dir.join(format!("{UNBORN}{id}")), LOCK);
+                    return Err(error);
+                }
+                Ok(made) => return Ok(made),
+            }
+        }
+    }
+
+    fn create_as(&self, id: &str, graph: &str, nodes: usize) -> Result<RunDir, Unmade> {
+        const ROOM: &str = "check that there is room and that you may write there, or set TMPDIR";
+        let id = id.to_string();
         let paths = RunPaths { root: self.dir.join(&id), id: id.clone() };
         if paths.root.as_os_str().len() > LONGEST_ROOT {
             let reason = format!("the path has more than {LONGEST_ROOT} bytes");
-            return Err(failed(&paths.root, "make it", reason, "set TMPDIR to a shorter path"));
+            return Err(Unmade::Failed(failed(&paths.root, "make it", reason, "set TMPDIR to a shorter path")));
         }
-        self.check_shm(&paths.prefix(), nodes as u64 * SHM_PER_NODE)?;
-
-        const ROOM: &str = "check that there is room and that you may write there, or set TMPDIR";
         let unborn = self.dir.join(format!("{UNBORN}{id}"));
-        let make = |dir: &Path| DirBuilder::new().mode(0o700).create(dir).map_err(|e| failed(dir, "make it", e, ROOM));
+        let wrong = |path: &Path, what: &'static str| {
+            let path = path.to_path_buf();
+            move |e: std::io::Error| match e.kind() {
+                std::io::ErrorKind::NotFound => Unmade::Swept(failed(&path, what, e, ROOM)),
+                _ => Unmade::Failed(failed(&path, what, e, ROOM)),
+            }
+        };
+        let make = |dir: &Path| DirBuilder::new().mode(0o700).create(dir).map_err(wrong(dir, "make it"));
+        let new_file = |name: &str| {
+            let path = unborn.join(name);
+            OpenOptions::new().append(true).create_new(true).mode(0o600).open(&path).map_err(wrong(&path, "make it"))
+        };
         make(&unborn)?;
-        let lock_path = unborn.join(LOCK);
-        let mut file = OpenOptions::new()
-            .write(true)
-            .create_new(true)
-            .mode(0o600)
-            .open(&lock_path)
-            .map_err(|e| failed(&lock_path, "make it", e, ROOM))?;
+        let mut file = new_file(LOCK)?;
         let _ = writeln!(file, "{}", std::process::id());
-        let lock = Flock::lock(file, FlockArg::LockExclusiveNonblock)
-            .map_err(|(_, e)| failed(&lock_path, "lock it", e, "set TMPDIR to a directory on a local file system"))?;
+        let lock = Flock::lock(file, FlockArg::LockExclusiveNonblock).map_err(|(_, e)| {
+            let error = failed(&unborn.join(LOCK), "lock it", e, "set TMPDIR to a directory on a local file system");
+            if e == Errno::EWOULDBLOCK { Unmade::Swept(error) } else { Unmade::Failed(error) }
+        })?;
+        // From here on it is seen to be alive, and when this process is killed, to be dead. So nothing is made outside of it before.
+        new_file(PROCESSES)?;
+        self.check_shm(&paths.prefix(), nodes as u64 * SHM_PER_NODE).map_err(Unmade::Failed)?;
         let graph_path = unborn.join(GRAPH);
-        std::fs::write(&graph_path, graph).map_err(|e| failed(&graph_path, "write it", e, ROOM))?;
+        std::fs::write(&graph_path, graph).map_err(wrong(&graph_path, "write it"))?;
         make(&unborn.join(MIDDLEWARE))?;
-        let pids_path = unborn.join(PIDS);
-        let mut pids = OpenOptions::new()
-            .append(true)
-            .create_new(true)
-            .mode(0o600)
-            .open(&pids_path)
-            .map_err(|e| failed(&pids_path, "make it", e, ROOM))?;
+        let mut pids = new_file(PIDS)?;
         let _ = writeln!(pids, "{}", boot_id());
-        std::fs::rename(&unborn, &paths.root).map_err(|e| failed(&paths.root, "make it", e, ROOM))?;
+        std::fs::rename(&unborn, &paths.root).map_err(wrong(&paths.root, "make it"))?;
         Ok(RunDir { paths, shm: self.shm.clone(), pids, _lock: lock })
     }
 
@@ -181,7 +207,7 @@ impl RunDir {
 
     /// Notes a process of the run, so that it can be ended should it outlive the supervisor.
     pub(crate) fn note(&mut self, pid: i32, name: &str) {
-        if let Some(started) = crate::remains::start_time(pid) {
+        if let Some(started) = start_time(pid) {
             let _ = writeln!(self.pids, "{pid} {started} {name}");
         }
     }
@@ -193,10 +219,10 @@ impl RunDir {
     pub fn remove(self) -> Result<(), LaunchError> {
         let advice = "run `backdrive clean`";
         let mut first = None;
-        match crate::remains::shm_files(&self.shm, &[&self.paths.prefix()]) {
+        match shm_files(&self.shm, &[&self.paths.prefix()]) {
             Ok(files) => {
                 for file in files {
-                    if let Err(e) = crate::remains::remove_file(&file) {
+                    if let Err(e) = remove_file(&file) {
                         first.get_or_insert(failed(&file, "remove it", e, advice));
                     }
                 }
@@ -204,11 +230,18 @@ impl RunDir {
             Err(e) => first = Some(failed(&self.shm, "read it", e, advice)),
         }
         // Last, and with the lock still held: what remains of a removal that is cut short is swept.
-        if let Err(e) = crate::remains::remove_dir(&self.paths.root) {
+        if let Err(e) = remove_run(&self.paths.root, LOCK) {
             first.get_or_insert(failed(&self.paths.root, "remove it", e, advice));
         }
         first.map_or(Ok(()), Err)
     }
+}
+
+/// Why a directory was not made.
+enum Unmade {
+    /// A sweep has removed it meanwhile.
+    Swept(LaunchError),
+    Failed(LaunchError),
 }
 
 /// Takes the lock of a run if it is free. `Ok(None)`: the run is alive.

@@ -4,6 +4,7 @@ use crate::child::Child;
 use crate::member::Member;
 use crate::pace::Pace;
 use crate::plan::NodePlan;
+use crate::proc_stat::ProcStat;
 use backdrive_nodes::protocol::{NodeStatus, ToNode};
 use nix::sys::signal::Signal;
 use std::collections::VecDeque;
@@ -58,6 +59,11 @@ pub(crate) struct Slot {
     /// When it was last heard.
     pub heard: Instant,
     pub silent: bool,
+    /// What the system said of the process last, while the run ends, and when it was last seen to work.
+    pub stat: Option<ProcStat>,
+    pub worked: Instant,
+    /// When it was continued, because it had been stopped.
+    pub continued: Option<Instant>,
     pub stray: bool,
     pub stderr: VecDeque<String>,
     pub lines: Pace,
@@ -85,6 +91,9 @@ impl Slot {
             progress: now,
             heard: now,
             silent: false,
+            stat: None,
+            worked: now,
+            continued: None,
             stray: false,
             stderr: VecDeque::new(),
             lines: Pace::new(20.0, 60.0, now),
@@ -110,6 +119,7 @@ impl Slot {
         self.heard = now;
         self.progress = now;
         self.silent = false;
+        (self.stat, self.worked, self.continued) = (None, now, None);
         self.enter(Phase::Joining, now);
     }
 

@@ -4,10 +4,7 @@
 
 use crate::paths::{is_id, prefix_of};
 use crate::remains::name_of;
-use crate::remains::remove_dir;
-use crate::remains::remove_file;
-use crate::remains::shm_files;
-use crate::remains::start_time;
+use crate::remains::{remove_file, remove_run, shm_files, start_time};
 use crate::rundir::{LOCK, PIDS, RunHome, UNBORN, boot_id, try_lock, uid};
 use nix::fcntl::Flock;
 use nix::sys::signal::{Signal, kill};
@@ -19,7 +16,7 @@ use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant, SystemTime};
 
-/// How long a directory may lack its lock: it is being made, or half removed by another sweep.
+/// How long a directory that holds something may lack its lock. None of ours does: the lock is made first and removed last.
 const UNBORN_FOR: Duration = Duration::from_secs(60);
 
 /// How long a process that has lost its supervisor may take to finish, such as a bag.
@@ -104,7 +101,7 @@ impl RunHome {
             }
             // The directory goes last: as long as it is there, the next sweep tries again.
             if whole {
-                match remove_dir(&dead.run.root) {
+                match remove_run(&dead.run.root, LOCK) {
                     Ok(()) => swept.removed.push(dead.run),
                     Err(e) => swept.failed.push(format!("{}: cannot remove it: {e}", dead.run.root.display())),
                 }
@@ -148,9 +145,6 @@ impl RunHome {
                 continue;
             }
             let old = meta.modified().ok().and_then(|m| SystemTime::now().duration_since(m).ok()).is_some_and(|age| age > UNBORN_FOR);
-            if name.starts_with(UNBORN) && !old {
-                continue;
-            }
             let lock = match try_lock(&root.join(LOCK)) {
                 Ok(Some(lock)) => Some(lock),
                 Ok(None) => {
@@ -158,7 +152,11 @@ impl RunHome {
                     continue;
                 }
                 Err(e) if e.kind() == ErrorKind::NotFound && old => None,
-                Err(e) if e.kind() == ErrorKind::NotFound => continue,
+                Err(e) if e.kind() == ErrorKind::NotFound => {
+                    // Made and not yet locked, or its lock removed and it itself not yet: it is empty. Its maker, if it lives, begins again.
+                    let _ = std::fs::remove_dir(&root);
+                    continue;
+                }
                 Err(e) => {
                     swept.failed.push(format!("{}: cannot lock it: {e}", root.join(LOCK).display()));
                     continue;

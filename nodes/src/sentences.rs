@@ -12,7 +12,7 @@ const SENTENCES: &[(&str, &str, Option<&str>)] = &[
     ("drive_back", "a controller's forces arrive again, after", Some("steps without any")),
     ("drive_stale", "no force has come for", Some("steps: the slave's motor force decays to zero")),
     ("force_back", "forces arrive again, after", Some("steps without any")),
-    ("force_outdated", "the slave gets no commands any more: the master's force decays to zero", None),
+    ("force_outdated", "the slave gets no commands, or the link to it is silent: the master's force decays to zero", None),
     ("force_stale", "no force has come for", Some("steps: the master's force decays to zero")),
     ("guard_growing", "an oscillation grows: the guard lowers lambda to", Some("")),
     ("guard_persistent", "an oscillation does not die: the guard lowers lambda to", Some("")),

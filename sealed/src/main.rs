@@ -167,8 +167,15 @@ fn draw_truth(options: &Options) -> Result<(), Failure> {
     let out = options.need_path("out")?;
     let truth = draw(&options.network()?, seed, &drawn).map_err(wrong)?;
     let (bytes, hash) = seal(&truth).map_err(wrong)?;
-    let written = OpenOptions::new().write(true).create_new(true).open(&out).and_then(|mut file| file.write_all(&bytes));
-    written.map_err(|error| Failure(format!("{}: cannot be written: {error}", out.display()), 5))?;
+    let mut file = OpenOptions::new().write(true).create_new(true).open(&out);
+    if let Ok(made) = &mut file
+        && let Err(error) = made.write_all(&bytes).and_then(|()| made.sync_all())
+    {
+        // Half a truth is none.
+        let _ = fs::remove_file(&out);
+        file = Err(error);
+    }
+    file.map_err(|error| Failure(format!("{}: cannot be written: {error}", out.display()), 5))?;
     put(&format!("{hash}  {}\n", out.display()))
 }
 

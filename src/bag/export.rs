@@ -75,10 +75,18 @@ fn dataset(asked: &BagExport) -> Result<u8, Failure> {
     let beside = tempfile::Builder::new().prefix(".backdrive-").tempdir_in(above).map_err(failed)?;
     let made = beside.path().join("dataset");
     let report = busy("exporting", || export_lerobot(&readers, &made, &contract, &task)).map_err(Failure::bag)?;
-    if out.exists() {
-        std::fs::rename(out, beside.path().join("before")).map_err(failed)?;
+    let before = beside.path().join("before");
+    let replaces = out.exists();
+    if replaces {
+        std::fs::rename(out, &before).map_err(failed)?;
     }
-    std::fs::rename(&made, out).map_err(failed)?;
+    if let Err(e) = std::fs::rename(&made, out) {
+        // What was there is there still.
+        if replaces {
+            std::fs::rename(&before, out).map_err(failed)?;
+        }
+        return Err(failed(e));
+    }
     for note in &report.notes {
         output::note(format_args!("warning: {note}"));
     }

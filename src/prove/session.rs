@@ -1,6 +1,7 @@
 //! What of a session a diagnosis gets: bags that hold the nominal model and the digest of the truth, and of the hand what a real one would.
 
 use crate::failure::Failure;
+use crate::output;
 use backdrive_bags::{BagHeader, Reader, without};
 use std::path::Path;
 use toml_edit::{DocumentMut, InlineTable, Item, Table, Value, value};
@@ -21,7 +22,8 @@ pub fn hand_over(recorded: &Path, session: &Path, shows_hand: bool, hand_hz: f64
             without(&from, &to, &|topic| hidden.iter().any(|h| h == topic), &|header| tell_less(header, shows_hand))
                 .map_err(Failure::input)?;
         } else {
-            std::fs::copy(&from, &to).map_err(|e| Failure::write(&to, e))?;
+            let bytes = std::fs::read(&from).map_err(|e| Failure::input(format!("{}: cannot be read: {e}", from.display())))?;
+            output::file(&to, bytes)?;
         }
     }
     if !shows_hand {

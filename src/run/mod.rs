@@ -4,7 +4,7 @@ mod done;
 mod way;
 
 pub use done::Done;
-pub use way::{Way, run_graph, run_here};
+pub use way::{Way, repeat_here, run_graph, run_here};
 
 use crate::cli;
 use crate::failure::{Failure, code};

@@ -7,7 +7,7 @@ use crate::graph::buildable;
 use crate::network::place;
 use crate::summary::{Traces, summarise};
 use crate::{output, progress};
-use backdrive_bags::{Completeness, Reader, Recorder, check_target};
+use backdrive_bags::{Completeness, Reader, Recorder, RecorderOptions, check_target};
 use backdrive_launch::join::{recorder_options, recording};
 use backdrive_launch::{Cause, Place, RunReport, SuperviseOptions, Wire};
 use backdrive_msgs::Message;
@@ -125,8 +125,18 @@ pub(super) fn fault(report: &RunReport, lost: u64) -> Option<Unjudged> {
     (lost > 0).then_some(Unjudged::Lost { messages: lost })
 }
 
-/// Runs a graph in this process, in lockstep; `hear` gets every message with its topic.
+/// Runs a graph in this process, in lockstep; `hear` gets every message with its topic. As with processes, its bag has its name from the
+/// beginning: what was recorded survives a run that is cut short.
 pub fn run_here(graph: &Graph, hear: &mut dyn FnMut(&str, &Message)) -> Result<Done, Failure> {
+    in_this_process(graph, false, hear)
+}
+
+/// The same for what can be repeated: its bag is there whole or not at all.
+pub fn repeat_here(graph: &Graph, hear: &mut dyn FnMut(&str, &Message)) -> Result<Done, Failure> {
+    in_this_process(graph, true, hear)
+}
+
+fn in_this_process(graph: &Graph, all_or_nothing: bool, hear: &mut dyn FnMut(&str, &Message)) -> Result<Done, Failure> {
     if graph.timing.clock == Clock::Realtime {
         return Err(Failure::input("one process runs in lockstep only; use --clock lockstep, or --transport iceoryx2"));
     }
@@ -146,7 +156,10 @@ pub fn run_here(graph: &Graph, hear: &mut dyn FnMut(&str, &Message)) -> Result<D
     let names: Vec<String> = sequence.topics().iter().map(|t| t.name.clone()).collect();
     let place: Vec<Option<usize>> = names.iter().map(|name| record.topics.iter().position(|t| t.name == *name)).collect();
     let mut recorder = match &graph.bag {
-        Some(bag) => Some(Recorder::create(bag, &header, &recorder_options(graph)).map_err(Failure::bag)?),
+        Some(bag) => {
+            let options = RecorderOptions { whole: all_or_nothing, ..recorder_options(graph) };
+            Some(Recorder::create(bag, &header, &options).map_err(Failure::bag)?)
+        }
         None => None,
     };
     let bar = progress::steps(steps, &graph.title);

@@ -57,19 +57,8 @@ pub fn import_rosbag(from: &Path, bag: &Path, overwrite: bool, most_bytes: u64) 
             .unwrap_or_else(|why| Err(wrong(&format!("cannot be read as a ROS 1 bag: {why}; it is damaged")))),
         false => files.iter().try_for_each(|file| sqlite::copy(file, &mut target)),
     };
-    let finished = done.and_then(|()| target.finish());
-    match finished {
-        Ok(report) if report.messages == 0 => {
-            let _ = std::fs::remove_file(bag);
-            Err(wrong("holds no messages"))
-        }
-        Ok(report) => Ok(report),
-        Err(error) => {
-            // Half a bag would look like a whole one.
-            let _ = std::fs::remove_file(bag);
-            Err(error)
-        }
-    }
+    let report = done.and_then(|()| target.finish())?;
+    if report.messages == 0 { Err(wrong("holds no messages")) } else { Ok(report) }
 }
 
 /// The sqlite3 files of a rosbag2's folder, in the order in which they were recorded.

@@ -1,7 +1,7 @@
 //! The MCAP file that messages of others go into, and what is to be said of them.
 
 use crate::cdr::{FieldPath, Schema};
-use crate::claim::claim;
+use crate::whole::Whole;
 use crate::writer::reason;
 use crate::{BagError, clock_remarks};
 use mcap::records::MessageHeader;
@@ -50,6 +50,7 @@ pub(crate) struct Form<'a> {
 
 pub(crate) struct Target {
     path: PathBuf,
+    whole: Whole,
     mcap: mcap::Writer<BufWriter<File>>,
     topics: Vec<Topic>,
 }
@@ -71,14 +72,15 @@ struct Topic {
 
 impl Target {
     pub(crate) fn create(path: &Path, overwrite: bool) -> Result<Target, BagError> {
-        let file = claim(path, overwrite)?;
+        let whole = Whole::begin(path, overwrite)?;
+        let file = whole.file()?;
         let options = mcap::WriteOptions::new()
             .profile("ros2")
             .library(concat!("backdrive ", env!("CARGO_PKG_VERSION")))
             .compression(Some(mcap::Compression::Lz4))
             .compression_threads(0);
         let mcap = options.create(BufWriter::with_capacity(1 << 17, file)).map_err(failed(path))?;
-        Ok(Target { path: path.to_owned(), mcap, topics: Vec::new() })
+        Ok(Target { path: path.to_owned(), whole, mcap, topics: Vec::new() })
     }
 
     /// The number of a topic; one that is there already has the same.
@@ -139,8 +141,12 @@ impl Target {
         Ok(())
     }
 
+    /// Ends the bag. One without a message is removed again, and its report says 0 messages.
     pub(crate) fn finish(mut self) -> Result<RosbagReport, BagError> {
         self.mcap.finish().map_err(failed(&self.path))?;
+        if self.topics.iter().any(|topic| topic.told.messages > 0) {
+            self.whole.commit()?;
+        }
         let topics = self.topics.into_iter().map(|mut topic| {
             let times = if topic.stamps.iter().all(|stamp| *stamp != 0) { topic.stamps } else { topic.logged };
             let first = times.first().copied().unwrap_or(0);

@@ -158,11 +158,7 @@ fn placed<'a, 'b>(
 
 /// A row is a step. Half a bag would look like a whole one, so none is left behind.
 fn record(bag: &Path, header: &BagHeader, times: &[f64], sources: &[Source], overwrite: bool) -> Result<(), BagError> {
-    let recorder = Recorder::create(bag, header, &RecorderOptions { overwrite, ..RecorderOptions::lockstep() })?;
-    fill(recorder, header, times, sources).inspect_err(|_| drop(std::fs::remove_file(bag)))
-}
-
-fn fill(mut recorder: Recorder, header: &BagHeader, times: &[f64], sources: &[Source]) -> Result<(), BagError> {
+    let mut recorder = Recorder::create(bag, header, &RecorderOptions { overwrite, whole: true, ..RecorderOptions::lockstep() })?;
     for (row, time) in times.iter().enumerate() {
         let mut samples: Vec<Sample> = header.topics.iter().map(|info| Sample::new(info.axes.len())).collect();
         samples[0].position[0] = *time;

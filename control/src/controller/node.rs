@@ -2,7 +2,7 @@
 
 use super::{AxisModel, ControllerError, Differentiator, ReferenceFilter, Settings, State, Working};
 use crate::core::{Core, Events, Port, Tick};
-use crate::freshness::Freshness;
+use crate::freshness::{Freshness, bridged_steps};
 use backdrive_msgs::{MAX_AXES, Sample, flag};
 use backdrive_plant::model::Model;
 
@@ -62,7 +62,7 @@ impl Controller {
             command: Freshness::default(),
             measured: Freshness::default(),
             measured_at: 0,
-            stale_steps: ((stale_after_s / period_s).round() as u64).max(1),
+            stale_steps: bridged_steps(stale_after_s, period_s),
             trusted: true,
         })
     }

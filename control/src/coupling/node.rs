@@ -3,7 +3,7 @@
 use super::velocity::Velocity;
 use super::{Conditions, Far, Law, Near, Own, Packet};
 use crate::core::{Core, Events, Port, Tick};
-use crate::freshness::Freshness;
+use crate::freshness::{Freshness, bridged_steps};
 use crate::scaling::{GainPlan, Ramp};
 use backdrive_msgs::{Gains, MAX_AXES, Sample, flag};
 
@@ -20,8 +20,7 @@ struct Link {
 
 impl Link {
     fn new(stale_after_s: f64, period_s: f64) -> Link {
-        let hold_steps = ((stale_after_s / period_s).round() as u64).max(1);
-        Link { fresh: Freshness::default(), hold_steps, outdated: false }
+        Link { fresh: Freshness::default(), hold_steps: bridged_steps(stale_after_s, period_s), outdated: false }
     }
 
     /// The new packets of all axes, if any have come.
@@ -100,7 +99,8 @@ impl Core for NearNode {
         // Without a measurement there is nothing to say: the far side then holds, and the master lets go.
         let Some(motion) = self.motion.new_sample(motion, |s| s.position[0]).copied() else { return };
         let silent = self.link.is_stale();
-        if self.link.outdated {
+        // The link was bridged here already: the master need not bridge it once more.
+        if self.link.outdated || silent {
             force.flags |= flag::STALE;
         }
         for (axis, (law, velocity)) in self.axes.iter_mut().enumerate().take(motion.len()) {
@@ -133,8 +133,8 @@ impl Core for NearNode {
 /// Inputs `contact` (position, velocity and effort of the slave, one step late), `from_near` (the link); outputs `command` (position),
 /// `to_near` (the link).
 ///
-/// Before the first packet the slave is told to stay where it is. When packets stop coming the law stands still, the slave holds, and what is sent
-/// says so.
+/// Before the first packet the slave is told to stay where it is. When packets or contact samples stop coming, the law stands still, the slave
+/// holds, and the packets carry the flag STALE.
 pub struct FarNode {
     period_s: f64,
     axes: Vec<(Box<dyn Far>, f64)>,
@@ -177,7 +177,8 @@ impl Core for FarNode {
             }
             return;
         }
-        if self.link.is_stale() {
+        // A slave that is silent feels nothing any more: its last contact force must not be reflected for ever.
+        if self.link.is_stale() || self.contact.stale_steps > self.link.hold_steps {
             to_near.flags |= flag::STALE;
             (to_near.position, to_near.velocity, to_near.effort) = (self.said.position, self.said.velocity, self.said.effort);
             return;

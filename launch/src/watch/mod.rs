@@ -1,6 +1,7 @@
 //! What happens between the start of a run and its end.
 
 mod deaths;
+mod standing;
 mod start;
 mod state;
 mod stop;

@@ -1,13 +1,20 @@
 //! What is due at a time: restarts, silence, the next step of ending.
 
 use super::state::Supervisor;
-use crate::child::End;
+use crate::child::{Child, End};
 use crate::error::LaunchError;
+use crate::proc_stat::ProcStat;
 use crate::slot::{Asked, Phase, Slot};
 use std::time::{Duration, Instant};
 
 /// In real time a node that is not heard for this long is reported.
 const SILENCE: Duration = Duration::from_secs(3);
+
+/// How long a recorder that was asked to end may neither make progress nor use its processor.
+const STANDS_STILL: Duration = Duration::from_secs(3);
+
+/// Time from SIGTERM to SIGKILL, for one that does nothing; it has been asked before.
+const TERM_GRACE: Duration = Duration::from_secs(1);
 
 /// How long a recorder may take to see by itself that the planned steps are over.
 const RECORDER_LEAD: Duration = Duration::from_secs(1);
@@ -19,6 +26,8 @@ impl Supervisor {
     /// Whatever is due.
     pub(crate) fn act(&mut self, now: Instant) {
         self.meet();
+        self.see_planned_end(now);
+        self.continue_stopped(now);
         if self.start.is_none() && !self.stopping && now.saturating_duration_since(self.begun) > self.options.ready_timeout {
             let mut missing: Vec<String> = self.slots.iter().filter(|s| s.phase == Phase::Joining).map(Slot::lack).collect();
             missing.append(&mut self.absent);
@@ -41,11 +50,16 @@ impl Supervisor {
     fn act_on(&mut self, index: usize, now: Instant) {
         let started = self.start.is_some();
         let slot = &mut self.slots[index];
-        let (grace, since) = match slot.plan.records {
-            true => (self.options.recorder_grace, slot.asked_at.max(slot.progress)),
-            false => (self.options.grace, slot.asked_at),
+        let grace = self.options.grace;
+        let since = |from: Instant| now.saturating_duration_since(from);
+        // A recorder has a file to end, on a disk that may be slow: while it works it has time.
+        let (idle_since, over) = match slot.plan.records {
+            true => {
+                let (progress, idle_since) = (slot.asked_at.max(slot.progress), slot.asked_at.max(slot.progress).max(slot.worked));
+                (idle_since, since(idle_since) > grace.max(STANDS_STILL) || since(progress) > self.options.recorder_grace)
+            }
+            false => (slot.asked_at, since(slot.asked_at) > grace),
         };
-        let over = now.saturating_duration_since(since) > grace;
         match (slot.phase, slot.asked) {
             (Phase::Ended, _) => {}
             (Phase::Backoff { until }, _) if now >= until => {
@@ -58,7 +72,7 @@ impl Supervisor {
             }
             (Phase::Backoff { .. }, _) => {}
             (_, Asked::Stop) if over => slot.ask(Asked::Term, now),
-            (_, Asked::Term) if over => slot.ask(Asked::Kill, now),
+            (_, Asked::Term) if over || since(idle_since) > TERM_GRACE => slot.ask(Asked::Kill, now),
             (_, Asked::Kill) if now.saturating_duration_since(slot.asked_at) > UNKILLABLE => {
                 slot.end = "does not die".to_string();
                 slot.enter(Phase::Ended, now);
@@ -80,9 +94,16 @@ impl Supervisor {
                     slot.ask(Asked::Stop, now);
                     let text = format!("`{}` has not ended with the others; it is stopped", slot.plan.label());
                     self.tell(1, "node_late", text);
-                } else if self.plan.realtime() && !slot.silent && now.saturating_duration_since(slot.heard) > SILENCE {
+                } else if !slot.silent && now.saturating_duration_since(slot.heard) > SILENCE {
+                    let stopped = slot.child.as_ref().map(Child::pid).filter(|pid| ProcStat::of(*pid).is_some_and(|s| s.is_stopped()));
+                    let text = match stopped {
+                        Some(pid) => format!("`{}` has been stopped (SIGSTOP); `kill -CONT {pid}` continues it", slot.plan.label()),
+                        None if self.plan.realtime() => {
+                            format!("`{}` has not been heard for {} s; it may hang", slot.plan.label(), SILENCE.as_secs())
+                        }
+                        None => return,
+                    };
                     slot.silent = true;
-                    let text = format!("`{}` has not been heard for {} s; it may hang", slot.plan.name, SILENCE.as_secs());
                     self.tell(1, "node_silent", text);
                 }
             }

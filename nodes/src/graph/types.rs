@@ -34,7 +34,7 @@ pub struct Graph {
     pub seed: u64,
     /// Gains at the start and later.
     pub gains: GainPlan,
-    /// Time from the last sample of an input to the start of the decay, s.
+    /// Time from the last sample of an input to the start of the decay, s. The force is zero within twice that time.
     pub stale_after_s: f64,
     /// The bag to record, if there is a recorder.
     pub bag: Option<PathBuf>,

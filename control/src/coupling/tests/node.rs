@@ -49,13 +49,24 @@ fn silence_of_the_link_takes_the_force_away_and_lets_the_slave_hold() {
         commands.push(command.position[0]);
         flags.push(back.flags & flag::STALE);
     }
-    // 20 ms are bridged.
-    assert!(forces[..=30].iter().all(|f| *f == -1.0) && forces[31..].iter().all(|f| f.is_nan()), "{forces:?}");
-    assert!(commands[..=30].iter().all(|x| *x == 0.001) && commands[31..].iter().all(|x| x.is_nan()), "{commands:?}");
-    assert!(flags[..=30].iter().all(|f| *f == 0) && flags[31..].iter().all(|f| *f == flag::STALE));
+    // The last packet is of step 10, and stale after 20 ms.
+    assert!(forces[..30].iter().all(|f| *f == -1.0) && forces[30..].iter().all(|f| f.is_nan()), "{forces:?}");
+    assert!(commands[..30].iter().all(|x| *x == 0.001) && commands[30..].iter().all(|x| x.is_nan()), "{commands:?}");
+    assert!(flags[..30].iter().all(|f| *f == 0) && flags[30..].iter().all(|f| *f == flag::STALE));
     // What a slave that holds feels is not the hand's doing.
     let [force, _] = step(&mut near, 60, &[port(60, 0.001, f64::NAN, 0), port(60, 0.0, -1.0, flag::STALE), Port::EMPTY]);
     assert_eq!(force.flags & flag::STALE, flag::STALE);
+}
+
+#[test]
+fn a_slave_that_is_silent_is_reported_to_the_master() {
+    let mut far = FarNode::new(1, &Law::Direct, &CONDITIONS, 0.01);
+    let flags: Vec<u32> =
+        (0..40).map(|at| step(&mut far, at, &[port(at.min(5), 0.0, -1.0, 0), port(at, 0.001, 0.0, 0)])[1].flags & flag::STALE).collect();
+    assert!(flags[..15].iter().all(|f| *f == 0) && flags[15..].iter().all(|f| *f == flag::STALE), "{flags:?}");
+    // It comes back.
+    let [_, back] = step(&mut far, 40, &[port(40, 0.0, -1.0, 0), port(40, 0.001, 0.0, 0)]);
+    assert_eq!((back.flags & flag::STALE, back.effort[0]), (0, -1.0));
 }
 
 #[test]

@@ -21,6 +21,9 @@ use experiment::{in_experiment, read_experiment};
 use gains::read_gains;
 use std::path::{Path, PathBuf};
 
+/// Where a graph does not state it: a force is zero at most 20 ms after a node of its loop died, s.
+const STALE_AFTER_S: f64 = 0.01;
+
 /// Highest rate of a graph, Hz.
 pub const MAX_RATE_HZ: f64 = 10_000.0;
 
@@ -53,9 +56,9 @@ impl Graph {
         let peer_timeout_s = top.number_or("peer_timeout_s", Range::Positive, 10.0)?;
         let gains = read_gains(&mut top)?;
         let stale_after_s = match top.table("safety")? {
-            None => 0.02,
+            None => STALE_AFTER_S,
             Some(mut safety) => {
-                let stale_after_s = safety.number_or("stale_after_s", Range::Positive, 0.02)?;
+                let stale_after_s = safety.number_or("stale_after_s", Range::Positive, STALE_AFTER_S)?;
                 safety.finish()?;
                 stale_after_s
             }
