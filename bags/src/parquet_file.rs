@@ -56,7 +56,7 @@ impl Default for Numbers {
 
 impl ParquetFile {
     pub(crate) fn open(path: &Path) -> Result<ParquetFile, BagError> {
-        let file = File::open(path).map_err(BagError::io(path))?;
+        let file = backdrive_plant::input_file::open(path).map_err(BagError::io(path))?;
         let size = file.metadata().map_err(BagError::io(path))?.len();
         let reader = SerializedFileReader::new(file).map_err(|error| {
             let what = format!("is not a whole parquet file: {}; if it was cut off, it has to be written again", told(&error));

@@ -147,7 +147,7 @@ impl<R: Read + Seek> Source<'_, R> {
 
 /// Opens a file only to look at its end.
 pub(crate) fn of_file(path: &Path) -> io::Result<(Option<Summary>, u64)> {
-    let mut file = std::fs::File::open(path)?;
+    let mut file = backdrive_plant::input_file::open(path)?;
     let size = file.metadata()?.len();
     Ok((summary(path, &mut file, size), size))
 }

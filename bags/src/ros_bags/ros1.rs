@@ -6,7 +6,6 @@ use crate::BagError;
 use rosbag::{ChunkRecord, MessageRecord, RosBag};
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;
-use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
@@ -63,8 +62,9 @@ pub(crate) fn copy(file: &Path, target: &mut Target) -> Result<(), BagError> {
 fn check_extent(file: &Path) -> Result<(), BagError> {
     let wrong = |what: &str| Err(BagError::File { path: file.to_owned(), what: what.to_owned() });
     let mut start = Vec::new();
-    let (mut open, size) =
-        File::open(file).and_then(|open| open.metadata().map(|about| (open, about.len()))).map_err(BagError::io(file))?;
+    let (mut open, size) = backdrive_plant::input_file::open(file)
+        .and_then(|open| open.metadata().map(|about| (open, about.len())))
+        .map_err(BagError::io(file))?;
     open.by_ref().take(4096).read_to_end(&mut start).map_err(BagError::io(file))?;
     let number = |at: usize, bytes: usize| {
         let bytes = start.get(at..at.checked_add(bytes)?)?;
