@@ -31,8 +31,7 @@ fn show(bag: &Path, json: bool, whole: bool) -> Result<u8, Failure> {
     } else {
         output::text(format_args!("{info}"))?;
     }
-    let lossy = info.damage.is_some() || !info.ended_cleanly;
-    Ok(if lossy { code::LOST_DATA } else { 0 })
+    Ok(if info.faults.is_empty() { 0 } else { code::LOST_DATA })
 }
 
 fn save(damaged: &Path, bag: &Path, overwrite: bool) -> Result<u8, Failure> {

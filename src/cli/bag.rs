@@ -129,7 +129,7 @@ pub struct BagImport {
 /// `backdrive bag export`
 #[derive(Debug, Args)]
 #[command(
-    after_help = "Examples:\n  backdrive bag export contact.mcap --csv contact.csv\n  backdrive bag export contact.mcap --to parquet --out contact.parquet\n  backdrive bag export episode_000000.mcap episode_000001.mcap --to lerobot --out my_dataset\n\nExit codes: 0 exported, 2 usage, 3 a bag is wrong or what is to be written exists, 5 it cannot be written."
+    after_help = "Examples:\n  backdrive bag export contact.mcap --csv contact.csv\n  backdrive bag export contact.mcap --to parquet --out contact.parquet\n  backdrive bag export episode_000000.mcap episode_000001.mcap --to lerobot --out my_dataset\n\nExit codes: 0 exported, 2 usage, 3 a bag is wrong or what is to be written exists, 4 exported, but the bag is cut off, contradicts itself or lacks messages, 5 it cannot be written."
 )]
 pub struct BagExport {
     /// The bag; for a LeRobot dataset one an episode, with columns JOINT.position and the like.

@@ -1,20 +1,20 @@
 //! The answer: what happens, why, and what would stop it.
 
-use crate::alone::AloneError;
 use crate::as_it_was::as_it_was;
 use crate::cause::{Asked, Cause, causes, reproduces};
 use crate::cause_kind::CauseKind;
 use crate::change::Change;
-use crate::compared::SMALL;
 use crate::difference::Difference;
 use crate::differences::{Differences, Look, differences};
 use crate::happening::Happening;
 use crate::named::named;
-use crate::recorded::{Recorded, Told};
 use crate::remedy::{Remedy, remedies};
 use crate::trial::{Hand, Trial};
 use backdrive_control::operator::Intent;
 use backdrive_nodes::graph::{DeviceFiles, Graph, NodeKind};
+use backdrive_stability::by_itself::alone::AloneError;
+use backdrive_stability::by_itself::compared::SMALL;
+use backdrive_stability::by_itself::recorded::{Recorded, Told};
 use backdrive_stability::resimulate::{Gain, ResimulateError, RunOptions};
 use backdrive_stability::session::Session;
 use serde::Serialize;
