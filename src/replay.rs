@@ -14,6 +14,7 @@ use backdrive_msgs::{Message, Sample};
 use backdrive_nodes::graph::{Node, NodeKind, Overrides, Settings};
 use backdrive_nodes::stage::Clock;
 use backdrive_stability::bag_gate::held_back;
+use backdrive_stability::unjudged::Unjudged;
 
 /// Replays a bag in lockstep, in this process.
 pub fn replay(options: &cli::Replay) -> Result<u8, Failure> {
@@ -79,10 +80,12 @@ pub fn replay(options: &cli::Replay) -> Result<u8, Failure> {
     })?;
     // The run above is whole, but what it was made of is not where the recording is not, or is contradictory.
     if let Some(summary) = &mut done.summary {
-        for note in notes {
+        for note in notes.iter().filter(|_| kept_back.is_some()) {
             output::note(format_args!("warning: {}: {note}", path.display()));
         }
-        summary.hold_back(kept_back);
+        // Who asks for another length does not ask for the recorded one.
+        let is_asked = |why: &Unjudged| !(options.changes.duration.is_some() && matches!(why, Unjudged::CutShort { .. }));
+        summary.hold_back(kept_back.filter(is_asked));
     }
     let page = options.result.html.as_deref().map(|html| (html, page(&done, &graph, &heard, Some(path))));
     done.tell(page, options.result.json)

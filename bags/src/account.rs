@@ -161,7 +161,8 @@ struct TopicHeard {
     stamped: [u64; 2],
     stamped_wrong: u64,
     logged_apart: u64,
-    recent: VecDeque<(u64, u32)>,
+    /// Source, number and checksum of the last messages.
+    recent: VecDeque<(u32, u64, u32)>,
     twice_but_different: Option<u64>,
     /// A number of axes that is not that of the header.
     axes: Option<usize>,
@@ -228,12 +229,14 @@ impl Hearing {
             }
         };
         heard.ours = true;
-        let sequence = message.sequence();
+        let (source, sequence) = (message.source(), message.sequence());
         let sum = crc32fast::hash(&entry.payload);
-        if heard.recent.iter().any(|(other, was)| *other == sequence && *was != sum) && heard.tracker.found.restarts == 0 {
+        if heard.recent.iter().any(|(from, other, was)| (*from, *other) == (source, sequence) && *was != sum)
+            && heard.tracker.found.restarts == 0
+        {
             heard.twice_but_different.get_or_insert(message.step());
         }
-        heard.recent.push_back((sequence, sum));
+        heard.recent.push_back((source, sequence, sum));
         if heard.recent.len() > REMEMBERED {
             heard.recent.pop_front();
         }

@@ -8,7 +8,7 @@ use std::path::PathBuf;
 pub enum Bag {
     /// What is in a bag, and whether it is complete, as its end tells without reading the messages; of a bag that was not closed all is read.
     #[command(
-        after_help = "Example:\n  backdrive bag info contact.mcap\n  backdrive bag info contact.mcap --check\n\nExit codes: 0 whole, 2 usage, 3 cannot be read, 4 damaged, cut off or with losses."
+        after_help = "Example:\n  backdrive bag info contact.mcap\n  backdrive bag info contact.mcap --check\n\nExit codes: 0 whole, 2 usage, 3 cannot be read, 4 damaged, cut off, with losses or contradicting itself."
     )]
     Info {
         /// The bag; any MCAP file.

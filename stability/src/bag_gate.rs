@@ -29,7 +29,16 @@ pub(crate) fn gate(reader: &Reader, graph: &Graph) -> Result<Gate, SessionError>
     let account = Account::of(reader)?;
     let Against { contradictions, parts, notes: of_nodes } = against(reader, graph)?;
     let mut notes: Vec<String> = account.notes.iter().map(|note| format!("the bag: {note}")).collect();
-    notes.extend(account.faults.iter().filter(|fault| !matches!(fault, Fault::NotClosed)).map(|fault| format!("the bag: {fault}")));
+    let faults = account.faults.iter().filter(|fault| !matches!(fault, Fault::NotClosed | Fault::Lost { .. }));
+    notes.extend(faults.map(|fault| format!("the bag: {fault}")));
+    let missing = account.faults.iter().filter_map(|fault| match fault {
+        Fault::Lost { topic, messages, of } => Some(format!("{topic} {messages} of {of}")),
+        _ => None,
+    });
+    let missing: Vec<String> = missing.collect();
+    if !missing.is_empty() {
+        notes.push(format!("the bag lacks messages: {}", missing.join(", ")));
+    }
     notes.extend(contradictions.iter().map(|what| format!("the recording contradicts its graph: {what}")));
     notes.extend(of_nodes);
     let contradicts = !contradictions.is_empty() || account.contradictions().next().is_some();

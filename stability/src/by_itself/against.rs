@@ -39,6 +39,7 @@ const COMPUTED: &[(NodeKind, &str, Quantity, bool)] = &[
 /// The same of devices: the name of the part.
 const DEVICES: &[(NodeKind, &str, Quantity, &str)] = &[
     (NodeKind::Master, "measured", Quantity::Effort, "master's motor"),
+    (NodeKind::Master, "user", Quantity::Position, "handle's motion"),
     (NodeKind::Slave, "measured", Quantity::Position, "slave's motion"),
 ];
 
