@@ -2,7 +2,7 @@
 
 use crate::failure::Failure;
 use crate::set_checks;
-use backdrive_bags::{Reader, is_lerobot, is_rosbag};
+use backdrive_bags::{Account, Reader, is_lerobot, is_rosbag};
 use backdrive_diagnosis::audit;
 use backdrive_diagnosis::problem::{MOST_OF_A_BAG, Problem, ProblemError};
 use backdrive_plant::model::{Fragment, Model};
@@ -126,11 +126,17 @@ fn unfinished(path: &Path) -> Option<String> {
     let reader = Reader::open(path).ok()?;
     let name = path.display();
     let recover = "what it holds is used, and `backdrive bag recover` makes a clean copy";
-    match reader.damage().first() {
-        Some(damage) => Some(format!("{name} is damaged ({damage}): {recover}")),
-        None if !reader.ended_cleanly() => Some(format!("{name} was not closed: {recover}")),
-        None => None,
+    if let Some(damage) = reader.damage().first() {
+        return Some(format!("{name} is damaged ({damage}): {recover}"));
     }
+    if !reader.ended_cleanly() {
+        return Some(format!("{name} was not closed: {recover}"));
+    }
+    // A bag of its own, whatever it says of itself: by its messages.
+    let faults = Account::of(&reader).ok()?.faults;
+    let (first, more) = (faults.first()?, faults.len() - 1);
+    let others = if more > 0 { format!(", and {more} more: `backdrive bag info --check {name}` says all") } else { String::new() };
+    Some(format!("{name} is not whole: {first}{others}"))
 }
 
 /// What to know of a bag that is longer than what is read of it.

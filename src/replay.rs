@@ -11,9 +11,9 @@ use backdrive_bags::Reader;
 use backdrive_control::cycle::Cycle;
 use backdrive_control::operator::Intent;
 use backdrive_msgs::{Message, Sample};
-use backdrive_nodes::graph::{Node, NodeKind, Settings};
+use backdrive_nodes::graph::{Node, NodeKind, Overrides, Settings};
 use backdrive_nodes::stage::Clock;
-use backdrive_stability::from_bag::cut_short;
+use backdrive_stability::bag_gate::held_back;
 use backdrive_stability::unjudged::Unjudged;
 
 /// Replays a bag in lockstep, in this process.
@@ -31,7 +31,10 @@ pub fn replay(options: &cli::Replay) -> Result<u8, Failure> {
         return Err(Failure::input(format!("{}: is the bag that is replayed; name another with --bag", path.display())));
     }
 
-    let planned = graph.timing.steps.unwrap_or(0);
+    let recorded_graph = graph_of(&reader, &Overrides::default())?;
+    let exchanged = Overrides { duration_s: None, ..changes.clone() } != Overrides { overwrite: changes.overwrite, ..Overrides::default() };
+    let (kept_back, notes) =
+        busy(&format!("reading {}", path.display()), || held_back(&reader, &recorded_graph, exchanged)).map_err(Failure::input)?;
     if !reader.ended_cleanly() {
         output::note(format_args!(
             "warning: {}: was not closed; what it holds is replayed, and `backdrive bag recover` makes a clean copy",
@@ -75,11 +78,14 @@ pub fn replay(options: &cli::Replay) -> Result<u8, Failure> {
             heard.take(topic, message);
         }
     })?;
-    // The run above is whole, but the hand that moved it is not.
+    // The run above is whole, but what it was made of is not where the recording is not, or is contradictory.
     if let Some(summary) = &mut done.summary {
-        let rows = if options.changes.duration.is_some() { usize::MAX } else { steps as usize };
-        let lost = reader.completeness().map_or(0, |c| c.lost());
-        summary.hold_back(cut_short(&reader, planned as usize, rows).or((lost > 0).then_some(Unjudged::Lost { messages: lost })));
+        for note in notes.iter().filter(|_| kept_back.is_some()) {
+            output::note(format_args!("warning: {}: {note}", path.display()));
+        }
+        // Who asks for another length does not ask for the recorded one.
+        let is_asked = |why: &Unjudged| !(options.changes.duration.is_some() && matches!(why, Unjudged::CutShort { .. }));
+        summary.hold_back(kept_back.filter(is_asked));
     }
     let page = options.result.html.as_deref().map(|html| (html, page(&done, &graph, &heard, Some(path))));
     done.tell(page, options.result.json)

@@ -59,7 +59,9 @@ pub(crate) fn same_data(first: &Path, second: &Path) -> bool {
     if is_same_file(first, second) {
         return true;
     }
-    let open = |path: &Path| std::fs::File::open(path).ok().map(|f| (f.metadata().map_or(0, |m| m.len()), std::io::BufReader::new(f)));
+    let open = |path: &Path| {
+        backdrive_plant::input_file::open(path).ok().map(|f| (f.metadata().map_or(0, |m| m.len()), std::io::BufReader::new(f)))
+    };
     let (Some((size, first)), Some((other, second))) = (open(first), open(second)) else { return false };
     size == other && size > 0 && first.bytes().zip(second.bytes()).all(|(a, b)| matches!((a, b), (Ok(a), Ok(b)) if a == b))
 }

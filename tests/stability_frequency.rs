@@ -60,6 +60,7 @@ fn session(graph: &Graph, lambda: f64, dither: &str) -> Session {
         notes: Vec::new(),
         sensors: Vec::new(),
         cut_short: None,
+        parts: Vec::new(),
         elsewhere: None,
         bridged_s: backdrive_stability::unjudged::BRIDGED_S,
     }

@@ -1,6 +1,7 @@
 //! The outermost layer of an MCAP file, read so that the place of every record is known and a file may end anywhere.
 
 use crate::BagError;
+use backdrive_plant::input_file;
 use mcap::records::op;
 use std::fs::File;
 use std::io::{BufReader, Read, Seek, SeekFrom};
@@ -39,7 +40,7 @@ pub(crate) struct Frames {
 impl Frames {
     /// Errors: it cannot be read, or is no MCAP file.
     pub(crate) fn open(path: &Path) -> Result<Frames, BagError> {
-        let file = File::open(path).map_err(BagError::io(path))?;
+        let file = input_file::open(path).map_err(BagError::io(path))?;
         let size = file.metadata().map_err(BagError::io(path))?.len();
         let mut file = BufReader::with_capacity(1 << 16, file);
         let mut magic = [0; mcap::MAGIC.len()];

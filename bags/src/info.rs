@@ -1,6 +1,7 @@
 //! A bag in one look.
 
-use crate::completeness::Tracker;
+use crate::account::{Account, Fault};
+use crate::header::Clock;
 use crate::reader::TopicRef;
 use crate::{BagError, Reader};
 use serde::Serialize;
@@ -50,6 +51,10 @@ pub struct BagInfo {
     pub ended_cleanly: bool,
     /// The first damage, if there is any; what stands behind it is not counted.
     pub damage: Option<String>,
+    /// What forbids calling it whole: losses, damage, contradictions. Empty where nothing does.
+    pub faults: Vec<Fault>,
+    /// What it says of itself that is wrong, and costs nothing.
+    pub notes: Vec<String>,
     /// Whether every message and its checksum was read; otherwise all this is what stands at the end of the file.
     pub read_whole: bool,
 }
@@ -76,29 +81,53 @@ pub struct TopicSummary {
 /// Sums a bag up from what stands at its end, without reading its messages: in the same time whatever its size. Damage among the
 /// messages is not seen, for which see [`check`].
 ///
-/// A bag that was not closed, or that others wrote without statistics or indices, is read whole, as by [`check`].
+/// A bag is read whole, as by [`check`], where its end does not stand for its messages: it was not closed, others wrote it without statistics or
+/// indices, or wrote a bag of ours again, or its recorder's record and its statistics count differently.
 /// Errors: it cannot be read or is no MCAP file.
 pub fn info(path: &Path) -> Result<BagInfo, BagError> {
     let Some((reader, spans)) = Reader::of_summary(path)? else { return check(path) };
+    if !end_is_believed(&reader) {
+        return check(path);
+    }
     let by_topic = |topic: &Arc<TopicRef>| spans.0.get(&topic.channel).copied();
+    let lost = |topic: &Arc<TopicRef>| {
+        reader.completeness().and_then(|record| record.topics.iter().find(|told| told.topic == topic.name)).map(|told| told.lost)
+    };
+    let of_record = reader.completeness().into_iter().flat_map(|record| &record.topics).filter(|told| told.lost > 0);
+    let faults = of_record.map(|told| Fault::Lost { topic: told.topic.clone(), messages: told.lost, of: told.written + told.lost });
+    let damaged = reader.damage().iter().map(|what| Fault::Damaged { what: what.clone() });
+    let denied = reader.contradictions().iter().map(|what| Fault::Contradiction { what: what.clone() });
     let heard = Heard {
         spans: reader.topics().iter().map(by_topic).collect(),
         counts: reader.counts().to_vec(),
-        lost: vec![None; reader.topics().len()],
-        damage: reader.damage().first().cloned(),
-        whole: false,
+        lost: reader.topics().iter().map(lost).collect(),
+        faults: damaged.chain(denied).chain(faults).collect(),
+        ..Heard::default()
     };
     Ok(sum_up(&reader, heard))
 }
 
-/// What of a bag's messages is told, by topic.
+/// Whether what a bag of ours says at its end stands for its messages.
+fn end_is_believed(reader: &Reader) -> bool {
+    let Some(header) = reader.header() else { return true };
+    let Some(record) = reader.completeness() else { return false };
+    let counted = |name: &str| reader.topics().iter().position(|topic| topic.name == name).and_then(|index| reader.counts().get(index));
+    let is_rate = header.rate_hz.is_finite() && header.rate_hz > 0.0 || header.clock == Clock::Imported;
+    is_rate && !record.recovered && record.topics.iter().all(|told| counted(&told.topic).copied().unwrap_or(0) == told.written)
+}
+
+/// What is known of a bag's messages, by topic.
+#[derive(Default)]
 struct Heard {
     /// First and last log time, ns.
     spans: Vec<Option<(u64, u64)>>,
     counts: Vec<u64>,
-    /// By the sequence numbers, for bags without the recorder's verdict.
+    /// Messages that are missing.
     lost: Vec<Option<u64>>,
-    damage: Option<String>,
+    faults: Vec<Fault>,
+    notes: Vec<String>,
+    /// That of the messages, where the metadata say another.
+    rate_hz: Option<f64>,
     whole: bool,
 }
 
@@ -107,44 +136,14 @@ struct Heard {
 /// Errors: it cannot be read or is no MCAP file. Damage inside is reported in the result.
 pub fn check(path: &Path) -> Result<BagInfo, BagError> {
     let reader = Reader::open(path)?;
-    let count = reader.topics().len();
-    let (mut spans, mut counts) = (vec![None::<(u64, u64)>; count], vec![0_u64; count]);
-    let mut trackers: Vec<Tracker> = reader.topics().iter().map(|topic| Tracker::new(&topic.name)).collect();
-    let mut ours = vec![false; count];
-    let mut damage = reader.damage().first().cloned();
-    for entry in reader.messages()? {
-        let entry = match entry {
-            Ok(entry) => entry,
-            Err(error) => {
-                damage = damage.or(Some(error.to_string()));
-                break;
-            }
-        };
-        let (index, time) = (entry.topic.index, entry.log_time_ns);
-        counts[index] += 1;
-        spans[index] = Some(spans[index].map_or((time, time), |(first, last)| (first.min(time), last.max(time))));
-        // Without the recorder's verdict, what the sequence numbers say.
-        if reader.completeness().is_none() {
-            match entry.message(path) {
-                Ok(Some(message)) => {
-                    ours[index] = true;
-                    trackers[index].see(&message);
-                }
-                Ok(None) => {}
-                Err(error) => damage = damage.or(Some(error.to_string())),
-            }
-        }
-    }
-    let lost = ours.iter().zip(&trackers).map(|(ours, tracker)| ours.then_some(tracker.found.lost)).collect();
-    Ok(sum_up(&reader, Heard { spans, counts, lost, damage, whole: true }))
+    let Account { topics, spans, counts, rate_hz, faults, notes, rate_is_denied, .. } = Account::of(&reader)?;
+    let rate_hz = rate_hz.filter(|_| rate_is_denied);
+    let lost = topics.iter().map(|topic| topic.as_ref().map(|topic| topic.lost)).collect();
+    Ok(sum_up(&reader, Heard { spans, counts, lost, faults, notes, rate_hz, whole: true }))
 }
 
 fn sum_up(reader: &Reader, heard: Heard) -> BagInfo {
-    let Heard { spans, counts, lost, damage, whole } = heard;
-    let lost = |index: usize, name: &str| match reader.completeness() {
-        Some(verdict) => verdict.topics.iter().find(|topic| topic.topic == name).map(|topic| topic.lost),
-        None => lost[index],
-    };
+    let Heard { spans, counts, lost, faults, notes, rate_hz, whole } = heard;
     let topics: Vec<TopicSummary> = reader
         .topics()
         .iter()
@@ -162,18 +161,13 @@ fn sum_up(reader: &Reader, heard: Heard) -> BagInfo {
             rate_hz: spans[index]
                 .filter(|(first, last)| last > first)
                 .map(|(first, last)| (counts[index] - 1) as f64 / ((last - first) as f64 * 1e-9)),
-            lost: lost(index, &topic.name),
+            lost: lost[index],
         })
         .collect();
     let first = spans.iter().flatten().map(|span| span.0).min();
     let last = spans.iter().flatten().map(|span| span.1).max();
-    let known: Vec<u64> = topics.iter().filter_map(|topic| topic.lost).collect();
-    let lost = (!known.is_empty()).then(|| known.iter().sum());
-    let complete = match reader.completeness() {
-        Some(verdict) => Some(verdict.is_complete() && damage.is_none()),
-        None if reader.header().is_some() => Some(false), // the recorder did not come to its end
-        None => None,
-    };
+    let is_known = reader.header().is_some() || lost.iter().any(Option::is_some);
+    let lost = faults.iter().map(|fault| if let Fault::Lost { messages, .. } = fault { *messages } else { 0 }).sum();
     let header = reader.header().cloned();
     let told = header.as_ref();
     BagInfo {
@@ -183,20 +177,23 @@ fn sum_up(reader: &Reader, heard: Heard) -> BagInfo {
         library: reader.library().to_owned(),
         title: told.map(|header| header.title.clone()),
         clock: told.map(|header| header.clock.as_str()),
-        rate_hz: told.map(|header| header.rate_hz),
+        // Of a rate that the messages deny, theirs.
+        rate_hz: told.map(|header| rate_hz.unwrap_or(header.rate_hz)),
         host: told.map(|header| header.host.clone()).filter(|host| !host.is_empty()),
         files: told.map(|header| header.files.iter().map(|file| file.0.clone()).collect()).unwrap_or_default(),
         start_s: first.map(|time| time as f64 * 1e-9),
         duration_s: first.zip(last).map_or(0.0, |(first, last)| (last - first) as f64 * 1e-9),
         messages: counts.iter().sum(),
         topics,
-        complete,
-        lost,
+        complete: reader.header().is_some().then_some(faults.is_empty()),
+        lost: is_known.then_some(lost),
         ended_cleanly: reader.ended_cleanly(),
-        damage,
+        damage: faults.iter().find_map(|fault| if let Fault::Damaged { what } = fault { Some(what.clone()) } else { None }),
         read_whole: whole,
         versions: header.as_ref().map(|header| header.versions.clone()).unwrap_or_default(),
         seeds: header.map(|header| header.seeds).unwrap_or_default(),
+        faults,
+        notes,
     }
 }
 
@@ -225,12 +222,19 @@ impl fmt::Display for BagInfo {
             writeln!(f, "  {:width$}  {:types$}  {:>9}  {rate:>9} Hz{lost}", topic.name, topic.type_name, topic.messages)?;
         }
         let verdict = match (self.complete, self.lost) {
-            (Some(true), _) => "complete".to_owned(),
             (_, Some(lost)) if lost > 0 => format!("INCOMPLETE: {lost} messages lost"),
-            (Some(false), _) => "no gaps, but the recorder did not finish: what is missing at the end is not known".to_owned(),
+            (_, _) if self.faults.iter().any(|fault| matches!(fault, Fault::Contradiction { .. })) => "CONTRADICTORY".to_owned(),
+            (Some(true), _) => "complete".to_owned(),
+            (Some(false), _) => "no gaps, but what is missing at its end is not known".to_owned(),
             (None, _) => "whether it is complete is not known".to_owned(),
         };
         writeln!(f, "  {verdict}")?;
+        for fault in self.faults.iter().filter(|fault| !matches!(fault, Fault::NotClosed | Fault::Damaged { .. })) {
+            writeln!(f, "    {fault}")?;
+        }
+        for note in &self.notes {
+            writeln!(f, "  note: {note}")?;
+        }
         if !self.ended_cleanly {
             writeln!(f, "  the file was not closed; `backdrive bag recover` makes a clean copy")?;
             writeln!(f, "  it has no end that tells, so all of it was read")?;

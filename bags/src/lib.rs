@@ -11,6 +11,7 @@
 // Printing panics where the other end is full or gone.
 #![cfg_attr(not(test), warn(clippy::print_stdout, clippy::print_stderr))]
 
+mod account;
 mod arrow_schema;
 mod cdr;
 mod cdr_bytes;
@@ -46,6 +47,7 @@ mod whole;
 mod without;
 mod writer;
 
+pub use account::{Account, Fault};
 pub use cdr::{FieldPath, Schema};
 pub use claim::check_target;
 pub use clock_check::clock_remarks;

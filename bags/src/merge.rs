@@ -5,6 +5,7 @@
 //! merged bag is as complete as all of them together. Log times are told in the first bag's clock: what the bags say of
 //! the clocks (events of kind [`CLOCK_OFFSET`]) is applied at the time nearest to each message.
 
+use crate::account::{Account, Fault};
 use crate::claim::not_itself;
 use crate::clock_offset::{CLOCK_OFFSET, ClockOffset};
 use crate::header::Clock;
@@ -28,6 +29,10 @@ pub struct MergeReport {
     pub offset_s: Option<(f64, f64)>,
     /// How wrong that may be, s, where it is worst.
     pub uncertainty_s: f64,
+    /// Messages that both bags hold, and not alike: the first bag's is in the merged one.
+    pub differ: u64,
+    /// Where the bags, or the merged one, contradict themselves, or cannot show that they are whole: a sentence each.
+    pub faults: Vec<String>,
     /// The verdict in the merged bag.
     pub completeness: Completeness,
 }
@@ -49,11 +54,19 @@ pub fn merge(first: &Path, second: &Path, to: &Path, offset_s: Option<f64>, over
     let (head, other) = (header(&a, first)?, header(&b, second)?);
     let wrong =
         |path: &Path, key: &'static str, what: String| BagError::Metadata { path: path.to_owned(), record: crate::header::RUN, key, what };
-    if (head.rate_hz, head.clock) != (other.rate_hz, other.clock) || head.title != other.title {
-        let what = format!("is not that of {}: {:?} at {} Hz", first.display(), head.title, head.rate_hz);
+    let accounts = [Account::of(&a)?, Account::of(&b)?];
+    // A rate that the messages deny says nothing of which run it is.
+    let rates = [(head, &accounts[0]), (other, &accounts[1])].map(|(head, account)| match (account.rate_is_denied, account.rate_hz) {
+        (true, Some(found)) => found,
+        _ => head.rate_hz,
+    });
+    let same_rate = rates[0].to_bits() == rates[1].to_bits() || accounts.iter().any(|account| account.rate_is_denied);
+    if !same_rate || head.clock != other.clock || head.title != other.title {
+        let what = format!("is not that of {}: {:?} at {} Hz", first.display(), head.title, rates[0]);
         return Err(wrong(second, "title", what));
     }
     let mut merged = head.clone();
+    merged.rate_hz = rates[0];
     merged.topics.extend(other.topics.iter().filter(|info| head.topic(&info.topic.name).is_none()).cloned());
     if merged.host != other.host {
         merged.host = format!("{} and {}", head.host, other.host);
@@ -89,7 +102,8 @@ pub fn merge(first: &Path, second: &Path, to: &Path, offset_s: Option<f64>, over
                     if is_second { report.in_one.1 += 1 } else { report.in_one.0 += 1 }
                 }
                 Entry::Occupied(mut place) => {
-                    let (earliest, _, both) = place.get_mut();
+                    let (earliest, other, both) = place.get_mut();
+                    report.differ += u64::from(!alike(other, &message));
                     *earliest = log_ns.min(*earliest);
                     if is_second && !std::mem::replace(both, true) {
                         report.in_both += 1;
@@ -108,8 +122,41 @@ pub fn merge(first: &Path, second: &Path, to: &Path, offset_s: Option<f64>, over
         recorder.push(topic, message, log_ns)?;
         report.messages += 1;
     }
+    // What the hosts' recorders know to have been sent is due in the merged bag too.
+    for record in [&a, &b].into_iter().filter_map(|reader| reader.completeness()) {
+        for told in &record.topics {
+            if let Some(topic) = merged.topic(&told.topic) {
+                recorder.expect(topic, told.written.saturating_sub(told.repeated).saturating_add(told.lost));
+            }
+        }
+    }
+    for fault in accounts.iter().flat_map(|account| &account.faults) {
+        if let Fault::Lost { topic, of, .. } = fault
+            && let Some(topic) = merged.topic(topic)
+        {
+            recorder.expect(topic, *of);
+        }
+    }
+    if [&a, &b].iter().all(|reader| reader.completeness().is_none_or(|record| record.recovered)) {
+        recorder.leave_end_open();
+    }
     report.completeness = recorder.finish()?;
+    let [one, two] = &accounts;
+    for (path, account) in [(first, one), (second, two), (to, &Account::of(&Reader::open(to)?)?)] {
+        // What one of them lost the other may hold; what is lost in both is in the verdict.
+        let faults = account.faults.iter().filter(|fault| !matches!(fault, Fault::Lost { .. }));
+        report.faults.extend(faults.map(|fault| format!("{}: {fault}", path.display())));
+    }
     Ok(report)
+}
+
+/// Whether two copies of a message are the same.
+fn alike(one: &Message, other: &Message) -> bool {
+    match (one, other) {
+        (Message::Sample(one), Message::Sample(other)) => one.same_bits(other),
+        // Numbers that were not measured are NaN, which is not equal to itself.
+        (one, other) => format!("{one:?}") == format!("{other:?}"),
+    }
 }
 
 fn header<'a>(reader: &'a Reader, path: &Path) -> Result<&'a BagHeader, BagError> {

@@ -61,7 +61,7 @@ impl Default for Numbers {
 
 impl ParquetFile {
     pub(crate) fn open(path: &Path, memory: &Rc<Memory>) -> Result<ParquetFile, BagError> {
-        let file = File::open(path).map_err(BagError::io(path))?;
+        let file = backdrive_plant::input_file::open(path).map_err(BagError::io(path))?;
         let size = file.metadata().map_err(BagError::io(path))?.len();
         let opened = guarded(|| SerializedFileReader::new(file)).and_then(|opened| opened.map_err(|error| told(&error)));
         let reader = opened.map_err(|why| {

@@ -88,6 +88,10 @@ pub struct Recorder {
     trackers: Vec<Tracker>,
     /// Messages per topic that the queue or a dead writer refused.
     refused: Vec<u64>,
+    /// Messages per topic that are known to have been sent.
+    due: Vec<u64>,
+    /// Whether nobody knows what is missing behind the last message.
+    open_end: bool,
     when_full: WhenFull,
     /// Where the file is put once it is whole.
     whole: Option<Whole>,
@@ -147,6 +151,8 @@ impl Recorder {
             thread: Some(thread),
             trackers: header.topics.iter().map(|info| Tracker::new(&info.topic.name)).collect(),
             refused: vec![0; header.topics.len()],
+            due: vec![0; header.topics.len()],
+            open_end: false,
             when_full: options.when_full,
             whole: None,
             shared,
@@ -192,6 +198,18 @@ impl Recorder {
         }
     }
 
+    /// That at least so many messages of a topic were sent, as somebody else knows: those that do not come are counted as lost.
+    pub(crate) fn expect(&mut self, topic: usize, messages: u64) {
+        if let Some(due) = self.due.get_mut(topic) {
+            *due = messages.max(*due);
+        }
+    }
+
+    /// That nobody knows what is missing behind the last message, as of a bag that was recovered.
+    pub(crate) fn leave_end_open(&mut self) {
+        self.open_end = true;
+    }
+
     /// How it is doing; cheap enough to ask at every pass.
     pub fn health(&self) -> Health {
         Health {
@@ -211,13 +229,13 @@ impl Recorder {
     }
 
     fn close(&mut self) -> Result<Completeness, BagError> {
-        let counted = self.trackers.iter().zip(&self.refused).map(|(tracker, refused)| {
+        let counted = self.trackers.iter().zip(&self.refused).zip(&self.due).map(|((tracker, refused), due)| {
             let mut found = tracker.found.clone();
             found.written = found.written.saturating_sub(*refused);
-            found.lost += refused;
+            found.lost = (found.lost + refused).max(due.saturating_sub(found.written));
             found
         });
-        let completeness = Completeness { topics: counted.collect(), late: 0, recovered: false };
+        let completeness = Completeness { topics: counted.collect(), late: 0, recovered: self.open_end };
         if let Some(queue) = self.queue.take() {
             // Waits for room. A thread that has stopped says why below.
             let _ = queue.send(Item::Finish(completeness));

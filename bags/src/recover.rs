@@ -1,7 +1,8 @@
 //! Saves what a killed recorder, a full disk or a broken copy left behind.
 
+use crate::account::{Account, Fault};
 use crate::claim::not_itself;
-use crate::completeness::{COMPLETENESS, Completeness, Tracker};
+use crate::completeness::{COMPLETENESS, Completeness, TopicCompleteness, Tracker};
 use crate::framing::{Frame, Frames};
 use crate::header::{BagHeader, RUN};
 use crate::index::{COMPACT_INDEX, Index, decode as decode_index};
@@ -27,7 +28,8 @@ impl RecoverReport {
     /// Whether anything is known, or must be feared, to be missing in the copy.
     pub fn is_lossy(&self) -> bool {
         let short = self.expected.is_some_and(|expected| expected > self.messages);
-        !self.was_clean || short || !self.damaged.is_empty() || self.completeness.as_ref().is_some_and(|verdict| verdict.lost() > 0)
+        let lost = self.completeness.as_ref().is_some_and(|verdict| verdict.lost() > 0);
+        !self.was_clean || short || !self.damaged.is_empty() || lost || !self.faults.is_empty()
     }
 }
 
@@ -55,6 +57,8 @@ pub struct RecoverReport {
     pub missing: BTreeMap<String, u64>,
     /// The verdict in the copy, for bags of ours.
     pub completeness: Option<Completeness>,
+    /// What forbids calling the copy whole, by its messages.
+    pub faults: Vec<Fault>,
 }
 
 /// Copies everything that is whole into a clean bag, which has all of MCAP's indices: so this is the way to a bag in which a player can jump, too.
@@ -69,7 +73,9 @@ pub fn recover(from: &Path, to: &Path, overwrite: bool) -> Result<RecoverReport,
     let whole = Whole::begin(to, overwrite)?;
     let report = copy(from, &mut frames, to, whole.file()?)?;
     whole.commit()?;
-    Ok(report)
+    // The same question as every other verb asks of it.
+    let faults = Account::of(&Reader::open(to)?)?.faults;
+    Ok(RecoverReport { faults, ..report })
 }
 
 fn copy(from: &Path, frames: &mut Frames, to: &Path, file: File) -> Result<RecoverReport, BagError> {
@@ -142,7 +148,11 @@ fn copy(from: &Path, frames: &mut Frames, to: &Path, file: File) -> Result<Recov
     let out = begun.writer("", "").map_err(failed)?;
     if run {
         // A verdict of the recorder knows more than the sequence numbers tell, if the bag got as far.
-        let told = Reader::open(from).ok().and_then(|reader| reader.completeness().cloned());
+        let original = Reader::open(from).ok();
+        let told = original.as_ref().and_then(|reader| reader.completeness().cloned());
+        // Of a bag that another program wrote again without the record, the topics tell by each other what is missing at their ends.
+        let uncounted = original.filter(|_| told.is_none() && report.was_clean && report.damaged.is_empty());
+        let faults = uncounted.and_then(|reader| Account::of(&reader).ok()).map(|account| account.faults).unwrap_or_default();
         let verdict = match told {
             Some(told) if report.damaged.is_empty() => told,
             told => {
@@ -150,6 +160,13 @@ fn copy(from: &Path, frames: &mut Frames, to: &Path, file: File) -> Result<Recov
                 for topic in &mut topics {
                     let told = told.iter().flat_map(|told| &told.topics).find(|told| told.topic == topic.topic);
                     topic.lost = told.map_or(topic.lost, |told| topic.lost.max((told.written + told.lost).saturating_sub(topic.written)));
+                }
+                for fault in faults {
+                    let Fault::Lost { topic, messages, .. } = fault else { continue };
+                    match topics.iter_mut().find(|found| found.topic == topic) {
+                        Some(found) => found.lost = found.lost.max(messages),
+                        None => topics.push(TopicCompleteness { topic, lost: messages, ..TopicCompleteness::default() }),
+                    }
                 }
                 Completeness { topics, late: 0, recovered: true }
             }

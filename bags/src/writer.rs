@@ -95,6 +95,8 @@ pub(crate) struct BagWriter {
     /// Log times of the chunk at hand, and first and last of the bag.
     index: Index,
     spans: Spans,
+    /// Bytes of the file so far.
+    size: Arc<AtomicU64>,
     /// Size at which a chunk ends, and of the one at hand, bytes before compression.
     chunk_bytes: u64,
     in_chunk: u64,
@@ -114,7 +116,7 @@ const RECORD_BYTES: u64 = 31;
 impl BagWriter {
     /// Writes everything that comes before the first message, so that a bag that is cut off later has it.
     pub(crate) fn new(store: Box<dyn Store>, header: &BagHeader, chunk_bytes: u64, size: Arc<AtomicU64>) -> Result<BagWriter, WriteError> {
-        let sink = BufWriter::with_capacity(1 << 17, Counted { store, position: 0, size });
+        let sink = BufWriter::with_capacity(1 << 17, Counted { store, position: 0, size: size.clone() });
         // A chunk index without message indices would be worse than none: `@mcap/core`, which Foxglove reads with, then finds no message,
         // where without both it reads the file from its beginning, as the other readers do.
         let mut mcap = options().emit_message_indexes(false).emit_chunk_indexes(false).create(sink)?;
@@ -141,7 +143,7 @@ impl BagWriter {
         mcap.flush()?;
         let payload = Vec::with_capacity(1024);
         let (index, spans) = (Index::new(), Spans::default());
-        Ok(BagWriter { mcap, clock: header.clock, channels, steps, payload, index, spans, chunk_bytes, in_chunk: 0 })
+        Ok(BagWriter { mcap, clock: header.clock, channels, steps, payload, index, spans, size, chunk_bytes, in_chunk: 0 })
     }
 
     /// Writes one message. An index beyond the header's topics is ignored: the recorder has refused it before.
@@ -201,7 +203,8 @@ impl BagWriter {
     /// Writes the verdict and the summary.
     pub(crate) fn finish(&mut self, completeness: &Completeness) -> Result<(), WriteError> {
         self.end_chunk()?;
-        self.mcap.write_metadata(&self.spans.to_metadata())?;
+        self.mcap.flush()?;
+        self.mcap.write_metadata(&self.spans.to_metadata(self.size.load(Ordering::Relaxed)))?;
         self.mcap.write_metadata(&completeness_record(completeness)?)?;
         self.mcap.finish()?;
         Ok(())

@@ -11,6 +11,7 @@ pub mod describe;
 pub mod elements;
 pub mod excitation;
 pub mod fragment;
+pub mod input_file;
 pub mod isolate;
 pub mod linear;
 pub mod load;

@@ -1,10 +1,10 @@
 //! `backdrive bag export`
 
 use crate::cli::{BagExport, ExportTo};
-use crate::failure::Failure;
+use crate::failure::{Failure, code};
 use crate::output;
 use crate::progress::busy;
-use backdrive_bags::{Contract, Reader, TableFormat, export_lerobot, export_table, is_lerobot};
+use backdrive_bags::{Account, Contract, Fault, Reader, TableFormat, export_lerobot, export_table, is_lerobot};
 use std::path::Path;
 
 /// A bag's signals as a table, or bags as a dataset.
@@ -31,7 +31,38 @@ pub fn export(asked: &BagExport) -> Result<u8, Failure> {
         output::note(format_args!("warning: {}: {note}", asked.out.display()));
     }
     output::line(format_args!("{}: {rows} rows", asked.out.display()))?;
-    Ok(0)
+    whole(&[reader], topics)
+}
+
+/// The exit code of what was written of bags: what of them is missing is missing in it too, and is said.
+fn whole(bags: &[Reader], topics: Option<&[String]>) -> Result<u8, Failure> {
+    let mut code = 0;
+    for bag in bags {
+        let path = bag.path().display();
+        let account = busy(&format!("counting {path}"), || Account::of(bag)).map_err(Failure::bag)?;
+        let counts = |fault: &&Fault| match (fault, topics) {
+            (Fault::Lost { topic, .. }, Some(topics)) => topics.contains(topic),
+            _ => true,
+        };
+        let faults: Vec<&Fault> = account.faults.iter().filter(counts).collect();
+        if account.empty_steps > 0 && !faults.is_empty() {
+            let of = account.last_step.map_or(0, |last| last + 1);
+            output::note(format_args!(
+                "warning: {path}: {} of {of} rows are missing, for no topic has a message of their steps",
+                account.empty_steps
+            ));
+        }
+        for fault in &faults {
+            output::note(format_args!("warning: {path}: {fault}"));
+        }
+        for note in &account.notes {
+            output::note(format_args!("note: {path}: {note}"));
+        }
+        if !faults.is_empty() {
+            code = code::LOST_DATA;
+        }
+    }
+    Ok(code)
 }
 
 /// What is written replaces what is there: no bag that is read may be it, or in it.
@@ -98,5 +129,5 @@ fn dataset(asked: &BagExport) -> Result<u8, Failure> {
         report.rows,
         report.fps
     ))?;
-    Ok(0)
+    whole(&readers, None)
 }

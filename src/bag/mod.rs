@@ -31,8 +31,7 @@ fn show(bag: &Path, json: bool, whole: bool) -> Result<u8, Failure> {
     } else {
         output::text(format_args!("{info}"))?;
     }
-    let lossy = info.damage.is_some() || !info.ended_cleanly;
-    Ok(if lossy { code::LOST_DATA } else { 0 })
+    Ok(if info.faults.is_empty() { 0 } else { code::LOST_DATA })
 }
 
 fn save(damaged: &Path, bag: &Path, overwrite: bool) -> Result<u8, Failure> {
@@ -45,6 +44,9 @@ fn save(damaged: &Path, bag: &Path, overwrite: bool) -> Result<u8, Failure> {
     output::line(format_args!("{}: {}{of} messages saved{until}", bag.display(), report.messages))?;
     for (topic, messages) in &report.missing {
         output::line(format_args!("  {topic}: {messages} lost in damaged chunks"))?;
+    }
+    for fault in &report.faults {
+        output::note(format_args!("warning: {}: {fault}", bag.display()));
     }
     for place in &report.damaged {
         output::note(format_args!("warning: damaged: {}", place.trim_end_matches("; `backdrive bag recover` saves what is whole")));
@@ -78,7 +80,14 @@ fn join([a, b]: [&Path; 2], bag: &Path, overwrite: bool, offset_s: Option<f64>, 
             output::line(format_args!("clock    the second is {least:.6} to {most:.6} s ahead, known to {:.6} s", report.uncertainty_s))?;
         }
     }
-    Ok(if report.completeness.lost() > 0 { code::LOST_DATA } else { 0 })
+    if report.differ > 0 {
+        output::note(format_args!("warning: {} of the messages in both are not alike; those of {} are kept", report.differ, a.display()));
+    }
+    for fault in &report.faults {
+        output::note(format_args!("warning: {fault}"));
+    }
+    let whole = report.completeness.lost() == 0 && report.differ == 0 && report.faults.is_empty();
+    Ok(if whole { 0 } else { code::LOST_DATA })
 }
 
 fn compare(a: &Path, b: &Path, tolerances: &[String], ignore: &[String], json: bool) -> Result<u8, Failure> {

@@ -8,7 +8,7 @@ use std::path::PathBuf;
 pub enum Bag {
     /// What is in a bag, and whether it is complete, as its end tells without reading the messages; of a bag that was not closed all is read.
     #[command(
-        after_help = "Example:\n  backdrive bag info contact.mcap\n  backdrive bag info contact.mcap --check\n\nExit codes: 0 whole, 2 usage, 3 cannot be read, 4 damaged, cut off or with losses."
+        after_help = "Example:\n  backdrive bag info contact.mcap\n  backdrive bag info contact.mcap --check\n\nExit codes: 0 whole, 2 usage, 3 cannot be read, 4 damaged, cut off, with losses or contradicting itself."
     )]
     Info {
         /// The bag; any MCAP file.
@@ -132,7 +132,7 @@ pub struct BagImport {
 /// `backdrive bag export`
 #[derive(Debug, Args)]
 #[command(
-    after_help = "Examples:\n  backdrive bag export contact.mcap --csv contact.csv\n  backdrive bag export contact.mcap --to parquet --out contact.parquet\n  backdrive bag export episode_000000.mcap episode_000001.mcap --to lerobot --out my_dataset\n\nExit codes: 0 exported, 2 usage, 3 a bag is wrong or what is to be written exists, 5 it cannot be written."
+    after_help = "Examples:\n  backdrive bag export contact.mcap --csv contact.csv\n  backdrive bag export contact.mcap --to parquet --out contact.parquet\n  backdrive bag export episode_000000.mcap episode_000001.mcap --to lerobot --out my_dataset\n\nExit codes: 0 exported, 2 usage, 3 a bag is wrong or what is to be written exists, 4 exported, but the bag is cut off, contradicts itself or lacks messages, 5 it cannot be written."
 )]
 pub struct BagExport {
     /// The bag; for a LeRobot dataset one an episode, with columns JOINT.position and the like.

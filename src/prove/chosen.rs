@@ -63,7 +63,8 @@ impl Chosen {
 /// Chooses, and writes the model with its outputs scaled to `path`. The hand holds the diagnosed model `model`, and every one of its `rivals`: the
 /// loop has to be stable whichever of them the device is.
 pub fn choose(model: &Path, rivals: &[PathBuf], path: &Path, task: &Task, stop: &AtomicBool) -> Result<Chosen, Failure> {
-    let text = std::fs::read_to_string(model).map_err(|e| Failure::input(format!("{}: cannot be read: {e}", model.display())))?;
+    let text = backdrive_plant::input_file::read_to_string(model)
+        .map_err(|e| Failure::input(format!("{}: cannot be read: {e}", model.display())))?;
     let masters: Vec<&Path> = std::iter::once(model).chain(rivals.iter().map(PathBuf::as_path)).collect();
     // Below `enough` it does not matter by how much.
     let worst = |canceller: &Canceller, enough: f64| -> Result<f64, Failure> {

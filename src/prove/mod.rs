@@ -91,7 +91,7 @@ fn given_files_are_there(options: &cli::Prove) -> Result<(), Failure> {
         ("regrip", &options.regrip),
     ];
     for (option, path) in given {
-        std::fs::File::open(path).map_err(|e| {
+        backdrive_plant::input_file::open(path).map_err(|e| {
             let path = path.display();
             Failure::input(format!(
                 "{path}: cannot be read: {e}; run this in the folder of the project, or name another file with --{option}"

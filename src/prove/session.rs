@@ -73,7 +73,8 @@ fn tell_less(header: &mut BagHeader, shows_hand: bool) {
 
 /// Makes the column of the hand in a set an unknown input.
 fn hide_hand(path: &Path, hand_hz: f64) -> Result<(), Failure> {
-    let text = std::fs::read_to_string(path).map_err(|e| Failure::input(format!("{}: cannot be read: {e}", path.display())))?;
+    let text = backdrive_plant::input_file::read_to_string(path)
+        .map_err(|e| Failure::input(format!("{}: cannot be read: {e}", path.display())))?;
     let mut set: DocumentMut = text.parse().map_err(|e| Failure::input(format!("{}: {e}", path.display())))?;
     let Some(columns) = set.get_mut("columns").and_then(Item::as_table_like_mut) else { return Ok(()) };
     let topic = |item: &Item| item.as_table_like().and_then(|t| t.get("topic")?.as_str().map(str::to_string)).unwrap_or_default();

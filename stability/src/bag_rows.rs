@@ -178,6 +178,7 @@ impl Rows {
             lambda,
             notes,
             sensors: Vec::new(),
+            parts: Vec::new(),
             cut_short: cut_short(reader, graph.timing.steps.unwrap_or(0) as usize, rows),
             elsewhere: None,
             bridged_s: graph.stale_after_s,

@@ -154,6 +154,7 @@ impl Collector {
                 notes: Vec::new(),
                 sensors: Vec::new(),
                 cut_short: None,
+                parts: Vec::new(),
                 elsewhere: None,
                 bridged_s: graph.stale_after_s,
             },

@@ -1,10 +1,12 @@
 //! A session from a bag of ours: the graph in the bag tells which topic is which signal.
 
+use crate::bag_gate::{Gate, gate};
 use crate::bag_rows::{Place, Rows};
 use crate::long_bag;
 pub use crate::long_bag::MOST_ROWS;
 use crate::session::Session;
-pub use crate::signal_role::{SessionError, cut_short};
+pub use crate::signal_role::SessionError;
+use crate::unjudged::Unjudged;
 use backdrive_bags::Reader;
 use backdrive_nodes::graph::Graph;
 
@@ -28,13 +30,19 @@ impl Session {
         let place = Place::of(reader, graph)?;
         let longest = reader.counts().iter().max().copied().unwrap_or(0);
         let most = (most_rows / place.axes.max(1)).max(1) as u64;
-        if longest > most {
-            return long_bag::read(reader, graph, &place, most);
-        }
-        let mut rows = Rows::of(&place);
-        for entry in reader.messages()? {
-            rows.take(&place, &entry?)?;
-        }
-        rows.session(reader, graph, &place)
+        let mut session = if longest > most {
+            long_bag::read(reader, graph, &place, most)?
+        } else {
+            let mut rows = Rows::of(&place);
+            for entry in reader.messages()? {
+                rows.take(&place, &entry?)?;
+            }
+            rows.session(reader, graph, &place)?
+        };
+        let Gate { kept_back, notes, parts } = gate(reader, graph)?;
+        session.cut_short = kept_back.filter(|why| *why == Unjudged::Contradictory).or(session.cut_short).or(kept_back);
+        session.notes.extend(notes);
+        session.parts = parts;
+        Ok(session)
     }
 }

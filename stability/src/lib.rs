@@ -3,7 +3,9 @@
 // Printing panics where the other end is full or gone.
 #![cfg_attr(not(test), warn(clippy::print_stdout, clippy::print_stderr))]
 
+pub mod bag_gate;
 mod bag_rows;
+pub mod by_itself;
 pub mod collect;
 pub mod compare;
 pub mod coupling;

@@ -39,6 +39,11 @@ impl std::fmt::Display for PartCheck {
         let share = 100.0 * self.error_rms / self.effect_rms.max(f64::MIN_POSITIVE);
         match self.part {
             "master" => write!(f, "the master's model misses {share:.1} % of the motion that the reflected force makes"),
+            "master's motor" => {
+                write!(f, "{share:.1} % of the force applied to the master is not what its model makes of the force command")
+            }
+            "handle's motion" => write!(f, "the master's model misses {share:.1} % of the motion of what the hand holds"),
+            "slave's motion" => write!(f, "the slave's model misses {share:.1} % of its motion"),
             "slave" => write!(f, "the slave's model misses {share:.1} % of the contact force"),
             _ => write!(f, "{share:.1} % of the reflected force is not lambda times the contact force as late as the graph says"),
         }

@@ -54,7 +54,7 @@ fn of_folder(folder: &Path) -> Result<Vec<PathBuf>, SessionError> {
         }
         return Ok(files);
     }
-    let text = std::fs::read_to_string(&metadata).map_err(|e| storage(format!("metadata.yaml cannot be read: {e}")))?;
+    let text = backdrive_plant::input_file::read_to_string(&metadata).map_err(|e| storage(format!("metadata.yaml cannot be read: {e}")))?;
     let told = Metadata::parse(&text);
     if told.storage.as_deref().is_some_and(|s| s == "sqlite3") || told.files.iter().any(|f| f.ends_with(".db3")) {
         return Err(storage(sqlite_advice()));

@@ -1,5 +1,6 @@
 //! The signals of a recorded loop, one value per step: what every answer is drawn from.
 
+use crate::model_check::PartCheck;
 use crate::outcome::{Closes, Outcome, Unit};
 use crate::sensors::SensorFault;
 use crate::unjudged::Unjudged;
@@ -24,8 +25,10 @@ pub struct Session {
     pub notes: Vec<String>,
     /// Signals of the recording that say nothing, or not always, whether a role names them or not.
     pub sensors: Vec<SensorFault>,
-    /// Whether its end is missing: then nothing in it proves that a loop is stable.
+    /// What forbids a green answer whatever the rows show: its end is missing, messages are, or it contradicts itself.
     pub cut_short: Option<Unjudged>,
+    /// Devices beside their models, where the rows in contact do not tell.
+    pub parts: Vec<PartCheck>,
     /// Of a recording that is longer than what is judged at once, and of which this is a piece: the worst that all of it did.
     pub elsewhere: Option<Outcome>,
     /// Longest gap that the loop bridges by holding its last force, s.

@@ -360,6 +360,7 @@ mod tests {
             notes: Vec::new(),
             sensors: Vec::new(),
             cut_short: None,
+            parts: Vec::new(),
             elsewhere: None,
             bridged_s: crate::unjudged::BRIDGED_S,
         }

@@ -36,6 +36,10 @@ pub enum Unjudged {
     NotClosed,
     /// A node died or failed while it ran.
     NodeDied,
+    /// The recording says two things that exclude each other, or what its graph does not make of it.
+    Contradictory,
+    /// The models in the bag do not do what was recorded.
+    ModelsApart,
     /// Messages were lost.
     Lost {
         /// How many.
@@ -67,6 +71,10 @@ impl Unjudged {
                 "Record again and let the run end by itself or by Ctrl-C; `backdrive bag recover` makes a clean copy of what there is, but does not \
                  make it whole."
             }
+            Unjudged::Contradictory => {
+                "Find out what changed the bag: the notes name topic, factor and time. `backdrive bag info --check` counts its messages; else record again."
+            }
+            Unjudged::ModelsApart => "Find out with `backdrive why` or `backdrive diagnose` what its models leave out.",
             Unjudged::NodeDied => "Find out why the node ended (above), and run again.",
             Unjudged::Lost { .. } => "Run again at a lower rate or with fewer topics, or on a machine with more processors free.",
         }
@@ -95,6 +103,8 @@ impl std::fmt::Display for Unjudged {
             }
             Unjudged::CutShort { steps, of } => write!(f, "it ends after {steps} of the {of} steps that the graph asks for"),
             Unjudged::NotClosed => write!(f, "the bag was cut off, and how much is missing behind its end is not known"),
+            Unjudged::Contradictory => write!(f, "what was recorded contradicts itself or its graph (see the notes)"),
+            Unjudged::ModelsApart => write!(f, "the models in the bag do not do what was recorded"),
             Unjudged::NodeDied => write!(f, "a node died while it ran"),
             Unjudged::Lost { messages } => write!(f, "{messages} messages were lost"),
         }

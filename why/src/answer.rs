@@ -1,22 +1,23 @@
 //! The answer: what happens, why, and what would stop it.
 
-use crate::alone::AloneError;
 use crate::as_it_was::as_it_was;
 use crate::cause::{Asked, Cause, causes, reproduces};
 use crate::cause_kind::CauseKind;
 use crate::change::Change;
-use crate::compared::SMALL;
 use crate::difference::Difference;
 use crate::differences::{Differences, Look, differences};
 use crate::happening::Happening;
 use crate::named::named;
-use crate::recorded::{Recorded, Told};
 use crate::remedy::{Remedy, remedies};
 use crate::trial::{Hand, Trial};
 use backdrive_control::operator::Intent;
 use backdrive_nodes::graph::{DeviceFiles, Graph, NodeKind};
+use backdrive_stability::by_itself::alone::AloneError;
+use backdrive_stability::by_itself::compared::SMALL;
+use backdrive_stability::by_itself::recorded::{Recorded, Told};
 use backdrive_stability::resimulate::{Gain, ResimulateError, RunOptions};
 use backdrive_stability::session::Session;
+use backdrive_stability::unjudged::Unjudged;
 use serde::Serialize;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
@@ -103,7 +104,10 @@ pub fn why(question: &Question, hear: &(dyn Fn(&str) + Sync), cancel: &AtomicBoo
     let Question { session, graph, gain, .. } = question;
     let recorded = &bounded(question);
     let happening = Happening::of(session, recorded.rows);
-    let Differences { found, notes } = differences(graph, recorded, &Look { small: SMALL, patience: question.patience }, hear, cancel)?;
+    // What contradicts itself is no record of this loop: where, is known, and a search of physics in it or the loop run again says nothing.
+    let contradictory = happening == Happening::NotJudged { why: Unjudged::Contradictory };
+    let patience = if contradictory { Duration::ZERO } else { question.patience };
+    let Differences { found, notes } = differences(graph, recorded, &Look { small: SMALL, patience }, hear, cancel)?;
     let mut answer = Answer {
         bag: session.name.clone(),
         gain: gain.product(),
@@ -123,6 +127,11 @@ pub fn why(question: &Question, hear: &(dyn Fn(&str) + Sync), cancel: &AtomicBoo
         differences: found,
         notes: session.notes.iter().cloned().chain(notes).collect(),
     };
+    if contradictory {
+        answer.not_again = Some("what was recorded contradicts itself or its graph".to_string());
+        of_events(&mut answer, recorded);
+        return Ok(answer);
+    }
     match again(question, &mut answer, hear, cancel) {
         Ok(()) => {}
         Err(ResimulateError::Cancelled) => return Err(ResimulateError::Cancelled.into()),

@@ -1,10 +1,10 @@
 //! The loop as it was: the graph of a bag with what was found to be otherwise.
 
-use crate::compared::AsIf;
 use crate::difference::{Difference, delay};
 use crate::faulty::Distortion;
 use crate::trial::Trial;
 use backdrive_nodes::graph::{Direction, Graph, NodeKind, Settings};
+use backdrive_stability::by_itself::compared::AsIf;
 
 /// Puts differences into a graph; those of which nothing simple is known stay out, and are not counted.
 pub fn as_it_was(graph: &Graph, differences: &[Difference]) -> Trial {

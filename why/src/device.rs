@@ -1,6 +1,5 @@
 //! What a master does that its model does not: a diagnosis of the recorded loop, with the force on the motor and the hand as what was put in.
 
-use crate::recorded::{Quantity, Recorded};
 use backdrive_diagnosis::candidate::{Candidate, price};
 use backdrive_diagnosis::hypothesis::{Family, Place};
 use backdrive_diagnosis::problem::{Problem, Record};
@@ -9,6 +8,7 @@ use backdrive_nodes::graph::{DeviceFiles, Graph, NodeKind, Settings as NodeSetti
 use backdrive_plant::model::Model;
 use backdrive_plant::recording::{Jitter, Recording};
 use backdrive_plant::set::Initial;
+use backdrive_stability::by_itself::recorded::{Quantity, Recorded};
 use serde::Serialize;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;

@@ -1,10 +1,10 @@
 //! A place where a recording is not what its graph says.
 
-use crate::compared::{AsIf, Compared};
 use crate::device::DeviceFound;
-use crate::recorded::Quantity;
 use backdrive_nodes::graph::{Graph, NodeKind};
 use backdrive_nodes::stage::Impairment;
+use backdrive_stability::by_itself::compared::{AsIf, Compared};
+use backdrive_stability::by_itself::recorded::Quantity;
 use serde::Serialize;
 
 /// A node whose recorded output is not what its recorded inputs make of it.

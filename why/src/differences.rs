@@ -1,13 +1,13 @@
 //! Where the loop of a bag is not the loop of its graph: every node by itself on what it was given.
 
-use crate::alone::{AloneError, alone};
 use crate::as_it_was::as_it_was;
-use crate::compared::{AsIf, Compared, Sensor, compare};
 use crate::device::diagnose_master;
 use crate::difference::{Difference, delay};
 use crate::numbers::wrong_number;
-use crate::recorded::{Quantity, Recorded};
 use backdrive_nodes::graph::{DeviceFiles, Graph, NodeKind, Settings};
+use backdrive_stability::by_itself::alone::{AloneError, alone};
+use backdrive_stability::by_itself::compared::{AsIf, Compared, Sensor, compare};
+use backdrive_stability::by_itself::recorded::{Quantity, Recorded};
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
@@ -79,7 +79,7 @@ pub fn differences(
         let number =
             wrong_number(&as_it_is, &node, axis, recorded, compared.share).filter(|(_, left)| !simple || *left < 0.5 * compared.left);
         let device = number.map(|(found, _)| found).or_else(|| {
-            (!simple).then(|| hear("the master, physics by physics"))?;
+            (!simple && !look.patience.is_zero()).then(|| hear("the master, physics by physics"))?;
             diagnose_master(&as_it_is, recorded, look.patience, stop)
         });
         for d in all.found.iter_mut().filter(|d| is_master(d)) {

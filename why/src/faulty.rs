@@ -1,9 +1,9 @@
 //! What a sensor or a motor does that its model does not say, put around a node's core.
 
-use crate::recorded::Quantity;
 use backdrive_control::core::{Core, Events, Port, Tick};
 use backdrive_control::live_margin::Told;
 use backdrive_msgs::{Gains, Sample};
+use backdrive_stability::by_itself::recorded::Quantity;
 use serde::Serialize;
 use std::collections::VecDeque;
 

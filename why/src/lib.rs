@@ -3,13 +3,11 @@
 // Printing panics where the other end is full or gone.
 #![cfg_attr(not(test), warn(clippy::print_stdout, clippy::print_stderr))]
 
-pub mod alone;
 pub mod answer;
 pub mod as_it_was;
 pub mod cause;
 pub mod cause_kind;
 pub mod change;
-pub mod compared;
 mod coupled;
 pub mod device;
 pub mod difference;
@@ -19,8 +17,6 @@ pub mod foreign;
 pub mod happening;
 mod named;
 mod numbers;
-pub mod recorded;
 pub mod remedy;
 mod stated;
 pub mod trial;
-mod ways;

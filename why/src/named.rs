@@ -1,12 +1,12 @@
 //! A difference as a cause: what it is, where, and what was seen of it.
 
 use crate::cause_kind::CauseKind;
-use crate::compared::AsIf;
 use crate::device::{DeviceFound, NumberFound, PhysicsFound};
 use crate::difference::Difference;
-use crate::recorded::Quantity;
 use backdrive_diagnosis::hypothesis::Family;
 use backdrive_nodes::graph::{Graph, NodeKind};
+use backdrive_stability::by_itself::compared::AsIf;
+use backdrive_stability::by_itself::recorded::Quantity;
 
 /// What a difference is, where, and what was seen of it.
 pub fn named(difference: &Difference, graph: &Graph) -> (CauseKind, String, String) {

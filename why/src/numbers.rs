@@ -1,12 +1,12 @@
 //! Whether one wrong number makes a master do what was recorded: a firmer or softer hand, more or less mass. Tried before any physics is, for
 //! one number that explains everything is the simplest answer.
 
-use crate::alone::alone;
-use crate::compared::{Sensor, compare};
 use crate::device::{DeviceFound, NumberFound};
-use crate::recorded::{Quantity, Recorded};
 use backdrive_nodes::graph::{DeviceFiles, Graph, Settings};
 use backdrive_plant::elements::Law;
+use backdrive_stability::by_itself::alone::alone;
+use backdrive_stability::by_itself::compared::{Sensor, compare};
+use backdrive_stability::by_itself::recorded::{Quantity, Recorded};
 use backdrive_stability::resimulate::grip;
 
 /// A number explains a difference where it leaves no more of it than this.
@@ -87,7 +87,7 @@ pub fn wrong_number(graph: &Graph, node: &str, axis: usize, recorded: &Recorded,
         let predicted: Vec<f64> = put.samples.iter().map(|s| Quantity::Position.of(s, axis)).collect();
         compare(column, &predicted, &Sensor::default(), graph.period_s()).map_or(f64::INFINITY, |c| c.share)
     };
-    let enough = (EXPLAINS * share).max(0.5 * crate::compared::SMALL).min(0.5 * share);
+    let enough = (EXPLAINS * share).max(0.5 * backdrive_stability::by_itself::compared::SMALL).min(0.5 * share);
     let numbers: &[Number] =
         if files.fragment.is_some() { &[Number::Grip, Number::Masses, Number::HeldMass] } else { &[Number::Masses, Number::HeldMass] };
     for number in numbers {

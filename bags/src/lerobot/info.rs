@@ -19,7 +19,7 @@ impl Info {
     pub(crate) fn read(folder: &Path) -> Result<Info, BagError> {
         let path = folder.join("meta/info.json");
         let wrong = |what: String| BagError::File { path: path.clone(), what };
-        let text = std::fs::read_to_string(&path)
+        let text = backdrive_plant::input_file::read_to_string(&path)
             .map_err(|error| wrong(format!("cannot be read: {error}; is this the folder of a LeRobot dataset?")))?;
         let info: Value = serde_json::from_str(&text).map_err(|error| wrong(error.to_string()))?;
         let version = info.get("codebase_version").and_then(Value::as_str).unwrap_or_default();

@@ -36,6 +36,7 @@ pub struct Reader {
     header: Option<BagHeader>,
     completeness: Option<Completeness>,
     damage: Vec<String>,
+    contradictions: Vec<String>,
     closed: bool,
     bytes: u64,
 }
@@ -51,7 +52,7 @@ impl Reader {
         let (mut profile, mut library) = (String::new(), String::new());
         let mut found = Channels::default();
         let (mut in_summary, mut summary_has_channels) = (false, false);
-        let (mut metadata, mut attachments, mut statistics) = (Vec::new(), HashMap::new(), None);
+        let (mut metadata, mut attachments, mut statistics) = (Vec::new(), Attachments::default(), None);
         let mut damage = Vec::new();
         while let Some(frame) = frames.next()? {
             if frame.opcode == op::DATA_END {
@@ -73,9 +74,7 @@ impl Reader {
                 Record::Header(header) => (profile, library) = (header.profile, header.library),
                 Record::Statistics(found) => statistics = Some(found),
                 Record::Metadata(record) => metadata.push(record),
-                Record::Attachment { header, data, .. } => {
-                    attachments.insert(header.name, String::from_utf8_lossy(&data).into_owned());
-                }
+                Record::Attachment { header, data, .. } => attachments.see(header.name, &data),
                 record => {
                     summary_has_channels |= in_summary && matches!(record, Record::Channel(_));
                     found.see(record);
@@ -83,7 +82,7 @@ impl Reader {
             }
         }
         let closed = frames.closed;
-        let (header, completeness) = described(path, &metadata, &attachments, &mut damage);
+        let Described { header, completeness, contradictions } = described(path, &metadata, attachments, &mut damage);
         let mut counts = HashMap::new();
         if closed && summary_has_channels && statistics.is_some() {
             counts.extend(statistics.into_iter().flat_map(|statistics| statistics.channel_message_counts));
@@ -115,6 +114,7 @@ impl Reader {
             header,
             completeness,
             damage,
+            contradictions,
             closed,
             bytes,
         })
@@ -128,12 +128,13 @@ impl Reader {
             return Ok(None);
         };
         let mut damage = Vec::new();
-        let (header, completeness) = described(path, &metadata, &attachments, &mut damage);
+        let Described { header, completeness, contradictions } = described(path, &metadata, attachments, &mut damage);
         let steps = found.steps();
         let topics = found.topics(header.as_ref());
         let counts = topics.iter().map(|topic| statistics.channel_message_counts.get(&topic.channel).copied().unwrap_or(0)).collect();
         let path = path.to_owned();
-        let reader = Reader { path, profile, library, topics, steps, counts, header, completeness, damage, closed: true, bytes };
+        let closed = true;
+        let reader = Reader { path, profile, library, topics, steps, counts, header, completeness, damage, contradictions, closed, bytes };
         Ok(Some((reader, spans)))
     }
 
@@ -166,6 +167,11 @@ impl Reader {
     /// What could not be read of the bag's description of itself, with its place.
     pub fn damage(&self) -> &[String] {
         &self.damage
+    }
+
+    /// Where the bag's description of itself excludes itself: files that it names and does not hold, two records of one kind that differ.
+    pub fn contradictions(&self) -> &[String] {
+        &self.contradictions
     }
 
     /// Whether the writer closed the file.
@@ -218,20 +224,59 @@ impl Reader {
     }
 }
 
+/// Files that a bag holds.
+#[derive(Debug, Default)]
+pub(crate) struct Attachments {
+    texts: HashMap<String, String>,
+    /// Names under which there are two that differ.
+    doubled: Vec<String>,
+}
+
+impl Attachments {
+    pub(crate) fn see(&mut self, name: String, data: &[u8]) {
+        let text = String::from_utf8_lossy(data).into_owned();
+        match self.texts.get(&name) {
+            Some(other) if *other != text => self.doubled.push(name),
+            Some(_) => {}
+            None => drop(self.texts.insert(name, text)),
+        }
+    }
+}
+
+/// What backdrive wrote of a run.
+struct Described {
+    header: Option<BagHeader>,
+    completeness: Option<Completeness>,
+    contradictions: Vec<String>,
+}
+
 /// What backdrive wrote of the run; what of it cannot be read goes to `damage`.
-fn described(
-    path: &Path,
-    metadata: &[Metadata],
-    attachments: &HashMap<String, String>,
-    damage: &mut Vec<String>,
-) -> (Option<BagHeader>, Option<Completeness>) {
+fn described(path: &Path, metadata: &[Metadata], attachments: Attachments, damage: &mut Vec<String>) -> Described {
+    let Attachments { texts, doubled } = attachments;
+    let mut contradictions: Vec<String> =
+        doubled.into_iter().map(|name| format!("two different files in it are called \"{name}\"; the first counts")).collect();
+    for name in [RUN, COMPLETENESS] {
+        let mut all = metadata.iter().filter(|record| record.name == name);
+        if let Some(first) = all.next().filter(|first| all.any(|other| other.metadata != first.metadata)) {
+            contradictions.push(format!("it holds two records {} that differ; the last counts", first.name));
+        }
+    }
+    let missing = std::cell::RefCell::new(Vec::new());
+    let text = |name: &str| {
+        let found = texts.get(name).cloned();
+        if found.is_none() {
+            missing.borrow_mut().push(format!("it names the file \"{name}\" as one of its own, and does not hold it"));
+        }
+        found
+    };
     let header = last(metadata, RUN)
-        .map(|record| BagHeader::from_metadata(path, &record.metadata, |name| attachments.get(name).cloned()))
+        .map(|record| BagHeader::from_metadata(path, &record.metadata, text))
         .and_then(|header| header.map_err(|error| damage.push(error.to_string())).ok());
     let completeness = last(metadata, COMPLETENESS)
         .map(|record| verdict(path, record))
         .and_then(|verdict| verdict.map_err(|error| damage.push(error.to_string())).ok());
-    (header, completeness)
+    contradictions.append(&mut missing.into_inner());
+    Described { header, completeness, contradictions }
 }
 
 fn last<'a>(metadata: &'a [Metadata], name: &str) -> Option<&'a Metadata> {

@@ -99,6 +99,13 @@ pub(crate) fn parse<'a>(path: &Path, frame: &Frame, body: &'a [u8]) -> Result<Re
     if frame.opcode == op::ATTACHMENT && attachment_header_len(body).is_none_or(|len| len + 4 > body.len()) {
         return Err(damaged(format!("an attachment record of {} bytes is too short for its own header", body.len())));
     }
+    if frame.opcode == op::ATTACHMENT
+        && let Some((fields, sum)) = body.split_last_chunk::<4>()
+        && !matches!(u32::from_le_bytes(*sum), 0)
+        && crc32fast::hash(fields) != u32::from_le_bytes(*sum)
+    {
+        return Err(damaged("an attachment does not have its checksum: it was changed".to_owned()));
+    }
     mcap::read::parse_record(frame.opcode, body)
         .map_err(|error| damaged(format!("record of type 0x{:02x}, {} bytes: {}", frame.opcode, body.len(), crate::writer::reason(&error))))
 }

@@ -1,11 +1,11 @@
 //! What a bag says of itself at its end, read without its messages: a bag of any size is looked at in the same time.
 
+use super::Attachments;
 use super::channels::Channels;
 use super::records::parse;
 use crate::framing::Frame;
 use crate::span::{SPANS, Spans};
 use mcap::records::{ChunkIndex, Metadata, Record, Statistics, op};
-use std::collections::HashMap;
 use std::io::{self, Read, Seek, SeekFrom};
 use std::path::Path;
 
@@ -23,7 +23,7 @@ pub(crate) struct Summary {
     pub(crate) library: String,
     pub(crate) found: Channels,
     pub(crate) metadata: Vec<Metadata>,
-    pub(crate) attachments: HashMap<String, String>,
+    pub(crate) attachments: Attachments,
     pub(crate) statistics: Option<Statistics>,
     /// `None` where neither the recorder nor MCAP's indices tell.
     pub(crate) spans: Option<Spans>,
@@ -52,7 +52,7 @@ pub(crate) fn summary<R: Read + Seek>(path: &Path, source: &mut R, size: u64) ->
     let mut summary = Summary::default();
     let Record::Header(header) = source.record(mcap::MAGIC.len() as u64)? else { return None };
     (summary.profile, summary.library) = (header.profile, header.library);
-    let (mut chunks, mut rest, mut at) = (Vec::new(), all.as_slice(), footer.summary_start);
+    let (mut chunks, mut rest, mut at, mut spans_at) = (Vec::new(), all.as_slice(), footer.summary_start, 0);
     while !rest.is_empty() {
         let len = PREFIX.checked_add(u64::from_le_bytes(rest.get(1..PREFIX as usize)?.try_into().ok()?))?;
         let (record, behind) = rest.split_at_checked(usize::try_from(len).ok()?)?;
@@ -61,11 +61,12 @@ pub(crate) fn summary<R: Read + Seek>(path: &Path, source: &mut R, size: u64) ->
             Record::ChunkIndex(chunk) => chunks.push(chunk),
             Record::MetadataIndex(index) => {
                 let Record::Metadata(metadata) = source.record(index.offset)? else { return None };
+                spans_at = if metadata.name == SPANS { index.offset } else { spans_at };
                 summary.metadata.push(metadata);
             }
             Record::AttachmentIndex(index) => {
                 let Record::Attachment { header, data, .. } = source.record(index.offset)? else { return None };
-                summary.attachments.insert(header.name, String::from_utf8_lossy(&data).into_owned());
+                summary.attachments.see(header.name, &data);
             }
             record @ (Record::Schema { .. } | Record::Channel(_)) => summary.found.see(record.into_owned()),
             _ => {}
@@ -82,6 +83,8 @@ pub(crate) fn summary<R: Read + Seek>(path: &Path, source: &mut R, size: u64) ->
         return None;
     }
     summary.spans = match summary.metadata.iter().rev().find(|record| record.name == SPANS) {
+        // Where it does not stand where its writer put it, another program wrote the bag again, and may have left messages out.
+        Some(record) if !Spans::are_in_place(record, spans_at) => return None,
         Some(record) => Some(Spans::from_metadata(record)?),
         None => source.spans(&chunks, statistics),
     };
@@ -147,7 +150,7 @@ impl<R: Read + Seek> Source<'_, R> {
 
 /// Opens a file only to look at its end.
 pub(crate) fn of_file(path: &Path) -> io::Result<(Option<Summary>, u64)> {
-    let mut file = std::fs::File::open(path)?;
+    let mut file = backdrive_plant::input_file::open(path)?;
     let size = file.metadata()?.len();
     Ok((summary(path, &mut file, size), size))
 }

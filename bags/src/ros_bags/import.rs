@@ -4,7 +4,6 @@ use super::target::{RosbagReport, Target};
 use super::{ros1, sqlite};
 use crate::BagError;
 use crate::foreign_code::guarded;
-use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
@@ -27,7 +26,7 @@ fn has_ending(path: &Path, ending: &str) -> bool {
 
 fn begins(path: &Path, with: &[u8]) -> bool {
     let mut start = Vec::new();
-    path.is_file() && File::open(path).is_ok_and(|file| file.take(with.len() as u64).read_to_end(&mut start).is_ok()) && start == with
+    backdrive_plant::input_file::open(path).is_ok_and(|file| file.take(with.len() as u64).read_to_end(&mut start).is_ok()) && start == with
 }
 
 /// Copies the messages of a ROS bag into an MCAP file that any ROS 2 tool opens: those of rosbag2 verbatim, those of ROS 1 in the form of ROS 2. A topic whose
@@ -80,7 +79,7 @@ fn files_of(folder: &Path) -> Result<Vec<PathBuf>, BagError> {
             None => wrong("is a rosbag2 without a sqlite3 file (.db3)".to_owned()),
         });
     }
-    let metadata = std::fs::read_to_string(folder.join("metadata.yaml")).unwrap_or_default();
+    let metadata = backdrive_plant::input_file::read_to_string(&folder.join("metadata.yaml")).unwrap_or_default();
     if metadata.lines().any(|line| {
         line.trim().strip_prefix("compression_mode:").is_some_and(|mode| mode.trim().trim_matches('"').eq_ignore_ascii_case("message"))
     }) {

@@ -7,7 +7,6 @@ use crate::memory::Memory;
 use rosbag::{ChunkRecord, MessageRecord, RosBag};
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;
-use std::fs::File;
 use std::io::{BufReader, Read, Seek, SeekFrom};
 use std::path::Path;
 
@@ -65,8 +64,9 @@ pub(crate) fn copy(file: &Path, target: &mut Target, most_bytes: u64) -> Result<
 fn check_extent(file: &Path) -> Result<(), BagError> {
     let wrong = |what: &str| Err(BagError::File { path: file.to_owned(), what: what.to_owned() });
     let mut start = Vec::new();
-    let (mut open, size) =
-        File::open(file).and_then(|open| open.metadata().map(|about| (open, about.len()))).map_err(BagError::io(file))?;
+    let (mut open, size) = backdrive_plant::input_file::open(file)
+        .and_then(|open| open.metadata().map(|about| (open, about.len())))
+        .map_err(BagError::io(file))?;
     open.by_ref().take(4096).read_to_end(&mut start).map_err(BagError::io(file))?;
     let number = |at: usize, bytes: usize| {
         let bytes = start.get(at..at.checked_add(bytes)?)?;
@@ -89,7 +89,7 @@ fn check_extent(file: &Path) -> Result<(), BagError> {
 
 /// The reader unpacks a chunk whole, and makes room for what the chunk says of its size. Only the heads of records are read here.
 fn check_chunks(file: &Path, most_bytes: u64) -> Result<(), String> {
-    let Ok(open) = File::open(file) else { return Ok(()) };
+    let Ok(open) = backdrive_plant::input_file::open(file) else { return Ok(()) };
     let mut bytes = BufReader::new(open);
     let mut at = MAGIC as u64;
     // What is cut off or damaged is the reader's to report.

@@ -11,6 +11,7 @@ use std::path::Path;
 pub(crate) fn copy(file: &Path, target: &mut Target) -> Result<(), BagError> {
     let wrong = |what: String| BagError::File { path: file.to_owned(), what };
     let failed = |error: rusqlite::Error| wrong(format!("cannot be read as a rosbag2: {error}"));
+    backdrive_plant::input_file::open(file).map_err(BagError::io(file))?;
     let database = Connection::open_with_flags(file, OpenFlags::SQLITE_OPEN_READ_ONLY | OpenFlags::SQLITE_OPEN_NO_MUTEX).map_err(failed)?;
     let definitions = definitions_of(&database);
     let mut topics = HashMap::new();

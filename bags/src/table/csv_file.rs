@@ -12,7 +12,7 @@ use std::path::Path;
 /// error, as is an empty cell or `nan` of a column that goes into the bag.
 pub(crate) fn read(path: &Path, options: &ImportOptions) -> Result<Table, BagError> {
     let wrong = |(line, what): (u64, String)| BagError::Table { path: path.to_owned(), line, what };
-    let file = std::fs::File::open(path).map_err(BagError::io(path))?;
+    let file = backdrive_plant::input_file::open(path).map_err(BagError::io(path))?;
     let mut table = TextTable::new(std::io::BufReader::new(file)).map_err(BagError::io(path))?;
     let mut record = csv::StringRecord::new();
     let heading = table.next(&mut record).map_err(wrong)?.unwrap_or(1);

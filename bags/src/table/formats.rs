@@ -4,6 +4,7 @@ use super::mapping::{ImportOptions, ImportReport};
 use super::{csv_file, from_bag, mat_in, mat_out, parquet_in, parquet_out, to_bag};
 use crate::memory::Memory;
 use crate::{BagError, Reader};
+use backdrive_plant::input_file;
 use std::io::Read;
 use std::path::Path;
 
@@ -25,11 +26,12 @@ impl TableFormat {
     /// It cannot be read, or its ending promises what its bytes are not.
     pub fn of_file(path: &Path) -> Result<TableFormat, BagError> {
         let mut start = Vec::new();
+        let file = input_file::open(path).map_err(BagError::io(path))?;
         // What comes through a pipe cannot be looked at before it is read.
-        if std::fs::metadata(path).is_ok_and(|about| !about.is_file() && !about.is_dir()) {
+        if file.metadata().is_ok_and(|about| !about.is_file()) {
             return Ok(TableFormat::Csv);
         }
-        std::fs::File::open(path).and_then(|file| file.take(128).read_to_end(&mut start)).map_err(BagError::io(path))?;
+        file.take(128).read_to_end(&mut start).map_err(BagError::io(path))?;
         let promised = TableFormat::of_ending(path);
         let wrong = |what: &str| Err(BagError::File { path: path.to_owned(), what: what.to_owned() });
         if start.starts_with(b"PAR1") {

@@ -13,7 +13,7 @@ use std::path::Path;
 /// Reads the vectors and matrices of numbers that have as many rows as the vector of times; a matrix becomes columns `NAME[0]`, `NAME[1]` and so on.
 pub(crate) fn read(path: &Path, options: &ImportOptions) -> Result<Table, BagError> {
     let wrong = |what: String| BagError::File { path: path.to_owned(), what };
-    let file = std::fs::read(path).map_err(BagError::io(path))?;
+    let file = backdrive_plant::input_file::read(path).map_err(BagError::io(path))?;
     let mut arrays = variables(&file, &Memory::new(options.most_bytes)).map_err(wrong)?;
     let names = names(&arrays);
     // What objects hold stands at the end, without a name.

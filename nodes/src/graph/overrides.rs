@@ -65,7 +65,15 @@ pub struct Overrides {
 const FILE_KEYS: &[&str] = &["model", "grip", "environment", "recording", "map", "cycle", "specimen"];
 
 impl Overrides {
-    /// Text of the graph file with the changes, and with every file it names as an absolute path, but for those that a bag holds by the
+    /// Names of the files that the changes put into the graph.
+    pub(super) fn chosen_files(&self) -> Vec<String> {
+        let here = std::env::current_dir().unwrap_or_default();
+        let files = [&self.master, &self.grip, &self.slave, &self.environment, &self.canceller, &self.canceller_grip];
+        let played = self.dither.as_deref().and_then(Recorded::parse).and_then(Result::ok).map(|recorded| recorded.file);
+        files.into_iter().flatten().map(|path| absolute(&here, path).display().to_string()).chain(played).collect()
+    }
+
+    /// Text of the graph file with the changes, and with every file it names as an absolute path, but for those of a bag, which holds them by the
     /// name that stands there.
     pub(super) fn apply(&self, text: &str, path: &Path, files: &Files) -> Result<String, FileError> {
         let name = path.display().to_string();
@@ -76,7 +84,9 @@ impl Overrides {
         };
         let here = std::env::current_dir().unwrap_or_default();
         let beside = absolute(&here, path).parent().map(Path::to_path_buf).unwrap_or_default();
-        let full = |name: &str| if files.holds(name) { name.to_string() } else { absolute(&beside, Path::new(name)).display().to_string() };
+        // A bag's files have the names that stand in its graph, and no place on the disk.
+        let full =
+            |name: &str| if files.are_on_disk() { absolute(&beside, Path::new(name)).display().to_string() } else { name.to_string() };
         rename_files(&mut doc, &full);
         // A program that is named with its folder lies beside the graph; a bare name is looked for as a shell would.
         rename_programs(&mut doc, &|name| if name.contains('/') { full(name) } else { name.to_string() });

@@ -7,7 +7,6 @@ use super::units::{self, Kind, Unit};
 use crate::model::Model;
 use crate::tomlfile::{self, FileError};
 use csv::StringRecord;
-use std::fs::File;
 use std::io::{BufRead, BufReader};
 use std::path::Path;
 
@@ -28,7 +27,7 @@ struct Wanted {
 /// When the file cannot be read or has no heading.
 pub fn read_headings(path: &Path) -> Result<Vec<String>, FileError> {
     let name = path.display().to_string();
-    let file = File::open(path).map_err(|e| tomlfile::unreadable(path, &e))?;
+    let file = crate::input_file::open(path).map_err(|e| tomlfile::unreadable(path, &e))?;
     let mut table = TextTable::new(BufReader::new(file)).map_err(|e| tomlfile::unreadable(path, &e))?;
     Ok(heading_of(&mut table, &name)?.1.iter().map(str::to_string).collect())
 }

@@ -47,7 +47,7 @@ pub(crate) fn unreadable(path: &Path, error: &std::io::Error) -> FileError {
 /// Text of a file, or a clear error where it is missing, is not a file or is not UTF-8.
 pub fn read_text(path: &Path) -> Result<String, FileError> {
     let name = path.display().to_string();
-    let bytes = std::fs::read(path).map_err(|e| unreadable(path, &e))?;
+    let bytes = crate::input_file::read(path).map_err(|e| unreadable(path, &e))?;
     String::from_utf8(bytes).map_err(|e| {
         let good = e.utf8_error().valid_up_to();
         let line = e.as_bytes()[..good].iter().filter(|b| **b == b'\n').count() + 1;

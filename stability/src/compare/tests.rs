@@ -36,6 +36,7 @@ fn session() -> Session {
         lambda: vec![0.5; rows],
         notes: Vec::new(),
         cut_short: None,
+        parts: Vec::new(),
         elsewhere: None,
         bridged_s: 0.02,
     }

@@ -206,6 +206,7 @@ fn recorded(signals: &Recorded) -> crate::session::Session {
         notes: Vec::new(),
         sensors: Vec::new(),
         cut_short: None,
+        parts: Vec::new(),
         elsewhere: None,
         bridged_s: crate::unjudged::BRIDGED_S,
     }

@@ -177,6 +177,7 @@ impl Setup {
             notes: Vec::new(),
             sensors: Vec::new(),
             cut_short: None,
+            parts: Vec::new(),
             elsewhere: None,
             bridged_s: crate::unjudged::BRIDGED_S,
         }
@@ -485,6 +486,7 @@ fn coupled_axes_have_the_edge_of_their_closed_loop() {
         notes: Vec::new(),
         sensors: Vec::new(),
         cut_short: None,
+        parts: Vec::new(),
         elsewhere: None,
         bridged_s: crate::unjudged::BRIDGED_S,
     };

@@ -117,6 +117,7 @@ impl Session {
             notes,
             sensors,
             cut_short,
+            parts: Vec::new(),
             elsewhere: None,
             bridged_s: BRIDGED_S,
         };

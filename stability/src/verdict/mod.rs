@@ -66,7 +66,8 @@ pub fn answer(question: &Question, progress: Progress, cancel: &AtomicBool) -> R
     let frequency = frequency::analyse(session, &frequency::Options { parts, ..Default::default() })?;
     progress("models against the recording", 0, 1);
     let with_hand = with_recovered_hand(question);
-    let checks = recorded.map(|graph| check(graph, with_hand.as_ref().unwrap_or(session))).transpose()?.unwrap_or_default();
+    let mut checks = recorded.map(|graph| check(graph, with_hand.as_ref().unwrap_or(session))).transpose()?.unwrap_or_default();
+    checks.extend(session.parts.iter().cloned());
     let mut answer = Answer::of(question, frequency, checks);
     match scenario(question) {
         Ok(scenario) => {

@@ -1,6 +1,6 @@
 //! Keys that several kinds of nodes have: a simulated device, and the file that a key names.
 
-use crate::graph::files::Files;
+use crate::graph::files::Sources;
 use crate::graph::{DeviceFiles, Graph};
 use backdrive_msgs::MAX_AXES;
 use backdrive_plant::model::{Fragment, Model};
@@ -8,7 +8,7 @@ use backdrive_plant::tomlfile::{FileError, Table};
 use std::path::Path;
 
 pub(super) struct NodeReader<'a> {
-    pub(super) files: &'a Files<'a>,
+    pub(super) files: &'a Sources<'a>,
     pub(super) graph: &'a mut Graph,
 }
 

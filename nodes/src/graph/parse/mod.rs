@@ -7,7 +7,7 @@ mod gains;
 mod node;
 mod played;
 
-use super::files::Files;
+use super::files::{Files, Sources};
 use super::hosts::read_hosts;
 use super::overrides::experiment_text;
 use super::together::read_together;
@@ -82,7 +82,8 @@ impl Graph {
             files: Vec::new(),
             experiments: Vec::new(),
         };
-        let mut reader = NodeReader { files, graph: &mut graph };
+        let sources = Sources { files, chosen: changes.chosen_files(), of: path.display().to_string() };
+        let mut reader = NodeReader { files: &sources, graph: &mut graph };
         for table in top.tables("nodes")? {
             reader.read(table)?;
         }

@@ -1,7 +1,7 @@
 //! Every sample of a bag by its step, and the events beside them.
 
 use backdrive_bags::{BagError, Reader};
-use backdrive_msgs::{Message, Sample};
+use backdrive_msgs::{Gains, Message, Sample};
 
 /// A loop is looked at over at most so many steps, the first of its bag: 200 s at 5 kHz.
 const MOST_STEPS: u64 = 1_000_000;
@@ -17,6 +17,8 @@ pub struct Recorded {
     pub tracks: Vec<Track>,
     /// What nodes told: kind, text, number.
     pub events: Vec<Told>,
+    /// Gains in force, by topic.
+    pub gains: Vec<(String, Gains)>,
 }
 
 /// An event as it was told.
@@ -57,6 +59,14 @@ impl Recorded {
     /// # Errors
     /// A bag that cannot be read.
     pub fn read(reader: &Reader) -> Result<Recorded, BagError> {
+        Recorded::read_up_to(reader, MOST_STEPS)
+    }
+
+    /// The same, its first `most` steps.
+    ///
+    /// # Errors
+    /// A bag that cannot be read.
+    pub fn read_up_to(reader: &Reader, most: u64) -> Result<Recorded, BagError> {
         let mut recorded = Recorded::default();
         let mut of_topic: Vec<Option<usize>> = vec![None; reader.topics().len()];
         let mut first = None;
@@ -65,7 +75,7 @@ impl Recorded {
             match entry.message(reader.path())? {
                 Some(Message::Sample(sample)) => {
                     let first = *first.get_or_insert(sample.step);
-                    let Some(row) = sample.step.checked_sub(first).filter(|r| *r < MOST_STEPS) else { continue };
+                    let Some(row) = sample.step.checked_sub(first).filter(|r| *r < most) else { continue };
                     let known = of_topic.get(entry.topic.index).copied().flatten();
                     let place = known.unwrap_or_else(|| {
                         recorded.tracks.push(Track::new(&entry.topic.name, sample.len()));
@@ -79,6 +89,7 @@ impl Recorded {
                         track.put(row as usize, &sample);
                     }
                 }
+                Some(Message::Gains(gains)) => recorded.gains.push((entry.topic.name.clone(), gains)),
                 Some(Message::Event(event)) => recorded.events.push(Told {
                     topic: entry.topic.name.clone(),
                     kind: event.kind.as_str().to_string(),

@@ -1,6 +1,6 @@
 //! A signal as it was recorded beside what it should have been: by how much they differ, and what simple thing would make one of the other.
 
-use crate::ways::{MOST_LATE, MOST_LATE_S, unsteady};
+use super::ways::{MOST_LATE, MOST_LATE_S, unsteady};
 use serde::Serialize;
 
 /// What simple thing makes the recorded signal of the predicted one.
@@ -302,6 +302,7 @@ fn is_white(values: &[f64]) -> bool {
 
 #[cfg(test)]
 mod tests {
+    use super::super::ways::in_time;
     use super::*;
 
     const PERIOD_S: f64 = 2e-4;
@@ -406,7 +407,7 @@ mod tests {
                 .collect();
             let AsIf::Unsteady { late, jitter: found, missing } = told(&passed, true) else { panic!("{jitter} {loss}") };
             // More jitter and less loss look the same: what counts is how many come, and how late.
-            let ((comes, mean), (true_comes, true_mean)) = (crate::ways::in_time(found, missing), crate::ways::in_time(jitter, loss));
+            let ((comes, mean), (true_comes, true_mean)) = (in_time(found, missing), in_time(jitter, loss));
             assert!(late <= 1 && (comes - true_comes).abs() < 0.03 && (mean - true_mean).abs() < 0.4, "{jitter} {loss}: {found} {missing}");
             assert!(jitter > 0 || (found == 0 && (missing - loss).abs() < 0.03), "{jitter} {loss}: {found} {missing}");
         }

@@ -4,10 +4,10 @@
 //! node, or the way to it, is what differs from the graph: so a fault is located before it is named. A node is run open loop, for a closed
 //! loop that is stable hides what its parts do wrong, and one that is not multiplies it.
 
-use crate::recorded::{Recorded, Track};
+use super::recorded::{Recorded, Track};
 use backdrive_control::core::{Core, Events, Port, Tick};
-use backdrive_msgs::Sample;
 use backdrive_msgs::topic::{Kind, Topic};
+use backdrive_msgs::{Gains, Sample};
 use backdrive_nodes::build::{BuildError, plan};
 use backdrive_nodes::graph::Graph;
 use backdrive_nodes::sequence::{Sequence, SequenceError};
@@ -52,6 +52,14 @@ impl Core for Player {
 /// # Errors
 /// A node that cannot be built, such as one that only the user's own program knows.
 pub fn alone(graph: &Graph, name: &str, recorded: &Recorded) -> Result<Vec<PutOut>, AloneError> {
+    alone_at(graph, name, recorded, &[])
+}
+
+/// The same with gains in force from their steps on, in order, in the place of what the graph plans.
+///
+/// # Errors
+/// As [`alone`].
+pub fn alone_at(graph: &Graph, name: &str, recorded: &Recorded, gains: &[Gains]) -> Result<Vec<PutOut>, AloneError> {
     let node = plan(graph, name)?;
     let side = |part: &str| Topic { name: format!("/recorded/{part}"), kind: Kind::Event };
     let mut inputs: Vec<Topic> = Vec::new();
@@ -80,7 +88,12 @@ pub fn alone(graph: &Graph, name: &str, recorded: &Recorded) -> Result<Vec<PutOu
     let numbers: Vec<(String, usize)> = outputs.into_iter().filter_map(|o| sequence.sample_topic(&o).map(|n| (o, n))).collect();
     let mut put: Vec<PutOut> =
         numbers.iter().map(|(topic, _)| PutOut { topic: topic.clone(), samples: Vec::with_capacity(recorded.rows) }).collect();
-    for _ in 0..recorded.rows {
+    let mut gains = gains.iter().peekable();
+    for row in 0..recorded.rows {
+        let now = recorded.first + row as u64;
+        while let Some(due) = gains.next_if(|due| due.step <= now) {
+            sequence.set_gains(Gains { step: row as u64, ramp_s: 0.0, ..*due });
+        }
         sequence.step(None);
         for ((_, number), put) in numbers.iter().zip(&mut put) {
             put.samples.extend(sequence.sample(*number).copied());

@@ -1,0 +1,422 @@
+//! A bag that was changed after it was recorded, asked by every verb: no answer may be green that the change makes wrong, and a change that costs nothing
+//! keeps its answer.
+
+mod changed;
+mod system;
+
+use backdrive::call::call;
+use backdrive::caller::Caller;
+use changed::kinds::{Costs, KINDS};
+use changed::{Bag, Numbers};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex};
+use system::{Ended, Place, graph_text};
+
+const FORCE: &str = "/master/servo_jf";
+
+/// A contact task of 2 s at 500 Hz: free motion, impact, a sustained push, release.
+fn short_graph() -> String {
+    let text = graph_text("launch/contact.toml");
+    let (from, to) = (text.find("waypoints = [").unwrap(), text.find("]\n\n[[nodes]]\nname = \"master\"").unwrap());
+    let points = "waypoints = [ { t = 0.2, x = 0.0 }, { t = 0.6, x = 0.003 }, { t = 0.8, x = 0.003 }, { t = 0.95, x = 0.007 }, \
+                  { t = 1.8, x = 0.007 }, { t = 1.95, x = 0.0 } ";
+    format!("{}{points}{}", &text[..from], &text[to..])
+        .replace("rate_hz = 5000", "rate_hz = 500")
+        .replace("duration_s = 4.0", "duration_s = 2.0")
+}
+
+/// The base: stable, and whole.
+fn base(place: &Place) -> Bag {
+    place.write("short.toml", &short_graph());
+    let options = ["--transport", "inproc", "--canceller", "none", "--rate", "100", "--lambda", "0.1", "--bag", "base.mcap"];
+    let done = place.backdrive(&[&["run", "short.toml"], &options[..]].concat());
+    assert_eq!(done.code, Some(0), "{done:?}");
+    Bag::load(&place.path("base.mcap"))
+}
+
+fn info(place: &Place, bag: &str) -> [Ended; 2] {
+    [&["bag", "info", bag][..], &["bag", "info", bag, "--check"]].map(|words| place.backdrive(words))
+}
+
+/// 10 % of the time is gone from the middle, from all topics.
+fn with_a_hole(bag: &mut Bag) {
+    let times = || bag.messages.iter().map(|m| m.header.log_time);
+    let (from, to) = (times().min().unwrap(), times().max().unwrap());
+    let at = |share: f64| from + ((to - from) as f64 * share) as u64;
+    bag.messages.retain(|m| m.topic == "/backdrive/steps" || !(at(0.5)..at(0.6)).contains(&m.header.log_time));
+}
+
+#[test]
+fn the_base_of_these_tests_is_stable_and_whole_by_every_verb_also_when_it_is_written_again() {
+    let place = Place::new();
+    base(&place).save(&place.path("again.mcap"));
+    for bag in ["base.mcap", "again.mcap"] {
+        for verb in [
+            &["bag", "info"][..],
+            &["bag", "info", "--check"],
+            &["stability"],
+            &["replay"],
+            &["why"],
+            &["bag", "export", "--overwrite", "--out", "t.csv"],
+        ] {
+            let done = place.backdrive(&[verb, &[bag]].concat());
+            assert_eq!(done.code, Some(0), "{verb:?} of {bag}: {done:?}");
+        }
+    }
+}
+
+#[test]
+fn a_bag_with_a_hole_is_whole_by_no_verb_and_what_is_missing_is_said() {
+    let place = Place::new();
+    let mut bag = base(&place);
+    with_a_hole(&mut bag);
+    bag.save(&place.path("filtered.mcap"));
+    bag.forget_completeness();
+    bag.save(&place.path("hole.mcap"));
+    // A filter may also leave the record of completeness as it was: the messages win.
+    for name in ["hole.mcap", "filtered.mcap"] {
+        for done in info(&place, name) {
+            assert_eq!(done.code, Some(4), "{name}: {done:?}");
+            assert!(
+                done.stdout.contains("INCOMPLETE") && done.stdout.contains("/master/servo_jf: 20 of 200 messages are missing"),
+                "{done:?}"
+            );
+        }
+        let done = place.backdrive(&["bag", "export", name, "--out", "e.csv", "--overwrite"]);
+        assert!(done.code == Some(4) && done.stderr.contains("20 of 200 rows are missing"), "{done:?}");
+        for verb in ["stability", "replay", "why"] {
+            let done = place.backdrive(&[verb, name]);
+            assert_eq!(done.code, Some(7), "{verb} {name}: {done:?}");
+        }
+        let saved = place.backdrive(&["bag", "recover", name, "--bag", "saved.mcap", "--overwrite"]);
+        assert_eq!(saved.code, Some(4), "{saved:?}");
+        assert_eq!(place.backdrive(&["bag", "info", "saved.mcap"]).code, Some(4));
+        let merged = place.backdrive(&["bag", "merge", name, name, "--bag", "merged.mcap", "--overwrite"]);
+        assert_eq!(merged.code, Some(4), "{merged:?}");
+        assert_eq!(place.backdrive(&["bag", "info", "merged.mcap"]).code, Some(4));
+    }
+}
+
+#[test]
+fn a_force_command_that_its_graph_does_not_make_is_named_with_factor_and_time() {
+    let place = Place::new();
+    let bag = base(&place);
+    let was = bag.values(FORCE, Numbers::Effort);
+    type Change<'a> = &'a dyn Fn(usize, f64) -> f64;
+    let late = |index: usize, _: f64| was[index.saturating_sub(5)];
+    let changes: [(Change, &str); 5] = [
+        (&|_, f| 1000.0 * f, "1000.0000 times"),
+        (&|_, f| -f, "-1.0000 times"),
+        (&late, "50.0 ms late"),
+        (&|_, _| 0.0, "standing still"),
+        (&|_, _| f64::NAN, "says nothing"),
+    ];
+    for (change, how) in changes {
+        let mut bag = bag.clone();
+        bag.numbers(FORCE, Numbers::Effort, change);
+        bag.save(&place.path("changed.mcap"));
+        for verb in ["stability", "replay", "why"] {
+            let done = place.backdrive(&[verb, "changed.mcap"]);
+            let said = format!("{}{}", done.stdout, done.stderr);
+            assert_eq!(done.code, Some(7), "{how}: {verb}: {done:?}");
+            assert!(said.contains(FORCE) && said.contains(how), "{how}: {verb}: {done:?}");
+            assert!(!said.contains("nothing shakes"), "{how}: {verb}: {done:?}");
+        }
+    }
+    let mut without = bag.clone();
+    without.keep(|topic, _, _| topic != FORCE);
+    without.save(&place.path("without.mcap"));
+    for verb in ["stability", "replay", "why"] {
+        let done = place.backdrive(&[verb, "without.mcap"]);
+        assert!(done.code == Some(7) && format!("{}{}", done.stdout, done.stderr).contains(FORCE), "{verb}: {done:?}");
+    }
+}
+
+#[test]
+fn a_rate_that_is_none_gives_way_to_that_of_the_messages() {
+    let place = Place::new();
+    let bag = base(&place);
+    for rate in ["NaN", "0", "-1000", "inf", "250"] {
+        let mut bag = bag.clone();
+        bag.record("backdrive.run").insert("rate_hz".to_owned(), rate.to_owned());
+        bag.forget_completeness();
+        bag.save(&place.path("rate.mcap"));
+        for done in info(&place, "rate.mcap") {
+            assert!(done.code == Some(0) && done.stdout.contains("at 100 Hz") && done.stdout.contains("which counts"), "{rate}: {done:?}");
+        }
+        let done = place.backdrive(&["stability", "rate.mcap"]);
+        assert!(done.code == Some(0) && done.stdout.contains("which counts"), "{rate}: {done:?}");
+    }
+    // Of a graph at another rate everything that is computed would be wrong.
+    let mut other = bag.clone();
+    other.graph(|text| text.replace("rate_hz = 100", "rate_hz = 200"));
+    other.save(&place.path("other.mcap"));
+    assert_eq!(place.backdrive(&["bag", "info", "other.mcap", "--check"]).code, Some(4));
+    for verb in ["stability", "replay", "why"] {
+        assert_eq!(place.backdrive(&[verb, "other.mcap"]).code, Some(7), "{verb}");
+    }
+}
+
+#[test]
+fn a_duration_that_is_none_or_too_short_costs_nothing_and_without_any_record_the_end_is_not_known() {
+    let place = Place::new();
+    let bag = base(&place);
+    let mut shorter = bag.clone();
+    shorter.graph(|text| text.replace("duration_s = 2.0", "duration_s = 1.0"));
+    shorter.save(&place.path("shorter.mcap"));
+    let done = place.backdrive(&["bag", "info", "shorter.mcap", "--check"]);
+    assert!(done.code == Some(0) && done.stdout.contains("asks for 100 steps, and it holds 200"), "{done:?}");
+    let mut none = bag.clone();
+    none.graph(|text| text.replace("duration_s = 2.0", ""));
+    none.save(&place.path("none.mcap"));
+    assert_eq!(place.backdrive(&["stability", "none.mcap"]).code, Some(0));
+    none.forget_completeness();
+    none.save(&place.path("none.mcap"));
+    for done in info(&place, "none.mcap") {
+        assert!(done.code == Some(4) && done.stdout.contains("missing at its end is not known"), "{done:?}");
+    }
+    assert_eq!(place.backdrive(&["stability", "none.mcap"]).code, Some(7));
+}
+
+#[test]
+fn what_a_bag_names_is_taken_from_the_bag_alone_and_nothing_else_is_opened() {
+    let place = Place::new();
+    let bag = base(&place);
+    let outside = std::fs::read_to_string(system::file("plant/models/rigid-mass.toml")).unwrap();
+    let outside = place.write("outside.toml", &outside).display().to_string();
+    let pipe = place.path("pipe").display().to_string();
+    assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+    for named in [outside.as_str(), "/dev/zero", &pipe, "outside.toml"] {
+        let mut bag = bag.clone();
+        bag.graph(|text| text.replacen("model = \"impulse-engine.toml\"", &format!("model = \"{named}\""), 1));
+        bag.save(&place.path("stranger.mcap"));
+        for verb in ["stability", "replay", "why"] {
+            let done = place.backdrive(&[verb, "stranger.mcap"]);
+            assert!(
+                done.code == Some(3) && done.stderr.contains("which the bag does not hold") && done.stderr.contains(named),
+                "{verb} {named}: {done:?}"
+            );
+        }
+    }
+    // What an attached model names is not looked for either.
+    let mut inside = bag.clone();
+    let model = inside.attachments.iter_mut().find(|(name, _)| name == "impulse-engine.toml").unwrap();
+    model.1 = format!("name = \"x\"\nmotion = \"rotation\"\n[robot]\nfile = \"{pipe}\"\n").into_bytes();
+    inside.save(&place.path("inside.mcap"));
+    assert_eq!(place.backdrive(&["stability", "inside.mcap"]).code, Some(3));
+    // What the user names is read from the disk, and only where it is a file.
+    assert!(matches!(place.backdrive(&["stability", "base.mcap", "--master", "outside.toml"]).code, Some(0 | 1 | 7)));
+    for words in [
+        &["stability", "base.mcap", "--master", "pipe"][..],
+        &["stability", "pipe"],
+        &["bag", "info", "/dev/zero"],
+        &["model", "check", "pipe"],
+        &["check", "/dev/zero"],
+        &["stability", "base.mcap", "--roles", "pipe"],
+        &["bag", "import", "pipe", "--bag", "x.mcap"],
+        &["bag", "recover", "pipe", "--bag", "x.mcap"],
+        &["fit", "outside.toml", "pipe"],
+    ] {
+        let done = place.backdrive(words);
+        assert!(done.code == Some(3) && done.stderr.contains("expected a regular file"), "{words:?}: {done:?}");
+    }
+}
+
+#[test]
+fn attachments_that_are_missing_double_or_changed_are_noticed() {
+    let place = Place::new();
+    let bag = base(&place);
+    let check = |bag: &Bag, path: &Path| {
+        bag.save(path);
+        place.backdrive(&["bag", "info", "changed.mcap"])
+    };
+    let path = place.path("changed.mcap");
+    let mut gone = bag.clone();
+    gone.attachments.retain(|(name, _)| name != "slave.toml");
+    let done = check(&gone, &path);
+    assert!(done.code == Some(4) && done.stdout.contains("names the file \"slave.toml\""), "{done:?}");
+    let mut double = bag.clone();
+    double.attachments.push(("slave.toml".to_owned(), b"name = \"other\"\n".to_vec()));
+    let done = check(&double, &path);
+    assert!(done.code == Some(4) && done.stdout.contains("two different files"), "{done:?}");
+    assert_eq!(place.backdrive(&["stability", "changed.mcap"]).code, Some(7));
+    // Another mass than the recording shows: the models do not do what was recorded.
+    let mut heavier = bag.clone();
+    for (_, text) in heavier.attachments.iter_mut().filter(|(name, _)| name == "impulse-engine.toml") {
+        *text = String::from_utf8_lossy(text).replace("handle = 0.04", "handle = 4.0").into_bytes();
+    }
+    heavier.save(&path);
+    for verb in ["stability", "replay"] {
+        assert_eq!(place.backdrive(&[verb, "changed.mcap"]).code, Some(7), "{verb}");
+    }
+}
+
+/// Bags of every kind of run.
+fn bases(place: &Place) -> Vec<(&'static str, Bag)> {
+    base(place);
+    place.write("short.toml", &short_graph());
+    let (two, three, push, coupling) = (
+        system::file("launch/two-axis.toml"),
+        system::file("launch/three-joint.toml"),
+        system::file("launch/push-and-hold.toml"),
+        system::file("launch/coupling.toml"),
+    );
+    let inproc = ["--transport", "inproc"];
+    let runs: [(&str, &[&str]); 7] = [
+        ("contact", &["short.toml"]),
+        ("dithered", &["short.toml", "--dither", "multisine:peak=0.05,from=1,to=100,period=1"]),
+        ("push and hold", &[push.as_str(), "--rate", "500", "--duration", "4"]),
+        ("two axes", &[two.as_str(), "--rate", "1000"]),
+        ("arm", &[three.as_str(), "--rate", "1000", "--duration", "1.5"]),
+        ("coupling", &[coupling.as_str(), "--rate", "1000", "--duration", "2"]),
+        ("real time", &["short.toml", "--clock", "realtime"]),
+    ];
+    let mut bases = vec![("coarse contact", Bag::load(&place.path("base.mcap")))];
+    for (name, words) in runs {
+        let bag = format!("{}.mcap", name.replace(' ', "-"));
+        let done = place.backdrive(&[&["run"], words, &inproc, &["--bag", &bag]].concat());
+        assert!(matches!(done.code, Some(0 | 1 | 7)), "{name}: {done:?}");
+        bases.push((name, Bag::load(&place.path(&bag))));
+    }
+    bases
+}
+
+/// The exit codes of the verbs.
+struct Codes {
+    judged: Vec<(&'static str, u8)>,
+    counted: Vec<(&'static str, u8)>,
+    diff: u8,
+}
+
+fn asked(folder: &Path, bag: &Bag, base: &Path, why: bool) -> Codes {
+    let path = |name: &str| folder.join(name).display().to_string();
+    bag.save(Path::new(&path("changed.mcap")));
+    let (changed, table, saved, merged, both, base) =
+        (path("changed.mcap"), path("table.csv"), path("saved.mcap"), path("merged.mcap"), path("both.mcap"), base.display().to_string());
+    let code = |words: &[&str]| call(words, &Arc::new(Caller::default())).code;
+    let mut judged = vec![("stability", code(&["stability", &changed, "--grips", "1"])), ("replay", code(&["replay", &changed]))];
+    if why {
+        judged.push(("why", code(&["why", &changed])));
+    }
+    let counted = vec![
+        ("info", code(&["bag", "info", &changed])),
+        ("info --check", code(&["bag", "info", &changed, "--check"])),
+        ("export", code(&["bag", "export", &changed, "--overwrite", "--out", &table])),
+        ("recover", code(&["bag", "recover", &changed, "--overwrite", "--bag", &saved])),
+        ("info of recovered", code(&["bag", "info", &saved])),
+        ("merge", code(&["bag", "merge", &changed, &changed, "--offset", "0", "--overwrite", "--bag", &merged])),
+        ("merge with the base", code(&["bag", "merge", &base, &changed, "--offset", "0", "--overwrite", "--bag", &both])),
+    ];
+    Codes { judged, counted, diff: code(&["bag", "diff", &base, &changed]) }
+}
+
+/// What is green and must not be, or is not and was.
+fn wrong(costs: Costs, codes: &Codes, base: &Codes) -> Vec<String> {
+    let mut wrong = Vec::new();
+    for ((verb, code), (_, was)) in codes.judged.iter().zip(&base.judged) {
+        match costs {
+            Costs::Nothing | Costs::Others if code != was => wrong.push(format!("{verb} ends with {code}, before with {was}")),
+            Costs::Samples | Costs::Numbers | Costs::Itself if *code == 0 => wrong.push(format!("{verb} is green")),
+            _ => {}
+        }
+    }
+    for ((verb, code), (_, was)) in codes.counted.iter().zip(&base.counted) {
+        let heals = *verb == "merge with the base";
+        match costs {
+            // Of another title it is another run.
+            Costs::Nothing if code != was && !heals => wrong.push(format!("{verb} ends with {code}, before with {was}")),
+            Costs::Samples | Costs::Others if *code == 0 && !heals => wrong.push(format!("{verb} is green")),
+            Costs::Itself if *code == 0 && verb.starts_with("info -") => wrong.push(format!("{verb} is green")),
+            Costs::Numbers if *code == 0 && heals => wrong.push(format!("{verb} is green")),
+            _ => {}
+        }
+    }
+    if matches!(costs, Costs::Samples | Costs::Others | Costs::Numbers) && codes.diff == 0 {
+        wrong.push("diff finds no difference".to_owned());
+    }
+    wrong
+}
+
+/// 30 changed bags by default, 100 with `BACKDRIVE_LONG=1`, 500 with `BACKDRIVE_FULL=1`, which also asks `why` of every one.
+#[test]
+fn no_verb_is_green_of_a_bag_whose_change_matters_and_none_loses_its_answer_by_one_that_does_not() {
+    let asks = |name: &str| std::env::var(name).is_ok_and(|v| v == "1");
+    let (long, full) = (asks("BACKDRIVE_LONG"), asks("BACKDRIVE_FULL"));
+    let count = if full {
+        500
+    } else if long {
+        100
+    } else {
+        30
+    };
+    let place = Place::new();
+    let bases = bases(&place);
+    let bases = if full || long { &bases[..] } else { &bases[..3] };
+    let folder = |name: String| {
+        let folder = place.path(&name);
+        std::fs::create_dir(&folder).unwrap();
+        folder
+    };
+    let before: Vec<(std::path::PathBuf, Codes)> = bases
+        .iter()
+        .enumerate()
+        .map(|(index, (_, bag))| {
+            let folder = folder(format!("base-{index}"));
+            let path = folder.join("base.mcap");
+            bag.save(&path);
+            let codes = asked(&folder, bag, &path, full);
+            (path, codes)
+        })
+        .collect();
+    for ((name, _), (_, codes)) in bases.iter().zip(&before) {
+        println!("{name}: {:?} {:?} diff {}", codes.judged, codes.counted, codes.diff);
+        assert!(codes.counted.iter().all(|(_, code)| *code == 0) && codes.diff == 0, "{name}: {:?}", codes.counted);
+    }
+    let (next, done, failures) = (AtomicUsize::new(0), Mutex::new(BTreeMap::new()), Mutex::new(Vec::new()));
+    let work = || {
+        // The number of a case alone makes it again.
+        while let Some(case) = Some(next.fetch_add(1, Ordering::Relaxed)).filter(|case| *case < count) {
+            let mut random = ChaCha8Rng::seed_from_u64(case as u64);
+            let at = (case / KINDS.len() + case) % bases.len();
+            let ((of, bag), (base, was)) = (&bases[at], &before[at]);
+            let (kind, change) = KINDS[case % KINDS.len()];
+            let mut bag = bag.clone();
+            let Some(costs) = (0..20).find_map(|_| change(&mut bag, &mut random)) else {
+                *done.lock().unwrap().entry((kind, "means nothing there")).or_insert(0) += 1;
+                continue;
+            };
+            let folder = folder(format!("case-{case}"));
+            let codes = asked(&folder, &bag, base, full);
+            let found = wrong(costs, &codes, was);
+            for (verb, code) in codes.judged.iter().chain(&codes.counted) {
+                let said = match code {
+                    0 => "0",
+                    1 => "1",
+                    3 => "3",
+                    4 => "4",
+                    7 => "7",
+                    _ => "other",
+                };
+                *done.lock().unwrap().entry((*verb, said)).or_insert(0) += 1;
+            }
+            *done.lock().unwrap().entry((kind, "asked")).or_insert(0) += 1;
+            if !found.is_empty() {
+                failures.lock().unwrap().push(format!("case {case}: {of}, {kind} ({costs:?}): {}", found.join("; ")));
+            }
+            std::fs::remove_dir_all(folder).unwrap();
+        }
+    };
+    std::thread::scope(|scope| {
+        scope.spawn(work);
+        scope.spawn(work);
+    });
+    for ((what, how), times) in done.into_inner().unwrap() {
+        println!("{what}: {how}: {times}");
+    }
+    let failures = failures.into_inner().unwrap();
+    assert!(failures.is_empty(), "{} of {count}:\n{}", failures.len(), failures.join("\n"));
+}
