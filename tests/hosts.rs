@@ -75,7 +75,14 @@ fn run_on(hosts: &Hosts, host: usize, folder: &Path, more: &[&str]) -> Running {
 /// The same with a secret of these digits.
 fn run_with(hosts: &Hosts, host: usize, folder: &Path, digits: &str, more: &[&str]) -> Running {
     let mut command = hosts.on(host, env!("CARGO_BIN_EXE_backdrive"));
-    command.arg("run").arg(graph()).arg("--secret").arg(secret(folder, digits)).args(["--host", HOSTS[host], "--json", "--bag"]).arg(folder.join("run.mcap")).args(more);
+    command
+        .arg("run")
+        .arg(graph())
+        .arg("--secret")
+        .arg(secret(folder, digits))
+        .args(["--host", HOSTS[host], "--json", "--bag"])
+        .arg(folder.join("run.mcap"))
+        .args(more);
     command.env_remove("ROS_DOMAIN_ID").env("TMPDIR", folder);
     spawn(command)
 }
@@ -572,7 +579,7 @@ fn the_doctor_finds_an_interface_without_multicast() {
         let output = hosts.on(0, env!("CARGO_BIN_EXE_backdrive")).args(["doctor", "--listen", "0", "--json"]).output().unwrap();
         let findings: Value = serde_json::from_slice(&output.stdout).unwrap();
         let parts: Vec<&str> = findings.as_array().unwrap().iter().map(|f| f["part"].as_str().unwrap()).collect();
-        for part in ["shared memory", "real-time", "timers", "timer slack", "interfaces", "socket buffers", "domain"] {
+        for part in ["shared memory", "real-time", "timers", "timer slack", "interfaces", "socket buffers", "domain", "strangers"] {
             assert!(parts.contains(&part), "{part}: {parts:?}");
         }
         let multicast = findings.as_array().unwrap().iter().find(|f| f["part"] == "multicast").unwrap().clone();

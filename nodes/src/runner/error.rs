@@ -9,7 +9,7 @@ pub enum RunError {
     #[error(transparent)]
     Transport(#[from] TransportError),
     /// Somebody who is not of the run sends on one of its topics before it begins.
-    #[error("{0}: end that first, or choose another ROS domain with --domain")]
+    #[error("{0}; end that first, or choose another ROS domain with --domain")]
     Taken(TransportError),
     /// Lockstep: an input has not come.
     #[error("step {step}: nothing on {} within {timeout_s} s; has its node stopped?", topics.join(", "))]

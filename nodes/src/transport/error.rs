@@ -25,7 +25,7 @@ pub enum TransportError {
         reason: String,
     },
     /// Somebody who is not of this run sends on the topic; nothing of it was taken.
-    #[error("{topic}: {who}; messages refused: {refused}")]
+    #[error("{topic}: {who}, messages refused: {refused}")]
     Stranger {
         /// The topic.
         topic: String,

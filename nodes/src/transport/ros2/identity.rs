@@ -6,7 +6,9 @@
 
 use super::key::{Key, TAG_BYTES, absorb, from_hex};
 use crate::transport::TransportError;
+use backdrive_msgs::Message;
 use backdrive_msgs::ros::mark::{self, Mark, TAG_DIGITS};
+use backdrive_msgs::ros::{RosError, live};
 use backdrive_msgs::text::Text;
 use backdrive_msgs::topic::Topic;
 use hmac::{Hmac, Mac};
@@ -149,19 +151,37 @@ impl Identity {
         self.0.several
     }
 
+    /// A message as it goes over the network from a publisher of this run: see [`live::encode`].
+    ///
+    /// # Errors
+    /// As of [`live::encode`].
+    pub fn encode(
+        &self,
+        topic: &Topic,
+        message: &Message,
+        speaker: &str,
+        names: &[String],
+        life: u64,
+        cdr: &mut Vec<u8>,
+    ) -> Result<(), RosError> {
+        live::encode(message, speaker, names, Some(&Mark { run: self.run(), life }), cdr)?;
+        self.seal(topic, cdr);
+        Ok(())
+    }
+
+    /// Whether the CDR of a message on a topic was sent by this run, now or before.
+    pub fn is_ours(&self, topic: &Topic, little_endian: bool, cdr: &[u8]) -> bool {
+        matches!(self.judge(topic, little_endian, cdr), Judged::Ours { .. })
+    }
+
     /// Puts the tag into a message that was encoded with this run's mark.
-    pub(super) fn seal(&self, topic: &Topic, cdr: &mut [u8]) {
+    fn seal(&self, topic: &Topic, cdr: &mut [u8]) {
         let Some(digits) = mark::marked(topic.kind, true, cdr).map(|m| m.digits) else { return };
         let tag = self.0.own.over(topic, cdr, &digits).finalize().into_bytes();
         for (digits, byte) in cdr[digits].chunks_exact_mut(2).zip(&tag[..TAG_BYTES]) {
             const HEX: &[u8; 16] = b"0123456789abcdef";
             digits.copy_from_slice(&[HEX[usize::from(byte >> 4)], HEX[usize::from(byte & 15)]]);
         }
-    }
-
-    /// The mark of this run's messages.
-    pub(super) fn mark(&self, life: u64) -> Mark<'_> {
-        Mark { run: self.run(), life }
     }
 
     /// What a message of the topic is worth.
@@ -240,9 +260,8 @@ impl Known {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use backdrive_msgs::ros::live;
+    use backdrive_msgs::Sample;
     use backdrive_msgs::topic::Kind;
-    use backdrive_msgs::{Message, Sample};
 
     fn member(run: &str) -> Member {
         Member { run: run.to_string(), key: Key::fresh().unwrap() }
@@ -259,8 +278,7 @@ mod tests {
     fn sealed(identity: &Identity, topic: &Topic) -> Vec<u8> {
         let mut cdr = Vec::new();
         let sample = Sample { step: 7, sequence: 7, ..Sample::new(2) };
-        live::encode(&Message::Sample(sample), "", &[], Some(&identity.mark(5)), &mut cdr).unwrap();
-        identity.seal(topic, &mut cdr);
+        identity.encode(topic, &Message::Sample(sample), "", &[], 5, &mut cdr).unwrap();
         cdr
     }
 

@@ -69,11 +69,11 @@ impl Publisher for Sending {
             self.life = now_ns().unsigned_abs().max(self.life + 1);
         }
         self.newest = Some(message.sequence());
-        let mark = self.shared.identity.as_ref().map(|identity| identity.mark(self.life));
-        live::encode(message, &self.speaker, &self.names, mark.as_ref(), &mut self.cdr).map_err(|e| broken(e.to_string()))?;
-        if let Some(identity) = &self.shared.identity {
-            identity.seal(&self.topic, &mut self.cdr);
-        }
+        let encoded = match &self.shared.identity {
+            Some(identity) => identity.encode(&self.topic, message, &self.speaker, &self.names, self.life, &mut self.cdr),
+            None => live::encode(message, &self.speaker, &self.names, None, &mut self.cdr),
+        };
+        encoded.map_err(|e| broken(e.to_string()))?;
         let sent = self.writer.borrow().write(Bytes::copy_from_slice(&self.cdr), Some(Timestamp::now()));
         sent.map_err(|e| match e {
             rustdds::dds::WriteError::WouldBlock { .. } => {
