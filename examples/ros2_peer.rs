@@ -2,15 +2,18 @@
 //!
 //!   ros2_peer listen TOPIC[:KIND] ...     until nothing has come for 2 s: how many messages of each, the first and last number, how many late
 //!   ros2_peer speak TOPIC COUNT HZ        sends samples once somebody listens
+//!   ros2_peer push TOPIC EFFORT HZ SECONDS   sends a force at once, whoever listens, as a stranger would
 //!   ros2_peer ping COUNT HZ               sends on /ping, hears /pong: one way and round trip, median and 99th percentile
 //!   ros2_peer echo                        sends what it hears on /ping back on /pong, until nobody speaks any more
+//!
+//!   ros2_peer as FILE ...                 the same as a node of the run whose `identity.json` this is: it tags what it sends, and hears that run alone
 //!
 //! KIND is sample (where nothing is said), gains, status, margin or event. One way is told in the clock of one machine: both ends must share it, as network namespaces do.
 
 use backdrive_msgs::topic::{Kind, Topic};
 use backdrive_msgs::{Message, Sample};
 use backdrive_nodes::clock::now_ns;
-use backdrive_nodes::transport::ros2::{Delivery, Network, Ros2};
+use backdrive_nodes::transport::ros2::{Delivery, Identity, Network, Ros2};
 use backdrive_nodes::transport::{Transport, TransportError};
 use serde_json::json;
 use std::error::Error;
@@ -23,14 +26,19 @@ const QUIET: Duration = Duration::from_secs(2);
 
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let words: Vec<&str> = arguments.iter().map(String::as_str).collect();
+    let mut words: Vec<&str> = arguments.iter().map(String::as_str).collect();
     let mut ros2 = Ros2::open(&Network::from_environment()?, "ros2_peer", Delivery::BestEffort)?;
+    if let ["as", file, ref rest @ ..] = words[..] {
+        ros2 = ros2.with_identity(Identity::read(file.as_ref())?);
+        words = rest.to_vec();
+    }
     match words[..] {
         ["listen", ref topics @ ..] if !topics.is_empty() => listen(&mut ros2, topics)?,
         ["speak", topic, count, hz] => speak(&mut ros2, topic, count.parse()?, hz.parse()?)?,
+        ["push", topic, effort, hz, seconds] => push(&mut ros2, topic, effort.parse()?, hz.parse()?, seconds.parse()?)?,
         ["ping", count, hz] => ping(&mut ros2, count.parse()?, hz.parse()?)?,
         ["echo"] => echo(&mut ros2)?,
-        _ => return Err("say listen, speak, ping or echo; the first lines of the source tell how".into()),
+        _ => return Err("say listen, speak, push, ping or echo; the first lines of the source tell how".into()),
     }
     Ok(())
 }
@@ -98,6 +106,21 @@ fn speak(ros2: &mut Ros2, topic: &str, count: u64, hz: f64) -> Result<(), Transp
     for i in 0..count {
         std::thread::sleep(Duration::from_secs_f64(i as f64 / hz).saturating_sub(begun.elapsed()));
         publisher.send(&sample(i))?;
+    }
+    println!("{{\"count\": {count}}}");
+    Ok(())
+}
+
+fn push(ros2: &mut Ros2, topic: &str, effort: f64, hz: f64, seconds: f64) -> Result<(), TransportError> {
+    let mut publisher = ros2.publisher(&samples(topic), 1)?;
+    println!("listening");
+    let (begun, mut count) = (Instant::now(), 0);
+    while begun.elapsed().as_secs_f64() < seconds {
+        let mut sample = Sample { step: count, sequence: count, stamp_ns: now_ns(), ..Sample::new(1) };
+        sample.effort[0] = effort;
+        publisher.send(&Message::Sample(sample))?;
+        count += 1;
+        std::thread::sleep(Duration::from_secs_f64(count as f64 / hz).saturating_sub(begun.elapsed()));
     }
     println!("{{\"count\": {count}}}");
     Ok(())

@@ -1,7 +1,8 @@
 //! `backdrive bridge`: a local graph over shared memory, seen and joined over ROS 2.
 //!
-//! What a node of this host speaks is put on ROS 2. What the graph's nodes on other hosts speak is taken from ROS 2 into
-//! shared memory, so that the nodes here need not know where the others are.
+//! What a node of this host speaks is put on ROS 2, and nothing is taken from there: the bridge may be listened to. Asked for with `--both-ways`, what the
+//! graph's nodes on other hosts speak is taken from ROS 2 into shared memory, so that the nodes here need not know where the others are; only what is
+//! tagged by the run's own hosts.
 
 use crate::cli;
 use crate::failure::{Failure, code};
@@ -56,7 +57,16 @@ pub fn bridge(options: &cli::Bridge) -> Result<u8, Failure> {
     let network = if place.host.is_some() { place.network.clone() } else { network(&options.network)? };
     let place = Place { network, ..place };
     let courier = if place.host.is_some() { None } else { Courier::start(&place.network).map_err(Failure::machine)? };
-    let (out, back) = crossings(&graph, place.host.as_deref());
+    let (out, mut back) = crossings(&graph, place.host.as_deref());
+    if !options.both_ways {
+        if !back.is_empty() {
+            output::note(format_args!(
+                "nothing is taken from ROS 2: {} topics of other hosts do not reach the nodes here; add --both-ways if they should",
+                back.len()
+            ));
+        }
+        back.clear();
+    }
     output::note(format_args!(
         "run {}: {} topics to ROS domain {}, {} from there",
         paths.id(),
@@ -68,11 +78,18 @@ pub fn bridge(options: &cli::Bridge) -> Result<u8, Failure> {
     let ended = || stop.load(Ordering::SeqCst) || !lives(&paths);
     let (out, back) = std::thread::scope(|scope| -> Result<_, TransportError> {
         let carry_out = scope.spawn(|| {
-            let (mut from, mut to) = (Iceoryx2::open(&paths.location(), "bridge_out")?, place.join_ros2(&graph, "bridge_out")?);
+            let (mut from, mut to) = (Iceoryx2::open(&paths.location(), "bridge_out")?, place.join_ros2(&paths, &graph, "bridge_out")?);
             carry(&mut from, &mut to, &out, &over)
         });
         let carry_back = scope.spawn(|| {
-            let (mut from, mut to) = (place.join_ros2(&graph, "bridge_in")?, Iceoryx2::open(&paths.location(), "bridge_in")?);
+            if back.is_empty() {
+                // It does not even listen.
+                while !over.load(Ordering::SeqCst) {
+                    std::thread::sleep(Duration::from_millis(20));
+                }
+                return Ok(Crossed::default());
+            }
+            let (mut from, mut to) = (place.join_ros2(&paths, &graph, "bridge_in")?, Iceoryx2::open(&paths.location(), "bridge_in")?);
             carry(&mut from, &mut to, &back, &over)
         });
         while !carry_out.is_finished() && !carry_back.is_finished() && !ended() {
@@ -173,6 +190,8 @@ fn carry(from: &mut dyn Transport, to: &mut dyn Transport, crossings: &[Crossing
                         count(&mut crossed, &mut lane.expected, &message);
                     }
                     Ok(None) => break,
+                    // The nodes here then lack their inputs: forces decay and the slave holds.
+                    Err(e @ TransportError::Stranger { moves: true, .. }) => return Err(e),
                     Err(e) => {
                         if lane.complained.is_none_or(|at| at.elapsed() >= Duration::from_secs(1)) {
                             lane.complained = Some(Instant::now());

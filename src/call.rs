@@ -5,8 +5,8 @@ use crate::caller::{Caller, Calling, taken};
 use crate::cli::{self, Cli, Command};
 use crate::failure::{Failure, code};
 use crate::{
-    bag, bridge, compare, diagnose, doctor, export, fit, graph, init, model, prove, replay, run, shell, simulate, stability, test_bench,
-    why,
+    bag, bridge, compare, diagnose, doctor, export, fit, graph, init, model, prove, replay, run, secret, shell, simulate, stability,
+    test_bench, why,
 };
 use clap::Parser;
 use std::sync::Arc;
@@ -79,6 +79,7 @@ pub(crate) fn dispatch(command: &Command) -> Result<u8, Failure> {
         Command::Model(command) => model::model(command),
         Command::Bag(command) => bag::bag(command),
         Command::Clean => run::clean(),
+        Command::Secret(options) => secret::secret(options),
         Command::Bridge(options) => bridge::bridge(options),
         Command::Doctor(options) => doctor::doctor(options),
         Command::Prove(options) => prove::prove(options),

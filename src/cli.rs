@@ -18,6 +18,7 @@ mod prove;
 mod replay;
 mod run;
 mod run_result;
+mod secret;
 mod shell;
 mod simulate;
 mod stability;
@@ -40,6 +41,7 @@ pub use node::{Node, SealedMaster};
 pub use prove::{Nominal, Operator, Prove};
 pub use replay::Replay;
 pub use run::Run;
+pub use secret::Secret;
 pub use shell::{Completions, Man};
 pub use simulate::Simulate;
 pub use stability::Stability;
@@ -54,7 +56,7 @@ use clap::{Parser, Subcommand};
 /// What is written is named alike in every verb: --bag a bag, --csv a table, --html a page, --out what else a verb makes (a model, a folder);
 /// --json prints the result for programs.
 /// Exit codes: 0 fine; 1 the finding is negative (not stable, bags differ); 2 usage; 3 bad input;
-/// 4 data was lost; 5 this machine does not let it (shared memory, disk, permission); 6 a node failed;
+/// 4 data was lost; 5 this machine or its network does not let it (shared memory, disk, permission, a stranger on the run's topics); 6 a node failed;
 /// 7 it cannot be told; 130 interrupted.
 #[derive(Debug, Parser)]
 #[command(name = "backdrive", version = env!("BACKDRIVE_VERSION"), propagate_version = true, arg_required_else_help = true)]
@@ -121,9 +123,12 @@ pub enum Command {
         after_help = "Example:\n  backdrive clean\n\nExit codes: 0 removed, or nothing to remove; 2 usage; 5 something could not be removed."
     )]
     Clean,
-    /// Put the topics of a local graph on ROS 2, and take what other hosts tell from there.
+    /// Put the topics of a local graph on ROS 2; nothing is taken from there, unless other hosts of the graph are asked for with --both-ways.
     #[command(after_help = bridge::HELP)]
     Bridge(Bridge),
+    /// Make the secret by which the hosts of a run know each other: copy it to each, and name it with `run --host NAME --secret FILE`.
+    #[command(after_help = secret::HELP)]
+    Secret(Secret),
     /// Say what of this machine would hurt a run: shared memory, real-time rights, timers, multicast, socket buffers.
     #[command(after_help = doctor::HELP)]
     Doctor(Doctor),

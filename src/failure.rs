@@ -121,7 +121,7 @@ impl From<LaunchError> for Failure {
             LaunchError::RunDir { .. } | LaunchError::SharedMemory { .. } | LaunchError::Runtime { .. } | LaunchError::Network { .. } => {
                 code::MACHINE
             }
-            LaunchError::NoNodes | LaunchError::Spawn { .. } => code::BAD_INPUT,
+            LaunchError::NoNodes | LaunchError::NoSecret | LaunchError::Spawn { .. } => code::BAD_INPUT,
             LaunchError::NodeFailed { code, .. } => *code,
             LaunchError::NotReady { .. } | LaunchError::DiedAtStart { .. } => code::NODE,
             LaunchError::Stopped { .. } => code::INTERRUPTED,

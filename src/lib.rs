@@ -34,6 +34,7 @@ pub mod recordings;
 mod replay;
 mod run;
 mod run_page;
+mod secret;
 mod set_checks;
 mod shell;
 mod simulate;

@@ -2,10 +2,11 @@
 
 use crate::cli;
 use crate::failure::Failure;
-use backdrive_launch::{Place, Wire};
+use backdrive_launch::{LaunchError, Place, Wire};
 use backdrive_nodes::graph::Graph;
 use backdrive_nodes::transport::ros2::{MAX_DOMAIN, Network};
 use std::net::{Ipv4Addr, ToSocketAddrs};
+use std::path::Path;
 
 /// The domain of `--domain` or `ROS_DOMAIN_ID`, and the interfaces and peers that are named.
 pub fn network(options: &cli::Network) -> Result<Network, Failure> {
@@ -41,7 +42,16 @@ fn address(name: &str) -> Result<Ipv4Addr, Failure> {
 }
 
 /// Where the nodes of a graph meet, on one of its hosts if one is named. Without a `wire`: shared memory on one host, else ROS 2.
-pub fn place(graph: &Graph, wire: Option<Wire>, host: Option<&str>, options: &cli::Network) -> Result<Place, Failure> {
+pub fn place(
+    graph: &Graph,
+    wire: Option<Wire>,
+    host: Option<&str>,
+    secret: Option<&Path>,
+    options: &cli::Network,
+) -> Result<Place, Failure> {
+    if secret.is_some() && host.is_none() {
+        return Err(Failure::input("--secret is what several hosts share; leave it out without --host"));
+    }
     let wire = match (wire, host) {
         (Some(Wire::Iceoryx2) | None, None) => return Ok(Place::default()),
         (Some(Wire::Iceoryx2), Some(_)) => Wire::Iceoryx2,
@@ -65,5 +75,10 @@ pub fn place(graph: &Graph, wire: Option<Wire>, host: Option<&str>, options: &cl
         }
         network.peers.extend(graph.hosts.iter().filter(|h| h.name != name).filter_map(|h| h.address));
     }
-    Ok(Place { wire, network, host: host.map(str::to_string), overwrite: false })
+    let secret = match (secret, host) {
+        (Some(path), _) => Some(backdrive_launch::secret::read(path).map_err(|e| Failure::input(format!("--secret: {e}")))?),
+        (None, Some(_)) => return Err(Failure::from(LaunchError::NoSecret)),
+        (None, None) => None,
+    };
+    Ok(Place { wire, network, host: host.map(str::to_string), secret, overwrite: false })
 }

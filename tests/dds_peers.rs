@@ -1,8 +1,11 @@
 //! CycloneDDS and Fast DDS on the other host: they hear every topic, they are heard, and how long a sample takes beside Cyclone to Cyclone.
+//! Then strangers on the domain of a run: another run, who speaks first, who breaks in, and who plays a recording.
 
 mod netns;
 
 use backdrive_bags::Reader;
+use backdrive_msgs::Message;
+use backdrive_nodes::transport::ros2::{Key, Known, Member};
 use netns::Hosts;
 use netns::skipped::skipped;
 use serde_json::Value;
@@ -11,6 +14,7 @@ use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::sync::OnceLock;
+use std::time::{Duration, Instant};
 
 const DOMAIN: &str = "7";
 const OTHER_DOMAIN: &str = "8";
@@ -203,7 +207,27 @@ fn a_sample_takes_about_as_long_as_between_cyclones() {
     let Some(hosts) = Hosts::joined() else { return };
     let count = if std::env::var("BACKDRIVE_LONG").as_deref() == Ok("1") { "10000" } else { "2000" };
     let ping = ["ping", count, "1000"];
+    // As nodes of one run do it.
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("identity.json");
+    let own = Member { run: "a1".to_string(), key: Key::fresh().unwrap() };
+    Known { own, several: false, others: Vec::new() }.write(&file).unwrap();
+    let tagged = |words: &[&str]| [&["as", file.to_str().unwrap()], words].concat();
     let mut table = Vec::new();
+    // One after the other, twice: what the machine does besides meets both.
+    for round in 0..2 {
+        for (name, ping, echo) in
+            [("backdrive, no tags", ping.to_vec(), vec!["echo"]), ("backdrive, tagged", tagged(&ping), tagged(&["echo"]))]
+        {
+            let mut echo = listening(ours(&hosts, 1, &echo));
+            let result = told(ours(&hosts, 0, &ping).stdout(Stdio::piped()).spawn().unwrap());
+            let _ = echo.kill();
+            let _ = echo.wait();
+            eprintln!("{round}: {name:<21} one way {} us, round trip {} us", result["one_way_us"], result["round_trip_us"]);
+            let (count, sent) = (result["count"].as_f64().unwrap(), result["sent"].as_f64().unwrap());
+            assert!(count >= 0.99 * sent, "{name}: {count} of {sent} came back");
+        }
+    }
     for (name, ours_asks, ours_echoes) in
         [("backdrive - backdrive", true, true), ("cyclone - cyclone", false, false), ("backdrive - cyclone", true, false)]
     {
@@ -227,4 +251,130 @@ fn a_sample_takes_about_as_long_as_between_cyclones() {
     // A shared machine decides the figures; that all arrive on a cable is ours.
     let (count, sent) = (table[0]["count"].as_f64().unwrap(), table[0]["sent"].as_f64().unwrap());
     assert!(count >= 0.99 * sent, "{count} of {sent} came back");
+}
+
+/// The topic that brings the master its force.
+const FORCE: &str = "/master/servo_jf";
+
+/// The contact task in real time over ROS 2.
+fn contact(hosts: &Hosts, host: usize, folder: &Path, bag: &str, more: &[&str]) -> Child {
+    let mut run = hosts.on(host, env!("CARGO_BIN_EXE_backdrive"));
+    run.arg("run").arg(Path::new(env!("CARGO_MANIFEST_DIR")).join("launch/contact.toml"));
+    run.args(["--transport", "ros2", "--clock", "realtime", "--rate", "200", "--json"]).args(more);
+    run.arg("--bag").arg(folder.join(bag)).env("TMPDIR", folder).env("ROS_DOMAIN_ID", DOMAIN);
+    run.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap()
+}
+
+/// How a run ended: its exit code, what it said, and its result.
+fn ended(run: Child) -> (Option<i32>, String, Value) {
+    let output = run.wait_with_output().unwrap();
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    let result = serde_json::from_str(text.lines().last().unwrap_or_default()).unwrap_or(Value::Null);
+    (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned(), result)
+}
+
+fn until_it_records(folder: &Path, bag: &str) {
+    let begun = Instant::now();
+    while std::fs::metadata(folder.join(bag)).map_or(0, |m| m.len()) < 100_000 {
+        assert!(begun.elapsed() < Duration::from_secs(60), "nothing is recorded");
+        std::thread::sleep(Duration::from_millis(20));
+    }
+}
+
+/// Largest force that the master was given, and the largest that its own graph made of what the slave touched, N; and the events of strangers.
+fn forces(folder: &Path, bag: &str) -> (f64, f64, Vec<(String, f64)>) {
+    let reader = Reader::open(&folder.join(bag)).unwrap();
+    let (mut given, mut touched, mut strangers) = (0.0_f64, 0.0_f64, Vec::new());
+    for entry in reader.messages().unwrap().map(|e| e.unwrap()) {
+        match (entry.topic.name.as_str(), entry.message(reader.path()).unwrap()) {
+            (FORCE, Some(Message::Sample(s))) => given = given.max(s.effort[0].abs()),
+            ("/slave/measured_js", Some(Message::Sample(s))) => touched = touched.max(s.effort[0].abs()),
+            (_, Some(Message::Event(e))) if e.kind.as_str() == "stranger" => strangers.push((e.text.as_str().to_string(), e.value)),
+            _ => {}
+        }
+    }
+    (given, 0.3 * touched, strangers)
+}
+
+/// Whether a run ended because of a stranger on a topic, and nothing of it reached the master.
+fn assert_ended_by(who: &str, (code, told, result): (Option<i32>, String, Value), folder: &Path, bag: &str) {
+    assert_eq!(code, Some(5), "{told}\n{result}");
+    assert!(told.contains(&format!("{FORCE}: {who}")), "{told}");
+    assert!(result["refused"].as_u64().unwrap() > 0 && result["run"]["cause"].to_string().contains("tranger"), "{result}");
+    let (given, own, strangers) = forces(folder, bag);
+    assert!(given <= own + 0.05 && given < 8.0, "the master was given {given} N, {own} N were its own");
+    assert!(strangers.iter().any(|(text, count)| text.contains(who) && *count >= 1.0), "{strangers:?}");
+}
+
+#[test]
+fn two_runs_in_one_domain_do_not_feel_each_other() {
+    let Some(hosts) = Hosts::joined() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let first = contact(&hosts, 0, folder.path(), "a.mcap", &["--duration", "6"]);
+    until_it_records(folder.path(), "a.mcap");
+    // On another host, and on the same one.
+    for host in [1, 0] {
+        let (code, told, _) = ended(contact(&hosts, host, folder.path(), "b.mcap", &["--duration", "4", "--lambda", "0.1", "--overwrite"]));
+        assert_eq!(code, Some(5), "{told}");
+        assert!(told.contains("speaks here too") && told.contains("another ROS domain"), "{told}");
+    }
+    let (code, told, result) = ended(first);
+    // 7: too many samples came late for a judgement, which is not what is asked here.
+    assert!(matches!(code, Some(0 | 7)), "{told}\n{result}");
+    assert_eq!(result["refused"].as_u64(), Some(0), "{told}");
+    let (given, own, _) = forces(folder.path(), "a.mcap");
+    assert!(given > 0.5 && given <= own + 0.05, "{given} N of {own} N");
+}
+
+#[test]
+fn who_speaks_first_on_a_topic_has_nothing_of_it() {
+    let Some(hosts) = Hosts::joined() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let push = ["push", FORCE, "8", "200", "60"];
+    let mut strangers = vec![ours(&hosts, 1, &push)];
+    strangers.extend(python().map(|python| cyclone(&hosts, 1, &python, &push)));
+    for stranger in strangers {
+        let mut stranger = listening(stranger);
+        let (code, told, _) = ended(contact(&hosts, 0, folder.path(), "run.mcap", &["--duration", "4", "--overwrite"]));
+        let _ = stranger.kill();
+        let _ = stranger.wait();
+        assert_eq!(code, Some(5), "{told}");
+        assert!(told.contains(&format!("{FORCE}: a stranger speaks here (GID ")), "{told}");
+    }
+}
+
+#[test]
+fn who_breaks_in_is_refused_and_ends_the_run() {
+    let Some(hosts) = Hosts::joined() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let push = ["push", FORCE, "8", "200", "20"];
+    let mut strangers = vec![("a.mcap", ours(&hosts, 1, &push))];
+    strangers.extend(python().map(|python| ("b.mcap", cyclone(&hosts, 1, &python, &push))));
+    for (bag, stranger) in strangers {
+        let run = contact(&hosts, 0, folder.path(), bag, &["--duration", "30"]);
+        until_it_records(folder.path(), bag);
+        let mut stranger = listening(stranger);
+        let begun = Instant::now();
+        let end = ended(run);
+        assert!(begun.elapsed() < Duration::from_secs(20), "the run went on");
+        let _ = stranger.kill();
+        let _ = stranger.wait();
+        assert_ended_by("a stranger speaks here (GID ", end, folder.path(), bag);
+    }
+}
+
+#[test]
+fn a_recording_of_a_run_moves_nothing_in_it_and_nothing_in_the_next() {
+    let Some(python) = python() else { return };
+    let Some(hosts) = Hosts::joined() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let mut stranger = listening(cyclone(&hosts, 1, &python, &["replay", FORCE, "40"]));
+    let run = contact(&hosts, 0, folder.path(), "a.mcap", &["--duration", "30"]);
+    assert_ended_by("a stranger plays a recording (GID ", ended(run), folder.path(), "a.mcap");
+    // It plays on.
+    let (code, told, _) = ended(contact(&hosts, 0, folder.path(), "b.mcap", &["--duration", "4"]));
+    let _ = stranger.kill();
+    let _ = stranger.wait();
+    assert_eq!(code, Some(5), "{told}");
+    assert!(told.contains(FORCE) && told.contains("speaks here too"), "{told}");
 }

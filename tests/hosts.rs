@@ -7,8 +7,9 @@ use backdrive_msgs::Message;
 use netns::skipped::skipped;
 use netns::{ADDRESSES, Hosts, Link};
 use serde_json::Value;
-use std::io::Read;
+use std::io::{Read, Write};
 use std::ops::{Deref, DerefMut};
+use std::os::unix::fs::OpenOptionsExt;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
@@ -58,10 +59,30 @@ impl Drop for Running {
     }
 }
 
+/// What the hosts know each other by, for its user alone.
+fn secret(folder: &Path, digits: &str) -> PathBuf {
+    let path = folder.join(format!("{digits}.secret"));
+    let mut file = std::fs::OpenOptions::new().write(true).create(true).truncate(true).mode(0o600).open(&path).unwrap();
+    file.write_all(digits.repeat(64 / digits.len()).as_bytes()).unwrap();
+    path
+}
+
 /// `backdrive run` on one of the hosts.
 fn run_on(hosts: &Hosts, host: usize, folder: &Path, more: &[&str]) -> Running {
+    run_with(hosts, host, folder, "a1", more)
+}
+
+/// The same with a secret of these digits.
+fn run_with(hosts: &Hosts, host: usize, folder: &Path, digits: &str, more: &[&str]) -> Running {
     let mut command = hosts.on(host, env!("CARGO_BIN_EXE_backdrive"));
-    command.arg("run").arg(graph()).args(["--host", HOSTS[host], "--json", "--bag"]).arg(folder.join("run.mcap")).args(more);
+    command
+        .arg("run")
+        .arg(graph())
+        .arg("--secret")
+        .arg(secret(folder, digits))
+        .args(["--host", HOSTS[host], "--json", "--bag"])
+        .arg(folder.join("run.mcap"))
+        .args(more);
     command.env_remove("ROS_DOMAIN_ID").env("TMPDIR", folder);
     spawn(command)
 }
@@ -340,30 +361,37 @@ fn until_running(folder: &Path) {
 }
 
 #[test]
-fn a_stopped_slave_and_a_second_master_do_no_harm() {
+fn a_stopped_slave_does_no_harm_and_a_second_master_ends_the_run_on_both_hosts() {
     one_of_three(|| {
         let Some(hosts) = Hosts::joined() else { return };
         let folder = tempfile::tempdir().unwrap();
-        let seconds = if is_long() { "25" } else { "14" };
-        let runs = [0, 1].map(|host| run_on(&hosts, host, folder.path(), &["--duration", seconds]));
+        let runs = [0, 1].map(|host| run_on(&hosts, host, folder.path(), &["--duration", "60"]));
         until_running(folder.path());
-        // Somebody else commands the slave too, with a command of its own.
-        let mut other =
-            hosts.on(0, common_peer()).args(["speak", "/slave/servo_jp", "1500", "1000"]).env("ROS_DOMAIN_ID", "0").spawn().unwrap();
-        other.wait().unwrap();
         let slave = until(|| pid_of(folder.path(), "slave"));
         Command::new("kill").args(["-STOP", &slave]).status().unwrap();
         std::thread::sleep(Duration::from_millis(1000));
         Command::new("kill").args(["-CONT", &slave]).status().unwrap();
-        for (host, run) in runs.into_iter().enumerate() {
-            let (_, _, told) = end(run, Duration::from_secs(120));
+        // The slave's middleware begins again.
+        std::thread::sleep(Duration::from_millis(6000));
+        // Somebody else commands the slave too, with a command of its own.
+        let mut other =
+            hosts.on(0, common_peer()).args(["speak", "/slave/servo_jp", "1500", "1000"]).env("ROS_DOMAIN_ID", "0").spawn().unwrap();
+        let ended = runs.map(|run| end(run, Duration::from_secs(120)));
+        let _ = other.kill();
+        other.wait().unwrap();
+        for (host, (report, code, told)) in ended.into_iter().enumerate() {
             let all = events(&bag(folder.path(), host));
-            let has = |kind: &str, text: &str| all.iter().any(|(k, t, _)| k == kind && t.contains(text));
-            assert!(has("connection_broken", "another publisher"), "{}: {all:?}\n{told}", HOSTS[host]);
-            assert!(has("force_stale", "") && has("force_back", ""), "{}: {all:?}\n{told}", HOSTS[host]);
+            let has = |kind: &str| all.iter().any(|(k, ..)| k == kind);
+            assert!(has("force_stale") && has("force_back"), "{}: {all:?}\n{told}", HOSTS[host]);
+            assert_eq!(code, Some(5), "{}: {report} {told}", HOSTS[host]);
+            assert!(report["refused"].as_u64().unwrap() > 0, "{}: {report}", HOSTS[host]);
+            assert!(told.contains("/slave/servo_jp: a stranger speaks here (GID "), "{}: {told}", HOSTS[host]);
         }
-        // The second master's commands stand at 0.1 m: none was obeyed.
+        // The slave's node says it in its own host's bag.
         let bag = bag(folder.path(), 1);
+        let all = events(&bag);
+        assert!(all.iter().any(|(kind, text, count)| kind == "stranger" && text.contains("/slave/servo_jp") && *count >= 1.0), "{all:?}");
+        // The second master's commands stand at 0.1 m: none was obeyed.
         let far = bag
             .messages()
             .unwrap()
@@ -372,6 +400,26 @@ fn a_stopped_slave_and_a_second_master_do_no_harm() {
             .any(|e| matches!(e.message(bag.path()).unwrap(), Some(Message::Sample(s)) if s.position[0] > 0.05));
         assert!(!far, "the slave went where the second master wanted it");
     });
+}
+
+#[test]
+fn hosts_without_the_same_secret_do_not_hear_each_other() {
+    let Some(hosts) = Hosts::joined_at_leisure() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let runs = [0, 1].map(|host| run_with(&hosts, host, folder.path(), ["a1", "b2"][host], &["--duration", "1"]));
+    std::thread::sleep(Duration::from_secs(if is_long() { 20 } else { 8 }));
+    for (host, run) in runs.into_iter().enumerate() {
+        Command::new("kill").args(["-INT", &run.id().to_string()]).status().unwrap();
+        let (_, code, told) = end(run, Duration::from_secs(30));
+        assert_eq!(code, Some(130), "{told}");
+        assert!(told.contains("does not have") && told.contains("secret"), "{}: {told}", HOSTS[host]);
+    }
+    // And without any there is no beginning.
+    let mut without = hosts.on(0, env!("CARGO_BIN_EXE_backdrive"));
+    without.arg("run").arg(graph()).args(["--host", "desk"]).env("TMPDIR", folder.path());
+    let done = without.output().unwrap();
+    let told = String::from_utf8_lossy(&done.stderr).into_owned();
+    assert!(done.status.code() == Some(3) && told.contains("backdrive secret run.secret") && told.contains("--secret"), "{told}");
 }
 
 /// The example that is a ROS 2 node of its own.
@@ -425,7 +473,9 @@ fn a_wall_clock_that_is_stepped_by_a_minute_stops_nobody() {
             .arg("run")
             .arg(graph())
             .args(["--host", "robot", "--json", "--duration", &duration, "--bag"])
-            .arg(folder.path().join("run.mcap"));
+            .arg(folder.path().join("run.mcap"))
+            .arg("--secret")
+            .arg(secret(folder.path(), "a1"));
         robot.env_remove("ROS_DOMAIN_ID").env("TMPDIR", folder.path()).env("LD_PRELOAD", &library).env("OFFSET_FILE", &offset);
         let robot = spawn(robot);
         until_running(folder.path());
@@ -506,7 +556,7 @@ fn a_host_over_shared_memory_joins_the_others_by_its_bridge() {
                 .find(|run| run.path().join("pids").exists())
         });
         let mut bridge = hosts.on(0, env!("CARGO_BIN_EXE_backdrive"));
-        bridge.args(["bridge", "--json"]).env_remove("ROS_DOMAIN_ID").env("TMPDIR", &folders[0]);
+        bridge.args(["bridge", "--both-ways", "--json"]).env_remove("ROS_DOMAIN_ID").env("TMPDIR", &folders[0]);
         let bridge = spawn(bridge);
         let desk = end(desk, Duration::from_secs(60));
         let robot = end(robot, Duration::from_secs(60));
@@ -529,7 +579,7 @@ fn the_doctor_finds_an_interface_without_multicast() {
         let output = hosts.on(0, env!("CARGO_BIN_EXE_backdrive")).args(["doctor", "--listen", "0", "--json"]).output().unwrap();
         let findings: Value = serde_json::from_slice(&output.stdout).unwrap();
         let parts: Vec<&str> = findings.as_array().unwrap().iter().map(|f| f["part"].as_str().unwrap()).collect();
-        for part in ["shared memory", "real-time", "timers", "timer slack", "interfaces", "socket buffers", "domain"] {
+        for part in ["shared memory", "real-time", "timers", "timer slack", "interfaces", "socket buffers", "domain", "strangers"] {
             assert!(parts.contains(&part), "{part}: {parts:?}");
         }
         let multicast = findings.as_array().unwrap().iter().find(|f| f["part"] == "multicast").unwrap().clone();

@@ -80,6 +80,11 @@ pub enum LaunchError {
         /// What the network says.
         reason: String,
     },
+    /// The hosts of a run have nothing to know each other by.
+    #[error(
+        "hosts know each other by a shared secret: make one with `backdrive secret run.secret`, copy it to each host, and add --secret run.secret"
+    )]
+    NoSecret,
     /// Stopped before the run began.
     #[error("stopped by {by} before the run began")]
     Stopped {

@@ -5,6 +5,7 @@
 //! - `rundir`: the directory of a run; `sweep`: removing what dead runs have left
 //! - `child`: one process, heard and ended; `slot`: the place of a node in a run, over all its lives
 //! - `supervise`: starting and ending a run; `watch`: what happens between
+//! - `session`: who a run is on the network; `secret`: what its hosts share
 //! - `hosts`: a run on several hosts starts together; `place`: where its nodes meet
 //! - `status`, `screen`: what a person sees meanwhile
 //! - `report`: what is known afterwards
@@ -32,6 +33,8 @@ mod remains;
 mod report;
 mod rundir;
 mod screen;
+pub mod secret;
+mod session;
 mod signals;
 mod slot;
 mod status;

@@ -13,8 +13,8 @@ const PEAKS: usize = 32;
 pub(crate) struct Member {
     pub node: Named,
     pub status: Option<NodeStatus>,
-    /// Missed deadlines and losses of former lives.
-    pub before: (u64, u64),
+    /// Missed deadlines, losses and refusals of former lives.
+    pub before: (u64, u64, u64),
     pub peak: f64,
     peaks: VecDeque<(Instant, f64)>,
 }
@@ -27,7 +27,7 @@ impl Member {
     /// A new process begins to count from 0.
     pub fn begin(&mut self) {
         if let Some(status) = &self.status {
-            self.before = (status.missed_deadlines, status.lost);
+            self.before = (status.missed_deadlines, status.lost, status.refused);
         }
     }
 
@@ -35,6 +35,7 @@ impl Member {
     pub fn take_status(&mut self, mut status: NodeStatus, now: Instant) -> bool {
         status.missed_deadlines += self.before.0;
         status.lost += self.before.1;
+        status.refused += self.before.2;
         let steps = self.status.as_ref().map_or(0, |s| s.steps);
         let recorded = self.status.as_ref().and_then(|s| s.recorded);
         let further = status.steps > steps || (status.recorded.is_some() && status.recorded != recorded);

@@ -46,6 +46,11 @@ impl RunPaths {
         self.root.join(PLACE)
     }
 
+    /// Who the run is on the network: only its user can read it.
+    pub fn identity(&self) -> PathBuf {
+        self.root.join(IDENTITY)
+    }
+
     /// What the names of the run's files in shared memory begin with.
     pub fn prefix(&self) -> String {
         prefix_of(&self.id)
@@ -69,6 +74,8 @@ pub(crate) fn is_id(name: &str) -> bool {
 pub(crate) const GRAPH: &str = "graph.toml";
 
 pub(crate) const PLACE: &str = "place.json";
+
+pub(crate) const IDENTITY: &str = "identity.json";
 
 pub(crate) const MIDDLEWARE: &str = "middleware";
 

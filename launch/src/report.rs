@@ -33,6 +33,9 @@ pub struct RunReport {
     pub loop_p50_us: Option<f64>,
     /// The same, 99th percentile, µs.
     pub loop_p99_us: Option<f64>,
+    /// Messages that a node or the recorder refused because their sender is not of the run; one message may be refused by several.
+    #[serde(default)]
+    pub refused: u64,
     /// Steps that ended after their deadline, over all nodes.
     pub missed_deadlines: u64,
     /// The node that missed most of them, if one missed any, and how many.
@@ -148,6 +151,13 @@ pub enum Cause {
         /// Such as `was killed by signal 11 (SIGSEGV)`.
         how: String,
     },
+    /// Somebody who is not of the run sent on one of its topics that move something.
+    Stranger {
+        /// The node that refused it.
+        node: String,
+        /// Who it is, as far as it is known, and where.
+        text: String,
+    },
     /// A node said that it cannot go on.
     NodeFailed {
         /// Name of the node.
@@ -172,6 +182,7 @@ impl std::fmt::Display for Cause {
             Cause::Completed => write!(f, "completed"),
             Cause::EndedEarly { node, steps } => write!(f, "node `{node}` ended by itself after {steps} steps"),
             Cause::Stopped { by } => write!(f, "stopped by {by}"),
+            Cause::Stranger { node, text } => write!(f, "a stranger on the network, refused by `{node}`: {text}"),
             Cause::NodeDied { node, how } => write!(f, "node `{node}` {how}"),
             Cause::NodeFailed { node, error, .. } => write!(f, "node `{node}`: {error}"),
         }

@@ -4,6 +4,7 @@
 //! <tmp>/backdrive-<uid>/<id>/
 //!     graph.toml         the graph as every process of the run reads it
 //!     place.json         where its nodes meet, if that is not shared memory alone
+//!     identity.json      the key of its messages on the network, and those of the other hosts; for its user only
 //!     supervisor.lock    locked for as long as the supervisor lives
 //!     processes.lock     locked, shared, by each process of the run
 //!     pids               who was started, for the case that the supervisor is killed
@@ -21,6 +22,7 @@ use crate::paths::MIDDLEWARE;
 use crate::paths::RunPaths;
 use crate::paths::failed;
 use crate::remains::{remove_file, remove_run, shm_files, start_time};
+use backdrive_nodes::transport::ros2::Known;
 use nix::errno::Errno;
 use nix::fcntl::{Flock, FlockArg};
 use std::fs::{DirBuilder, File, OpenOptions};
@@ -203,6 +205,15 @@ impl RunDir {
         let path = self.paths.place();
         let text = serde_json::to_string(place).unwrap_or_default();
         std::fs::write(&path, text).map_err(|e| failed(&path, "write it", e, "check that there is room and that you may write there"))
+    }
+
+    /// Tells the processes of the run who they are on the network.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub(crate) fn tell_identity(&self, known: &Known) -> Result<(), LaunchError> {
+        let path = self.paths.identity();
+        known.write(&path).map_err(|e| failed(&path, "write it", e, "check that there is room and that you may write there"))
     }
 
     /// Notes a process of the run, so that it can be ended should it outlive the supervisor.

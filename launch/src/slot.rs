@@ -193,7 +193,7 @@ mod tests {
         let now = Instant::now();
         let mut slot = Slot::new(NodePlan::default(), now);
         slot.take_status(None, NodeStatus { steps: 90, lost: 2, missed_deadlines: 1, peak_effort: 5.0, ..NodeStatus::default() }, now);
-        slot.members[0].before = (1, 2);
+        slot.members[0].before = (1, 2, 0);
         slot.take_status(None, NodeStatus { steps: 10, lost: 4, peak_effort: 3.0, ..NodeStatus::default() }, now);
         let status = slot.members[0].status.unwrap_or_default();
         assert_eq!((status.steps, status.lost, status.missed_deadlines, status.peak_effort), (90, 6, 1, 5.0));

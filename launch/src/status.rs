@@ -25,6 +25,8 @@ pub struct Summary {
     pub loop_p99_us: Option<f64>,
     /// Samples and messages lost, at all nodes and the recorder.
     pub lost: u64,
+    /// Messages refused because their sender is not of the run.
+    pub refused: u64,
     /// Steps that ended after their deadline.
     pub missed_deadlines: u64,
     /// Largest magnitude of effort in the last second, N.
@@ -63,6 +65,9 @@ impl Summary {
         if let Some(p50) = self.loop_p50_us {
             let p99 = self.loop_p99_us.map(|v| format!(" p99 {}", micros(v))).unwrap_or_default();
             parts.push(format!("loop p50 {}{p99}", micros(p50)));
+        }
+        if self.refused > 0 {
+            parts.push(format!("STRANGER: {} messages refused", self.refused));
         }
         parts.push(format!("lost {}", self.lost));
         if self.realtime {
@@ -170,6 +175,8 @@ mod tests {
         assert_eq!(summary.plain(), format!("4.2 s, 42 %, 5.8 s left: {}", summary.line()));
         summary.dead.push("slave".to_string());
         assert!(summary.line().starts_with("DEAD: slave, "));
+        summary.refused = 12;
+        assert!(summary.line().contains(", STRANGER: 12 messages refused, lost 0"), "{}", summary.line());
         summary.planned = None;
         assert!(summary.plain().starts_with("4.2 s: DEAD"));
     }

@@ -6,6 +6,7 @@ use crate::place::Place;
 use crate::plan::Plan;
 use crate::report::RunReport;
 use crate::screen::{Display, Screen};
+use crate::session::Session;
 use crate::signals::Signals;
 use crate::watch::Supervisor;
 use backdrive_nodes::graph::Graph;
@@ -70,6 +71,8 @@ pub async fn supervise_plan(mut plan: Plan, mut options: SuperviseOptions) -> Re
     if plan.place != Place::default() {
         directory.tell_place(&plan.place)?;
     }
+    let session = Session::begin(&plan, directory.paths())?;
+    directory.tell_identity(&session.known)?;
     let commands = options.commands.take();
-    Supervisor::new(plan, options, directory, screen).run(signals, commands).await
+    Supervisor::new(plan, options, directory, screen, session).run(signals, commands).await
 }

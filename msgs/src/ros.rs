@@ -10,7 +10,9 @@
 //! Every payload is a 4-byte encapsulation header, `00 01 00 00`, and little-endian CDR.
 
 mod facts;
+mod frame;
 pub mod live;
+pub mod mark;
 mod twins;
 
 pub use facts::{Facts, RosError};

@@ -50,6 +50,16 @@ impl Input {
         self.subscriber.has_publisher()
     }
 
+    /// Messages whose sender is not of the run.
+    pub fn refused(&self) -> u64 {
+        self.subscriber.refused()
+    }
+
+    /// Who else sends on the topic before the start.
+    pub fn stranger(&mut self) -> Option<TransportError> {
+        self.subscriber.stranger()
+    }
+
     /// The graph has been running: whatever sequence number comes first is not a loss.
     pub fn join_late(&mut self) {
         self.expected = None;

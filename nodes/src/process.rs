@@ -51,7 +51,7 @@ pub fn run_processes(plans: Vec<NodePlan>, timing: &Timing, transport: Box<dyn T
     let timing = timing.clone();
     line.supervised(|line| {
         let mut runner = Runner::together(plans, &timing, transport, options.run)?;
-        let Some(start) = line.meet(|| runner.missing()) else {
+        let Some(start) = line.meet(|| runner.check_alone().map(|()| runner.missing()))? else {
             return Ok(NodeStatus::default());
         };
         let mut tell = |told| line.tell(told);
@@ -135,12 +135,15 @@ impl Line {
     }
 
     /// Says `created`, then `ready` once nothing is missing, and waits for the start. `None` when stopped before.
-    pub fn meet(&self, mut missing: impl FnMut() -> Vec<String>) -> Option<Start> {
+    ///
+    /// # Errors
+    /// Those of `missing`, which is asked until the start.
+    pub fn meet(&self, mut missing: impl FnMut() -> Result<Vec<String>, RunError>) -> Result<Option<Start>, RunError> {
         self.say(FromNode::Created);
         let (mut complained, mut ready) = (Instant::now(), false);
         loop {
+            let lacks = missing()?;
             if !ready {
-                let lacks = missing();
                 ready = lacks.is_empty();
                 if ready {
                     self.say(FromNode::Ready);
@@ -150,12 +153,12 @@ impl Line {
                 }
             }
             if self.control.is_stopped() {
-                return None;
+                return Ok(None);
             }
             match self.start.recv_timeout(Duration::from_millis(if ready { 20 } else { 2 })) {
-                Ok(start) => return Some(start),
+                Ok(start) => return Ok(Some(start)),
                 Err(RecvTimeoutError::Timeout) => {}
-                Err(RecvTimeoutError::Disconnected) => return None,
+                Err(RecvTimeoutError::Disconnected) => return Ok(None),
             }
         }
     }

@@ -6,6 +6,9 @@ use backdrive_msgs::{Margin, margin, measured};
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
+/// Kind of the event that somebody who is not of the run sends on one of its topics. Where that topic moves something, as severity 2 says, the run ends.
+pub const STRANGER: &str = "stranger";
+
 /// From the supervisor to a node.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "say", rename_all = "snake_case")]
@@ -86,6 +89,9 @@ pub struct NodeStatus {
     pub missed_deadlines: u64,
     /// Samples found missing by sequence number, over all inputs.
     pub lost: u64,
+    /// Messages refused because their sender is not of the run, over all inputs.
+    #[serde(default)]
+    pub refused: u64,
     /// Time for one step, waiting for inputs included, median, µs.
     pub loop_p50_us: f64,
     /// 99th percentile, µs.

@@ -7,7 +7,7 @@
 
 use crate::clock::{Start, now_ns};
 use crate::process::{GRACE, Line};
-use crate::protocol::NodeStatus;
+use crate::protocol::{NodeStatus, STRANGER};
 use crate::runner::{RunError, Told};
 use crate::sentences::sentence;
 use crate::stage::{Clock, Timing};
@@ -149,6 +149,14 @@ impl RunningRecorder {
         })
     }
 
+    /// Refuses to begin where somebody else sends on one of the topics.
+    ///
+    /// # Errors
+    /// Somebody does.
+    pub fn check_alone(&mut self) -> Result<(), RunError> {
+        self.heard.iter_mut().find_map(|h| h.subscriber.stranger()).map_or(Ok(()), |e| Err(RunError::Taken(e)))
+    }
+
     /// What it still lacks before a run can start, one line each.
     pub fn missing(&self) -> Vec<String> {
         let silent = self.heard.iter().filter(|h| !h.subscriber.has_publisher());
@@ -177,7 +185,8 @@ impl RunningRecorder {
                 let message = match heard.subscriber.receive() {
                     Ok(Some(message)) => message,
                     Ok(None) => break,
-                    Err(e) if self.clock == Clock::Realtime => {
+                    // A stranger's message is none of the run's, and takes nothing from them.
+                    Err(e) if self.clock == Clock::Realtime || matches!(e, TransportError::Stranger { .. }) => {
                         self.broken = Some(e);
                         break;
                     }
@@ -243,7 +252,8 @@ impl RunningRecorder {
 
     fn report(&self) -> NodeStatus {
         let (written, bytes, lost) = self.sink.health();
-        NodeStatus { steps: self.steps(), lost, recorded: Some((written, bytes)), ..NodeStatus::default() }
+        let refused = self.heard.iter().map(|h| h.subscriber.refused()).sum();
+        NodeStatus { steps: self.steps(), lost, refused, recorded: Some((written, bytes)), ..NodeStatus::default() }
     }
 
     /// Takes over until every topic has reached the last of `steps`, or `stopped` says so; then what is still
@@ -269,7 +279,13 @@ impl RunningRecorder {
                 lost_before = lost;
             }
             if let Some(error) = self.broken.take() {
-                tell(Told::Event(self.event("connection_broken", backdrive_msgs::NOT_MEASURED, Text::new(&error.to_string()))));
+                let text = Text::new(&error.to_string());
+                tell(Told::Event(match error {
+                    TransportError::Stranger { refused, moves, .. } => {
+                        Event { severity: 1 + u32::from(moves), ..self.event(STRANGER, refused as f64, text) }
+                    }
+                    _ => self.event("connection_broken", backdrive_msgs::NOT_MEASURED, text),
+                }));
             }
             if reported.elapsed() >= Duration::from_millis(100) {
                 reported = Instant::now();
@@ -318,7 +334,7 @@ impl RunningRecorder {
 pub fn run_recorder(plan: &RecorderPlan, timing: &Timing, transport: Box<dyn Transport>, sink: Box<dyn Sink>) -> ExitCode {
     Line::open(GRACE, Vec::new()).supervised(|line| {
         let mut recorder = RunningRecorder::new(plan, timing, transport, sink)?;
-        let Some(start) = line.meet(|| recorder.missing()) else {
+        let Some(start) = line.meet(|| recorder.check_alone().map(|()| recorder.missing()))? else {
             return recorder.finish();
         };
         recorder.run(start, timing.steps, || line.control.is_stopped(), &mut |told| line.tell(told))?;

@@ -6,7 +6,7 @@ use backdrive_msgs::{Event, Gains, LAYOUT, Message, NOT_MEASURED, Sample, Status
 use backdrive_nodes::clock::now_ns;
 use backdrive_nodes::transport::iceoryx2::Iceoryx2;
 use backdrive_nodes::transport::inproc::Hub;
-use backdrive_nodes::transport::ros2::{Delivery, Network, Ros2};
+use backdrive_nodes::transport::ros2::{Delivery, Identity, Key, Known, Member, Network, Ros2};
 use backdrive_nodes::transport::{Location, Publisher, Subscriber, Transport, TransportError};
 use std::path::Path;
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -61,20 +61,26 @@ impl Drop for SharedMemory {
     }
 }
 
-/// A domain of its own, among those whose ports no other program is given.
-struct Domain(Network);
+/// A run in a domain of its own, among those whose ports no other program is given.
+struct Domain(Network, Identity);
+
+/// Who a run of this name is, with a key that no other has.
+fn identity(run: &str) -> Identity {
+    let own = Member { run: run.to_string(), key: Key::fresh().unwrap() };
+    Identity::new(&Known { own, several: false, others: Vec::new() }).unwrap()
+}
 
 impl Domain {
     fn new() -> Domain {
         static COUNT: AtomicU32 = AtomicU32::new(0);
         let domain = 10 + (std::process::id() + COUNT.fetch_add(1, Ordering::Relaxed)) % 90;
-        Domain(Network { domain: domain as u16, ..Network::default() })
+        Domain(Network { domain: domain as u16, ..Network::default() }, identity("a1"))
     }
 }
 
 impl World for Domain {
     fn join(&self, name: &str) -> Box<dyn Transport> {
-        Box::new(Ros2::open(&self.0, name, Delivery::Reliable).unwrap())
+        Box::new(Ros2::open(&self.0, name, Delivery::Reliable).unwrap().with_identity(self.1.clone()))
     }
 
     fn patience(&self) -> Duration {
@@ -561,5 +567,73 @@ mod killed {
         }
         transport.sweep();
         assert!(!receiver.has_publisher());
+    }
+}
+
+/// Who is not of the run, in its domain.
+mod strangers {
+    use super::*;
+
+    /// What a subscriber of the run says of messages that `transport` sends on its topic of forces, none of which it takes.
+    fn said_of(domain: &Domain, mut transport: Ros2) -> (String, bool) {
+        let mut run = domain.join("run");
+        let mut receiver = run.subscriber(&samples(), 64, true).unwrap();
+        let mut genuine = domain.join("genuine");
+        let mut sender = genuine.publisher(&samples(), 1).unwrap();
+        let mut stranger = transport.publisher(&samples(), 1).unwrap();
+        assert!(eventually(domain, || receiver.has_publisher() && sender.listeners() == 1 && stranger.listeners() == 1));
+        // The stranger speaks first, and then in between.
+        for sequence in 100..110 {
+            stranger.send(&sample(sequence)).unwrap();
+        }
+        let (mut taken, mut said) = (Vec::new(), None);
+        let mut sent = 0;
+        eventually(domain, || {
+            if sent < 10 {
+                sender.send(&sample(sent)).unwrap();
+                stranger.send(&sample(1000 + sent)).unwrap();
+                sent += 1;
+            }
+            match receiver.receive() {
+                Ok(Some(message)) => taken.push(message.sequence()),
+                Ok(None) => {}
+                Err(TransportError::Stranger { topic, who, refused, moves }) => {
+                    assert!(refused > 0 && topic == samples().name);
+                    said.get_or_insert((who, moves));
+                }
+                Err(e) => panic!("{e}"),
+            }
+            taken.len() == 10 && said.is_some() && receiver.refused() == 20
+        });
+        assert_eq!((taken, receiver.refused()), ((0..10).collect::<Vec<_>>(), 20));
+        said.unwrap()
+    }
+
+    fn open(domain: &Domain) -> Ros2 {
+        Ros2::open(&domain.0, "stranger", Delivery::Reliable).unwrap()
+    }
+
+    #[test]
+    fn nothing_is_taken_of_who_has_no_tag_another_run_or_another_key() {
+        let domain = Domain::new();
+        let (who, moves) = said_of(&domain, open(&domain));
+        assert!(who.starts_with("a stranger speaks here (GID ") && moves, "{who}");
+        let (who, _) = said_of(&domain, open(&domain).with_identity(identity("b2")));
+        assert_eq!(who, "run b2 speaks here too");
+        let (who, _) = said_of(&domain, open(&domain).with_identity(identity("a1")));
+        assert!(who.starts_with("a stranger forges tags"), "{who}");
+    }
+
+    #[test]
+    fn a_tool_of_no_run_hears_a_run() {
+        let domain = Domain::new();
+        let (mut tool, mut run) = (open(&domain), domain.join("run"));
+        let mut receiver = tool.subscriber(&samples(), 64, true).unwrap();
+        let mut sender = run.publisher(&samples(), 1).unwrap();
+        assert!(eventually(&domain, || receiver.has_publisher() && sender.listeners() == 1));
+        for sequence in 0..10 {
+            sender.send(&sample(sequence)).unwrap();
+        }
+        assert_eq!(sequences(&domain, &mut receiver, 10), (0..10).collect::<Vec<_>>());
     }
 }

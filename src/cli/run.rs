@@ -23,6 +23,9 @@ pub struct Run {
     /// Run only the nodes of this host of the graph, together with the other hosts.
     #[arg(long, value_name = "NAME")]
     pub host: Option<String>,
+    /// File with the secret that the hosts share, made by `backdrive secret FILE` and copied to each; needed with --host.
+    #[arg(long, value_name = "FILE")]
+    pub secret: Option<PathBuf>,
     #[command(flatten)]
     #[allow(missing_docs)]
     pub network: Network,

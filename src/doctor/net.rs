@@ -19,7 +19,7 @@ pub(super) fn look(network: &Network, listen_s: f64) -> Vec<Finding> {
     let used: Vec<&Interface> = all.iter().filter(|i| network.interfaces.is_empty() || network.interfaces.contains(&i.address)).collect();
     let mut findings = vec![which(&used)];
     findings.extend(used.iter().filter(|i| i.up && !i.loopback).map(|i| multicast(i)));
-    findings.extend([buffers(), ports(network.domain), heard(network.domain, listen_s)]);
+    findings.extend([buffers(), ports(network.domain), heard(network.domain, listen_s), strangers(network.domain)]);
     findings
 }
 
@@ -112,6 +112,15 @@ fn ports(domain: u16) -> Finding {
         return Finding::weak("domain", found, advice);
     }
     Finding::fine("domain", found)
+}
+
+/// What holds of every run, whoever is in the domain.
+fn strangers(domain: u16) -> Finding {
+    let found = format!(
+        "a run takes messages of its own nodes alone; anybody in ROS domain {domain} can read what it sends, and can end it by sending on its topics \
+         (docs/security.md)"
+    );
+    Finding::fine("strangers", found)
 }
 
 fn heard(domain: u16, listen_s: f64) -> Finding {

@@ -31,7 +31,7 @@ pub struct Done {
 
 impl Done {
     /// 0 judged and stable, or there is no loop, which its text says; 1 not stable, 7 it cannot be told; before these, of a run that did not go as it should:
-    /// 4 lost data, 6 a node failed, 130 interrupted.
+    /// 4 lost data, 5 a stranger on the network, 6 a node failed, 130 interrupted.
     pub fn exit_code(&self) -> u8 {
         match (self.fault_code(), self.summary.as_ref().and_then(|s| s.outcome)) {
             (0, None | Some(Outcome::Stable)) => 0,
@@ -41,12 +41,13 @@ impl Done {
         }
     }
 
-    /// How it went, whatever the loop did: 0 fine, 4 lost data, 6 a node failed, 130 interrupted.
+    /// How it went, whatever the loop did: 0 fine, 4 lost data, 5 a stranger on the network, 6 a node failed, 130 interrupted.
     pub fn fault_code(&self) -> u8 {
         if let Some(report) = &self.report {
             match &report.cause {
                 Cause::NodeFailed { code, .. } if *code != 0 => return *code,
                 Cause::NodeDied { .. } | Cause::NodeFailed { .. } | Cause::EndedEarly { .. } => return code::NODE,
+                Cause::Stranger { .. } => return code::MACHINE,
                 Cause::Stopped { .. } => return code::INTERRUPTED,
                 Cause::Completed if !report.orderly() => return code::NODE,
                 Cause::Completed => {}
@@ -82,8 +83,11 @@ impl Done {
             }
             let told = match &report.cause {
                 Cause::NodeDied { node, .. } | Cause::NodeFailed { node, .. } => node.as_str(),
-                Cause::Completed | Cause::EndedEarly { .. } | Cause::Stopped { .. } => "",
+                Cause::Completed | Cause::EndedEarly { .. } | Cause::Stopped { .. } | Cause::Stranger { .. } => "",
             };
+            if report.refused > 0 {
+                lines.push(format!("refused  {} messages of strangers; none was used", report.refused));
+            }
             for death in report.deaths.iter().filter(|d| d.node != told || d.recovered) {
                 lines.push(format!("died     {} {} at {:.3} s", death.node, death.how, death.t_s));
             }
@@ -119,6 +123,7 @@ impl Done {
             "loop_p99_us": report.and_then(|r| r.loop_p99_us),
             "missed_deadlines": report.map(|r| r.missed_deadlines),
             "lost": self.lost,
+            "refused": report.map(|r| r.refused),
             "bag": self.bag,
             "unreadable": self.unreadable,
             "complete": self.bag.as_ref().map(|_| self.complete),
@@ -208,6 +213,7 @@ mod tests {
             loop_node: Some("master".to_string()),
             loop_p50_us: Some(40.0),
             loop_p99_us: Some(400.0),
+            refused: 0,
             missed_deadlines: missed.iter().map(|m| m.1).sum(),
             latest_node: missed.iter().max_by_key(|m| m.1).filter(|m| m.1 > 0).map(|m| (m.0.to_string(), m.1)),
             lost: 0,

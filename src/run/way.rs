@@ -35,12 +35,15 @@ impl Way {
             Some(Transport::Inproc) if options.host.is_some() => {
                 return Err(Failure::input("--transport inproc is for one host; leave --host out"));
             }
+            Some(Transport::Inproc) if options.secret.is_some() => {
+                return Err(Failure::input("--secret is what several hosts share; leave it out without --host"));
+            }
             Some(Transport::Inproc) => return Ok(Way::Here),
             Some(Transport::Iceoryx2) => Some(Wire::Iceoryx2),
             Some(Transport::Ros2) => Some(Wire::Ros2),
             None => None,
         };
-        place(graph, wire, options.host.as_deref(), &options.network).map(Way::Processes)
+        place(graph, wire, options.host.as_deref(), options.secret.as_deref(), &options.network).map(Way::Processes)
     }
 }
 

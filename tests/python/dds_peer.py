@@ -3,6 +3,8 @@
     dds_peer.py hear SECONDS [TOPIC:TYPE:QOS ...]   counts what arrives, until nothing has for a second, at most SECONDS
     dds_peer.py pass SECONDS DOMAIN [TOPIC:TYPE:QOS ...]   hears the same, and publishes it in another domain, once each is listened to there
     dds_peer.py speak TOPIC COUNT HZ                sends JointStates whose frame_id says what backdrive's says
+    dds_peer.py push TOPIC EFFORT HZ SECONDS        sends forces at once, whoever listens
+    dds_peer.py replay TOPIC SECONDS                hears a topic for a second, then sends what it heard once more, again and again
     dds_peer.py ping COUNT HZ | echo                as examples/ros2_peer.rs
 
 TYPE is JointState or Log; QOS is best_effort or reliable. The domain is that of ROS_DOMAIN_ID.
@@ -140,6 +142,37 @@ def speak(participant, name, count, hz):
     print(json.dumps({"count": count}))
 
 
+def push(participant, name, effort, hz, seconds):
+    writer = DataWriter(participant, Topic(participant, "rt" + name, JointState, qos=BEST_EFFORT), qos=BEST_EFFORT)
+    print("listening", flush=True)
+    begun, number = time.monotonic(), 0
+    while time.monotonic() - begun < seconds:
+        message = joint_state(number)
+        message.header.frame_id = message.header.frame_id.replace("axes=2", "axes=1")
+        message.name, message.position, message.effort = ["axis0"], [], [effort]
+        writer.write(message)
+        number += 1
+        time.sleep(max(0.0, begun + number / hz - time.monotonic()))
+    print(json.dumps({"count": number}))
+
+
+def replay(participant, name, seconds):
+    topic = Topic(participant, "rt" + name, JointState, qos=BEST_EFFORT)
+    reader = DataReader(participant, topic, qos=BEST_EFFORT)
+    print("listening", flush=True)
+    begun, heard = time.monotonic(), []
+    while time.monotonic() - begun < PATIENCE_S and len(heard) < 200:
+        heard += valid(reader.take(N=2000))
+        time.sleep(0.002)
+    writer = DataWriter(participant, topic, qos=BEST_EFFORT)
+    begun, number = time.monotonic(), 0
+    while heard and time.monotonic() - begun < seconds:
+        writer.write(heard[number % len(heard)])
+        number += 1
+        time.sleep(0.002)
+    print(json.dumps({"count": number}))
+
+
 def ends(participant, out, back):
     writer = DataWriter(participant, Topic(participant, "rt" + out, JointState, qos=BEST_EFFORT), qos=BEST_EFFORT)
     reader = DataReader(participant, Topic(participant, "rt" + back, JointState, qos=BEST_EFFORT), qos=BEST_EFFORT)
@@ -200,6 +233,10 @@ def main():
         hear(participant, float(rest[0]), rest[2:], DomainParticipant(int(rest[1])))
     elif verb == "speak":
         speak(participant, rest[0], int(rest[1]), float(rest[2]))
+    elif verb == "push":
+        push(participant, rest[0], *(float(number) for number in rest[1:]))
+    elif verb == "replay":
+        replay(participant, rest[0], float(rest[1]))
     elif verb == "ping":
         ping(participant, int(rest[0]), float(rest[1]))
     elif verb == "echo":

@@ -1,28 +1,31 @@
 //! A run on several hosts: the supervisors find each other, start together, and tell what becomes of the others.
 //!
-//! They talk on one topic, each says twice a second how it is, and each measures the others' clocks. The first host of
+//! They know each other by a secret that they share, and tell their nodes whose messages to take. They talk on one topic, each says twice a second how it is, and each measures the others' clocks. The first host of
 //! the graph says when step 0 is due, in each host's own clock. A host that is started again, or late, is told when step
 //! 0 was by one that runs, and joins at the step that is due.
 
+mod absent;
 mod clocks;
+mod sealed;
 mod words;
 
 pub use words::Begun;
 
 use crate::error::LaunchError;
 use crate::plan::Plan;
+use crate::session::Session;
 use backdrive_bags::CLOCK_OFFSET;
 use backdrive_msgs::text::Text;
 use backdrive_msgs::{Event, LAYOUT, Message, source_id};
 use backdrive_nodes::build::host_topic;
 use backdrive_nodes::realtime;
 use backdrive_nodes::transport::ros2::overheard::Overheard;
-use backdrive_nodes::transport::ros2::{Delivery, Network, Ros2, Talk, interfaces};
+use backdrive_nodes::transport::ros2::{Delivery, Identity, Network, Ros2, Talk};
 use backdrive_nodes::transport::{Publisher, Transport, TransportError};
 use clocks::{Clocks, monotonic_ns, unix_ns};
+use sealed::{Opened, Sealed, Speaker};
 use std::collections::BTreeMap;
 use std::hash::{BuildHasher, Hasher};
-use std::net::Ipv4Addr;
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
@@ -89,12 +92,12 @@ pub(crate) struct Hosts {
 
 impl Hosts {
     /// Begins to look for the others; `None` for a run on one host.
-    pub fn begin(plan: &Plan) -> Result<Option<Hosts>, LaunchError> {
+    pub fn begin(plan: &Plan, session: &Session) -> Result<Option<Hosts>, LaunchError> {
         let Some(name) = plan.place.host.clone().filter(|_| plan.hosts.len() > 1) else { return Ok(None) };
         let here = Arc::new(Mutex::new(Here::default()));
         let (send, there) = channel();
         let (opened, result) = channel();
-        let (shared, plan) = (Arc::clone(&here), plan.clone());
+        let (shared, plan, session) = (Arc::clone(&here), plan.clone(), session.clone());
         // Its ports belong to the thread that makes them.
         let thread = std::thread::spawn(move || {
             if plan.realtime() {
@@ -102,7 +105,7 @@ impl Hosts {
                 let _ =
                     realtime::enter(&realtime::Options { priority: Some(PRIORITY), lock_memory: false, ..realtime::Options::default() });
             }
-            match Round::open(&plan, name, send) {
+            match Round::open(&plan, session, name, send) {
                 Ok(round) => {
                     let _ = opened.send(Ok(()));
                     round.go(&shared);
@@ -140,6 +143,8 @@ impl Drop for Hosts {
 /// Another host.
 struct Other {
     heard: Option<Instant>,
+    /// Whose messages are its.
+    speaker: Option<Speaker>,
     life: u64,
     ready: bool,
     missing: Vec<String>,
@@ -161,6 +166,12 @@ struct Round {
     leader: String,
     begun: Option<Begun>,
     talk: Talk,
+    session: Session,
+    sealed: Sealed,
+    /// Somebody without the secret speaks where hosts do.
+    foreign: bool,
+    /// Another host was heard for the first time and waits to hear that.
+    answers: bool,
     events: Option<Box<dyn Publisher>>,
     sequence: u64,
     rate_hz: f64,
@@ -171,10 +182,10 @@ struct Round {
 }
 
 impl Round {
-    fn open(plan: &Plan, name: String, send: Sender<There>) -> Result<Round, TransportError> {
+    fn open(plan: &Plan, session: Session, name: String, send: Sender<There>) -> Result<Round, TransportError> {
         let network = plan.place.network.clone();
         let node = format!("host_{name}");
-        let mut ros2 = Ros2::open(&network, &node, Delivery::BestEffort)?;
+        let mut ros2 = Ros2::open(&network, &node, Delivery::BestEffort)?.with_identity(Identity::new(&session.known)?);
         let talk = ros2.talk(TOPIC)?;
         let events = match plan.realtime() {
             true => Some(ros2.publisher(&host_topic(&name), 1)?),
@@ -182,6 +193,7 @@ impl Round {
         };
         let other = || Other {
             heard: None,
+            speaker: None,
             life: 0,
             ready: false,
             missing: Vec::new(),
@@ -200,6 +212,10 @@ impl Round {
             leader: plan.hosts[0].clone(),
             begun: None,
             talk,
+            sealed: Sealed::new(&session),
+            session,
+            foreign: false,
+            answers: false,
             events,
             sequence: 0,
             rate_hz: plan.timing.rate_hz,
@@ -217,13 +233,16 @@ impl Round {
         loop {
             self.talk.wait(Duration::from_millis(10));
             while let Some(text) = self.talk.hear() {
-                if let Ok(say) = serde_json::from_str::<Say>(&text) {
-                    self.hear(say);
+                match self.sealed.open(&text) {
+                    Opened::Said(speaker, say) => self.hear(&speaker, say),
+                    Opened::Unproven { first } => self.answers |= first,
+                    Opened::Foreign => self.hear_foreign(),
+                    Opened::Nothing => {}
                 }
             }
             let here = shared.lock().unwrap_or_else(PoisonError::into_inner).clone();
             self.begun = here.begun.or(self.begun);
-            if here.stop || said.is_none_or(|at| at.elapsed() >= HELLO_EVERY) {
+            if here.stop || std::mem::take(&mut self.answers) || said.is_none_or(|at| at.elapsed() >= HELLO_EVERY) {
                 said = Some(Instant::now());
                 self.hello(&here);
             }
@@ -243,27 +262,54 @@ impl Round {
         }
     }
 
-    fn say(&self, say: &Say) {
-        if let Ok(text) = serde_json::to_string(say) {
+    fn say(&mut self, say: &Say) {
+        if let Some(text) = self.sealed.seal(say) {
             self.talk.say(&text);
         }
     }
 
-    fn hello(&self, here: &Here) {
+    fn hello(&mut self, here: &Here) {
+        // Nodes that begin together take each other's first messages.
+        let met = self.begun.is_some() || self.others.values().all(|o| o.speaker.is_some());
+        let heard = self.sealed.heard();
         self.say(&Say::Hello {
             run: self.run,
             host: self.name.clone(),
             life: self.life,
-            ready: here.ready,
+            ready: here.ready && met,
             missing: here.missing.clone(),
             begun: self.begun,
             leaving: here.leaving,
+            heard,
         });
     }
 
-    fn hear(&mut self, say: Say) {
+    /// Said so that a person knows; nothing of it is heard.
+    fn hear_foreign(&mut self) {
+        if !std::mem::replace(&mut self.foreign, true) {
+            self.event(1, "host_secret", "somebody who does not have this run's secret speaks as a host; it is not heard");
+        }
+    }
+
+    /// Takes this speaker for the host, and tells the nodes whose messages are the host's.
+    fn take_for(&mut self, host: &str, speaker: &Speaker) {
+        if let Some(other) = self.others.get_mut(host) {
+            other.speaker = Some(speaker.clone());
+        }
+        let of = |(host, other): (&String, &Other)| {
+            let speaker = other.speaker.as_ref()?;
+            Some((host.clone(), Session::member(&self.session.secret, &speaker.run, &speaker.nonce)))
+        };
+        self.session.known.others = self.others.iter().filter_map(of).collect();
+        if let Err(e) = self.session.known.write(&self.session.path) {
+            self.event(2, "host_unknown", &format!("the nodes cannot be told of host `{host}`, and refuse it: {e}"));
+        }
+    }
+
+    fn hear(&mut self, speaker: &Speaker, say: Say) {
+        let is_known = self.others.values().any(|o| o.speaker.as_ref() == Some(speaker));
         match say {
-            Say::Hello { run, host, life, ready, missing, begun, leaving } => {
+            Say::Hello { run, host, life, ready, missing, begun, leaving, .. } => {
                 if host == self.name {
                     if life != self.life && self.stranger.is_none() {
                         self.stranger = Some(host.clone());
@@ -278,6 +324,19 @@ impl Round {
                     }
                     return;
                 }
+                let is_same = other.speaker.as_ref() == Some(speaker);
+                let lives = other.heard.is_some_and(|at| at.elapsed() < LOST_AFTER) && !other.left;
+                if other.speaker.is_some() && !is_same && lives {
+                    // The one that was here first is the host, until it is not heard any more.
+                    if self.stranger.replace(host.clone()).is_none() {
+                        self.event(
+                            2,
+                            "host_twice",
+                            &format!("two programs run as host `{host}`; the second is not heard: end one of them"),
+                        );
+                    }
+                    return;
+                }
                 let (known, returns) = (other.heard.is_some(), other.heard.is_some() && other.life != life);
                 let was_lost = std::mem::take(&mut other.lost);
                 if returns {
@@ -286,7 +345,13 @@ impl Round {
                 }
                 (other.heard, other.life, other.ready, other.missing) = (Some(Instant::now()), life, ready, missing);
                 other.begun = begun;
+                if returns {
+                    other.left = false;
+                }
                 let left = leaving && !std::mem::replace(&mut other.left, leaving);
+                if !is_same {
+                    self.take_for(&host, speaker);
+                }
                 if known && (returns || was_lost) {
                     self.event(0, "host_back", &format!("host `{host}` is heard again"));
                 }
@@ -295,6 +360,8 @@ impl Round {
                     let _ = self.send.send(There::Left(host));
                 }
             }
+            // Only what the hosts say that are taken for them.
+            _ if !is_known => {}
             Say::Ping { from, to, at_ns } if to == self.name => {
                 self.say(&Say::Pong { from: to, to: from, at_ns, monotonic_ns: monotonic_ns(), unix_ns: unix_ns() });
             }
@@ -324,7 +391,7 @@ impl Round {
             if other.heard.is_some() && other.pinged.is_none_or(|at| at.elapsed() >= every) {
                 other.pinged = Some(Instant::now());
                 let ping = Say::Ping { from: self.name.clone(), to: host.clone(), at_ns: monotonic_ns() };
-                if let Ok(text) = serde_json::to_string(&ping) {
+                if let Some(text) = self.sealed.seal(&ping) {
                     self.talk.say(&text);
                 }
             }
@@ -358,11 +425,13 @@ impl Round {
         // Everyone who runs tells everyone who waits.
         if let Some(begun) = self.begun {
             let waiting = self.others.iter().filter(|(_, o)| o.heard.is_some() && o.ready && o.begun.is_none() && !o.left);
-            for (host, other) in waiting {
-                if let Some(offset_ns) = other.clocks.monotonic() {
-                    let there = Begun { t0_ns: begun.t0_ns + offset_ns, unix_ns: begun.unix_ns };
-                    self.say(&Say::Start { to: host.clone(), life: other.life, begun: there });
-                }
+            let starts = waiting.filter_map(|(host, other)| {
+                let offset_ns = other.clocks.monotonic()?;
+                let there = Begun { t0_ns: begun.t0_ns + offset_ns, unix_ns: begun.unix_ns };
+                Some(Say::Start { to: host.clone(), life: other.life, begun: there })
+            });
+            for start in starts.collect::<Vec<_>>() {
+                self.say(&start);
             }
         }
     }
@@ -379,66 +448,6 @@ impl Round {
         for host in lost {
             self.event(2, "host_lost", &format!("host `{host}` is not heard any more; its nodes may still run"));
         }
-    }
-
-    /// Who is missing, and why.
-    fn look(&mut self, here: &Here) {
-        if self.begun.is_some() {
-            self.overheard = None;
-            return;
-        }
-        let overheard = self.overheard.as_mut().map(Overheard::others).unwrap_or_default();
-        let mut missing = Vec::new();
-        for (host, other) in &self.others {
-            match other.heard {
-                None => missing.push(self.why_absent(host, &overheard)),
-                Some(_) if other.lost => missing.push(format!("host {host}: is not heard any more")),
-                Some(_) if !other.ready && other.missing.is_empty() => {
-                    missing.push(format!("host {host}: is there, its nodes are still starting"))
-                }
-                Some(_) if !other.ready => missing.extend(other.missing.iter().map(|m| format!("host {host}: {m}"))),
-                Some(_) if other.clocks.len() < ENOUGH => missing.push(format!("host {host}: its clock is being measured")),
-                Some(_) => {}
-            }
-        }
-        if missing.is_empty() && here.ready && self.name != self.leader {
-            missing.push(format!("host {}: has not said when to start", self.leader));
-        }
-        let elsewhere = overheard.iter().filter(|(domain, _)| *domain != self.network.domain);
-        if self.others.values().any(|o| o.heard.is_none()) {
-            missing.extend(elsewhere.map(|(domain, address)| {
-                format!(
-                    "{address} announces itself in ROS domain {domain}, this host in {}: is ROS_DOMAIN_ID the same on both?",
-                    self.network.domain
-                )
-            }));
-        }
-        let _ = self.send.send(There::Missing(missing));
-    }
-
-    fn why_absent(&self, host: &str, heard_of: &[(u16, Ipv4Addr)]) -> String {
-        let all = interfaces().unwrap_or_default();
-        let used: Vec<_> =
-            all.iter().filter(|i| i.up && (self.network.interfaces.is_empty() || self.network.interfaces.contains(&i.address))).collect();
-        let over = used.iter().map(|i| format!("{} ({})", i.address, i.name)).collect::<Vec<_>>().join(", ");
-        let domain = self.network.domain;
-        let why = if !used.iter().any(|i| !i.loopback) {
-            "only the loopback is up here: connect the network or name another --interface".to_string()
-        } else if self.network.peers.is_empty() && !used.iter().any(|i| i.multicast && !i.loopback) {
-            "none of these interfaces can multicast: name its address with --peer, or `address` under [hosts] in the graph".to_string()
-        } else if let Some((_, address)) = heard_of.iter().find(|(d, _)| *d == domain) {
-            format!("{address} announces itself in this domain but does not answer: is its way back open (firewall, interface)?")
-        } else if self.network.peers.is_empty() {
-            format!(
-                "is `backdrive run ... --host {host}` started there, with the same ROS_DOMAIN_ID? Where the network has no multicast, name its address with --peer"
-            )
-        } else {
-            let peers = self.network.peers.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ");
-            format!(
-                "is `backdrive run ... --host {host}` started there, with the same ROS_DOMAIN_ID? It is looked for at {peers} and by multicast"
-            )
-        };
-        format!("host {host}: not heard in ROS domain {domain} on {over}; {why}")
     }
 
     /// Tells a person, and the bag.

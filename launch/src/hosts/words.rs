@@ -1,4 +1,4 @@
-//! What supervisors say to each other: JSON in a `std_msgs/String`, so that `ros2 topic echo` shows it.
+//! What supervisors say to each other: JSON in a `std_msgs/String`, so that `ros2 topic echo` shows it; `sealed.rs` puts a tag beside it.
 
 use serde::{Deserialize, Serialize};
 
@@ -31,6 +31,8 @@ pub(super) enum Say {
         begun: Option<Begun>,
         /// It ends.
         leaving: bool,
+        /// Nonces of the others that it has heard: who reads its own there knows that this was said after it began.
+        heard: Vec<String>,
     },
     /// What is your clock?
     Ping {

@@ -18,7 +18,7 @@ use crate::options::Command;
 use crate::report::{Cause, RunEvent, RunReport};
 use crate::signals::Signals;
 use crate::slot::{Phase, Slot};
-use backdrive_nodes::protocol::{FromNode, ToNode};
+use backdrive_nodes::protocol::{FromNode, STRANGER, ToNode};
 use std::time::{Duration, Instant};
 use tokio::sync::mpsc;
 
@@ -28,7 +28,7 @@ const TICK: Duration = Duration::from_millis(50);
 impl Supervisor {
     /// The whole life of the run. Afterwards nothing of it is left.
     pub async fn run(mut self, mut signals: Signals, commands: Option<mpsc::Receiver<Command>>) -> Result<RunReport, LaunchError> {
-        match Hosts::begin(&self.plan) {
+        match Hosts::begin(&self.plan, &self.session) {
             Ok(hosts) => self.hosts = hosts,
             Err(e) => {
                 self.slots.iter_mut().for_each(|s| s.enter(Phase::Ended, Instant::now()));
@@ -119,8 +119,7 @@ impl Supervisor {
             }
             Heard::Said(FromNode::Event { step, severity, kind, text, value }) => {
                 let node = self.slots[index].plan.name.clone();
-                let t_s = self.start.map(|s| seconds_since(now, s.at));
-                self.event(Some(index), RunEvent { node, t_s, step: Some(step), severity, kind, text, value });
+                self.happened(index, now, RunEvent { node, t_s: None, step: Some(step), severity, kind, text, value });
             }
             Heard::Said(FromNode::Done(status)) => {
                 self.slots[index].take_status(None, status, now);
@@ -149,11 +148,19 @@ impl Supervisor {
         match said {
             FromNode::Status(status) => self.slots[index].take_status(Some(&node), status, now),
             FromNode::Event { step, severity, kind, text, value } => {
-                let t_s = self.start.map(|s| seconds_since(now, s.at));
-                self.event(Some(index), RunEvent { node, t_s, step: Some(step), severity, kind, text, value });
+                self.happened(index, now, RunEvent { node, t_s: None, step: Some(step), severity, kind, text, value });
             }
             // Everything else is said of the process.
             _ => {}
+        }
+    }
+
+    /// An event that a node tells. Where a stranger sends what moves something, the run ends; nothing of it was taken.
+    fn happened(&mut self, index: usize, now: Instant, event: RunEvent) {
+        let stranger = (event.kind == STRANGER && event.severity >= 2).then(|| (event.node.clone(), event.text.clone()));
+        self.event(Some(index), RunEvent { t_s: self.start.map(|s| seconds_since(now, s.at)), ..event });
+        if let Some((node, text)) = stranger {
+            self.stop(Cause::Stranger { node, text });
         }
     }
 

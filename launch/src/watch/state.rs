@@ -8,6 +8,7 @@ use crate::plan::Plan;
 use crate::report::{Cause, Death, RunEvent};
 use crate::rundir::RunDir;
 use crate::screen::Screen;
+use crate::session::Session;
 use crate::slot::Slot;
 use backdrive_nodes::protocol::ToNode;
 use std::collections::VecDeque;
@@ -50,6 +51,8 @@ pub(crate) struct Supervisor {
     pub(crate) unkillable: bool,
     /// (when, steps) of the last seconds.
     pub pace: VecDeque<(Instant, u64)>,
+    /// Who the run is on the network.
+    pub(crate) session: Session,
     /// The other hosts of the run, if it has some, and who of them is missing.
     pub(crate) hosts: Option<Hosts>,
     pub(crate) absent: Vec<String>,
@@ -61,7 +64,7 @@ pub(crate) struct Supervisor {
 pub(crate) const MOST_EVENTS: usize = 10_000;
 
 impl Supervisor {
-    pub fn new(plan: Plan, options: SuperviseOptions, directory: RunDir, screen: Screen) -> Supervisor {
+    pub fn new(plan: Plan, options: SuperviseOptions, directory: RunDir, screen: Screen, session: Session) -> Supervisor {
         let now = Instant::now();
         let slots = plan.nodes.iter().map(|n| Slot::new(n.clone(), now)).collect();
         let (notices, heard) = mpsc::channel(1024);
@@ -88,6 +91,7 @@ impl Supervisor {
             killed: Vec::new(),
             unkillable: false,
             pace: VecDeque::new(),
+            session,
             hosts: None,
             absent: Vec::new(),
             notices,

@@ -9,6 +9,7 @@
 //! tells it, `msg` its sentence, `function` its kind, and `file` carries what `Log` has no field for. Counts travel as
 //! floating point, so they are exact up to 2^53.
 
+use super::mark::Mark;
 use super::twins::{Form, JointState, JointStateIn, Time};
 use super::{RosError, read_cdr};
 use crate::text::Text;
@@ -52,19 +53,23 @@ struct Log<'a> {
 }
 
 /// Writes the CDR of `message`, little endian and without encapsulation header, into `cdr`, replacing what was there. `speaker` is who tells an event; `names`
-/// are the axes of a sample, or for the other kinds [`fields`] as strings.
+/// are the axes of a sample, or for the other kinds [`fields`] as strings. A `mark` ends the text that says what the type has no field for, with
+/// zeros in place of its tag: see [`super::mark::marked`].
 ///
 /// # Errors
 /// None for any value of `message` as it is built today; the encoder's own are passed on.
-pub fn encode(message: &Message, speaker: &str, names: &[String], cdr: &mut Vec<u8>) -> Result<(), RosError> {
+pub fn encode(message: &Message, speaker: &str, names: &[String], mark: Option<&Mark<'_>>, cdr: &mut Vec<u8>) -> Result<(), RosError> {
     cdr.clear();
     let numbers = |values: &[f64]| listed(message, values);
     let written = match message {
         Message::Event(event) => {
-            let file = format!(
+            let mut file = format!(
                 "step={} seq={} src={:08x} layout={} severity={} value={} stamp={}",
                 event.step, event.sequence, event.source, event.layout, event.severity, event.value, event.stamp_ns
             );
+            if let Some(mark) = mark {
+                file.push_str(&mark.to_string());
+            }
             let level = LEVELS[(event.severity as usize).min(LEVELS.len() - 1)];
             let log = Log {
                 stamp: Time::from_ns(event.stamp_ns),
@@ -77,21 +82,21 @@ pub fn encode(message: &Message, speaker: &str, names: &[String], cdr: &mut Vec<
             };
             cdr_encoding::to_writer::<_, LittleEndian, _>(cdr, &log)
         }
-        Message::Sample(sample) => joint_state(cdr, sample, names, Form::Wire),
-        Message::Gains(g) => joint_state(cdr, &numbers(&[g.mu, g.lambda, g.ramp_s]), names, Form::WireList),
+        Message::Sample(sample) => joint_state(cdr, sample, names, Form::Wire(mark)),
+        Message::Gains(g) => joint_state(cdr, &numbers(&[g.mu, g.lambda, g.ramp_s]), names, Form::WireList(mark)),
         Message::Status(s) => {
             let values = [s.steps as f64, s.missed_deadlines as f64, s.lost as f64, s.loop_p50_s, s.loop_p99_s];
-            joint_state(cdr, &numbers(&values), names, Form::WireList)
+            joint_state(cdr, &numbers(&values), names, Form::WireList(mark))
         }
         Message::Margin(m) => {
             let values = [f64::from(m.axis), f64::from(m.known), m.gain, m.factor, m.deviation, m.frequency_hz, m.decay_per_s];
-            joint_state(cdr, &numbers(&values), names, Form::WireList)
+            joint_state(cdr, &numbers(&values), names, Form::WireList(mark))
         }
     };
     written.map_err(|source| RosError::Cdr { type_name: type_of(message.kind()).1, source })
 }
 
-fn joint_state(cdr: &mut Vec<u8>, sample: &Sample, axis_names: &[String], form: Form) -> Result<(), cdr_encoding::Error> {
+fn joint_state(cdr: &mut Vec<u8>, sample: &Sample, axis_names: &[String], form: Form<'_>) -> Result<(), cdr_encoding::Error> {
     cdr_encoding::to_writer::<_, LittleEndian, _>(cdr, &JointState { sample, axis_names, form })
 }
 
@@ -172,7 +177,7 @@ mod tests {
     fn there_and_back(message: &Message) -> String {
         let mut payload = Vec::new();
         let names: Vec<String> = fields(message.kind()).iter().map(|f| (*f).to_string()).collect();
-        encode(message, "slave", &names, &mut payload).unwrap();
+        encode(message, "slave", &names, None, &mut payload).unwrap();
         format!("{:?}", decode(message.kind(), true, &payload).unwrap())
     }
 
@@ -223,13 +228,13 @@ mod tests {
     fn what_is_cut_off_or_of_somebody_else_is_refused() {
         for message in messages() {
             let mut payload = Vec::new();
-            encode(&message, "slave", &[], &mut payload).unwrap();
+            encode(&message, "slave", &[], None, &mut payload).unwrap();
             for end in 0..payload.len() {
                 assert!(decode(message.kind(), true, &payload[..end]).is_err(), "{:?} cut at {end}", message.kind());
             }
         }
         let mut payload = Vec::new();
-        encode(&messages()[1], "", &[], &mut payload).unwrap();
+        encode(&messages()[1], "", &[], None, &mut payload).unwrap();
         assert!(decode(Kind::Status, true, &payload).unwrap_err().to_string().contains("a Status has 5"));
     }
 }

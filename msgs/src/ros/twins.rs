@@ -1,6 +1,8 @@
 //! What the CDR encoder and decoder see: the fields of each message in the order of its schema.
 
 use super::facts::{Facts, RosError};
+use super::frame::FrameId;
+use super::mark::Mark;
 use crate::text::Text;
 use crate::{Event, Gains, MAX_AXES, Margin, NOT_MEASURED, Sample, Status};
 use serde::de::{SeqAccess, Visitor};
@@ -8,7 +10,6 @@ use serde::ser::{SerializeSeq, SerializeStruct};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::borrow::Cow;
 use std::fmt;
-use std::io::Write;
 
 const NS_PER_S: i64 = 1_000_000_000;
 
@@ -40,68 +41,37 @@ pub(super) fn canonical(value: f64) -> f64 {
     if value.is_nan() { NOT_MEASURED } else { value }
 }
 
-/// What the wire's JointState has no other room for, as text on the stack.
-struct FrameId {
-    bytes: [u8; 192],
-    len: usize,
-}
-
-impl FrameId {
-    fn of(sample: &Sample) -> FrameId {
-        let mut bytes = [0; 192];
-        let mut rest = &mut bytes[..];
-        // The longest text is 20 + 20 + 8 + 1 + 10 + 10 digits, 20 more for the stamp, and 47 for the keys: it fits.
-        let _ = write!(
-            rest,
-            "step={} seq={} src={:08x} axes={} flags={} layout={}",
-            sample.step,
-            sample.sequence,
-            sample.source,
-            sample.len(),
-            sample.flags,
-            sample.layout
-        );
-        // A stamp that the header cannot hold.
-        if Time::from_ns(sample.stamp_ns).to_ns() != sample.stamp_ns {
-            let _ = write!(rest, " stamp={}", sample.stamp_ns);
-        }
-        let len = 192 - rest.len();
-        FrameId { bytes, len }
-    }
-
-    fn as_str(&self) -> &str {
-        std::str::from_utf8(&self.bytes[..self.len]).unwrap_or("")
-    }
-}
-
 /// `sensor_msgs/JointState` as it is written.
 pub(super) struct JointState<'a> {
     pub(super) sample: &'a Sample,
     pub(super) axis_names: &'a [String],
-    pub(super) form: Form,
+    pub(super) form: Form<'a>,
 }
 
 /// What a JointState is written for.
 #[derive(Clone, Copy, PartialEq, Eq)]
-pub(super) enum Form {
+pub(super) enum Form<'a> {
     /// A bag: no frame, and what else is to be said stands beside it.
     Bag,
     /// The wire: everything in one message, in the frame id.
-    Wire,
+    Wire(Option<&'a Mark<'a>>),
     /// The wire, for a list of named numbers, which are positions and nothing else.
-    WireList,
+    WireList(Option<&'a Mark<'a>>),
 }
 
 impl Serialize for JointState<'_> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let axes = self.sample.len();
-        let frame_id = (self.form != Form::Bag).then(|| FrameId::of(self.sample));
+        let frame_id = match self.form {
+            Form::Bag => None,
+            Form::Wire(mark) | Form::WireList(mark) => Some(FrameId::of(self.sample, mark)),
+        };
         let mut out = serializer.serialize_struct("JointState", 7)?;
         out.serialize_field("stamp", &Time::from_ns(self.sample.stamp_ns))?;
         out.serialize_field("frame_id", frame_id.as_ref().map_or("", FrameId::as_str))?;
         out.serialize_field("name", &AxisNames { given: self.axis_names, axes })?;
         out.serialize_field("position", &Quantity(&self.sample.position[..axes]))?;
-        let further = if self.form == Form::WireList { 0 } else { axes };
+        let further = if matches!(self.form, Form::WireList(_)) { 0 } else { axes };
         out.serialize_field("velocity", &Quantity(&self.sample.velocity[..further]))?;
         out.serialize_field("effort", &Quantity(&self.sample.effort[..further]))?;
         out.end()

@@ -8,6 +8,9 @@ pub enum RunError {
     /// A transport does not do what it must.
     #[error(transparent)]
     Transport(#[from] TransportError),
+    /// Somebody who is not of the run sends on one of its topics before it begins.
+    #[error("{0}; end that first, or choose another ROS domain with --domain")]
+    Taken(TransportError),
     /// Lockstep: an input has not come.
     #[error("step {step}: nothing on {} within {timeout_s} s; has its node stopped?", topics.join(", "))]
     PeerTimeout {
@@ -53,7 +56,7 @@ impl RunError {
         match self {
             RunError::Plan { .. } => 3,
             RunError::Lost { .. } | RunError::Incomplete { .. } => 4,
-            RunError::Transport(_) | RunError::PeerTimeout { .. } | RunError::Bag(_) => 5,
+            RunError::Transport(_) | RunError::Taken(_) | RunError::PeerTimeout { .. } | RunError::Bag(_) => 5,
         }
     }
 }

@@ -5,6 +5,7 @@ use super::error::RunError;
 use super::state::Runner;
 use crate::clock::now_ns;
 use crate::sentences::sentence;
+use crate::transport::TransportError;
 use std::time::Duration;
 
 impl Runner {
@@ -14,7 +15,11 @@ impl Runner {
         let begun = now_ns();
         self.stages.iter_mut().for_each(|s| s.waiting_since = begun);
         while !control.is_stopped() {
-            self.take_gains(control);
+            for (member, e) in self.take_gains(control) {
+                let step = self.stages.iter().find(|s| s.member == member).map_or(0, |s| s.step);
+                let teller = &mut self.members[member].teller;
+                teller.tell_broken(step, teller.book.simulated_ns(step), &e, tell);
+            }
             let (mut stepped, mut finished) = (false, true);
             for i in 0..self.stages.len() {
                 let stage = &mut self.stages[i];
@@ -22,8 +27,13 @@ impl Runner {
                     continue;
                 }
                 finished = false;
-                if stage.poll()? {
-                    let stamp = self.members[stage.member].teller.book.simulated_ns(stage.step);
+                let teller = &mut self.members[stage.member].teller;
+                let stamp = teller.book.simulated_ns(stage.step);
+                let ready = match stage.poll() {
+                    Err(e @ TransportError::Stranger { .. }) => teller.tell_broken(stage.step, stamp, &e, tell),
+                    polled => polled?,
+                };
+                if ready {
                     self.do_step(i, stamp, tell)?;
                     self.refuse_losses(i, tell)?;
                     stepped = true;

@@ -27,9 +27,10 @@ impl Member {
         [&self.teller.events, &self.teller.status].into_iter().chain(&self.gains_out).chain(&self.margin_out)
     }
 
-    /// Its figures, with `lost` samples and times from this histogram.
-    pub(super) fn report(&self, lost: u64, times: &Histogram) -> NodeStatus {
+    /// Its figures, with what its stages lost and refused, and times from this histogram.
+    pub(super) fn report(&self, (lost, refused): (u64, u64), times: &Histogram) -> NodeStatus {
         let us = |q: f64| times.quantile(q) * 1e-3;
-        NodeStatus { lost, loop_p50_us: us(0.5), loop_p99_us: us(0.99), ..self.teller.report }
+        let refused = refused + self.gains_in.as_ref().map_or(0, |gains| gains.refused());
+        NodeStatus { lost, refused, loop_p50_us: us(0.5), loop_p99_us: us(0.99), ..self.teller.report }
     }
 }

@@ -24,7 +24,7 @@ pub use state::Runner;
 use crate::clock::{Start, now_ns};
 use crate::protocol::NodeStatus;
 use crate::stage::Clock;
-use stage::lost;
+use stage::{lost, refused};
 use std::sync::Arc;
 
 impl Runner {
@@ -39,6 +39,11 @@ impl Runner {
             Clock::Lockstep => self.run_lockstep(control, tell)?,
             Clock::Realtime => self.run_realtime(start, control, tell)?,
         }
-        Ok(self.members.iter().enumerate().map(|(i, m)| m.report(lost(&self.stages, i), &m.loop_time)).collect())
+        Ok(self
+            .members
+            .iter()
+            .enumerate()
+            .map(|(i, m)| m.report((lost(&self.stages, i), refused(&self.stages, i)), &m.loop_time))
+            .collect())
     }
 }

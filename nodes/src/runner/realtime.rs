@@ -30,8 +30,11 @@ impl Runner {
             }
         }
         while !control.is_stopped() {
-            self.take_gains(control);
             let mut now = now_ns();
+            for (member, e) in self.take_gains(control) {
+                let step = self.stages.iter().find(|s| s.member == member).map_or(0, |s| s.step);
+                self.members[member].teller.tell_broken(step, unix(now), &e, tell);
+            }
             let (mut wake_at, mut waits_for_input, mut finished, mut stepped) = (now + SLICE_NS, false, true, false);
             for i in 0..self.stages.len() {
                 let stage = &mut self.stages[i];

@@ -48,6 +48,10 @@ pub(super) fn lost(stages: &[Stage], member: usize) -> u64 {
     stages.iter().filter(|s| s.member == member).flat_map(|s| &s.inputs).map(|i| i.lost).sum()
 }
 
+pub(super) fn refused(stages: &[Stage], member: usize) -> u64 {
+    stages.iter().filter(|s| s.member == member).flat_map(|s| &s.inputs).map(Input::refused).sum()
+}
+
 pub(super) fn want(stages: &mut [Stage], member: usize, gains: Gains) {
     if gains_are_valid(&gains) {
         stages.iter_mut().filter(|s| s.member == member).for_each(|s| s.wanted.push(gains));

@@ -123,6 +123,16 @@ impl Runner {
         self.members.first().map_or("", |m| m.name.as_str())
     }
 
+    /// Refuses to begin where somebody else sends on one of its topics.
+    ///
+    /// # Errors
+    /// Somebody does.
+    pub fn check_alone(&mut self) -> Result<(), RunError> {
+        let gains = self.members.iter_mut().filter_map(|m| m.gains_in.as_mut()).find_map(|gains| gains.stranger());
+        let stranger = gains.or_else(|| self.stages.iter_mut().flat_map(|s| &mut s.inputs).find_map(Input::stranger));
+        stranger.map_or(Ok(()), |e| Err(RunError::Taken(e)))
+    }
+
     /// What it still lacks before it can start, one line each.
     pub fn missing(&self) -> Vec<String> {
         let inputs = self.stages.iter().flat_map(|s| &s.inputs);

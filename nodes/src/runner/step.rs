@@ -1,7 +1,7 @@
 //! One step of a stage, and what is told of the steps.
 
 use super::control::{Control, Told};
-use super::stage::{lost, want};
+use super::stage::{lost, refused, want};
 use super::state::Runner;
 use crate::book::Health;
 use crate::clock::now_ns;
@@ -86,8 +86,9 @@ impl Runner {
         }
     }
 
-    /// Gains that the supervisor or a topic wants.
-    pub(super) fn take_gains(&mut self, control: &Control) {
+    /// Gains that the supervisor or a topic wants. Which members a stranger would have given some, with what is to be told of it.
+    pub(super) fn take_gains(&mut self, control: &Control) -> Vec<(usize, TransportError)> {
+        let mut strangers = Vec::new();
         if control.has_gains.swap(false, Ordering::Relaxed) {
             let alone = self.members.len() == 1;
             for gains in control.gains.lock().unwrap_or_else(PoisonError::into_inner).drain(..) {
@@ -99,10 +100,15 @@ impl Runner {
         for (index, member) in self.members.iter_mut().enumerate() {
             let Some(subscriber) = &mut member.gains_in else { continue };
             // A broken message here must not end the loop: the gains simply stay.
-            while let Ok(Some(Message::Gains(gains))) = subscriber.receive() {
-                want(&mut self.stages, index, gains);
+            loop {
+                match subscriber.receive() {
+                    Ok(Some(Message::Gains(gains))) => want(&mut self.stages, index, gains),
+                    Err(e @ TransportError::Stranger { .. }) => break strangers.push((index, e)),
+                    Ok(_) | Err(_) => break,
+                }
             }
         }
+        strangers
     }
 
     pub(super) fn report_if_due(&mut self, now: i64, tell: &mut dyn FnMut(Told)) {
@@ -111,7 +117,7 @@ impl Runner {
         }
         self.reported_at = now;
         for (index, member) in self.members.iter_mut().enumerate() {
-            let status = member.report(lost(&self.stages, index), &member.loop_time_recent);
+            let status = member.report((lost(&self.stages, index), refused(&self.stages, index)), &member.loop_time_recent);
             tell(Told::Status { source: member.teller.book.source, status });
             member.teller.report.peak_effort = 0.0;
             member.loop_time_recent.clear();

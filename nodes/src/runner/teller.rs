@@ -3,7 +3,7 @@
 use super::control::Told;
 use super::stage::Output;
 use crate::book::{Book, NO_VALUE};
-use crate::protocol::NodeStatus;
+use crate::protocol::{NodeStatus, STRANGER};
 use crate::transport::TransportError;
 use backdrive_control::core::Events;
 use backdrive_msgs::Message;
@@ -46,8 +46,13 @@ impl Teller {
         tell(Told::Event(event));
     }
 
-    /// Real time goes on without a message that could not be moved. Returns "not ready".
+    /// Real time goes on without a message that could not be moved, and both clocks without a stranger's. Returns "not ready".
     pub(super) fn tell_broken(&mut self, step: u64, stamp_ns: i64, error: &TransportError, tell: &mut dyn FnMut(Told)) -> bool {
+        if let TransportError::Stranger { refused, moves, .. } = error {
+            let (severity, text) = (1 + u32::from(*moves), Text::new(&error.to_string()));
+            self.tell_event(step, stamp_ns, STRANGER, *refused as f64, severity, text, tell);
+            return false;
+        }
         if stamp_ns.saturating_sub(self.broken_told_at) >= 1_000_000_000 {
             self.broken_told_at = stamp_ns;
             self.tell_event(step, stamp_ns, "connection_broken", NO_VALUE, 2, Text::new(&error.to_string()), tell);

@@ -24,6 +24,18 @@ pub enum TransportError {
         /// What the middleware says.
         reason: String,
     },
+    /// Somebody who is not of this run sends on the topic; nothing of it was taken.
+    #[error("{topic}: {who}, messages refused: {refused}")]
+    Stranger {
+        /// The topic.
+        topic: String,
+        /// Who, as far as it can be known.
+        who: String,
+        /// Messages of strangers on this topic that were refused until now.
+        refused: u64,
+        /// Whether what the topic carries moves something.
+        moves: bool,
+    },
     /// The transport itself cannot start.
     #[error("{0}")]
     Start(String),

@@ -51,6 +51,16 @@ pub trait Subscriber {
     /// arrives meanwhile is kept as always, only nobody is woken for it.
     fn set_awaited(&mut self, _awaited: bool) {}
 
+    /// Messages that were refused because their sender is not of this run.
+    fn refused(&self) -> u64 {
+        0
+    }
+
+    /// Before the start: who else sends on the topic, if somebody does.
+    fn stranger(&mut self) -> Option<TransportError> {
+        None
+    }
+
     /// Messages that came after a later one and were dropped. Each is a hole in the sequence numbers as well.
     fn late(&self) -> u64 {
         0

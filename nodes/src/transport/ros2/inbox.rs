@@ -1,7 +1,10 @@
 //! What has arrived for a subscriber, taken over from the middleware before anybody asks.
 
+use super::identity::{Identity, Why};
+use super::order::{Admission, First, Proven};
 use super::participant::Reader;
-use super::raw::Reads;
+use super::raw::{Checked, Reads};
+use super::refusals::Refusals;
 use crate::clock::now_ns;
 use crate::transport::bell::Bell;
 use crate::transport::{TransportError, check_layout};
@@ -21,8 +24,8 @@ const SPEAKER_SILENCE: Duration = Duration::from_millis(100);
 /// The same for what is told now and then.
 const TELLER_SILENCE: Duration = Duration::from_secs(2);
 
-/// How often a second speaker is complained about.
-const COMPLAIN_EVERY: Duration = Duration::from_secs(1);
+/// How long a second publisher of a topic is listened for before the start: one that runs sends in this time, and one that was killed does not.
+const SECOND: Duration = Duration::from_millis(300);
 
 /// Rings the node's bell when the middleware has something.
 struct Ring(Arc<Bell>);
@@ -38,12 +41,25 @@ pub(super) fn ringing(bell: &Arc<Bell>) -> Waker {
     Waker::from(Arc::new(Ring(Arc::clone(bell))))
 }
 
-/// Who speaks on the topic, and how far it has come.
-#[derive(Clone, Copy)]
-pub(super) struct Speaker {
-    guid: GUID,
-    sequence: u64,
-    heard: Instant,
+/// Whose messages are taken.
+pub(super) enum Taken {
+    /// Those of a run.
+    Run(Identity, Proven<GUID>),
+    /// Anybody's.
+    Anybody(First<GUID>),
+}
+
+impl Taken {
+    pub fn new(identity: Option<&Identity>, topic: &Topic) -> Taken {
+        let is_sample = topic.kind == Kind::Sample;
+        let silence = if is_sample { SPEAKER_SILENCE } else { TELLER_SILENCE };
+        identity.map_or_else(|| Taken::Anybody(First::new(silence, !is_sample)), |i| Taken::Run(i.clone(), Proven::default()))
+    }
+
+    /// Whether who is unknown may be a host of the run that has just begun.
+    fn is_of_several(&self) -> bool {
+        matches!(self, Taken::Run(identity, _) if identity.is_of_several())
+    }
 }
 
 /// What has arrived on a topic, and from whom.
@@ -55,14 +71,15 @@ pub(super) struct Inbox {
     pub(super) reader: Reader,
     pub(super) life: u32,
     pub(super) matched: usize,
-    pub(super) speaker: Option<Speaker>,
+    /// Since when it has more than one publisher.
+    pub(super) crowded: Option<Instant>,
+    pub(super) from: Taken,
     /// With when each was taken in: CLOCK_MONOTONIC, ns.
     pub(super) queue: VecDeque<(Result<Message, TransportError>, i64)>,
     /// The latest of these times, ns.
     pub(super) newest_ns: i64,
     pub(super) late: u64,
-    pub(super) strangers: u64,
-    pub(super) complained: Option<Instant>,
+    pub(super) refusals: Refusals,
 }
 
 /// The inboxes of a node.
@@ -121,18 +138,24 @@ impl Inbox {
         }
         loop {
             let mut arrived_ns = now_ns();
-            let entry = match self.reader.try_take_one_with(Reads(self.topic.kind)) {
+            let identity = match &self.from {
+                Taken::Run(identity, _) => Some(identity),
+                Taken::Anybody(_) => None,
+            };
+            let entry = match self.reader.try_take_one_with(Reads { topic: &self.topic, identity }) {
                 Ok(None) => return,
                 Ok(Some(change)) => {
                     // The middleware hands over in order what has overtaken each other on the way, and its times are read by two
                     // clocks: nothing counts as there before what is used before it.
                     arrived_ns = taken_in_ns(change.receive_instant).max(self.newest_ns);
                     let guid = change.writer_guid();
-                    let message = change.into_value();
-                    if !self.admits(guid, &message) {
-                        continue;
-                    }
+                    let Some(message) = self.admitted(guid, change.into_value()) else { continue };
                     check_layout(&self.topic.name, &message).map(|()| message)
+                }
+                // No node of a run sends what cannot be read.
+                Err(ReadError::Deserialization { .. }) if identity.is_some() => {
+                    self.refusals.add(None, Why::Unreadable, false);
+                    continue;
                 }
                 Err(ReadError::Deserialization { reason }) => Err(self.broken(reason)),
                 Err(e) => Err(self.broken(e.to_string())),
@@ -149,38 +172,51 @@ impl Inbox {
         TransportError::Broken { topic: self.topic.name.clone(), reason }
     }
 
-    /// Whether this message is the topic's next: from its speaker, and later than what was heard.
-    fn admits(&mut self, guid: GUID, message: &Message) -> bool {
-        let silence = if self.topic.kind == Kind::Sample { SPEAKER_SILENCE } else { TELLER_SILENCE };
-        let (heard, sequence) = (Instant::now(), message.sequence());
-        let admitted = match self.speaker {
-            None => true,
-            Some(s) if s.guid == guid => {
-                self.late += u64::from(sequence <= s.sequence);
-                sequence > s.sequence
+    /// The message, if it is of the topic's publisher and later than what was heard.
+    fn admitted(&mut self, guid: GUID, checked: Checked) -> Option<Message> {
+        let (admission, message) = match (checked, &mut self.from) {
+            (Checked::Ours(message, run, life), Taken::Run(_, proven)) => {
+                (proven.admit(guid, run, life, message.sequence()), Some(message))
             }
-            Some(s) => {
-                // What is told now and then goes on where a publisher was made anew; of samples two may count alike.
-                let continues = self.topic.kind != Kind::Sample && sequence == s.sequence + 1;
-                let admitted = continues || s.heard.elapsed() >= silence;
-                self.strangers += u64::from(!admitted);
-                admitted
-            }
+            (Checked::Anybodys(message), Taken::Anybody(first)) => (first.admit(guid, message.sequence()), Some(message)),
+            (Checked::Refused(why), _) => (Admission::Refused(why), None),
+            // What is read without a judgement is nothing for a run, and there is no judgement without one.
+            (Checked::Ours(..) | Checked::Anybodys(_), _) => (Admission::Refused(Why::Untagged), None),
         };
-        if admitted {
-            self.speaker = Some(Speaker { guid, sequence, heard });
+        match admission {
+            Admission::Next => message,
+            Admission::Late => {
+                self.late += 1;
+                None
+            }
+            Admission::Refused(why) => {
+                self.refusals.add(Some(guid), why, self.from.is_of_several());
+                None
+            }
         }
-        admitted
     }
 
     /// Once a second, that somebody else speaks on the topic too.
     pub(super) fn complaint(&mut self) -> Option<TransportError> {
-        if self.strangers == 0 || self.complained.is_some_and(|at| at.elapsed() < COMPLAIN_EVERY) {
-            return None;
+        self.refusals.complaint(&self.topic)
+    }
+
+    /// Before the start: who else speaks on the topic. Of a run on several hosts who is unknown may still be found.
+    pub(super) fn stranger(&mut self) -> Option<TransportError> {
+        self.drain();
+        let complaint = self.refusals.complaint(&self.topic);
+        if complaint.is_none() {
+            self.refusals.forgive();
         }
-        self.complained = Some(Instant::now());
-        let ignored = std::mem::take(&mut self.strangers);
-        Some(self.broken(format!("another publisher speaks here too; {ignored} of its messages were ignored")))
+        complaint
+    }
+
+    /// Whether the topic has its publisher, and another one, if there is, has not been heard for long enough.
+    pub(super) fn is_met(&mut self) -> bool {
+        self.hear_statuses();
+        self.crowded = if self.matched > 1 { self.crowded.or_else(|| Some(Instant::now())) } else { None };
+        let settled = matches!(self.from, Taken::Anybody(_)) || self.crowded.is_none_or(|since| since.elapsed() >= SECOND);
+        self.matched > 0 && settled
     }
 
     /// Learns who is connected.
@@ -188,8 +224,8 @@ impl Inbox {
         while let Some(status) = self.reader.try_recv_status() {
             if let DataReaderStatus::SubscriptionMatched { current, writer, .. } = status {
                 self.matched = current.count().max(0) as usize;
-                if current.count_change() < 0 && self.speaker.is_some_and(|s| s.guid == writer) {
-                    self.speaker = None;
+                if let (true, Taken::Anybody(first)) = (current.count_change() < 0, &mut self.from) {
+                    first.gone(writer);
                 }
             }
         }

@@ -5,25 +5,34 @@
 //! status and margin are reliable and their last few are kept for whoever joins late. The types on the wire are those
 //! of [`backdrive_msgs::ros::live`].
 //!
+//! Every message of a run is tagged with a key of the run, in the text of standard messages that tells step and sequence, and a node of the run takes
+//! nothing else ([`Identity`]). Any ROS tool can still listen.
+//!
 //! The middleware finds the others by multicast, and on one host without it. Where multicast is not to be had, a
 //! [`Courier`] tells the named peers by unicast.
 
 mod clock;
 mod courier;
 mod delivery;
+mod identity;
 mod inbox;
+mod key;
 mod network;
 mod node;
+mod order;
 pub mod overheard;
 mod participant;
 mod raw;
 mod receiving;
+mod refusals;
 mod sending;
 mod shared;
 mod talk;
 
 pub use courier::Courier;
 pub use delivery::Delivery;
+pub use identity::{Identity, Known, Member};
+pub use key::Key;
 pub use network::{Interface, MAX_DOMAIN, Network, NetworkError, interfaces};
 pub use node::Ros2;
 pub use talk::Talk;

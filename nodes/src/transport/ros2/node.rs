@@ -4,6 +4,7 @@ use super::super::bell::{Bell, Looks};
 use super::super::{Publisher, Subscriber, Transport, TransportError};
 use super::clock::ClockWatch;
 use super::delivery::Delivery;
+use super::identity::Identity;
 use super::inbox::Inboxes;
 use super::network::Network;
 use super::participant::Participant;
@@ -25,7 +26,8 @@ pub struct Ros2 {
 }
 
 impl Ros2 {
-    /// Joins the network as a ROS node called `/NAME`.
+    /// Joins the network as a ROS node called `/NAME`, which belongs to no run until [`Ros2::with_identity`]: it takes what anybody sends, and
+    /// the nodes of a run take nothing of it.
     ///
     /// # Errors
     /// The network cannot be what was asked for, or its sockets cannot be had.
@@ -41,6 +43,7 @@ impl Ros2 {
                 name: name.to_string(),
                 network: network.clone(),
                 delivery,
+                identity: None,
                 axes: HashMap::new(),
                 participant: RefCell::new(participant),
                 life: Cell::new(0),
@@ -53,6 +56,14 @@ impl Ros2 {
             }),
             seen: 0,
         })
+    }
+
+    /// Makes it a node of a run: its messages are tagged, and it takes those of its run alone. Before any port is made.
+    pub fn with_identity(mut self, identity: Identity) -> Ros2 {
+        if let Some(shared) = Rc::get_mut(&mut self.shared) {
+            shared.identity = Some(identity);
+        }
+        self
     }
 
     /// Names the axes of sample topics, for `JointState.name`. Before any port is made.

@@ -2,7 +2,6 @@
 
 use super::{Delivery, Network};
 use crate::transport::{TransportError, capacity};
-use backdrive_msgs::Message;
 use backdrive_msgs::ros::live;
 use backdrive_msgs::topic::{Kind, Topic};
 use ros2_client::entities_info::{NodeEntitiesInfo, ParticipantEntitiesInfo};
@@ -15,13 +14,13 @@ use std::fmt::Display;
 use std::net::IpAddr;
 use std::sync::{Mutex, PoisonError};
 
-use super::raw::Raw;
+use super::raw::{Checked, Raw};
 
 /// How long a reliable writer waits for room in lockstep; what it waits for is a reader that is behind, or dead.
 const LOCKSTEP_ROOM: Duration = Duration::from_secs(2);
 
 pub(super) type Writer = DataWriter<Bytes, Raw>;
-pub(super) type Reader = SimpleDataReader<Message, Raw>;
+pub(super) type Reader = SimpleDataReader<Checked, Raw>;
 
 /// A DDS participant that is one ROS node.
 pub(super) struct Participant {

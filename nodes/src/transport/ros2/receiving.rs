@@ -1,6 +1,7 @@
 //! A subscriber over ROS 2: one speaker per topic, nothing late, nothing twice.
 
-use super::inbox::{Inbox, locked, ringing};
+use super::inbox::{Inbox, Taken, locked, ringing};
+use super::refusals::Refusals;
 use super::shared::Shared;
 use crate::transport::{Subscriber, TransportError, capacity};
 use backdrive_msgs::Message;
@@ -26,12 +27,12 @@ impl Receiving {
             awaited: wakes,
             waker: ringing(&shared.bell),
             matched: 0,
-            speaker: None,
+            crowded: None,
+            from: Taken::new(shared.identity.as_ref(), topic),
             queue: VecDeque::new(),
             newest_ns: i64::MIN,
             late: 0,
-            strangers: 0,
-            complained: None,
+            refusals: Refusals::default(),
         };
         inbox.drain();
         let inbox = Arc::new(Mutex::new(inbox));
@@ -63,13 +64,10 @@ impl Subscriber for Receiving {
                 inbox.hear_statuses();
             }
         }
-        if inbox.strangers > 0 {
-            inbox.hear_statuses();
-            if let Some(complaint) = inbox.complaint() {
-                return Err(complaint);
-            }
-        }
-        let Some((entry, arrived_ns)) = inbox.queue.pop_front() else { return Ok(None) };
+        let Some((entry, arrived_ns)) = inbox.queue.pop_front() else {
+            // Behind what is genuine: a stranger must not hold it up.
+            return inbox.complaint().map_or(Ok(None), Err);
+        };
         drop(inbox);
         self.arrived_ns = arrived_ns;
         entry.map(Some)
@@ -84,8 +82,15 @@ impl Subscriber for Receiving {
         if self.revive(&mut inbox).is_err() {
             return false;
         }
-        inbox.hear_statuses();
-        inbox.matched > 0
+        inbox.is_met()
+    }
+
+    fn refused(&self) -> u64 {
+        locked(&self.inbox).refusals.count()
+    }
+
+    fn stranger(&mut self) -> Option<TransportError> {
+        locked(&self.inbox).stranger()
     }
 
     fn set_awaited(&mut self, awaited: bool) {

@@ -2,6 +2,7 @@
 
 use super::participant::Writer;
 use super::shared::{FLUSH, Shared};
+use crate::clock::now_ns;
 use crate::transport::{Publisher, TransportError, wrong_kind};
 use backdrive_msgs::Message;
 use backdrive_msgs::ros::live;
@@ -18,8 +19,11 @@ pub(super) struct Sending {
     speaker: String,
     names: Vec<String>,
     writer: RefCell<Writer>,
-    life: Cell<u32>,
+    participants: Cell<u32>,
     matched: Cell<usize>,
+    /// When it began to count from 0: CLOCK_MONOTONIC, ns. A publisher that is started again counts in a later life.
+    life: u64,
+    newest: Option<u64>,
     cdr: Vec<u8>,
 }
 
@@ -31,19 +35,21 @@ impl Sending {
         };
         Ok(Sending {
             writer: RefCell::new(shared.participant().writer(topic, shared.delivery)?),
-            life: Cell::new(shared.life.get()),
+            participants: Cell::new(shared.life.get()),
             shared: Rc::clone(shared),
             topic: topic.clone(),
             speaker: topic.name.split('/').nth(1).unwrap_or_default().to_string(),
             names,
             matched: Cell::new(0),
+            life: now_ns().unsigned_abs(),
+            newest: None,
             cdr: Vec::with_capacity(512),
         })
     }
 
     /// Has a writer of the participant that the node has now.
     fn revive(&self) -> Result<(), TransportError> {
-        if self.life.replace(self.shared.life.get()) != self.shared.life.get() {
+        if self.participants.replace(self.shared.life.get()) != self.shared.life.get() {
             self.matched.set(0);
             self.writer.replace(self.shared.participant().writer(&self.topic, self.shared.delivery)?);
         }
@@ -58,7 +64,16 @@ impl Publisher for Sending {
         }
         self.revive()?;
         let broken = |reason: String| TransportError::Broken { topic: self.topic.name.clone(), reason };
-        live::encode(message, &self.speaker, &self.names, &mut self.cdr).map_err(|e| broken(e.to_string()))?;
+        // A bridge passes on what a node sends that was started again.
+        if self.newest.is_some_and(|newest| message.sequence() <= newest) {
+            self.life = now_ns().unsigned_abs().max(self.life + 1);
+        }
+        self.newest = Some(message.sequence());
+        let encoded = match &self.shared.identity {
+            Some(identity) => identity.encode(&self.topic, message, &self.speaker, &self.names, self.life, &mut self.cdr),
+            None => live::encode(message, &self.speaker, &self.names, None, &mut self.cdr),
+        };
+        encoded.map_err(|e| broken(e.to_string()))?;
         let sent = self.writer.borrow().write(Bytes::copy_from_slice(&self.cdr), Some(Timestamp::now()));
         sent.map_err(|e| match e {
             rustdds::dds::WriteError::WouldBlock { .. } => {

@@ -4,6 +4,7 @@ use super::super::TransportError;
 use super::super::bell::Bell;
 use super::clock::ClockWatch;
 use super::delivery::Delivery;
+use super::identity::Identity;
 use super::inbox::Inboxes;
 use super::network::Network;
 use super::participant::Participant;
@@ -25,6 +26,8 @@ pub(super) struct Shared {
     pub(super) name: String,
     pub(super) network: Network,
     pub(super) delivery: Delivery,
+    /// Whose messages it takes; anybody's where it belongs to no run.
+    pub(super) identity: Option<Identity>,
     pub(super) axes: HashMap<String, Vec<String>>,
     pub(super) participant: RefCell<Arc<Participant>>,
     /// Counts the participants that this node has had; a port of an earlier one makes itself anew.
