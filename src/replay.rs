@@ -2,9 +2,10 @@
 
 use crate::cli;
 use crate::failure::Failure;
+use crate::offered::with_recover;
 use crate::output;
 use crate::progress::busy;
-use crate::run::run_here;
+use crate::run::{next, run_here};
 use crate::run_page::{Heard, page};
 use crate::summary::graph_of;
 use backdrive_bags::Reader;
@@ -33,10 +34,7 @@ pub fn replay(options: &cli::Replay) -> Result<u8, Failure> {
 
     let planned = graph.timing.steps.unwrap_or(0);
     if !reader.ended_cleanly() {
-        output::note(format_args!(
-            "warning: {}: was not closed; what it holds is replayed, and `backdrive bag recover` makes a clean copy",
-            path.display()
-        ));
+        output::note(format_args!("warning: {}: {}", path.display(), with_recover("was not closed; what it holds is replayed", path)));
     }
     let sources = |n: &Node| matches!(n.kind, NodeKind::Operator | NodeKind::Cycle);
     let Some(operator) = graph.nodes.iter().position(sources) else {
@@ -81,8 +79,9 @@ pub fn replay(options: &cli::Replay) -> Result<u8, Failure> {
         let lost = reader.completeness().map_or(0, |c| c.lost());
         summary.hold_back(cut_short(&reader, planned as usize, rows).or((lost > 0).then_some(Unjudged::Lost { messages: lost })));
     }
-    let page = options.result.html.as_deref().map(|html| (html, page(&done, &graph, &heard, Some(path))));
-    done.tell(page, options.result.json)
+    let steps = next(&done, &graph, Some(path));
+    let page = options.result.html.as_deref().map(|html| (html, page(&done, &graph, &heard, &steps)));
+    done.tell(page, options.result.json, &steps)
 }
 
 /// Two numbers per step, per axis.

@@ -3,6 +3,7 @@
 //! ```text
 //! <tmp>/backdrive-<uid>/<id>/
 //!     graph.toml         the graph as every process of the run reads it
+//!     files/             what it names that lies nowhere else: the files of a graph that comes from a bag
 //!     place.json         where its nodes meet, if that is not shared memory alone
 //!     supervisor.lock    locked for as long as the supervisor lives
 //!     pids               who was started, for the case that the supervisor is killed
@@ -18,6 +19,7 @@ use crate::paths::GRAPH;
 use crate::paths::MIDDLEWARE;
 use crate::paths::RunPaths;
 use crate::paths::failed;
+use backdrive_nodes::graph::with_files_renamed;
 use nix::errno::Errno;
 use nix::fcntl::{Flock, FlockArg};
 use std::fs::{DirBuilder, File, OpenOptions};
@@ -29,6 +31,7 @@ use std::time::{SystemTime, UNIX_EPOCH};
 
 pub(crate) const LOCK: &str = "supervisor.lock";
 pub(crate) const PIDS: &str = "pids";
+const HELD: &str = "files";
 
 /// A run gets its directory under this name and takes its lock before it gets the name that others look at.
 pub(crate) const UNBORN: &str = ".new-";
@@ -67,6 +70,14 @@ impl RunHome {
     /// # Errors
     /// The directory cannot be made, is not this user's, or shared memory cannot be used or is nearly full.
     pub fn create(&self, graph: &str, nodes: usize) -> Result<RunDir, LaunchError> {
+        self.create_with(graph, &[], nodes)
+    }
+
+    /// The same with files that the graph names and that lie nowhere on the disk, as (name, text): they are written beside it.
+    ///
+    /// # Errors
+    /// As [`RunHome::create`].
+    pub fn create_with(&self, graph: &str, held: &[(String, String)], nodes: usize) -> Result<RunDir, LaunchError> {
         self.make_home()?;
         let id = new_id();
         let paths = RunPaths { root: self.dir.join(&id), id: id.clone() };
@@ -91,6 +102,22 @@ impl RunHome {
         let lock = Flock::lock(file, FlockArg::LockExclusiveNonblock)
             .map_err(|(_, e)| failed(&lock_path, "lock it", e, "set TMPDIR to a directory on a local file system"))?;
         let graph_path = unborn.join(GRAPH);
+        // Each in a folder of its own: their names are the bag's, and not ours to trust or to change.
+        let place = |number: usize, name: &str| {
+            let own = Path::new(name).file_name().unwrap_or_else(|| std::ffi::OsStr::new("file"));
+            Path::new(HELD).join(number.to_string()).join(own)
+        };
+        for (number, (name, text)) in held.iter().enumerate() {
+            let path = unborn.join(place(number, name));
+            let folder = path.parent().unwrap_or(&unborn);
+            DirBuilder::new().recursive(true).mode(0o700).create(folder).map_err(|e| failed(folder, "make it", e, ROOM))?;
+            std::fs::write(&path, text).map_err(|e| failed(&path, "write it", e, ROOM))?;
+        }
+        let at = |named: &str| held.iter().position(|(name, _)| name == named).map(|number| paths.root.join(place(number, named)));
+        let graph = match held {
+            [] => graph.to_string(),
+            _ => with_files_renamed(graph, &|named| at(named).map_or_else(|| named.to_string(), |path| path.display().to_string())),
+        };
         std::fs::write(&graph_path, graph).map_err(|e| failed(&graph_path, "write it", e, ROOM))?;
         make(&unborn.join(MIDDLEWARE))?;
         let pids_path = unborn.join(PIDS);

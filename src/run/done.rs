@@ -1,6 +1,7 @@
 //! What a run gave, for a person and for programs.
 
 use crate::failure::{Failure, code};
+use crate::offered::{Step, lines};
 use crate::output;
 use crate::summary::Summary;
 use backdrive_launch::{Cause, RunReport};
@@ -29,6 +30,9 @@ pub struct Done {
     pub summary: Option<Summary>,
 }
 
+/// Next steps that a terminal shows; the page shows all.
+const SHOWN: usize = 2;
+
 impl Done {
     /// 0 stable, or nothing was asked of a loop; 1 not stable, 7 it cannot be told; before these, of a run that did not go as it should:
     /// 4 lost data, 6 a node failed, 130 interrupted.
@@ -56,15 +60,21 @@ impl Done {
     }
 
     /// Writes its page, if one is wanted, prints the result, and gives the exit code.
-    pub fn tell(&self, page: Option<(&Path, Page)>, json: bool) -> Result<u8, Failure> {
+    /// `steps` are what to do next.
+    pub fn tell(&self, page: Option<(&Path, Page)>, json: bool, steps: &[Step]) -> Result<u8, Failure> {
         if let Some((html, page)) = page {
             output::file(html, page.html())?;
             output::note(format_args!("wrote {}", html.display()));
         }
         if json {
-            output::line(self.json())?;
+            let mut all = self.json();
+            all["next"] = serde_json::to_value(steps).map_err(Failure::input)?;
+            output::line(all)?;
         } else {
             output::line(self.text())?;
+            // A sentence without a command stands above, where it belongs.
+            let with_commands: Vec<Step> = steps.iter().filter(|step| !step.commands.is_empty()).take(SHOWN).cloned().collect();
+            lines("next", 9, &with_commands).iter().try_for_each(output::line)?;
         }
         Ok(self.exit_code())
     }
@@ -95,7 +105,7 @@ impl Done {
             let complete = match self.lost {
                 _ if self.unreadable.is_some() => "cannot be read".to_string(),
                 0 if self.complete => "complete".to_string(),
-                0 => "cut off; `backdrive bag recover` makes a clean copy of what it holds".to_string(),
+                0 => "cut off".to_string(),
                 lost => format!("{lost} messages lost"),
             };
             lines.push(format!("bag      {} ({complete})", bag.display()));
