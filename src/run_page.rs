@@ -182,6 +182,9 @@ fn facts(done: &Done, graph: &Graph) -> Table {
         if let Some(peak) = s.peak_feedback_force {
             row("reflected force", format!("up to {}", si(peak, "N")));
         }
+        if let Some(margin) = &s.margin {
+            row("margin in contact", margin.clone());
+        }
     }
     if let Some(bag) = &done.bag {
         let state = if done.complete { "complete".to_string() } else { format!("not complete, {} messages lost", done.lost) };

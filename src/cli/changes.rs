@@ -197,8 +197,8 @@ pub struct Changes {
     /// The bag to record.
     #[arg(long, value_name = "FILE")]
     pub bag: Option<PathBuf>,
-    /// Replace a bag that exists, whether --bag, --out or the graph file names it; without this it is an error. A bag that
-    /// another run is writing is never replaced.
+    /// Replace a bag that exists, whether --bag, --out or the graph file names it. Without this a bag that --bag or --out names must not exist, and
+    /// one that the graph file names gets a number: NAME-2.mcap. A bag that another run is writing is never replaced.
     #[arg(long)]
     pub overwrite: bool,
     /// Let the bag say on which machine and from which folders it was made. Without this it holds neither; in a graph file:

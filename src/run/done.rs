@@ -138,6 +138,7 @@ impl Done {
             "peak_feedback_force_n": summary.and_then(|s| s.peak_feedback_force),
             "first_contact_s": summary.and_then(|s| s.first_contact_s),
             "contact_s": summary.map(|s| s.contact_s),
+            "margin": summary.and_then(|s| s.margin.as_ref()),
             "outcome": summary.and_then(|s| s.outcome).map(|o| o.word()),
             "outcome_detail": summary.and_then(|s| s.outcome),
             "run": report,
