@@ -27,6 +27,7 @@ pub struct Called {
 /// Runs a verb in this thread, as `backdrive ARGUMENTS` would. Verbs that start other processes or never end by themselves are refused.
 pub fn call<S: AsRef<str>>(arguments: &[S], caller: &Arc<Caller>) -> Called {
     let words = std::iter::once("backdrive").chain(arguments.iter().map(AsRef::as_ref));
+    caller.calls(arguments.iter().map(|word| word.as_ref().to_string()).collect());
     let done = match Cli::try_parse_from(words) {
         Err(told) => {
             Err(Failure { code: code::USAGE, message: told.render().to_string().trim_start_matches("error: ").trim_end().to_string() })

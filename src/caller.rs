@@ -13,6 +13,7 @@ thread_local! {
 pub struct Caller {
     /// Set it to end the work early: a search ends with what it has, as after the first Ctrl-C on the command line.
     pub stop: Arc<AtomicBool>,
+    arguments: Mutex<Vec<String>>,
     result: Mutex<String>,
     notes: Mutex<Vec<String>>,
     progress: Mutex<Option<Progress>>,
@@ -33,6 +34,16 @@ impl Caller {
     /// How far the work is; `None` before it has begun and after its end.
     pub fn progress(&self) -> Option<Progress> {
         locked(&self.progress).clone()
+    }
+
+    /// The arguments of the verb that it calls.
+    pub(crate) fn arguments(&self) -> Vec<String> {
+        locked(&self.arguments).clone()
+    }
+
+    /// Keeps the arguments of the verb that it calls.
+    pub(crate) fn calls(&self, arguments: Vec<String>) {
+        *locked(&self.arguments) = arguments;
     }
 
     /// Tells how far the work is.

@@ -1,11 +1,12 @@
 //! `backdrive diagnose`: which physics a model leaves out, by recordings of its device.
 
 use crate::cli;
-use crate::diagnose_page::{Shown, page};
+use crate::diagnose_page::{Shown, next::next, page};
 use crate::diagnose_text::text;
 use crate::explain::explained;
 use crate::failure::{Failure, code};
 use crate::interrupt;
+use crate::offered::lines;
 use crate::output;
 use crate::progress;
 use crate::recordings::{self, Opened};
@@ -48,7 +49,7 @@ pub fn diagnose(options: &cli::Diagnose) -> Result<u8, Failure> {
         effort: options.effort.unwrap_or(usual.effort),
         patience: options.patience.map_or(usual.patience, Duration::from_secs_f64),
     };
-    let Diagnosed { found, written } = diagnose_into(opened, &settings, &options.out, report, &stop)?;
+    let Diagnosed { found, written, next } = diagnose_into(opened, &settings, &options.out, report, &stop)?;
     let seconds = began.elapsed().as_secs_f64();
     let path = options.out.join("time.txt");
     output::file(&path, format!("{seconds:.2}\n"))?;
@@ -60,6 +61,7 @@ pub fn diagnose(options: &cli::Diagnose) -> Result<u8, Failure> {
             output::line(format_args!("\n{}\n", explained(&found.search)))?;
         }
         output::line(format_args!("wrote     {}: {} ({seconds:.1} s)", shown(&options.out), written.join(", ")))?;
+        next.iter().try_for_each(output::line)?;
     }
     if stop.load(Ordering::SeqCst) {
         return Err(Failure { code: code::INTERRUPTED, message: "stopped; what was found until then is written".to_string() });
@@ -73,6 +75,8 @@ pub struct Diagnosed {
     pub found: Diagnosis,
     /// Names of the files in the folder that was given, and the path of a report that went elsewhere.
     pub written: Vec<String>,
+    /// What to do next with the commands that do it, as lines of a terminal.
+    pub next: Vec<String>,
 }
 
 /// Diagnoses what was opened and writes verdict, model and next experiment into a folder, which is made if it is not there, and where wanted the
@@ -90,6 +94,7 @@ pub fn diagnose_into(
     // What cannot be written is told before the work, not after it.
     output::folder(out)?;
     report.map_or(Ok(()), output::writable)?;
+    let files = opened.files;
     let found = progress::about(settings.expected(), |report| {
         diagnose::diagnose(opened.problem, settings, Some(stop), report).map_err(Failure::input)
     })?;
@@ -110,12 +115,14 @@ pub fn diagnose_into(
         write(EXPERIMENT_FILE, experiment)?;
         written.push(EXPERIMENT_FILE.to_string());
     }
+    let steps = next(&found, out, &files);
     if let Some(report) = report {
-        let shown = Shown { found: &found, name: &opened.name, notes: &opened.notes };
+        let shown = Shown { found: &found, name: &opened.name, notes: &opened.notes, steps: &steps };
         output::file(report, page(&shown).html())?;
         written.push(if report == out.join(REPORT) { REPORT.to_string() } else { report.display().to_string() });
     }
-    Ok(Diagnosed { found, written })
+    let next = lines("to do", 10, &steps.into_iter().filter(|step| !step.commands.is_empty()).collect::<Vec<_>>());
+    Ok(Diagnosed { found, written, next })
 }
 
 /// Physics to leave out that a device of one axis may have.

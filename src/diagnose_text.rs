@@ -60,7 +60,7 @@ pub fn text(found: &Diagnosis) -> String {
                 .to_string(),
         );
     } else if found.search.exhausted {
-        line("note", "the search ended before everything was tried; --effort gives it more".to_string());
+        line("note", "the search ended before everything was tried".to_string());
     }
     out.trim_end().to_string()
 }

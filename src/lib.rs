@@ -25,6 +25,7 @@ mod interrupt;
 mod model;
 mod network;
 mod node;
+mod offered;
 pub mod output;
 mod page_parts;
 mod play;

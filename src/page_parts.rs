@@ -1,5 +1,6 @@
-//! What all pages have: the terms they use, and what made them.
+//! What all pages have: what to do next, the terms they use, and what made them.
 
+use crate::offered::{Step, own_command};
 use backdrive_report::{Page, Table};
 
 /// The terms of a page, and the command and version that made it.
@@ -10,32 +11,11 @@ pub fn ending(page: &mut Page, terms: &[(&str, &str)]) {
         table.push([*term, *meaning]);
     }
     page.table(table);
-    page.text(&format!("Made by backdrive {} with: {}", env!("CARGO_PKG_VERSION"), command()));
+    page.text(&format!("Made by backdrive {} with: {}", env!("CARGO_PKG_VERSION"), own_command()));
 }
 
-/// The command line of this process, to be typed again.
-pub fn command() -> String {
-    let words: Vec<String> = std::env::args_os().skip(1).map(|w| shell_word(&w.to_string_lossy())).collect();
-    format!("backdrive {}", words.join(" "))
-}
-
-/// A word of a command line, in quotes where a shell would read it otherwise.
-pub fn shell_word(word: &str) -> String {
-    match word.chars().all(|c| c.is_alphanumeric() || "-_./:,=+@%".contains(c)) && !word.is_empty() {
-        true => word.to_string(),
-        false => format!("'{}'", word.replace('\'', "'\\''")),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn words_are_quoted_where_a_shell_would_cut_them() {
-        assert_eq!(shell_word("out/run-1.mcap"), "out/run-1.mcap");
-        assert_eq!(shell_word("my run.mcap"), "'my run.mcap'");
-        assert_eq!(shell_word("it's"), "'it'\\''s'");
-        assert_eq!(shell_word(""), "''");
-    }
+/// The box of what to do next, with the commands that do it.
+pub fn todo(page: &mut Page, steps: &[Step]) {
+    let items: Vec<(String, Option<String>)> = steps.iter().map(|step| (step.sentence.clone(), step.pasted())).collect();
+    page.todo("What to do now", &items);
 }

@@ -1,6 +1,7 @@
 //! Recordings and the model that they are held against, as `diagnose` and `fit` are given them.
 
 use crate::failure::Failure;
+use crate::offered::{Offered, with_recover};
 use crate::set_checks;
 use backdrive_bags::{Account, Reader, is_lerobot, is_rosbag};
 use backdrive_diagnosis::audit;
@@ -125,7 +126,7 @@ fn unfinished(path: &Path) -> Option<String> {
     }
     let reader = Reader::open(path).ok()?;
     let name = path.display();
-    let recover = "what it holds is used, and `backdrive bag recover` makes a clean copy";
+    let recover = with_recover("what it holds is used", path);
     if let Some(damage) = reader.damage().first() {
         return Some(format!("{name} is damaged ({damage}): {recover}"));
     }
@@ -185,7 +186,7 @@ fn import_of(path: &Path) -> Option<String> {
         (false, true) => format!("{stem}.mcap"),
         (false, false) => return None,
     };
-    Some(format!("backdrive bag import {} --bag {bag}", path.display()))
+    Some(Offered::verb("bag import").reads(path).option_writes("--bag", Path::new(&bag)).build()?.to_string())
 }
 
 /// Single files as a set.

@@ -2,9 +2,10 @@
 
 use crate::cli;
 use crate::failure::Failure;
+use crate::offered::with_recover;
 use crate::output;
 use crate::progress::busy;
-use crate::run::repeat_here;
+use crate::run::{next, repeat_here};
 use crate::run_page::{Heard, page};
 use crate::summary::graph_of;
 use backdrive_bags::Reader;
@@ -36,10 +37,7 @@ pub fn replay(options: &cli::Replay) -> Result<u8, Failure> {
     let (kept_back, notes) =
         busy(&format!("reading {}", path.display()), || held_back(&reader, &recorded_graph, exchanged)).map_err(Failure::input)?;
     if !reader.ended_cleanly() {
-        output::note(format_args!(
-            "warning: {}: was not closed; what it holds is replayed, and `backdrive bag recover` makes a clean copy",
-            path.display()
-        ));
+        output::note(format_args!("warning: {}: {}", path.display(), with_recover("was not closed; what it holds is replayed", path)));
     }
     let sources = |n: &Node| matches!(n.kind, NodeKind::Operator | NodeKind::Cycle);
     let Some(operator) = graph.nodes.iter().position(sources) else {
@@ -87,8 +85,9 @@ pub fn replay(options: &cli::Replay) -> Result<u8, Failure> {
         let is_asked = |why: &Unjudged| !(options.changes.duration.is_some() && matches!(why, Unjudged::CutShort { .. }));
         summary.hold_back(kept_back.filter(is_asked));
     }
-    let page = options.result.html.as_deref().map(|html| (html, page(&done, &graph, &heard, Some(path))));
-    done.tell(page, options.result.json)
+    let steps = next(&done, &graph, Some(path));
+    let page = options.result.html.as_deref().map(|html| (html, page(&done, &graph, &heard, &steps)));
+    done.tell(page, options.result.json, &steps)
 }
 
 /// Two numbers per step, per axis.

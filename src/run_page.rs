@@ -3,7 +3,8 @@
 //! It is made from what went by (from the bag, or from the run itself where it was in one process) and from the supervisor's report.
 
 use crate::failure::Failure;
-use crate::page_parts::{ending, shell_word};
+use crate::offered::Step;
+use crate::page_parts::{ending, todo};
 use crate::run::Done;
 use backdrive_bags::Reader;
 use backdrive_launch::{Cause, RunReport};
@@ -98,12 +99,12 @@ impl Heard {
     }
 }
 
-/// The page of a run, or of a replay of the bag `source`.
-pub fn page(done: &Done, graph: &Graph, heard: &Heard, source: Option<&Path>) -> Page {
+/// The page of a run or of a replay, with what to do next.
+pub fn page(done: &Done, graph: &Graph, heard: &Heard, steps: &[Step]) -> Page {
     let mut page = Page::new(if graph.title.is_empty() { "A run" } else { &graph.title });
     let (tone, sentence) = headline(done);
     page.lead(tone, &sentence);
-    page.todo("What to do now", &to_do(done, source));
+    todo(&mut page, steps);
     page.table(facts(done, graph));
 
     let session = heard.signals.session();
@@ -159,42 +160,6 @@ fn headline(done: &Done) -> (Tone, String) {
     (tone, format!("{text}{fault}"))
 }
 
-/// Sentences with a command to copy.
-fn to_do(done: &Done, source: Option<&Path>) -> Vec<(String, Option<String>)> {
-    let mut items = Vec::new();
-    let bag = done.bag.as_ref().map(|b| shell_word(&b.file_name().map_or(b.display().to_string(), |n| n.to_string_lossy().to_string())));
-    // What a replay would be asked about is the bag that it replays, with the gain of the replay.
-    let source = source.map(|p| shell_word(&p.display().to_string()));
-    let gain = done.summary.as_ref().map_or(1.0, |s| s.loop_gain);
-    let ask = bag.as_ref().map(|bag| format!("backdrive stability {bag} --html stability.html"));
-    let ask = ask.or(source.as_ref().map(|s| format!("backdrive stability {s} --gain {gain} --html stability.html")));
-    match done.summary.as_ref().and_then(|s| s.outcome) {
-        Some(Outcome::NotJudged { why }) => items.push((why.advice().to_string(), None)),
-        Some(Outcome::Stable) => {
-            items.push(("Ask how far away the edge is, and whether it holds for firmer and softer grips.".to_string(), ask.clone()))
-        }
-        Some(_) => {
-            let again = bag.as_ref().or(source.as_ref()).map(|bag| format!("backdrive replay {bag} --lambda LAMBDA --html again.html"));
-            items.push((format!("Find the gain up to which this loop is stable (it is not at {}).", number(gain)), ask.clone()));
-            items.push(("Run it again from the recorded hand with a lower force scale.".to_string(), again));
-        }
-        None => {}
-    }
-    if !done.complete
-        && done.lost == 0
-        && let Some(bag) = &bag
-    {
-        items.push((
-            "The bag was cut off: make a clean copy of what it holds.".to_string(),
-            Some(format!("backdrive bag recover {bag} --bag saved.mcap")),
-        ));
-    }
-    if done.lost > 0 || done.report.as_ref().is_some_and(|r| r.missed_deadlines > 0) {
-        items.push(("See what of this machine delays messages.".to_string(), Some("backdrive doctor".to_string())));
-    }
-    items
-}
-
 fn facts(done: &Done, graph: &Graph) -> Table {
     let mut table = Table::new(["", ""]);
     let mut row = |name: &str, text: String| table.push([name.to_string(), text]);
@@ -218,6 +183,9 @@ fn facts(done: &Done, graph: &Graph) -> Table {
         }
         if let Some(peak) = s.peak_feedback_force {
             row("reflected force", format!("up to {}", si(peak, s.force_units[1])));
+        }
+        if let Some(margin) = &s.margin {
+            row("margin in contact", margin.clone());
         }
     }
     if let Some(bag) = &done.bag {

@@ -111,3 +111,112 @@ fn a_recording_of_ones_own_ends_in_what_the_page_promises() {
     assert!(near(size("out/mine", "force"), 4e-3), "{}", size("out/mine", "force"));
     assert!(near(size("out/rig", "positive"), 80.0) && near(size("out/rig", "negative"), 40.0), "{}", size("out/rig", "positive"));
 }
+
+/// A command that a page shows, and what its line says of running it.
+struct Shown {
+    command: String,
+    /// Runs with BACKDRIVE_LONG=1 only: `<!-- long -->`.
+    is_long: bool,
+}
+
+/// The commands between backquotes in the list of the README, in their order, without those of items that end in `<!-- not run: why -->`.
+fn readme() -> Vec<Shown> {
+    let text = std::fs::read_to_string(file("README.md")).unwrap();
+    let list = text.split("## Thirteen things").nth(1).unwrap().split("In Python,").next().unwrap();
+    let mut items: Vec<String> = Vec::new();
+    for line in list.lines() {
+        match line.split_once(". **").filter(|(number, _)| number.parse::<u8>().is_ok()) {
+            Some(_) => items.push(line.to_string()),
+            None => items.iter_mut().last().into_iter().for_each(|item| *item += line),
+        }
+    }
+    assert_eq!(items.len(), 13);
+    let run = items.iter().filter(|item| !item.contains("<!-- not run: "));
+    run.flat_map(|item| {
+        let commands = item.split('`').skip(1).step_by(2).filter(|span| span.starts_with("backdrive ")).map(str::to_string);
+        let is_long = item.contains("<!-- long -->");
+        commands.map(move |command| Shown { command, is_long }).collect::<Vec<_>>()
+    })
+    .collect()
+}
+
+/// The commands of the gallery that need no Python, in their order; those that take longer are long.
+fn gallery() -> Vec<Shown> {
+    let lines = blocks("docs/gallery/README.md").into_iter().flat_map(|block| {
+        // What follows a heredoc's begin is another program's.
+        let shell: Vec<String> = block.commands.lines().take_while(|line| !line.starts_with("python ")).map(str::to_string).collect();
+        shell
+    });
+    let long = |command: &str| ["identify", "--sweep", "diagnose", "compare", "--gain 0.3"].iter().any(|word| command.contains(word));
+    lines.filter(|line| line.starts_with("backdrive ")).map(|command| Shown { is_long: long(&command), command }).collect()
+}
+
+/// Runs commands of a page in order in one folder. Each must be taken as it stands: exit codes 0, 1 and 7 are answers.
+fn run_in_order(shown: Vec<Shown>) -> Vec<(String, i32)> {
+    let place = Place::new();
+    for folder in ["launch", "plant"] {
+        std::os::unix::fs::symlink(file(folder), place.path(folder)).unwrap();
+    }
+    let program = Path::new(env!("CARGO_BIN_EXE_backdrive")).parent().unwrap().display().to_string();
+    let search = format!("{program}:{}", std::env::var("PATH").unwrap_or_default());
+    let is_long = std::env::var("BACKDRIVE_LONG").as_deref() == Ok("1");
+    let mut codes = Vec::new();
+    for Shown { command, .. } in shown.into_iter().filter(|shown| is_long || !shown.is_long) {
+        let mut shell = Command::new("bash");
+        shell.arg("-c").arg(&command).current_dir(place.path("")).env("PATH", &search).env("TMPDIR", place.path("tmp"));
+        let output = shell.output().unwrap();
+        let said = format!("{}{}", String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
+        println!("{command}\n{said}");
+        let code = output.status.code().unwrap_or(-1);
+        assert!([0, 1, 7].contains(&code), "{command} ends with {code}:\n{said}");
+        codes.push((command, code));
+    }
+    codes
+}
+
+#[test]
+fn every_command_of_the_readme_works_in_its_order_in_one_folder() {
+    let codes = run_in_order(readme());
+    assert!(codes.len() >= 7, "{codes:?}");
+    let code = |begin: &str| codes.iter().find(|(command, _)| command.starts_with(begin)).unwrap_or_else(|| panic!("{begin}: {codes:?}")).1;
+    // The question why is about the run that shakes, not about an earlier one.
+    assert_eq!((code("backdrive run launch/contact.toml --lambda 6"), code("backdrive why shaking.mcap")), (1, 1));
+    assert_eq!(code("backdrive run shaking.mcap --lambda 1"), 0);
+}
+
+#[test]
+fn every_command_of_the_gallery_works_in_its_order_in_one_folder() {
+    let codes = run_in_order(gallery());
+    assert!(codes.len() >= 6, "{codes:?}");
+}
+
+#[test]
+fn two_runs_of_one_graph_keep_both_recordings() {
+    let place = Place::new();
+    for folder in ["launch", "plant"] {
+        std::os::unix::fs::symlink(file(folder), place.path(folder)).unwrap();
+    }
+    let run = |more: &[&str]| {
+        let ended = place.backdrive(&[&["run", "launch/contact.toml", "--transport", "inproc", "--duration", "2.4"], more].concat());
+        assert!(matches!(ended.code, Some(0 | 1)), "{ended:?}");
+        ended.stdout
+    };
+    assert!(run(&[]).contains("/contact.mcap (complete)"));
+    let first = std::fs::read(place.path("contact.mcap")).unwrap();
+    let second = run(&["--lambda", "6", "--canceller", "none"]);
+    assert!(second.contains("/contact-2.mcap (complete)") && second.contains("backdrive why contact-2.mcap"), "{second}");
+    assert_eq!(std::fs::read(place.path("contact.mcap")).unwrap(), first);
+    // What is named on the command line is still not replaced without being asked to.
+    let named = place.backdrive(&["run", "launch/contact.toml", "--transport", "inproc", "--bag", "contact.mcap"]);
+    assert!(named.code == Some(3) && named.stderr.contains("--overwrite replaces it"), "{named:?}");
+    // A bag runs again with all that it was run with.
+    let again = place.backdrive(&["run", "contact-2.mcap", "--lambda", "0.3", "--bag", "again.mcap"]);
+    assert_eq!(again.code, Some(0), "{again:?}");
+    let model = |bag: &str| {
+        let reader = backdrive_bags::Reader::open(&place.path(bag)).unwrap();
+        reader.header().unwrap().graph_toml.clone()
+    };
+    let canceller = |text: &str| text.split("kind = \"canceller\"").nth(1).unwrap().split("[[").next().unwrap().trim().to_string();
+    assert_eq!(canceller(&model("again.mcap")), canceller(&model("contact-2.mcap")));
+    assert!(model("again.mcap").contains("duration_s = 2.4"), "{}", model("again.mcap"));
+}

@@ -236,3 +236,21 @@ fn a_thin_margin_is_widened_before_the_loop_shakes() {
     assert!(last.factor > 1.25, "{last:?}");
     assert!(done.acts.len() <= 2, "it hunts: {:?}", done.acts);
 }
+
+#[test]
+fn a_guarded_push_and_hold_tells_its_margin_while_it_touches() {
+    let changes = Overrides { guard: Some(true), ..Overrides::default() };
+    let graph = Graph::load(&file("launch/push-and-hold.toml"), &changes).unwrap();
+    let done = run(&graph);
+    // In contact from 0.89 s on, with a knock at 10 s; an answer needs three windows of 0.6 s.
+    let held: Vec<_> = done.margins.iter().filter(|m| (2.5..9.9).contains(&(m.step as f64 * PERIOD))).collect();
+    let told = held.iter().filter(|m| m.known == margin::KNOWN || m.known == margin::ABOVE).count();
+    println!("{told} of {}", held.len());
+    assert!(held.len() > 70 && 10 * told >= 6 * held.len(), "{told} of {}", held.len());
+    assert!(held.iter().all(|m| m.known != margin::FREE), "it touches");
+    // The edge of this loop by bisection is at 2.1: no known margin or bound is beyond it by more than its own uncertainty.
+    for m in held.iter().filter(|m| !m.factor.is_nan()) {
+        let sd = if m.deviation.is_nan() { 0.0 } else { m.deviation };
+        println!("{:.1} {} {:.2} {:.2}", m.step as f64 * PERIOD, m.known, m.factor, sd);
+    }
+}

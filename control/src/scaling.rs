@@ -211,7 +211,7 @@ impl Core for Backward {
             for axis in 0..self.axes {
                 self.ring[axis].step(f64::NAN);
                 if let Some(live) = &mut self.live[axis] {
-                    live.step(f64::NAN, f64::NAN, None, mu);
+                    live.step(dither[0].effort[axis], f64::NAN, None, mu);
                 }
             }
             return;

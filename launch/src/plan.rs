@@ -3,7 +3,7 @@
 use crate::place::Place;
 use backdrive_nodes::graph::{Graph, Node, NodeKind};
 use backdrive_nodes::stage::{Clock, Timing};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// A graph as the supervisor sees it: processes, and how time runs.
 #[derive(Debug, Clone)]
@@ -12,6 +12,8 @@ pub struct Plan {
     pub title: String,
     /// The graph's text, as each process reads it from the run directory.
     pub text: String,
+    /// Files of a graph that comes from a bag: the name that stands in the text, and their text.
+    pub held: Vec<(String, String)>,
     /// Rate, clock, number of steps.
     pub timing: Timing,
     /// The bag that is recorded, if one is.
@@ -83,6 +85,7 @@ impl Plan {
         Plan {
             title: graph.title.clone(),
             text: graph.text.clone(),
+            held: graph.files.iter().filter(|(name, _)| Path::new(name).is_relative()).cloned().collect(),
             timing: graph.timing.clone(),
             bag: graph.bag_of(place.host.as_deref()),
             nodes: nodes.collect(),

@@ -3,6 +3,7 @@
 //! ```text
 //! <tmp>/backdrive-<uid>/<id>/
 //!     graph.toml         the graph as every process of the run reads it
+//!     files/             what it names that lies nowhere else: the files of a graph that comes from a bag
 //!     place.json         where its nodes meet, if that is not shared memory alone
 //!     identity.json      the key of its messages on the network, and those of the other hosts; for its user only
 //!     supervisor.lock    locked for as long as the supervisor lives
@@ -22,6 +23,7 @@ use crate::paths::MIDDLEWARE;
 use crate::paths::RunPaths;
 use crate::paths::failed;
 use crate::remains::{remove_file, remove_run, shm_files, start_time};
+use backdrive_nodes::graph::with_files_renamed;
 use backdrive_nodes::transport::ros2::Known;
 use nix::errno::Errno;
 use nix::fcntl::{Flock, FlockArg};
@@ -35,6 +37,7 @@ use std::time::{SystemTime, UNIX_EPOCH};
 pub(crate) const LOCK: &str = "supervisor.lock";
 pub(crate) const PIDS: &str = "pids";
 pub(crate) const PROCESSES: &str = "processes.lock";
+const HELD: &str = "files";
 
 /// A run gets its directory under this name and takes its lock before it gets the name that others look at.
 pub(crate) const UNBORN: &str = ".new-";
@@ -76,12 +79,20 @@ impl RunHome {
     /// # Errors
     /// The directory cannot be made, is not this user's, or shared memory cannot be used or is nearly full.
     pub fn create(&self, graph: &str, nodes: usize) -> Result<RunDir, LaunchError> {
+        self.create_with(graph, &[], nodes)
+    }
+
+    /// The same with files that the graph names and that lie nowhere on the disk, as (name, text): they are written beside it.
+    ///
+    /// # Errors
+    /// As [`RunHome::create`].
+    pub fn create_with(&self, graph: &str, held: &[(String, String)], nodes: usize) -> Result<RunDir, LaunchError> {
         self.make_home()?;
         let mut tries = 0;
         loop {
             tries += 1;
             let id = new_id();
-            match self.create_as(&id, graph, nodes) {
+            match self.create_as(&id, graph, held, nodes) {
                 // A sweep was here between two lines of the making.
                 Err(Unmade::Swept(_)) if tries < TRIES => {}
                 Err(Unmade::Swept(error) | Unmade::Failed(error)) => {
@@ -93,7 +104,7 @@ impl RunHome {
         }
     }
 
-    fn create_as(&self, id: &str, graph: &str, nodes: usize) -> Result<RunDir, Unmade> {
+    fn create_as(&self, id: &str, graph: &str, held: &[(String, String)], nodes: usize) -> Result<RunDir, Unmade> {
         const ROOM: &str = "check that there is room and that you may write there, or set TMPDIR";
         let id = id.to_string();
         let paths = RunPaths { root: self.dir.join(&id), id: id.clone() };
@@ -125,6 +136,22 @@ impl RunHome {
         new_file(PROCESSES)?;
         self.check_shm(&paths.prefix(), nodes as u64 * SHM_PER_NODE).map_err(Unmade::Failed)?;
         let graph_path = unborn.join(GRAPH);
+        // Each in a folder of its own: their names are the bag's, and not ours to trust or to change.
+        let place = |number: usize, name: &str| {
+            let own = Path::new(name).file_name().unwrap_or_else(|| std::ffi::OsStr::new("file"));
+            Path::new(HELD).join(number.to_string()).join(own)
+        };
+        for (number, (name, text)) in held.iter().enumerate() {
+            let path = unborn.join(place(number, name));
+            let folder = path.parent().unwrap_or(&unborn);
+            DirBuilder::new().recursive(true).mode(0o700).create(folder).map_err(wrong(folder, "make it"))?;
+            std::fs::write(&path, text).map_err(wrong(&path, "write it"))?;
+        }
+        let at = |named: &str| held.iter().position(|(name, _)| name == named).map(|number| paths.root.join(place(number, named)));
+        let graph = match held {
+            [] => graph.to_string(),
+            _ => with_files_renamed(graph, &|named| at(named).map_or_else(|| named.to_string(), |path| path.display().to_string())),
+        };
         std::fs::write(&graph_path, graph).map_err(wrong(&graph_path, "write it"))?;
         make(&unborn.join(MIDDLEWARE))?;
         let mut pids = new_file(PIDS)?;

@@ -67,7 +67,7 @@ pub async fn supervise_plan(mut plan: Plan, mut options: SuperviseOptions) -> Re
     for failure in &swept.failed {
         screen.line(format!("warning: left by a dead run: {failure}"));
     }
-    let directory = options.home.create(&plan.text, plan.nodes.len())?;
+    let directory = options.home.create_with(&plan.text, &plan.held, plan.nodes.len())?;
     if plan.place != Place::default() {
         directory.tell_place(&plan.place)?;
     }

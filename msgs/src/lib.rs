@@ -224,7 +224,7 @@ pub struct Margin {
 pub mod margin {
     /// Nothing: there is no dither to tell it from.
     pub const NO_DITHER: u32 = 0;
-    /// Nothing: the slave touches nothing, or not yet for long enough.
+    /// Nothing: the slave touches nothing, or not for the 0.6 s of a window.
     pub const FREE: u32 = 1;
     /// Nothing: the dither is lost in what else moves.
     pub const NOISY: u32 = 2;
@@ -232,6 +232,10 @@ pub mod margin {
     pub const ABOVE: u32 = 3;
     /// The margin is this.
     pub const KNOWN: u32 = 4;
+    /// Nothing yet: the slave is in contact, and three windows are needed (1.2 s).
+    pub const SETTLING: u32 = 5;
+    /// Nothing: too many contact forces come late for a whole window of the loop.
+    pub const LATE: u32 = 6;
 }
 
 /// The 32-bit FNV-1a hash of a node's name: how a sample says who sent it without carrying a string.

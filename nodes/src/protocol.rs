@@ -136,7 +136,7 @@ impl From<&Margin> for MarginStatus {
 }
 
 impl fmt::Display for MarginStatus {
-    /// Such as `margin 2.4x at 71 Hz`, `margin over 8x`, `margin unknown (free)`; then what a ring-down did.
+    /// Such as `margin 2.4x at 71 Hz`, `margin over 8x`, `margin unknown (no dither)`; then what a ring-down did.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match (self.known, self.factor) {
             (margin::KNOWN, Some(factor)) => match self.frequency_hz.filter(|hz| *hz > 0.0) {
@@ -145,8 +145,10 @@ impl fmt::Display for MarginStatus {
             },
             (margin::ABOVE, Some(factor)) => write!(f, "margin over {}x", Times(factor))?,
             (margin::NO_DITHER, _) => write!(f, "margin unknown (no dither)")?,
-            (margin::FREE, _) => write!(f, "margin unknown (free)")?,
-            _ => write!(f, "margin unknown (noisy)")?,
+            (margin::FREE, _) => write!(f, "margin unknown (no contact for 0.6 s)")?,
+            (margin::SETTLING, _) => write!(f, "margin unknown (needs 1.2 s of contact)")?,
+            (margin::LATE, _) => write!(f, "margin unknown (contact forces come late)")?,
+            _ => write!(f, "margin unknown (dither too weak)")?,
         }
         match self.decay_per_s {
             Some(decay) if decay >= 0.0 => write!(f, ", decays at {decay:.0} /s"),
@@ -180,10 +182,10 @@ mod tests {
         assert_eq!(known.to_string(), "margin 2.4x at 71 Hz");
         assert_eq!(MarginStatus { frequency_hz: Some(0.0), ..known }.to_string(), "margin 2.4x to running away");
         assert_eq!(MarginStatus { known: margin::ABOVE, factor: Some(8.1), ..known }.to_string(), "margin over 8.1x");
-        assert_eq!(MarginStatus { known: margin::FREE, factor: None, ..known }.to_string(), "margin unknown (free)");
+        assert_eq!(MarginStatus { known: margin::FREE, factor: None, ..known }.to_string(), "margin unknown (no contact for 0.6 s)");
         let none = MarginStatus { known: margin::NO_DITHER, factor: None, decay_per_s: Some(-4.6), ..known };
         assert_eq!(none.to_string(), "margin unknown (no dither), grows at 5 /s");
         assert_eq!(MarginStatus { decay_per_s: Some(12.3), ..none }.to_string(), "margin unknown (no dither), decays at 12 /s");
-        assert_eq!(MarginStatus { known: 99, ..none }.to_string(), "margin unknown (noisy), grows at 5 /s");
+        assert_eq!(MarginStatus { known: 99, ..none }.to_string(), "margin unknown (dither too weak), grows at 5 /s");
     }
 }

@@ -21,16 +21,19 @@ pub struct SwappedParts {
     /// What the slave touches; `none` for nothing.
     #[arg(long, value_name = "FILE|none")]
     pub environment: Option<PathBuf>,
-    /// Model that predicts the induced motion; `none` to cancel nothing. Without this it stays the graph's, whatever the master is.
-    #[arg(long, value_name = "FILE|none")]
+    /// Model that predicts the induced motion; `none` to cancel nothing, `master` for the model and the grip of the graph's master (a file of
+    /// that name: `./master`). Without this it stays the graph's, whatever the master is.
+    #[arg(long, value_name = "FILE|none|master")]
     pub canceller: Option<PathBuf>,
-    /// Grip that the canceller assumes; without this it stays the graph's, whatever the real grip is.
-    #[arg(long, value_name = "FILE|none")]
+    /// Grip that the canceller assumes; `none` for no hand, `master` for the grip of the graph's master. Without this it stays the graph's,
+    /// whatever the real grip is.
+    #[arg(long, value_name = "FILE|none|master")]
     pub canceller_grip: Option<PathBuf>,
     /// Corner of a high-pass on the canceller's estimate; 0 for none.
     #[arg(long, value_name = "HZ", value_parser = not_negative, allow_negative_numbers = true)]
     pub high_pass: Option<f64>,
-    /// Whether the canceller takes the hand as its grip says, or estimates how firmly it holds while the loop runs: docs/canceller.md.
+    /// Whether the canceller takes the hand as its grip says, or estimates how firmly it holds while the loop runs: docs/canceller.md. Over several
+    /// axes an estimate needs --edge-without.
     #[arg(long, value_enum)]
     pub hand: Option<Hand>,
     /// Gain product from which on the loop shakes without a canceller, whichever hand holds (`backdrive stability` says it): a canceller that estimates the hand
@@ -46,6 +49,23 @@ pub struct SwappedParts {
 }
 
 impl SwappedParts {
+    /// The same as words of a command line.
+    pub fn words(&self) -> Vec<String> {
+        let mut words = Words::default();
+        words.file("--master", self.master.as_ref());
+        words.file("--grip", self.grip.as_ref());
+        words.file("--slave", self.slave.as_ref());
+        words.file("--environment", self.environment.as_ref());
+        words.file("--canceller", self.canceller.as_ref());
+        words.file("--canceller-grip", self.canceller_grip.as_ref());
+        words.value("--high-pass", self.high_pass);
+        words.value("--hand", self.hand.and_then(|hand| Some(hand.to_possible_value()?.get_name().to_string())));
+        words.value("--edge-without", self.edge_without);
+        words.value("--sensors", self.sensors.and_then(|sensors| Some(sensors.to_possible_value()?.get_name().to_string())));
+        words.value("--limits", self.limits.and_then(|limits| Some(limits.to_possible_value()?.get_name().to_string())));
+        words.0
+    }
+
     /// As the graph's reader takes them.
     pub fn overrides(&self) -> Overrides {
         Overrides {
@@ -62,6 +82,24 @@ impl SwappedParts {
             limits: self.limits.map(|l| l.word().to_string()),
             ..Overrides::default()
         }
+    }
+}
+
+/// Options with their values, as words of a command line.
+#[derive(Debug, Default)]
+pub struct Words(pub Vec<String>);
+
+impl Words {
+    /// An option with a value, where it has one.
+    pub fn value(&mut self, name: &str, value: Option<impl ToString>) {
+        if let Some(value) = value {
+            self.0.extend([name.to_string(), value.to_string()]);
+        }
+    }
+
+    /// The same of a file.
+    fn file(&mut self, name: &str, path: Option<&PathBuf>) {
+        self.value(name, path.map(|path| path.display()));
     }
 }
 
@@ -159,8 +197,8 @@ pub struct Changes {
     /// The bag to record.
     #[arg(long, value_name = "FILE")]
     pub bag: Option<PathBuf>,
-    /// Replace a bag that exists, whether --bag, --out or the graph file names it; without this it is an error. A bag that
-    /// another run is writing is never replaced.
+    /// Replace a bag that exists, whether --bag, --out or the graph file names it. Without this a bag that --bag or --out names must not exist, and
+    /// one that the graph file names gets a number: NAME-2.mcap. A bag that another run is writing is never replaced.
     #[arg(long)]
     pub overwrite: bool,
     /// Let the bag say on which machine and from which folders it was made. Without this it holds neither; in a graph file:
@@ -216,3 +254,35 @@ impl Clock {
 
 /// A dither that is small beside a finger's force, and broad enough for a frequency response.
 const DEFAULT_DITHER: &str = "multisine:peak=0.05,from=1,to=500,period=2";
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cli::{Cli, Command};
+    use clap::Parser;
+
+    #[test]
+    fn the_words_of_swapped_parts_are_read_as_the_same_parts() {
+        let given = [
+            "--master m.toml --grip none --slave s.toml --environment none --canceller master --canceller-grip g.toml --high-pass 1.5",
+            "--hand estimated --edge-without 2.06 --sensors ideal --limits ignored",
+        ];
+        let words: Vec<&str> = given.iter().flat_map(|line| line.split_whitespace()).collect();
+        let parsed = |words: &[&str]| match Cli::try_parse_from([&["backdrive", "stability", "x.mcap"], words].concat()).unwrap().command {
+            Command::Stability(options) => options.parts,
+            _ => unreachable!(),
+        };
+        let parts = parsed(&words);
+        // Every option of the parts stands above.
+        let own = parts.words();
+        assert_eq!(own, words);
+        let again = parsed(&own.iter().map(String::as_str).collect::<Vec<_>>());
+        assert_eq!(again.overrides(), parts.overrides());
+        let help = <Cli as clap::CommandFactory>::command();
+        let stability = help.find_subcommand("stability").unwrap();
+        let swapped = stability.get_arguments().filter(|a| a.get_help_heading() == Some("Swapped parts"));
+        for option in swapped {
+            assert!(own.contains(&format!("--{}", option.get_long().unwrap())), "{option:?}");
+        }
+    }
+}

@@ -13,8 +13,9 @@ The hidden plant is a program of its own: `cargo build --release --workspace` pu
 first: its SHA-256 is printed before anything is recorded, and only that program opens it until the verdict is written. Of several cases
 every fifth conceals nothing, and in every second one nobody measures the hand; its search may take 2.5 times as long. Each case has a
 folder: sealed/, session/ (bags and set), diagnosis/, and logs; proof.json and proof.html are about all of them.
-Exit code 0 when all was found by family and place and nothing where nothing was, 1 when not, 2 usage, 3 a file is wrong,
-5 a file cannot be written, 6 a node failed, 130 interrupted.";
+Exit code 0 when all was found by family and place and nothing where nothing was, no canceller of the diagnosis is worse than none with any
+hand, and every live run did what the stability limits say; 1 when not, 2 usage, 3 a file is wrong, 5 a file cannot be written,
+6 a node failed, 130 interrupted.";
 
 /// `backdrive prove`
 #[derive(Debug, Args)]

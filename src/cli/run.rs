@@ -7,15 +7,18 @@ use clap::Args;
 use std::path::PathBuf;
 
 /// Examples and exit codes.
-pub const HELP: &str = "Example:
-  backdrive run launch/contact.toml --master plant/models/rigid-mass.toml --lambda 0.2
+pub const HELP: &str = "Examples:
+  backdrive run launch/contact.toml --master plant/models/rigid-mass.toml --lambda 0.2 --bag rigid.mcap
+  backdrive run rigid.mcap --lambda 0.4
+
+A bag that the graph file names and that exists already is kept: the run writes NAME-2.mcap, NAME-3.mcap, ... and reports it.
 
 Exit codes: 0 stable, or no loop to judge; 1 not stable; 7 it cannot be told; 4 data lost, 6 a node failed, 130 interrupted.";
 
 /// `backdrive run`
 #[derive(Debug, Args)]
 pub struct Run {
-    /// The graph file.
+    /// The graph file; or a bag, whose graph is run with the files and options of the recorded run.
     pub graph: PathBuf,
     /// How messages travel: shared memory without --host, else ROS 2.
     #[arg(long, value_enum)]

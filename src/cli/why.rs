@@ -5,10 +5,10 @@ use std::path::PathBuf;
 
 /// Examples and exit codes.
 pub const HELP: &str = "Examples:
-  backdrive run launch/contact.toml --lambda 6 --canceller none
-  backdrive why contact.mcap
-  backdrive why contact.mcap --html out/why.html
-  backdrive why contact.mcap --out out/as-it-was.toml
+  backdrive run launch/contact.toml --lambda 6 --canceller none --bag shaking.mcap
+  backdrive why shaking.mcap
+  backdrive why shaking.mcap --html out/why.html
+  backdrive why shaking.mcap --out out/as-recorded.toml
   backdrive why session/ --roles roles.toml
 
 Exit codes: 0 nothing shakes, 1 it does, 2 usage, 3 the bag is wrong, 5 the page cannot be written, 7 it cannot be told, 130 interrupted.";

@@ -62,7 +62,7 @@ pub fn diagnose(options: &cli::Diagnose, set: &RecordingSet, model: &Path, repor
     let mut written = [VERDICT_FILE, MODEL_FILE, EXPERIMENT_FILE].map(str::to_string).to_vec();
     if let Some(report) = report {
         let name = options.set.first().and_then(|p| p.file_name()).map_or(String::new(), |n| n.to_string_lossy().into_owned());
-        output::file(report, page(&Shown { problem: &problem, found: &found, name: &name, notes: &notes }).html())?;
+        output::file(report, page(&Shown { problem: &problem, found: &found, name: &name, notes: &notes, out: &options.out }).html())?;
         written.push(report.strip_prefix(&options.out).unwrap_or(report).display().to_string());
     }
     let seconds = began.elapsed().as_secs_f64();

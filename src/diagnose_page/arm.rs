@@ -2,13 +2,15 @@
 
 use super::phrases::{capital, tone};
 use super::{arm_figures as figures, arm_tables as tables};
-use crate::page_parts::ending;
+use crate::offered::{Offered, Step};
+use crate::page_parts::{ending, todo};
 use backdrive_arms::diagnose::Found;
 use backdrive_arms::problem::Problem;
 use backdrive_arms::said::unexplained;
 use backdrive_diagnosis::audit::Weight;
 use backdrive_diagnosis::verdict::{MODEL_FILE, Verdict, Word};
 use backdrive_report::{Page, percent};
+use std::path::Path;
 
 /// What a report shows.
 pub struct Shown<'a> {
@@ -20,17 +22,19 @@ pub struct Shown<'a> {
     pub name: &'a str,
     /// What a reader should know first.
     pub notes: &'a [String],
+    /// The folder of the model that was written.
+    pub out: &'a Path,
 }
 
 /// The report.
 pub fn page(shown: &Shown) -> Page {
-    let Shown { problem, found, name, notes } = shown;
+    let Shown { problem, found, name, notes, out } = shown;
     let verdict = &found.verdict;
     let held = !problem.held_out.is_empty();
     let mut page = Page::new(&format!("Diagnosis of {name} against {}", problem.model.name));
     page.lead(tone(verdict.word), &capital(&verdict.sentence));
     page.text(&summary(verdict, held));
-    page.todo("What to do now", &to_do(verdict));
+    todo(&mut page, &to_do(verdict, out));
     for note in *notes {
         page.note(&capital(note));
     }
@@ -99,38 +103,38 @@ fn summary(verdict: &Verdict, held: bool) -> String {
 }
 
 /// What to do now, most useful first, with commands to copy.
-fn to_do(verdict: &Verdict) -> Vec<(String, Option<String>)> {
-    let mut items = Vec::new();
-    let use_it = || Some(format!("backdrive export {MODEL_FILE} --to urdf --out arm.diagnosed.urdf"));
+fn to_do(verdict: &Verdict, out: &Path) -> Vec<Step> {
+    let mut steps = Vec::new();
+    let model = out.join(MODEL_FILE);
+    let (name, export) = (model.display(), Offered::verb("export").reads(&model).option("--to", "urdf"));
+    let use_it = || [export.option_writes("--out", Path::new("arm.diagnosed.urdf")).build()];
     match verdict.word {
-        Word::Missing | Word::Parameters => items.push((
-            format!("Use {MODEL_FILE}, beside this page, such as in a feed-forward or a simulation; this writes it for other programs:"),
+        Word::Missing | Word::Parameters => steps.push(Step::new(
+            format!("Use {name}, such as in a feed-forward or a simulation; this writes it for other programs:"),
             use_it(),
         )),
-        Word::Ambiguous => items.push((
-            format!("{MODEL_FILE}, beside this page, may be used, but the physics named first could be another one: see the table below."),
+        Word::Ambiguous => steps.push(Step::new(
+            format!("{name} may be used, but the physics named first could be another one: see the table below."),
             use_it(),
         )),
-        Word::NothingMissing => items.push(("Keep the model: the logs ask for nothing more.".to_string(), None)),
-        Word::Unexplained => items.push((
-            "Do not build on a law yet: look below at when and where the residual shows, and check the sensors of the joints named there first."
-                .to_string(),
-            None,
+        Word::NothingMissing => steps.push(Step::said("Keep the model: the logs ask for nothing more.")),
+        Word::Unexplained => steps.push(Step::said(
+            "Do not build on a law yet: look below at when and where the residual shows, and check the sensors of the joints named there first.",
         )),
         Word::CannotTell => {}
     }
     if verdict.word != Word::Unexplained {
         for joint in verdict.arm.iter().flat_map(|a| &a.joints) {
             if let Some(open) = unexplained(joint) {
-                items.push((format!("Look at what is left over {open}."), None));
+                steps.push(Step::said(format!("Look at what is left over {open}.")));
             }
         }
     }
     if let Some(next) = &verdict.next_experiment {
-        items.push((format!("Record next: {}", next.sentence()), None));
+        steps.push(Step::said(format!("Record next: {}", next.sentence())));
     }
     for remark in verdict.audit.iter().filter(|r| r.weight > Weight::Note).take(2) {
-        items.push((format!("Check this signal: {}: {}", remark.place, remark.message), None));
+        steps.push(Step::said(format!("Check this signal: {}: {}", remark.place, remark.message)));
     }
-    items
+    steps
 }

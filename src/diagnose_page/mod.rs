@@ -5,14 +5,16 @@ mod arm_figures;
 mod arm_tables;
 mod force;
 mod held_out;
+pub mod next;
 mod phrases;
 mod tables;
 
-use crate::diagnose_text::{alternatives, confidence, errors, next_experiment, parameters, shows};
-use crate::page_parts::{command, ending};
+use crate::diagnose_text::{alternatives, confidence, errors, parameters, shows};
+use crate::offered::Step;
+use crate::page_parts::{ending, todo};
 use backdrive_diagnosis::audit::Weight;
 use backdrive_diagnosis::diagnose::Diagnosis;
-use backdrive_diagnosis::verdict::{MODEL_FILE, Verdict, Word, chosen};
+use backdrive_diagnosis::verdict::{Verdict, chosen};
 use backdrive_diagnosis::words;
 use backdrive_report::{Cell, Page, Table, Tone, percent};
 use phrases::{adds, capital, tone};
@@ -25,6 +27,8 @@ pub struct Shown<'a> {
     pub name: &'a str,
     /// What a reader should know first.
     pub notes: &'a [String],
+    /// What to do next.
+    pub steps: &'a [Step],
 }
 
 /// The report.
@@ -34,7 +38,7 @@ pub fn page(shown: &Shown) -> Page {
     let mut page = Page::new(&format!("Diagnosis of {} against {}", shown.name, found.problem.model.name));
     page.lead(tone(found.verdict.word), &capital(&found.verdict.sentence));
     page.text(&summary(found, adds(best)));
-    page.todo("What to do now", &to_do(found));
+    todo(&mut page, shown.steps);
     for note in shown.notes {
         page.note(&capital(note));
     }
@@ -77,58 +81,6 @@ const TERMS: [(&str, &str); 8] = [
     ("asked for by the recordings", "the force at a place that makes the model do what was recorded when the law found there is left out"),
     ("sd", "standard deviations of a parameter's own error"),
 ];
-
-/// What to do now, most useful first, with commands to copy.
-fn to_do(found: &Diagnosis) -> Vec<(String, Option<String>)> {
-    let held = &found.verdict.held_out;
-    let mut items = Vec::new();
-    // A canceller takes the model of a master: one that says where it is held, pushed and read.
-    let is_master = !found.problem.model.axes.is_empty();
-    let use_it = Some(match is_master {
-        true => format!("backdrive run launch/contact.toml --canceller {MODEL_FILE}"),
-        false => format!("backdrive simulate {MODEL_FILE} RECORDING.csv --out predicted.csv"),
-    });
-    let place = if is_master { ", such as in the canceller" } else { ", such as in a feed-forward or a simulation" };
-    let (before, after) = (held.nrmse_before.unwrap_or(f64::NAN), held.nrmse_after.unwrap_or(f64::NAN));
-    let worth = format!("its error is {} of what was measured, that of the model as given {}", percent(after), percent(before));
-    match found.verdict.word {
-        Word::Missing | Word::Parameters => {
-            items.push((format!("Use {MODEL_FILE}, beside this page, where the motion is predicted{place}: {worth}."), use_it));
-            if is_master {
-                items.push((
-                    "See what it is worth in the loop: ask for the edge with it, in a bag of your contact task.".to_string(),
-                    Some(format!("backdrive stability RUN.mcap --canceller {MODEL_FILE} --html stability.html")),
-                ));
-            }
-        }
-        Word::Ambiguous => items.push((
-            format!("{MODEL_FILE}, beside this page, may be used ({worth}), but hold what is built on it against the rivals below too."),
-            use_it,
-        )),
-        Word::NothingMissing => items.push(("Keep the model: the recordings ask for nothing more.".to_string(), None)),
-        Word::Unexplained => items.push((
-            "Do not build on a law yet: look below at when and where the residual shows, and check the sensors named there first."
-                .to_string(),
-            None,
-        )),
-        Word::CannotTell => {}
-    }
-    if let Some(next) = &found.verdict.next_experiment {
-        items.push((format!("Record next: {}", next_experiment(next)), None));
-    }
-    if let Some(remark) = found.remarks.iter().find(|r| r.weight > Weight::Note && !r.signal.is_empty()) {
-        items.push((format!("Check this signal: {remark}"), None));
-    }
-    if found.search.exhausted || found.search.cut {
-        let more = if found.search.cut {
-            "Let the search come to its end: the same command with a larger --patience."
-        } else {
-            "Let it search more: the same command with a larger --effort."
-        };
-        items.push((more.to_string(), Some(command())));
-    }
-    items
-}
 
 /// How far it is explained, and where it shows.
 fn summary(found: &Diagnosis, added: bool) -> String {

@@ -8,6 +8,7 @@ mod write;
 
 use crate::cli::{self, Attached, Driven, Start};
 use crate::failure::Failure;
+use crate::offered::Offered;
 use crate::output;
 use crate::output::may_replace;
 use crate::recordings as sets;
@@ -54,8 +55,7 @@ pub fn init(options: &cli::Init) -> Result<u8, Failure> {
     let opened = sets::open(std::slice::from_ref(&options.folder), None, None, &[])
         .map_err(|e| Failure { code: e.code, message: format!("wrote {wrote}, and diagnose would refuse them: {}", e.message) })?;
     let remarks = audit::audit(&opened.problem);
-    let shown = quoted(&options.folder.display().to_string());
-    let next = format!("backdrive diagnose {shown} --out {}", quoted(&options.folder.join("diagnosis").display().to_string()));
+    let next = Offered::verb("diagnose").reads(&options.folder).word("--out").reads_later(&options.folder.join("diagnosis")).build();
     if options.json {
         output::json(&json!({
             "model": model, "set": set, "fit": seen.fit, "held_out": seen.held_out,
@@ -76,20 +76,20 @@ pub fn init(options: &cli::Init) -> Result<u8, Failure> {
         output::line(format_args!("{:<9} {text}", if index == 0 { "check" } else { "" }))?;
     }
     output::line(format_args!("wrote     {wrote}: look at them"))?;
-    output::line(format_args!("next      {next}"))?;
+    next.iter().try_for_each(|next| output::line(format_args!("next      {next}")))?;
     if is_terminal {
         // What an option cannot say is what happens without it.
         let sayable = asker.said().iter().filter(|(_, answer)| answer != ESTIMATE);
-        let said: Vec<String> = sayable.map(|(option, answer)| format!("--{option} {}", quoted(answer))).collect();
-        output::line(format_args!("again     backdrive init {shown} {}", said.join(" ")))?;
+        let again = options
+            .recording
+            .iter()
+            .fold(Offered::verb("init").reads(&options.folder), |again, file| again.word("--recording").reads(file));
+        let again = sayable.fold(again, |again, (option, answer)| again.word(format!("--{option}")).word(answer));
+        // What was written now would be in its way.
+        let again = again.flag("--yes").flag("--overwrite").build();
+        again.iter().try_for_each(|again| output::line(format_args!("again     {again}")))?;
     }
     Ok(0)
-}
-
-/// A word as a shell takes it.
-fn quoted(word: &str) -> String {
-    let plain = !word.is_empty() && word.chars().all(|c| c.is_ascii_alphanumeric() || "/._-+,:=".contains(c));
-    if plain { word.to_string() } else { format!("'{}'", word.replace('\'', r"'\''")) }
 }
 
 /// The signals of every recording, in SI units.
@@ -272,16 +272,4 @@ fn told_numbers(plan: &Plan, seen: &Seen) -> String {
     let Numbers { inertia, damping, stiffness } = seen.numbers;
     let spring = if stiffness > 0.0 { format!(", stiffness {} {holds}", number(stiffness)) } else { String::new() };
     format!("inertia {} {mass}, damping {} {damps}{spring}: {}", number(inertia), number(damping), seen.from)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn words_are_quoted_where_a_shell_would_part_them() {
-        assert_eq!(quoted("mine/set-1.csv"), "mine/set-1.csv");
-        assert_eq!(quoted("x [mm]"), "'x [mm]'");
-        assert_eq!(quoted("it's"), r"'it'\''s'");
-    }
 }

@@ -56,6 +56,7 @@ struct Nominal {
 }
 
 /// What a proof gave.
+#[derive(Debug, Clone)]
 pub struct Case {
     /// Its folder's name.
     pub name: String,

@@ -4,6 +4,7 @@ mod case;
 mod chosen;
 mod edges;
 mod files;
+mod headline;
 pub mod hidden;
 mod live;
 mod page;
@@ -20,6 +21,7 @@ use crate::failure::{Failure, code};
 use crate::interrupt;
 use crate::output;
 use case::{Case, Draw};
+use headline::Headline;
 use std::process::ExitCode;
 use std::sync::atomic::Ordering;
 use summary::Summary;
@@ -51,7 +53,11 @@ pub fn prove(options: &cli::Prove) -> Result<u8, Failure> {
         let folder = options.out.join(format!("case-{:03}", index + 1));
         match case::prove(options, &folder, &drawn, &stop) {
             Ok(case) => {
-                output::line(format_args!("{}\n", case.text()))?;
+                output::line(case.text())?;
+                for (index, sentence) in Headline::of([&case]).sentences().iter().enumerate() {
+                    output::line(format_args!("  {:<11} {sentence}", if index == 0 { "comes to" } else { "" }))?;
+                }
+                output::line("")?;
                 cases.push(case);
             }
             // What is wrong with the command shows in the first case; one of many that breaks must not cost the others.
@@ -69,6 +75,7 @@ pub fn prove(options: &cli::Prove) -> Result<u8, Failure> {
     }
     if cases.len() > 1 {
         output::line(format_args!("{} cases: {}", cases.len(), Summary::of(&cases).text()))?;
+        Headline::of(&cases).sentences().iter().try_for_each(output::line)?;
     }
     if let Some(failure) = broken {
         let not_ended = options.cases - cases.len();
@@ -77,7 +84,7 @@ pub fn prove(options: &cli::Prove) -> Result<u8, Failure> {
             ..failure
         });
     }
-    Ok(if cases.iter().all(Case::is_right) { 0 } else { code::NEGATIVE })
+    Ok(if Headline::of(&cases).favourable { 0 } else { code::NEGATIVE })
 }
 
 /// Before anything is sealed or recorded: the files that are needed at the end of a case.
@@ -103,8 +110,13 @@ fn given_files_are_there(options: &cli::Prove) -> Result<(), Failure> {
 
 /// Writes proof.json and the report.
 fn write(options: &cli::Prove, cases: &[Case]) -> Result<(), Failure> {
-    let all: Vec<serde_json::Value> = cases.iter().map(Case::json).collect();
-    let json = serde_json::json!({ "schema": 1, "summary": Summary::of(cases), "cases": all });
+    let with_headline = |case: &Case| {
+        let mut json = case.json();
+        json["headline"] = serde_json::json!(Headline::of([case]));
+        json
+    };
+    let all: Vec<serde_json::Value> = cases.iter().map(with_headline).collect();
+    let json = serde_json::json!({ "schema": 1, "headline": Headline::of(cases), "summary": Summary::of(cases), "cases": all });
     let path = options.out.join("proof.json");
     output::file(&path, serde_json::to_string_pretty(&json).map_err(Failure::input)?)?;
     let html = options.html.clone().unwrap_or_else(|| options.out.join("proof.html"));

@@ -1,10 +1,12 @@
 //! The report of a proof: what was concealed beside what was found, and what that is worth.
 
 use super::case::{Case, SHOWS};
+use super::headline::Headline;
 use super::raise::{ESTIMATED, Hand};
 use super::summary::Summary;
 use super::worth::{DIAGNOSED, Group};
 use crate::cli;
+use crate::offered::shell_word;
 use backdrive_diagnosis::hypothesis::Place;
 use backdrive_diagnosis::words;
 use backdrive_report::{Cell, Figure, Page, Plot, Series, Table, Tone, number, percent};
@@ -19,12 +21,12 @@ pub fn page(options: &cli::Prove, cases: &[Case]) -> Page {
     if cases.len() == 1 {
         cases.iter().for_each(|case| lead(&mut page, case));
     } else {
-        let all_right = cases.iter().all(Case::is_right);
-        let tone = if all_right { Tone::Good } else { Tone::Warning };
+        let headline = Headline::of(cases);
         page.lead(
-            tone,
+            headline.tone(),
             &format!(
-                "{} cases: {}; false alarms {}. Of effects that the nominal model's numbers cannot take on ({SHOWS} noise floors and more after a refit): {}.",
+                "{} {} cases: {}; false alarms {}. Of effects that the nominal model's numbers cannot take on ({SHOWS} noise floors and more after a refit): {}.",
+                headline.sentences().join(" "),
                 cases.len(),
                 summary.all,
                 summary.false_alarms,
@@ -82,7 +84,11 @@ pub fn page(options: &cli::Prove, cases: &[Case]) -> Page {
         "What another number of the nominal model does as well, or a constant force on a handle whose hand nobody measured, no recording can tell: there naming \
          nothing is right. The second count, of effects that stay away from the refitted nominal model, has none of those.",
     );
-    page.text("To check a seal: sha256sum case-NNN/sealed/truth.json gives the digest of the bags' title.");
+    if let Some(case) = cases.first() {
+        let truth = options.out.join(&case.name).join("sealed/truth.json");
+        let command = format!("sha256sum {}", shell_word(&truth.display().to_string()));
+        page.text(&format!("To check a seal: {command} gives the digest of the bags' title."));
+    }
     crate::page_parts::ending(&mut page, &TERMS);
     page
 }
@@ -122,8 +128,8 @@ fn found(case: &Case) -> String {
 }
 
 fn lead(page: &mut Page, case: &Case) {
-    let tone = if case.is_right() { Tone::Good } else { Tone::Warning };
-    page.lead(tone, &format!("Concealed: {}. Found: {}.", concealed(case), found(case)));
+    let headline = Headline::of([case]);
+    page.lead(headline.tone(), &format!("Concealed: {}. Found: {}. {}", concealed(case), found(case), headline.sentences().join(" ")));
 }
 
 fn one(page: &mut Page, case: &Case) {

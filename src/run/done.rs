@@ -1,6 +1,7 @@
 //! What a run gave, for a person and for programs.
 
 use crate::failure::{Failure, code};
+use crate::offered::{Step, lines};
 use crate::output;
 use crate::summary::Summary;
 use backdrive_launch::{Cause, RunReport};
@@ -28,6 +29,9 @@ pub struct Done {
     /// What happened.
     pub summary: Option<Summary>,
 }
+
+/// Next steps that a terminal shows; the page shows all.
+const SHOWN: usize = 2;
 
 impl Done {
     /// 0 judged and stable, or there is no loop, which its text says; 1 not stable, 7 it cannot be told; before these, of a run that did not go as it should:
@@ -57,15 +61,21 @@ impl Done {
     }
 
     /// Writes its page, if one is wanted, prints the result, and gives the exit code.
-    pub fn tell(&self, page: Option<(&Path, Page)>, json: bool) -> Result<u8, Failure> {
+    /// `steps` are what to do next.
+    pub fn tell(&self, page: Option<(&Path, Page)>, json: bool, steps: &[Step]) -> Result<u8, Failure> {
         if let Some((html, page)) = page {
             output::file(html, page.html())?;
             output::note(format_args!("wrote {}", html.display()));
         }
         if json {
-            output::line(self.json())?;
+            let mut all = self.json();
+            all["next"] = serde_json::to_value(steps).map_err(Failure::input)?;
+            output::line(all)?;
         } else {
             output::line(self.text())?;
+            // A sentence without a command stands above, where it belongs.
+            let with_commands: Vec<Step> = steps.iter().filter(|step| !step.commands.is_empty()).take(SHOWN).cloned().collect();
+            lines("next", 9, &with_commands).iter().try_for_each(output::line)?;
         }
         Ok(self.exit_code())
     }
@@ -99,7 +109,7 @@ impl Done {
             let complete = match self.lost {
                 _ if self.unreadable.is_some() => "cannot be read".to_string(),
                 0 if self.complete => "complete".to_string(),
-                0 => "cut off; `backdrive bag recover` makes a clean copy of what it holds".to_string(),
+                0 => "cut off".to_string(),
                 lost => format!("{lost} messages lost"),
             };
             lines.push(format!("bag      {} ({complete})", bag.display()));
@@ -134,6 +144,7 @@ impl Done {
             "first_contact_s": summary.and_then(|s| s.first_contact_s),
             "contact_s": summary.map(|s| s.contact_s),
             "no_loop": summary.and_then(|s| s.no_loop),
+            "margin": summary.and_then(|s| s.margin.as_ref()),
             "outcome": summary.and_then(|s| s.outcome).map(|o| o.word()),
             "outcome_detail": summary.and_then(|s| s.outcome),
             "run": report,

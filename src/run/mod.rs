@@ -1,9 +1,13 @@
 //! `backdrive run` and `backdrive clean`.
 
 mod done;
+mod next;
+mod source;
 mod way;
 
 pub use done::Done;
+pub use next::next;
+pub use source::runs_from_its_bag;
 pub use way::{Way, repeat_here, run_graph, run_here};
 
 use crate::cli;
@@ -11,13 +15,12 @@ use crate::failure::{Failure, code};
 use crate::output;
 use crate::run_page::{Heard, page};
 use backdrive_launch::RunHome;
-use backdrive_nodes::graph::Graph;
 use std::time::Duration;
 
 /// Runs a graph, or each experiment of one.
 pub fn run(options: &cli::Run) -> Result<u8, Failure> {
     let changes = options.changes.overrides(options.clock);
-    let mut graph = Graph::load(&options.graph, &changes)?;
+    let mut graph = source::load(&options.graph, &changes)?;
     if options.host.is_none() {
         graph = graph.on_one_host();
     }
@@ -40,8 +43,9 @@ pub fn run(options: &cli::Run) -> Result<u8, Failure> {
     if let (Way::Processes(_), Some(bag), true) = (&way, &done.bag, options.result.html.is_some()) {
         heard = Heard::from_bag(&graph, bag)?;
     }
-    let page = options.result.html.as_deref().map(|html| (html, page(&done, &graph, &heard, None)));
-    done.tell(page, options.result.json)
+    let steps = next(&done, &graph, None);
+    let page = options.result.html.as_deref().map(|html| (html, page(&done, &graph, &heard, &steps)));
+    done.tell(page, options.result.json, &steps)
 }
 
 /// Removes what dead runs left.

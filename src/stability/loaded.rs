@@ -2,6 +2,7 @@
 
 use crate::cli;
 use crate::failure::Failure;
+use crate::offered::with_recover;
 use crate::summary::graph_of;
 use backdrive_bags::Reader;
 use backdrive_control::operator::Intent;
@@ -49,7 +50,7 @@ impl Loaded {
         let asked = graph_of(&reader, &changes)?;
         let mut session = Session::from_bag(&reader, &recorded).map_err(Failure::input)?;
         if !reader.ended_cleanly() {
-            session.notes.push("the bag was not closed: what it holds is used, and `backdrive bag recover` makes a clean copy".to_string());
+            session.notes.push(with_recover("the bag was not closed: what it holds is used", path));
         }
         let mut intents = recorded_intents(&session);
         if intents.is_none() && options.script.is_none() {

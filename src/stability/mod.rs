@@ -2,16 +2,19 @@
 
 mod curve;
 mod loaded;
+mod next;
 mod text;
 
 pub use curve::Point;
 
 use crate::failure::{Failure, code};
+use crate::offered::{Step, lines};
 use crate::{cli, interrupt, output, progress};
 use backdrive_stability::resimulate::ResimulateError;
 use backdrive_stability::verdict::{Answer, AnswerError, Word, answer};
 use curve::{curve, curve_text, point_json};
 use loaded::Loaded;
+use next::next;
 use serde_json::{Value, json};
 use std::sync::atomic::Ordering;
 use text::text;
@@ -38,6 +41,7 @@ pub fn stability(options: &cli::Stability) -> Result<u8, Failure> {
     };
     let found = answer(&question, &hear, &cancel);
     bar.finish_and_clear();
+    let steps = found.as_ref().map_or_else(|_| Vec::new(), |found| next(found, options, loaded.asked.as_ref()));
     let found = match found {
         Ok(found) => Some(found),
         // What was done until then is printed.
@@ -49,6 +53,7 @@ pub fn stability(options: &cli::Stability) -> Result<u8, Failure> {
         if let Some(curve) = &curve {
             all["sweep"] = Value::Array(curve.iter().flatten().map(point_json).collect());
         }
+        all["next"] = serde_json::to_value(&steps).map_err(Failure::input)?;
         output::line(format_args!("{all}"))?;
     } else {
         if let Some(curve) = &curve {
@@ -56,13 +61,16 @@ pub fn stability(options: &cli::Stability) -> Result<u8, Failure> {
         }
         if let Some(found) = &found {
             output::line(text(found))?;
+            // The advice stands above.
+            let with_commands: Vec<Step> = steps.iter().filter(|step| !step.commands.is_empty()).cloned().collect();
+            lines("to do", 9, &with_commands).iter().try_for_each(output::line)?;
         }
     }
     let interrupted = || Failure { code: code::INTERRUPTED, message: "stopped; what was done until then is above".to_string() };
     let found = found.ok_or_else(interrupted)?;
     if let Some(html) = &options.html {
         let points: Vec<&Point> = curve.iter().flatten().flatten().collect();
-        let page = crate::stability_page::page(&found, question.session, &points);
+        let page = crate::stability_page::page(&found, question.session, &points, &steps);
         output::file(html, page.html())?;
         output::note(format_args!("wrote {}", html.display()));
     }

@@ -8,7 +8,8 @@ mod measured;
 mod response;
 mod words;
 
-use crate::page_parts::{ending, shell_word};
+use crate::offered::Step;
+use crate::page_parts::{ending, todo};
 use crate::stability::Point;
 pub use axes::CANCELLED;
 use backdrive_report::{Cell, Page, Table, Tone, number, percent, si};
@@ -19,10 +20,11 @@ use energy::{energy, transparency};
 use gains::gains;
 use measured::measured;
 use response::response;
-use words::{capital, energy_verdict, file_name, interval, spelled, tone, verdict, word};
+pub use words::spelled;
+use words::{capital, energy_verdict, file_name, interval, tone, verdict, word};
 
-/// The report of an answer; `session` is what was recorded, `curve` the sweep, which may be empty.
-pub fn page(found: &Answer, session: &Session, curve: &[&Point]) -> Page {
+/// The report of an answer; `session` is what was recorded, `curve` the sweep, which may be empty, `steps` what to do next.
+pub fn page(found: &Answer, session: &Session, curve: &[&Point], steps: &[Step]) -> Page {
     let is_pair = !found.coupled.is_empty();
     let mut page = Page::new(&match is_pair {
         true => coupled::title(file_name(&found.bag)),
@@ -30,7 +32,7 @@ pub fn page(found: &Answer, session: &Session, curve: &[&Point]) -> Page {
     });
     page.lead(tone(found.verdict), &lead(found));
     page.text(&capital(&found.reason));
-    page.todo("What to do now", &to_do(found));
+    todo(&mut page, steps);
     for d in &found.disagreements {
         page.warning(&capital(&d.text));
     }
@@ -68,81 +70,6 @@ pub fn page(found: &Answer, session: &Session, curve: &[&Point]) -> Page {
     ending(&mut page, &TERMS);
     page
 }
-
-/// What to do now, most useful first, with commands to copy.
-fn to_do(found: &Answer) -> Vec<(String, Option<String>)> {
-    let (bag, asked) = (shell_word(&found.bag), found.gain.product());
-    // Digits as a command takes them.
-    let plain = |v: f64| format!("{v:.3}").trim_end_matches('0').trim_end_matches('.').to_string();
-    let lower = |edge: f64| {
-        let low = found.critical_gain_ci95.map_or(edge, |ci| ci.0.min(edge));
-        low / SAFE
-    };
-    let mut items = Vec::new();
-    match (found.verdict, found.critical_gain, found.at_least) {
-        (Word::Stable, Some(edge), _) => {
-            let db = 20.0 * (edge / asked).log10();
-            items.push((
-                format!(
-                    "The edge is {} dB away. {} (6 dB below it, the usual reserve: μλ = {}.)",
-                    number(db),
-                    if lower(edge) < asked {
-                        "That is little: a firmer hand or an older cable may use it up."
-                    } else {
-                        "The gain may rise."
-                    },
-                    number(lower(edge))
-                ),
-                None,
-            ));
-            items.push((
-                "See what happens up to the edge and beyond it, before a hand feels it.".to_string(),
-                Some(format!("backdrive replay {bag} --lambda {} --html at-the-edge.html", plain(edge / found.gain.mu))),
-            ));
-        }
-        (Word::Stable, None, Some(least)) => {
-            items.push((format!("Nothing stands against a higher gain up to μλ = {}: that is how far was looked.", number(least)), None))
-        }
-        (Word::LimitCycle | Word::Unstable | Word::Limited, edge, least) if edge.or(least).is_some() => {
-            let edge = edge.or(least).unwrap_or(asked);
-            let gain = lower(edge).min(asked);
-            items.push((
-                format!(
-                    "Lower the force scale: at μλ = {} the loop keeps 6 dB to where it stops being stable, at the price of a reflected force of {} of what it would be now.",
-                    number(gain),
-                    percent(gain / asked)
-                ),
-                Some(format!("backdrive replay {bag} --lambda {} --html lower.html", plain(gain / found.gain.mu))),
-            ));
-            let has_canceller = found.transparency.iter().any(|t| t.cancellation.is_some());
-            items.push(if has_canceller {
-                (
-                    "Or cancel with a better model of the master: a diagnosis finds what the present one lacks.".to_string(),
-                    Some("backdrive diagnose --help".to_string()),
-                )
-            } else {
-                (
-                    "Or take the induced master motion out by a canceller, with a model of the master.".to_string(),
-                    Some(format!("backdrive stability {bag} --gain {} --canceller MODEL.toml --html cancelled.html", plain(asked))),
-                )
-            });
-        }
-        _ => {}
-    }
-    if let Some(advice) = &found.advice {
-        items.push((format!("To record for a better answer: {}", spelled(advice)), None));
-    }
-    if found.checks.iter().any(|c| !c.agrees) {
-        items.push((
-            "A model does something else than its device: find out what it lacks, and ask again.".to_string(),
-            Some("backdrive diagnose --help".to_string()),
-        ));
-    }
-    items
-}
-
-/// A gain is worked at this factor (6 dB) below its edge.
-const SAFE: f64 = 2.0;
 
 /// The terms of the page.
 const TERMS: [(&str, &str); 10] = [

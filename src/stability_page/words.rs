@@ -63,7 +63,7 @@ pub(super) fn capital(clause: &str) -> String {
 }
 
 /// The gain as the page spells it; in a terminal and in files it is `mu*lambda`.
-pub(super) fn spelled(text: &str) -> String {
+pub fn spelled(text: &str) -> String {
     text.replace("mu*lambda", "μλ")
 }
 

@@ -1,9 +1,11 @@
 //! `backdrive why`: what a recorded loop does, why, and what would stop it.
 
+mod next;
 mod page;
 mod text;
 
 use crate::failure::{Failure, code};
+use crate::run::runs_from_its_bag;
 use crate::summary::graph_of;
 use crate::{cli, interrupt, output, progress};
 use backdrive_bags::Reader;
@@ -16,6 +18,7 @@ use backdrive_stability::session::Session;
 use backdrive_why::answer::{Answer, PATIENCE, Question, WhyError, why as answer};
 use backdrive_why::foreign::why_of_signals;
 use backdrive_why::happening::Happening;
+use next::{Asked, next};
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -29,38 +32,53 @@ pub fn why(options: &cli::Why) -> Result<u8, Failure> {
     for file in options.html.iter().chain(&options.out) {
         output::writable(file)?;
     }
-    let (found, session) = match &options.roles {
+    let (found, session, graph) = match &options.roles {
         Some(roles) => {
             let roles = Roles::load(roles)?;
             let session =
                 progress::busy(&format!("reading {}", path.display()), || Session::from_roles(path, &roles)).map_err(Failure::input)?;
             let gain = own_gain(&session, None);
-            (why_of_signals(&session, gain), session)
+            (why_of_signals(&session, gain), session, None)
         }
         None => of_our_bag(path, &cancel)?,
     };
-    if options.json {
-        output::json(&found)?;
-    } else {
-        output::line(text(&found))?;
-    }
-    match (&options.out, &found.master) {
+    let written = match (&options.out, &found.master) {
         (Some(out), Some(model)) => {
             output::file(out, model)?;
             output::note(format_args!("wrote {}", out.display()));
+            Some(out.as_path())
         }
-        (Some(out), None) => output::note(format_args!("{}: not written, for the master does what the graph says", out.display())),
-        (None, _) => {}
+        (Some(out), None) => {
+            output::note(format_args!("{}: not written, for the master does what the graph says", out.display()));
+            None
+        }
+        (None, _) => None,
+    };
+    let takes = |changes: &Overrides| Reader::open(path).is_ok_and(|reader| graph_of(&reader, changes).is_ok());
+    let asked = Asked {
+        recording: path,
+        roles: options.roles.as_deref(),
+        master: written,
+        takes: &takes,
+        runs: graph.as_ref().is_some_and(runs_from_its_bag),
+    };
+    let steps = next(&found, &asked);
+    if options.json {
+        let mut all = serde_json::to_value(&found).map_err(Failure::input)?;
+        all["next"] = serde_json::to_value(&steps).map_err(Failure::input)?;
+        output::json(&all)?;
+    } else {
+        output::line(text(&found, &steps))?;
     }
     if let Some(html) = &options.html {
-        output::file(html, page::page(&found, &session, options.out.as_deref()).html())?;
+        output::file(html, page::page(&found, &session, &asked, &steps).html())?;
         output::note(format_args!("wrote {}", html.display()));
     }
     Ok(exit_code(&found))
 }
 
-/// The answer of a bag of ours, and its signals.
-fn of_our_bag(path: &Path, cancel: &Arc<AtomicBool>) -> Result<(Answer, Session), Failure> {
+/// The answer of a bag of ours, its signals and its graph.
+fn of_our_bag(path: &Path, cancel: &Arc<AtomicBool>) -> Result<(Answer, Session, Option<Graph>), Failure> {
     let hint = |f: Failure| Failure { message: format!("{}; a recording that we did not make needs --roles FILE", f.message), ..f };
     let reader = Reader::open(path).map_err(Failure::input)?;
     let graph = graph_of(&reader, &Overrides::default()).map_err(hint)?;
@@ -87,7 +105,7 @@ fn of_our_bag(path: &Path, cancel: &Arc<AtomicBool>) -> Result<(Answer, Session)
             other => Failure::input(format!("{}: {other}", path.display())),
         })
     })?;
-    Ok((found, session))
+    Ok((found, session, Some(graph)))
 }
 
 /// About how long an answer takes that needs a diagnosis.

@@ -1,19 +1,18 @@
 //! The page of `backdrive why`: what happens, why, and what would stop it, for a colleague who was not there.
 
-use super::text::{MASTER, master_is};
-use crate::page_parts::{ending, shell_word};
+use super::next::{Asked, capital, commands};
+use crate::offered::Step;
+use crate::page_parts::{ending, todo};
 use backdrive_report::{Figure, Page, Plot, Table, Tone, number, percent};
 use backdrive_stability::session::Session;
 use backdrive_why::answer::Answer;
-use backdrive_why::change::Change;
 use backdrive_why::happening::Happening;
-use std::path::Path;
 
 /// Causes that are less likely are not shown.
 const UNLIKELY: f64 = 0.01;
 
-/// The page of an answer about a session; `master` is where the master as it was has been written.
-pub fn page(found: &Answer, session: &Session, master: Option<&Path>) -> Page {
+/// The page of an answer about a session, with what to do next.
+pub fn page(found: &Answer, session: &Session, asked: &Asked, steps: &[Step]) -> Page {
     let name = std::path::Path::new(&found.bag).file_name().map_or(found.bag.clone(), |n| n.to_string_lossy().into_owned());
     let mut page = Page::new(&format!("Why does it shake? {name}"));
     page.lead(tone(found), &lead(found));
@@ -26,12 +25,12 @@ pub fn page(found: &Answer, session: &Session, master: Option<&Path>) -> Page {
              what follows is less sure.",
         );
     }
-    page.todo("What to do now", &to_do(found, master));
+    todo(&mut page, steps);
     pictures(&mut page, found, session);
     page.section("Causes");
     causes(&mut page, found);
     page.section("What would stop it");
-    remedies(&mut page, found);
+    remedies(&mut page, found, asked);
     page.section("Where the recording is not what its graph says");
     if found.differs.is_empty() {
         page.text("Nowhere: every node does of what it was given what the graph says of it.");
@@ -72,58 +71,6 @@ fn lead(found: &Answer) -> String {
         text += &format!(" The likeliest cause is {} (confidence {}).", first.kind.words(), percent(first.confidence));
     }
     text
-}
-
-fn to_do(found: &Answer, master: Option<&Path>) -> Vec<(String, Option<String>)> {
-    let stop = found.remedies.iter().filter(|r| r.stops).take(3);
-    let mut items: Vec<(String, Option<String>)> = stop
-        .map(|r| {
-            let hands = if r.robust {
-                "It holds with a grip 15 % softer or firmer and a gain a quarter higher too."
-            } else {
-                "It holds with this grip and this gain only."
-            };
-            (
-                format!(
-                    "{}. {hands} {} of the force and {} of the motion are left.",
-                    capital(&r.text),
-                    percent(r.force_kept),
-                    percent(r.motion_kept)
-                ),
-                replay(found, &r.changes, master),
-            )
-        })
-        .collect();
-    if items.is_empty() && found.happening.is_trouble() {
-        items.push((
-            "None of what was tried stops it in the loop that is run again. Record with a dither, and ask `backdrive stability`."
-                .to_string(),
-            None,
-        ));
-    }
-    if let Happening::NotJudged { why } = found.happening {
-        items.push((why.advice().to_string(), None));
-    }
-    items
-}
-
-/// The command that runs the bag again with changes, where the graph's own models are in it; what was found and is in no file cannot be named.
-fn replay(found: &Answer, changes: &[Change], master: Option<&Path>) -> Option<String> {
-    let mut command = format!("backdrive replay {}", shell_word(&found.bag));
-    for change in changes {
-        command += &match (change, master) {
-            (Change::Gain { lambda, .. }, _) => format!(" --lambda {lambda:.4}"),
-            (Change::HighPass { hz }, _) => format!(" --high-pass {hz}"),
-            (Change::Coupling { law }, _) => format!(" --coupling {law} --canceller none"),
-            (Change::Canceller { model: None, .. }, _) => " --canceller none".to_string(),
-            (Change::Canceller { model: Some(_), high_pass_hz, .. }, Some(file)) => {
-                format!(" --canceller {} --canceller-grip none --high-pass {high_pass_hz}", shell_word(&file.display().to_string()))
-            }
-            _ => return None,
-        };
-    }
-    // What is wrong beside the graph is not in the bag's graph: a replay of it would not shake in the first place.
-    found.differences.is_empty().then_some(command)
 }
 
 fn pictures(page: &mut Page, found: &Answer, session: &Session) {
@@ -190,7 +137,7 @@ fn causes(page: &mut Page, found: &Answer) {
     }
 }
 
-fn remedies(page: &mut Page, found: &Answer) {
+fn remedies(page: &mut Page, found: &Answer, asked: &Asked) {
     if found.remedies.is_empty() {
         page.text(if found.happening.is_trouble() { "Nothing could be tried." } else { "Nothing needs to be stopped." });
         return;
@@ -202,7 +149,8 @@ fn remedies(page: &mut Page, found: &Answer) {
         "with other grips and more gain",
         "force left",
         "motion left",
-        "backdrive run GRAPH ...",
+        "beyond what was recorded",
+        "how it is tried",
     ]);
     let yes = |is: bool| if is { "yes" } else { "no" }.to_string();
     for remedy in &found.remedies {
@@ -213,18 +161,11 @@ fn remedies(page: &mut Page, found: &Answer) {
             yes(remedy.robust),
             percent(remedy.force_kept),
             percent(remedy.motion_kept),
-            remedy.options.clone().unwrap_or_default(),
+            remedy.throws.as_ref().map_or_else(|| "no".to_string(), ToString::to_string),
+            Step::new("", commands(found, asked, remedy)).pasted().unwrap_or_default(),
         ]);
     }
     page.table(table);
-    if found.remedies.iter().any(|r| r.options.as_ref().is_some_and(|o| o.contains(MASTER))) {
-        page.text(&format!("GRAPH is the graph file that was run, MASTER is {}.", master_is(found)));
-    }
-}
-
-fn capital(text: &str) -> String {
-    let mut letters = text.chars();
-    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
 }
 
 /// The terms of the page.

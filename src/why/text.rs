@@ -1,12 +1,12 @@
 //! The answer for a terminal.
 
+use crate::offered::{Step, lines};
 use backdrive_why::answer::Answer;
 use backdrive_why::cause::Cause;
 use backdrive_why::happening::Happening;
-use backdrive_why::remedy::Remedy;
 use std::fmt::Write;
 
-/// Causes and remedies that are shown.
+/// Causes that are shown.
 const SHOWN: usize = 5;
 
 /// A cause that is less likely is not worth a line.
@@ -15,8 +15,8 @@ const UNLIKELY: f64 = 0.03;
 /// Where the signals alone do not say why.
 pub const NO_CAUSE: &str = "cannot be told: what there is holds no model of the loop and no excitation that measures it";
 
-/// The answer for a terminal.
-pub fn text(answer: &Answer) -> String {
+/// The answer for a terminal, and what to do next.
+pub fn text(answer: &Answer, steps: &[Step]) -> String {
     let mut out = String::new();
     let mut line = |label: &str, text: &str| {
         let _ = writeln!(out, "{label:<12}{text}");
@@ -39,19 +39,6 @@ pub fn text(answer: &Answer) -> String {
     for text in answer.differs.iter().filter(|d| !answer.causes.iter().any(|c| c.evidence == **d)) {
         line("differs", text);
     }
-    let stop: Vec<&Remedy> = answer.remedies.iter().filter(|r| r.stops).take(SHOWN).collect();
-    for (number, remedy) in stop.iter().enumerate() {
-        line(if number == 0 { "remedy" } else { "or" }, &of_remedy(remedy));
-        if let Some(options) = &remedy.options {
-            line("", &format!("backdrive run GRAPH {options}"));
-        }
-    }
-    if stop.iter().any(|r| r.options.as_ref().is_some_and(|o| o.contains(MASTER))) {
-        line("MASTER", master_is(answer));
-    }
-    if stop.is_empty() && !answer.remedies.is_empty() {
-        line("remedy", "none of what was tried stops it");
-    }
     if let Some(again) = &answer.again {
         let judged = !matches!(answer.happening, Happening::NotJudged { .. });
         let agrees = if !judged {
@@ -69,34 +56,14 @@ pub fn text(answer: &Answer) -> String {
     for note in &answer.notes {
         line("note", note);
     }
+    lines("to do", 12, steps).iter().for_each(|step| {
+        let _ = writeln!(out, "{step}");
+    });
     out.truncate(out.trim_end().len());
     out
-}
-
-/// What stands for a file in the options of a remedy.
-pub const MASTER: &str = "MASTER";
-
-/// Which file it is.
-pub fn master_is(answer: &Answer) -> &'static str {
-    match answer.master {
-        Some(_) => "the master as it was, which --out MASTER writes",
-        None => "the model file of the graph's master, with the grip that the graph gives the canceller",
-    }
 }
 
 fn of_cause(cause: &Cause) -> String {
     let place = if cause.place.is_empty() { String::new() } else { format!(" ({})", cause.place) };
     format!("{}{place}, confidence {:.2}: {}; without it: {}", cause.kind.words(), cause.confidence, cause.evidence, cause.without)
-}
-
-fn of_remedy(remedy: &Remedy) -> String {
-    let hands =
-        if remedy.robust { "also with a grip 15 % softer or firmer and a gain a quarter higher" } else { "with this grip and gain only" };
-    format!(
-        "{}: {}, {hands}; {:.0} % of the force and {:.0} % of the motion are left",
-        remedy.text,
-        remedy.outcome,
-        100.0 * remedy.force_kept,
-        100.0 * remedy.motion_kept
-    )
 }

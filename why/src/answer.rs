@@ -8,6 +8,7 @@ use crate::difference::Difference;
 use crate::differences::{Differences, Look, differences};
 use crate::happening::Happening;
 use crate::named::named;
+use crate::options::{Named, options};
 use crate::remedy::{Remedy, remedies};
 use crate::trial::{Hand, Trial};
 use backdrive_control::operator::Intent;
@@ -141,8 +142,9 @@ pub fn why(question: &Question, hear: &(dyn Fn(&str) + Sync), cancel: &AtomicBoo
     if answer.happening.is_trouble() && !answer.reproduced && answer.not_again.is_none() {
         closer(question, recorded, &mut answer, hear, cancel)?;
     }
-    let held = answer.master.is_some();
-    answer.remedies.iter_mut().for_each(|remedy| remedy.say_how(held));
+    let was = as_it_was(graph, &answer.differences);
+    let named = Named::of(&was.graph, graph, answer.master.is_none());
+    answer.remedies.iter_mut().for_each(|remedy| remedy.options = options(&remedy.changes, &named));
     of_events(&mut answer, recorded);
     Ok(answer)
 }
@@ -242,7 +244,7 @@ fn again(question: &Question, answer: &mut Answer, hear: &(dyn Fn(&str) + Sync),
     };
     answer.causes = causes(&asked, cancel)?;
     hear("what would stop it");
-    answer.remedies = remedies(&was, &hand, *gain, answer.edge, &answer.causes, cancel)?;
+    answer.remedies = remedies(&was, session, &hand, *gain, answer.edge, &answer.causes, cancel)?;
     Ok(())
 }
 

@@ -174,30 +174,6 @@ impl Change {
         }
     }
 
-    /// What makes the change on the command line of `backdrive run`, where there is something; MASTER is the master's model, in `held` whether what holds it
-    /// is part of that file.
-    pub fn options(&self, held: bool) -> Option<String> {
-        let master = if held { "--canceller MASTER --canceller-grip none" } else { "--canceller MASTER" };
-        match self {
-            Change::Gain { lambda, .. } => Some(format!("--lambda {lambda:.4}")),
-            Change::Canceller { model: None, .. } => Some("--canceller none".to_string()),
-            Change::Canceller { high_pass_hz, .. } => Some(format!("{master} --high-pass {high_pass_hz}")),
-            Change::EstimatedHand { .. } => Some(format!("{master} --hand estimated --high-pass 0")),
-            Change::HighPass { hz } => Some(format!("--high-pass {hz}")),
-            Change::Rate { hz } => Some(format!("--rate {hz:.0}")),
-            Change::Coupling { law } => Some(format!("--coupling {law}")),
-            Change::WayRepaired { .. }
-            | Change::Delays { .. }
-            | Change::SensorRepaired { .. }
-            | Change::FinerSensors
-            | Change::Damping { .. }
-            | Change::FrictionCompensated { .. }
-            | Change::Grip { .. }
-            | Change::StrongerMotor
-            | Change::NoLimits => None,
-        }
-    }
-
     /// Whether it does the same as another, however the two are called.
     pub fn does_the_same(&self, other: &Change) -> bool {
         match (self, other) {

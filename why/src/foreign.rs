@@ -168,6 +168,7 @@ fn lower(gain: Gain, edge: f64) -> Remedy {
         robust: false,
         force_kept: factor,
         motion_kept: 1.0,
+        throws: None,
         repairs_cause: false,
         options: None,
         signals: None,

@@ -17,6 +17,8 @@ pub mod foreign;
 pub mod happening;
 mod named;
 mod numbers;
+pub mod options;
 pub mod remedy;
 mod stated;
+pub mod throw;
 pub mod trial;

@@ -3,6 +3,8 @@
 use crate::cause::Cause;
 use crate::cause_kind::CauseKind;
 use crate::change::{Change, is_friction_to_ground};
+use crate::options::Word;
+use crate::throw::Throw;
 use crate::trial::{Hand, Trial};
 use backdrive_nodes::graph::{DeviceFiles, NodeKind, Settings};
 use backdrive_stability::outcome::Outcome;
@@ -50,34 +52,32 @@ pub struct Remedy {
     pub force_kept: f64,
     /// Share of the hand's free motion that reaches the slave, 0 to 1: against the master without force.
     pub motion_kept: f64,
+    /// How it moves or pushes the device harder than was recorded, where it does.
+    pub throws: Option<Throw>,
     /// Whether it puts right what was found to be wrong.
     pub repairs_cause: bool,
-    /// What does it on the command line of `backdrive run`, where all of it can be done there.
-    pub options: Option<String>,
+    /// What does it on the command line of `backdrive run` and `backdrive replay`, where all of it can be done there.
+    #[serde(skip)]
+    pub options: Option<Vec<Word>>,
     /// What the loop did then; of the best remedy only.
     #[serde(skip)]
     pub signals: Option<Session>,
 }
 
 impl Remedy {
-    /// Says how it is done on the command line; `held`: whether the file that is called MASTER holds its hand.
-    pub(crate) fn say_how(&mut self, held: bool) {
-        let each: Option<Vec<String>> = self.changes.iter().map(|change| change.options(held)).collect();
-        self.options = each.filter(|e| !e.is_empty()).map(|e| e.join(" "));
-    }
-
     /// What is left of force and motion together, 0 to 1.
     pub fn kept(&self) -> f64 {
         self.force_kept * self.motion_kept
     }
 }
 
-/// Tries what would stop a loop; the best first. `causes` are the likeliest first.
+/// Tries what would stop a loop; the best first. `recorded` is the loop as recorded, `causes` are the likeliest first.
 ///
 /// # Errors
 /// A loop that cannot be run; `cancel` was set.
 pub fn remedies(
     was: &Trial,
+    recorded: &Session,
     hand: &Hand,
     gain: Gain,
     edge: Option<f64>,
@@ -117,6 +117,7 @@ pub fn remedies(
             robust,
             force_kept,
             motion_kept,
+            throws: run.signals.as_ref().and_then(|signals| Throw::of(signals, recorded)),
             repairs_cause: *repairs_cause,
             options: None,
             signals: run.signals,
@@ -139,12 +140,12 @@ pub fn remedies(
     Ok(all)
 }
 
-/// What stops it comes first, then by what is kept: what holds with other hands too counts more, and what puts the cause right. To ask another grip
-/// of the hand is the last thing.
+/// What stops it without a throw comes first, then what stops it with one, then by what is kept: what holds with other hands too counts more, and what puts
+/// the cause right. To ask another grip of the hand is the last thing.
 fn rank(remedy: &Remedy) -> f64 {
     let hand = remedy.changes.iter().any(|c| matches!(c, Change::Grip { .. }));
     let more = f64::from(u8::try_from(remedy.changes.len()).unwrap_or(u8::MAX));
-    8.0 * f64::from(u8::from(remedy.stops))
+    8.0 * f64::from(u8::from(remedy.stops)) - 4.0 * f64::from(u8::from(remedy.throws.is_some()))
         + remedy.kept() * if remedy.robust { 1.0 } else { FRAGILE }
         + 0.5 * f64::from(u8::from(remedy.repairs_cause))
         - 0.01 * more
@@ -190,7 +191,8 @@ fn candidates(was: &Trial, gain: Gain, edge: Option<f64>, causes: &[Cause]) -> V
             grip: fragment.clone().map(Box::new),
             high_pass_hz,
         };
-        if let Some(grip) = fragment {
+        // Over several axes an estimated hand needs a limit to its share, which is not known here.
+        if let Some(grip) = fragment.as_ref().filter(|_| model.axes.len() == 1) {
             let estimated = Change::EstimatedHand { model: Box::new(model.clone()), grip: Box::new(grip.clone()) };
             all.push((vec![estimated], knows));
         }

@@ -5,9 +5,13 @@ use backdrive_msgs::margin;
 /// Where the edge of the running loop is, as the gain of the force at the present position scale.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum Edge {
-    /// Nothing is touched, or not for long enough.
+    /// Nothing is touched, or not for a whole window.
     #[default]
     Free,
+    /// In contact, but not for enough windows yet.
+    Settling,
+    /// In contact, but too many contact forces come late or not at all for a whole window.
+    Late,
     /// In contact, and no edge is below this lambda; where it is is not known.
     Above {
         /// Force scale, no unit.
@@ -49,6 +53,8 @@ impl Told {
         let (known, factor, deviation, frequency_hz) = match edge {
             None => (margin::NO_DITHER, f64::NAN, f64::NAN, f64::NAN),
             Some(Edge::Free) => (margin::FREE, f64::NAN, f64::NAN, f64::NAN),
+            Some(Edge::Settling) => (margin::SETTLING, f64::NAN, f64::NAN, f64::NAN),
+            Some(Edge::Late) => (margin::LATE, f64::NAN, f64::NAN, f64::NAN),
             Some(Edge::At { lambda: edge, deviation, frequency_hz }) if lambda > 0.0 => {
                 (margin::KNOWN, edge / lambda, deviation, frequency_hz)
             }
@@ -62,6 +68,13 @@ impl Told {
 
     /// Whether it is the worse news of two axes: a known margin before a bound, that before what is not known.
     pub fn is_tighter_than(&self, other: &Told) -> bool {
-        self.known > other.known || self.known == other.known && self.factor < other.factor
+        let (own, others) = (rank(self.known), rank(other.known));
+        own > others || own == others && self.factor < other.factor
     }
+}
+
+/// How much is known, ascending.
+fn rank(known: u32) -> usize {
+    let ascending = [margin::NO_DITHER, margin::FREE, margin::SETTLING, margin::LATE, margin::NOISY, margin::ABOVE, margin::KNOWN];
+    ascending.iter().position(|one| *one == known).unwrap_or(0)
 }

@@ -15,8 +15,15 @@ const WINDOWS: usize = 8;
 /// Windows without an impact that an answer needs.
 const LEAST_WINDOWS: usize = 3;
 
-/// A window whose force, beside its dither, has more than this times the power of the quietest's holds an impact or a jerk of the hand.
+/// A window whose force, beside its dither, has more than this times the power of the third quietest holds an impact or a jerk of the hand. The quietest of
+/// all is no measure: where friction holds the device still for a window, the force that comes back is a hundredth of what it is in the others.
 const QUIET: f64 = 10.0;
+
+/// Contact forces that are missing for up to this time are bridged by the last one, s: the loop itself holds it. It is half a period of the highest line.
+const BRIDGED_S: f64 = 0.002;
+
+/// An answer is given up where no window came to its end for this time, s.
+const OLD_S: f64 = 2.0;
 
 /// Lowest and highest line, Hz.
 const BAND_HZ: [f64; 2] = [6.5, 250.0];
@@ -54,6 +61,12 @@ pub struct LiveMargin {
     pub(super) slope: Option<[f64; 3]>,
     pub(super) mu: f64,
     free_steps: u32,
+    /// Steps without a contact force now, and how many are bridged.
+    missing: u32,
+    bridged: u32,
+    /// Steps since a window came to its end, and after how many an answer is old.
+    since_window: u32,
+    old: u32,
     pub(super) least_force: f64,
     pub(super) edge: Edge,
 }
@@ -111,6 +124,10 @@ impl LiveMargin {
             slope: None,
             mu: f64::NAN,
             free_steps: 0,
+            missing: 0,
+            bridged: ((BRIDGED_S / period_s).round() as u32).max(1),
+            since_window: 0,
+            old: (OLD_S / period_s).round() as u32,
             least_force,
             edge: Edge::Free,
         })
@@ -128,25 +145,60 @@ impl LiveMargin {
 
     /// Forgets everything: what it is of has changed.
     fn restart(&mut self) {
-        if self.last.is_none() {
+        (self.missing, self.since_window) = (0, 0);
+        if self.last.is_none() && self.edge == Edge::Free {
             return;
         }
-        self.windows.iter_mut().for_each(Window::clear);
+        self.drop_windows();
         self.taken.iter_mut().for_each(|t| t.power = 0.0);
-        (self.last, self.slope, self.edge) = (None, None, Edge::Free);
+        self.edge = Edge::Free;
+    }
+
+    /// Gives up the windows that have begun; those that came to their end are of the same loop and stay.
+    fn drop_windows(&mut self) {
+        self.windows.iter_mut().for_each(Window::clear);
+        (self.last, self.slope) = (None, None);
+    }
+
+    /// A step without a contact force: nothing was sent, and the master holds the last force. The held values of the step before, or `None` where the gap is
+    /// too long for a window to bridge.
+    fn held(&mut self) -> Option<[f64; 2]> {
+        self.missing = self.missing.saturating_add(1);
+        let held = self.last.filter(|_| self.missing <= self.bridged).map(|[_, sent, felt]| [sent, felt]);
+        if held.is_none() {
+            self.drop_windows();
+        }
+        held
     }
 
     /// One step: the dither, the force sent, which holds it, and the contact force felt of which it is made, N or N m;
     /// `None` for one that has not come. `mu` is the position scale now: the edge is that of one position scale, so a
     /// change begins anew. Says whether [`LiveMargin::edge`] is new.
     pub fn step(&mut self, dither: f64, sent: f64, felt: Option<f64>, mu: f64) -> bool {
-        let Some(felt) = felt.filter(|f| f.is_finite() && sent.is_finite()) else {
+        if mu != self.mu {
+            self.mu = mu;
             self.restart();
             return false;
+        }
+        self.since_window = self.since_window.saturating_add(1);
+        if self.since_window > self.old && self.edge != Edge::Late {
+            self.taken.iter_mut().for_each(|t| t.power = 0.0);
+            self.edge = Edge::Late;
+            return true;
+        }
+        let felt = felt.filter(|f| f.is_finite() && sent.is_finite());
+        let [sent, felt] = match felt {
+            Some(felt) => {
+                self.missing = 0;
+                [sent, felt]
+            }
+            None => match self.held() {
+                Some(held) => held,
+                None => return false,
+            },
         };
         self.free_steps = if felt == 0.0 { (self.free_steps + 1).min(FREE_STEPS) } else { 0 };
-        if self.free_steps >= FREE_STEPS || mu != self.mu {
-            self.mu = mu;
+        if self.free_steps >= FREE_STEPS {
             self.restart();
             return false;
         }
@@ -182,6 +234,7 @@ impl LiveMargin {
         let length = self.hann.len();
         let window = &self.windows[index];
         let rms = (window.square_sum / length as f64).sqrt();
+        self.since_window = 0;
         if rms < self.least_force {
             self.restart();
             return true;
@@ -204,12 +257,13 @@ impl LiveMargin {
 
     fn estimate(&self) -> Edge {
         let there = || self.taken.iter().filter(|t| t.power > 0.0);
-        let quietest = there().map(|t| t.power).fold(f64::INFINITY, f64::min);
+        if there().count() < LEAST_WINDOWS {
+            return Edge::Settling;
+        }
+        let below = |power: f64| there().filter(|t| t.power < power).count();
+        let quietest = there().map(|t| t.power).filter(|power| below(*power) < LEAST_WINDOWS).fold(0.0, f64::max);
         let quiet = || there().filter(|t| t.power <= QUIET * quietest);
         let windows = quiet().count();
-        if windows < LEAST_WINDOWS {
-            return Edge::Free;
-        }
         let nothing = Complex::new(0.0, 0.0);
         let (mut response, mut deviation) = ([Complex::new(f64::NAN, f64::NAN); MAX_LINES], [f64::INFINITY; MAX_LINES]);
         let mut most = 0.0_f64;

@@ -15,7 +15,10 @@ pub(super) fn file(model: &Model, trial: &Trial, name: &str, about: &str, rate_h
     for line in wrapped(about, 110) {
         let _ = writeln!(text, "# {line}");
     }
-    let _ = writeln!(text, "#\n#   backdrive simulate MODEL THIS_FILE --rate {rate_hz} --out predicted.csv\n#");
+    let _ = writeln!(
+        text,
+        "#\n#   backdrive simulate model.diagnosed.toml next-experiment.toml --rate {rate_hz} --out predicted.csv\n#\n# in the folder of these files,"
+    );
     let _ = writeln!(text, "# or in a graph: exciter = {{ force = \"{}\" }}", trial.choice.excitation);
     let others = trial.others.iter().map(|(input, excitation)| (*input, excitation));
     for (input, excitation) in std::iter::once((trial.choice.input, &trial.choice.excitation)).chain(others) {

@@ -54,6 +54,7 @@ fn toys(clock: &str, steps: &str, nodes: &[&str]) -> Outcome<Plan> {
     Ok(Plan {
         title: "toys".to_string(),
         text: "title = \"toys\"\n".to_string(),
+        held: Vec::new(),
         timing: Timing { rate_hz: 1000.0, clock, steps: steps.parse().ok(), peer_timeout_s: 1.0 },
         bag: None,
         nodes: nodes.collect(),

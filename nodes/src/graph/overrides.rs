@@ -19,9 +19,9 @@ pub struct Overrides {
     pub slave: Option<PathBuf>,
     /// What the slave touches; `none` for nothing.
     pub environment: Option<PathBuf>,
-    /// The canceller's model, or `none`.
+    /// The canceller's model; `none` for none, `master` for the model and the grip of the graph's master.
     pub canceller: Option<PathBuf>,
-    /// The grip that the canceller assumes, or `none`.
+    /// The grip that the canceller assumes; `none` for none, `master` for the grip of the graph's master.
     pub canceller_grip: Option<PathBuf>,
     /// Corner of the canceller's high-pass, Hz.
     pub high_pass_hz: Option<f64>,
@@ -131,13 +131,18 @@ impl Overrides {
             let keep = path.as_os_str() == "none";
             value(if keep { "none".to_string() } else { absolute(here, path).display().to_string() })
         };
+        let is_master = |path: &Option<PathBuf>| path.as_deref().is_some_and(|path| path.as_os_str() == MASTER);
+        let of_master = OfMaster { model: is_master(&self.canceller), grip: is_master(&self.canceller_grip) };
+        let of_master = OfMaster { grip: of_master.grip || of_master.model && self.canceller_grip.is_none(), ..of_master };
+        let canceller = self.canceller.as_ref().filter(|_| !of_master.model).map(file);
+        let canceller_grip = self.canceller_grip.as_ref().filter(|_| !of_master.grip).map(file);
         let wanted: [(&str, NodeKind, &str, Option<Item>); 17] = [
             ("--master", NodeKind::Master, "model", self.master.as_ref().map(file)),
             ("--grip", NodeKind::Master, "grip", self.grip.as_ref().map(file)),
             ("--slave", NodeKind::Slave, "model", self.slave.as_ref().map(file)),
             ("--environment", NodeKind::Slave, "environment", self.environment.as_ref().map(file)),
-            ("--canceller", NodeKind::Canceller, "model", self.canceller.as_ref().map(file)),
-            ("--canceller-grip", NodeKind::Canceller, "grip", self.canceller_grip.as_ref().map(file)),
+            ("--canceller", NodeKind::Canceller, "model", canceller),
+            ("--canceller-grip", NodeKind::Canceller, "grip", canceller_grip),
             ("--high-pass", NodeKind::Canceller, "high_pass_hz", self.high_pass_hz.map(value)),
             ("--hand", NodeKind::Canceller, "hand", self.hand.as_deref().map(value)),
             ("--edge-without", NodeKind::Canceller, "edge_without", self.edge_without.map(value)),
@@ -163,7 +168,47 @@ impl Overrides {
                 return Err(FileError::whole(name, format!("has no {} node, so {option} means nothing here", kind.name())));
             }
         }
-        Ok(())
+        of_master.write(doc, name)
+    }
+}
+
+/// What `--canceller` and `--canceller-grip` take for what the graph's master is, besides files and `none`.
+const MASTER: &str = "master";
+
+/// What a canceller takes from the graph's master.
+#[derive(Debug, Clone, Copy)]
+struct OfMaster {
+    model: bool,
+    grip: bool,
+}
+
+impl OfMaster {
+    /// Gives it to the cancellers.
+    fn write(self, doc: &mut DocumentMut, name: &str) -> Result<(), FileError> {
+        if !self.model && !self.grip {
+            return Ok(());
+        }
+        let option = if self.model { "--canceller master" } else { "--canceller-grip master" };
+        let is = |node: &toml_edit::Table, kind: NodeKind| node.get("kind").and_then(Item::as_str) == Some(kind.name());
+        let of = |node: &toml_edit::Table, key: &str| node.get(key).and_then(Item::as_str).map(str::to_string);
+        let master = node_tables(doc).find(|node| is(node, NodeKind::Master)).map(|node| (of(node, "model"), of(node, "grip")));
+        let Some((Some(model), grip)) = master else {
+            return Err(FileError::whole(name, format!("has no master with a model, so {option} means nothing here")));
+        };
+        let mut found = false;
+        for node in node_tables(doc).filter(|node| is(node, NodeKind::Canceller)) {
+            if self.model {
+                node["model"] = value(model.as_str());
+            }
+            if self.grip {
+                node["grip"] = value(grip.as_deref().unwrap_or("none"));
+            }
+            found = true;
+        }
+        match found {
+            true => Ok(()),
+            false => Err(FileError::whole(name, format!("has no canceller node, so {option} means nothing here"))),
+        }
     }
 }
 

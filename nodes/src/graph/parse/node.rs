@@ -127,6 +127,18 @@ impl NodeReader<'_> {
             (false, Some(key)) => return Err(table.error_at(key, "means nothing without hand = \"estimated\"")),
             (true, _) => Some(HandSettings { edge_without, ..hand_settings(table, range.as_deref())? }),
         };
+        if hand.is_some_and(|hand| hand.edge_without.is_none()) && names.len() > 1 {
+            // Measured on launch/three-joint.toml: without a limit to its share the loop shook at gains at which nothing cancelled was stable.
+            return Err(table.error_at(
+                "hand",
+                format!(
+                    "\"estimated\" over {} coupled axes needs edge_without (--edge-without MU_LAMBDA): without it the canceller can shake a loop \
+                     that is stable with nothing cancelled. It is the gain up to which this graph is stable with --canceller none; \
+                     `backdrive stability` on a bag of such a run gives it. Or leave hand = \"estimated\" (--hand estimated) out",
+                    names.len()
+                ),
+            ));
+        }
         Ok((Settings::Canceller(device, high_pass_hz, hand), names))
     }
 

@@ -1,0 +1,114 @@
+//! What to do after an answer about stability, with the commands that do it.
+
+use crate::cli;
+use crate::offered::{Builder, Offered, Step, free, plain};
+use crate::run::runs_from_its_bag;
+use crate::stability_page::spelled;
+use backdrive_nodes::graph::{Graph, NodeKind, Settings};
+use backdrive_report::{number, percent};
+use backdrive_stability::verdict::{Answer, Word};
+use std::path::Path;
+
+/// A gain is worked at this factor (6 dB) below its stability limit.
+const SAFE: f64 = 2.0;
+
+/// What to do, the most useful first. `asked` is the graph that was asked about, of a bag of ours.
+pub fn next(found: &Answer, options: &cli::Stability, asked: Option<&Graph>) -> Vec<Step> {
+    let gain = found.gain.product();
+    let lower = |limit: f64| found.critical_gain_ci95.map_or(limit, |ci| ci.0.min(limit)) / SAFE;
+    let mut steps = Vec::new();
+    match (found.verdict, found.critical_gain, found.at_least) {
+        (Word::Stable, Some(limit), _) => {
+            let db = 20.0 * (limit / gain).log10();
+            let advice = match lower(limit) < gain {
+                true => "That is little: a firmer hand or an older cable may use it up.",
+                false => "The gain may rise.",
+            };
+            steps.push(Step::said(format!(
+                "The stability limit is {} dB away. {advice} (6 dB below it, the usual reserve: μλ = {}.)",
+                number(db),
+                number(lower(limit))
+            )));
+            let text = "See what happens up to the stability limit and beyond it, before a hand feels it.";
+            steps.push(Step::new(text, [at(found, options, asked, limit, "at-the-limit.html")]));
+        }
+        (Word::Stable, None, Some(least)) => steps
+            .push(Step::said(format!("No limit was found for a higher gain up to μλ = {}: that is how far was looked.", number(least)))),
+        (Word::LimitCycle | Word::Unstable | Word::Limited, limit, least) if limit.or(least).is_some_and(|limit| limit > 0.0) => {
+            let safe = lower(limit.or(least).unwrap_or(gain)).min(gain);
+            steps.push(Step::new(
+                format!(
+                    "Lower the force scale: at μλ = {} the loop keeps 6 dB to where it stops being stable, at the price of a reflected force of {} of what it \
+                     would be now.",
+                    number(safe),
+                    percent(safe / gain)
+                ),
+                [at(found, options, asked, safe, "lower.html")],
+            ));
+            steps.extend(cancelled(options, asked));
+        }
+        _ => {}
+    }
+    if let Some(advice) = &found.advice {
+        let text = format!("To record for a better answer: {}.", spelled(advice).trim_end_matches('.'));
+        steps.push(Step::new(text, dithered(options, asked, advice)));
+    }
+    if found.checks.iter().any(|c| !c.agrees) {
+        steps.push(Step::new("A model does something else than its device: find out what it lacks, and ask again.", [why(options)]));
+    }
+    steps
+}
+
+/// The same loop at another gain: a replay where the bag has a graph and its own hand, else the same question.
+fn at(found: &Answer, options: &cli::Stability, asked: Option<&Graph>, gain: f64, page: &str) -> Option<Offered> {
+    let lambda = plain(gain / found.gain.mu);
+    if asked.is_some() && options.script.is_none() && options.roles.is_none() {
+        let replay = Offered::verb("replay").reads(&options.recording).words(options.parts.words());
+        let replay = options.coupling.iter().fold(replay, |replay, law| replay.option("--coupling", law));
+        let replay = options.mu.iter().fold(replay, |replay, mu| replay.option("--mu", mu));
+        return replay.option("--lambda", lambda).option_writes("--html", Path::new(page)).build();
+    }
+    let again = asked_again(page);
+    let again = match options.mu {
+        Some(mu) => again.option("--mu", mu).option("--lambda", lambda),
+        None => again.option("--gain", plain(gain)),
+    };
+    again.build()
+}
+
+/// The same question, to be changed.
+fn asked_again(page: &str) -> Builder {
+    let again = ["--gain", "--mu", "--lambda", "--sweep"].iter().fold(Offered::again(), |again, name| again.without(name, true));
+    again.without("--json", false).option_writes("--html", Path::new(page))
+}
+
+/// A canceller with the master's model where there is none, a better model where there is one.
+fn cancelled(options: &cli::Stability, asked: Option<&Graph>) -> Option<Step> {
+    let graph = asked?;
+    let Settings::Canceller(files, ..) = &graph.node_of(NodeKind::Canceller)?.settings else { return None };
+    if files.model.is_some() {
+        let text = "Or cancel with a better model of the master: this finds what the present one lacks.";
+        return Some(Step::new(text, [why(options)]));
+    }
+    let again = Offered::again().without("--sweep", true).without("--json", false).option_writes("--html", Path::new("cancelled.html"));
+    let text = "Or take the induced master motion out by a canceller. With the model and the grip that the graph gives its master:";
+    Some(Step::new(text, [again.option("--canceller", "master").option("--high-pass", 1).build()]))
+}
+
+/// A bag of the same loop with a dither, and the question of it.
+fn dithered(options: &cli::Stability, asked: Option<&Graph>, advice: &str) -> Vec<Option<Offered>> {
+    let excitation = advice.split_once("--dither ").and_then(|(_, rest)| rest.split_whitespace().next()).map(|w| w.trim_end_matches(','));
+    let Some(excitation) = excitation else { return Vec::new() };
+    if options.roles.is_some() || !asked.is_some_and(runs_from_its_bag) {
+        return Vec::new();
+    }
+    let bag = free(Path::new("dithered.mcap"));
+    let run = Offered::verb("run").reads(&options.recording).option("--dither", excitation).option_writes("--bag", &bag);
+    vec![run.build(), Offered::verb("stability").reads_later(&bag).build()]
+}
+
+fn why(options: &cli::Stability) -> Option<Offered> {
+    let why = Offered::verb("why").reads(&options.recording);
+    let why = options.roles.iter().fold(why, |why, roles| why.option_reads("--roles", roles));
+    why.option_writes("--html", Path::new("why.html")).build()
+}
