@@ -125,3 +125,42 @@ fn wrong_input_is_told_with_joint_file_and_key() {
     );
     failed(&["fit", "arm.toml", "."], 3, &["arm.toml: [robot]", "backdrive diagnose"]);
 }
+
+#[test]
+fn what_is_written_of_a_urdf_arm_keeps_axes_and_limits() {
+    let place = Place::new();
+    set(&place.path(""), &Beside { dry: [0.2, 0.3], ..AS_STATED }, "", |_| {});
+    let done = place.backdrive(&["diagnose", ".", "--out", "o", "--no-report"]);
+    assert_eq!(done.code, Some(1), "{done:?}");
+    for (target, out) in [("urdf", "x.urdf"), ("mjcf", "x.xml")] {
+        let done = place.backdrive(&["export", "o/model.diagnosed.toml", "--to", target, "--out", out]);
+        assert_eq!(done.code, Some(0), "{done:?}");
+    }
+    let read = |name: &str| std::fs::read_to_string(place.path(name)).unwrap();
+    for name in ["o/model.diagnosed.toml", "x.urdf"] {
+        let counts = ["<axis xyz=\"0 1 0\"", "<limit "].map(|part| read(name).matches(part).count());
+        assert_eq!(counts, [2, 2], "{name}: {}", read(name));
+    }
+    let mjcf = read("x.xml");
+    let parts = ["axis=\"0 1 0\"", "limited=\"true\" range=\"-2.5 2.5\"", "<motor name="].map(|part| mjcf.matches(part).count());
+    assert_eq!(parts, [2, 2, 2], "{mjcf}");
+}
+
+#[test]
+fn interrupted_it_writes_what_it_has_and_ends_with_130() {
+    let place = Place::new();
+    set(&place.path(""), &Beside { dry: [0.2, 0.3], ..AS_STATED }, "", |_| {});
+    // Ten times as much to do.
+    let set = "model = 'arm.toml'\nfit = ['a.csv', 'b.csv', 'a2.csv', 'b2.csv', 'a3.csv', 'b3.csv']\nheld_out = ['c.csv']\n";
+    place.write("set.toml", set);
+    for (from, to) in [("a.csv", "a2.csv"), ("b.csv", "b2.csv"), ("a.csv", "a3.csv"), ("b.csv", "b3.csv")] {
+        std::fs::copy(place.path(from), place.path(to)).unwrap();
+    }
+    let run = place.spawn(&["diagnose", ".", "--out", "out", "--no-report"]);
+    std::thread::sleep(std::time::Duration::from_millis(500));
+    system::kill(run.pid(), nix::sys::signal::Signal::SIGINT);
+    let done = run.end();
+    assert_eq!(done.code, Some(130), "{done:?}");
+    assert!(done.stderr.contains("stopped; what was found until then is written"), "{done:?}");
+    assert_eq!(verdict(&place, "out")["searched"]["cut_short"], true);
+}

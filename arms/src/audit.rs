@@ -31,6 +31,26 @@ pub fn audit(problem: &Problem, data: &Data) -> Vec<Remark> {
         of_joint(problem, data, j, joint, &mut out);
     }
     torques_fit(problem, data, &mut out);
+    for limit in &data.clipped {
+        let log = data.motions.get(limit.log).map_or("", |motion| motion.name.as_str());
+        let message = format!(
+            "stands at its limit of {:.4} in {:.1} % of the samples: it is clipped; these samples are left out",
+            limit.level,
+            100.0 * limit.share
+        );
+        out.push(remark("saturated", format!("{log}, {}.torque", problem.joints[limit.joint]), message, Weight::Caution));
+    }
+    for (joint, _) in problem.joints.iter().zip(&data.unsigned).filter(|(_, unsigned)| **unsigned) {
+        let message = "never changes its sign while the joint moves both ways: it was logged without its sign (rectified). Nothing is claimed at this joint; \
+                       log the signed torque or current"
+            .to_string();
+        out.push(remark("sign", format!("{joint}.torque"), message, Weight::Caution));
+    }
+    for unused in &data.unused {
+        let message =
+            format!("({}) is not used: {}; its force stands in the torque as if the model did not have it", unused.kind, unused.why);
+        out.push(remark("element", unused.place(&problem.model_file), message, Weight::Caution));
+    }
     out.sort_by_key(|r| std::cmp::Reverse(r.weight));
     out
 }
@@ -60,8 +80,16 @@ fn of_joint(problem: &Problem, data: &Data, j: usize, joint: &str, out: &mut Vec
         );
         out.push(remark("unit", format!("{joint}.position"), message, Weight::Caution));
     }
-    if rms(logs().flat_map(|l| l.torque[j].iter().copied())) == 0.0 {
-        let message = "is 0 throughout: the column is empty or another one is meant".to_string();
+    let torque = range(logs().flat_map(|l| l.torque[j].iter().copied()));
+    if data.is_passive(j) {
+        // It has no motor, and the set says so.
+    } else if rms(logs().flat_map(|l| l.torque[j].iter().copied())) == 0.0 {
+        let message = format!(
+            "is 0 throughout: the column is empty or another one is meant. If this joint has no motor, say torque = 0 in [joints.{joint}] of set.toml"
+        );
+        out.push(remark("constant", format!("{joint}.torque"), message, Weight::Unusable));
+    } else if torque == 0.0 {
+        let message = "has the same value throughout: no motor does that while its arm moves; name the column of its torque".to_string();
         out.push(remark("constant", format!("{joint}.torque"), message, Weight::Unusable));
     }
     // The told rate beside the derivative.

@@ -43,6 +43,7 @@ pub fn base(problem: &Problem) -> Result<Vec<Base>, ArmError> {
         torque: Vec::new(),
         told: Vec::new(),
         moves: Vec::new(),
+        counts: Vec::new(),
         payload: None,
     };
     let columns: Vec<DVector<f64>> = regressor(&problem.robot, &problem.bodies, &motion, &[])?

@@ -98,11 +98,15 @@ pub fn diagnose(problem: &Problem, settings: &Settings) -> Result<Found, ArmErro
     }
     let (model, mut notes) = model_of(&data, &found.best)?;
     let (nominal, _) = model_of(&data, &found.refit)?;
-    notes.extend(problem.notes.iter().cloned());
+    notes.extend(problem.notes.iter().cloned().chain(data.notes_along()));
     let gains = gains(&data, &model).unwrap_or_default();
     let simulated = |model: &Model, fit: &Fit| judge(&data, model, &Reading::of(&data, fit), &gains);
     let loops = [simulated(&nominal, &found.refit), simulated(&model, &found.best)];
-    let judged = each(&data, &found, &gains, loops[1].as_ref());
+    // Each is a fit and a simulation more: an interrupted diagnosis ends without them.
+    let judged = match cut_short {
+        true => vec![None; added(&found.best.structure).len()],
+        false => each(&data, &found, &gains, loops[1].as_ref()),
+    };
     for (index, judged) in added(&found.best.structure).into_iter().zip(&judged) {
         let Some(ratio) = judged.as_ref().map(Judged::ratio).filter(|r| *r > AGAINST) else { continue };
         let term = &found.best.structure.terms[index];

@@ -105,6 +105,7 @@ fn motion(problem: &Problem, series: &[Series], seconds: f64, count: usize) -> M
         torque: Vec::new(),
         told: Vec::new(),
         moves: Vec::new(),
+        counts: Vec::new(),
         payload: None,
     };
     for (j, coefficients) in series.iter().enumerate() {

@@ -93,7 +93,7 @@ pub fn judge(data: &Data, model: &Model, reading: &Reading, gains: &[[f64; 2]]) 
                 segments.push(Segment::line(now[j] + more, next[j] + more, period));
                 if i as f64 * period > SETTLING {
                     added[j] += more * more;
-                    torque[j] += now[j] * now[j];
+                    torque[j] += if data.is_passive(j) { data.scale(j, false).powi(2) } else { now[j] * now[j] };
                 }
             }
             count += 1;

@@ -42,10 +42,10 @@ pub fn left(data: &Data, fit: &Fit) -> Vec<Left> {
     let noise = noise(data, motions.clone());
     (0..data.problem.joints.len())
         .map(|joint| {
-            let rms = data.mean_square(&data.torque, joint, held).sqrt().max(f64::MIN_POSITIVE);
+            let rms = data.scale(joint, held).max(f64::MIN_POSITIVE);
             let share = data.mean_square(&fit.residual, joint, held).sqrt() / rms;
             let noise = noise[joint] / rms;
-            let is_much = share > MUCH && share > ABOVE_NOISE * noise;
+            let is_much = !data.unsigned[joint] && share > MUCH && share > ABOVE_NOISE * noise;
             let shows = if is_much { shows(data, fit, joint, motions.clone()) } else { None };
             Left { share, noise, shows }
         })

@@ -23,6 +23,7 @@ pub mod fit;
 pub mod gram;
 pub mod inertial;
 pub mod judge;
+mod known;
 pub mod layout;
 pub mod left;
 pub mod log;
@@ -35,7 +36,9 @@ pub mod rigid;
 pub mod said;
 pub mod search;
 pub mod soft;
+pub mod stated;
 pub mod system;
+pub mod usable;
 pub mod verdict;
 pub mod written;
 

@@ -110,7 +110,7 @@ pub fn read_log(set: &RecordingSet, file: &str, joints: &[JointColumns], coordin
     let (mut position, mut velocity, mut torque) = (Vec::new(), Vec::new(), Vec::new());
     for joint in joints {
         position.push(column(joint.position())?);
-        torque.push(column(joint.torque())?);
+        torque.push(if joint.is_passive { vec![0.0; recording.t.len()] } else { column(joint.torque())? });
         velocity.push(if joint.has_velocity { Some(column(joint.velocity())?) } else { None });
     }
     Ok(Log { name: file.to_string(), t: recording.t.clone(), position, velocity, torque, payload: None })
@@ -164,7 +164,10 @@ fn read_signals(set: &RecordingSet, file: &str, joints: &[JointColumns]) -> Resu
 fn keys_of(joint: &JointColumns) -> Vec<(String, String)> {
     let of_torque = if joint.torque_constant.is_some() { "current" } else { "torque" };
     let key = |what: &str| format!("[joints.{}] {what}", joint.name);
-    let mut out = vec![(joint.position(), key("position")), (joint.torque(), key(of_torque))];
+    let mut out = vec![(joint.position(), key("position"))];
+    if !joint.is_passive {
+        out.push((joint.torque(), key(of_torque)));
+    }
     if joint.has_velocity {
         out.push((joint.velocity(), key("velocity")));
     }

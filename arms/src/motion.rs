@@ -74,6 +74,11 @@ impl Rates {
         self.ends() as f64 * self.period() + row as f64 * self.row_period()
     }
 
+    /// Samples over which the filter of the positions smears a jump of the torque.
+    pub(crate) fn smeared(&self) -> usize {
+        (0.5 / self.position_corner / self.period()).ceil() as usize
+    }
+
     /// Samples left out at either end, where the filter still sees its mirrored beginning.
     fn ends(&self) -> usize {
         ((1.0 / self.corner) / self.period()).ceil() as usize
@@ -104,6 +109,8 @@ pub struct Motion {
     pub told: Vec<Option<Vec<f64>>>,
     /// 1 while a joint moves, 0 where it hardly does: dry friction is then anything between its levels, and a regression learns nothing of it.
     pub moves: Vec<Vec<f64>>,
+    /// 1 where the torque of a joint counts, 0 where it does not, as where it is clipped.
+    pub counts: Vec<Vec<f64>>,
     /// A known mass that the arm carries, with the index of its link.
     pub payload: Option<(usize, Payload)>,
 }
@@ -124,10 +131,10 @@ impl Motion {
         }
         let torque = log.torque.iter().map(|s| thin(smooth(s))).collect();
         let told = log.velocity.iter().map(|v| v.as_ref().map(|s| thin(smooth(s)))).collect();
-        // What the filter smears of a jump of the torque.
-        let smeared = (0.5 / rates.position_corner / rates.period()).ceil() as usize;
+        let smeared = rates.smeared();
         let moves = velocity.iter().zip(&log.position).map(|(v, q)| moving(v, resting(v, q, rates), smeared)).collect();
-        Motion { name: log.name.clone(), position, velocity, acceleration, torque, told, moves, payload: log.payload.clone() }
+        let counts = position.iter().map(|q| vec![1.0; q.len()]).collect();
+        Motion { name: log.name.clone(), counts, position, velocity, acceleration, torque, told, moves, payload: log.payload.clone() }
     }
 
     /// Samples.

@@ -18,7 +18,7 @@ pub(crate) fn torque_share(data: &Data, fit: &Fit, index: usize) -> f64 {
     let columns = data.columns(term, &fit.structure.slip);
     let values = &fit.values[fit.places[index].clone()];
     let torque: Vec<f64> = (0..data.layout.rows).map(|row| columns.iter().zip(values).map(|(c, x)| c[row] * x).sum()).collect();
-    let share = |j: usize| (data.mean_square(&torque, j, false) / data.mean_square(&data.torque, j, false).max(f64::MIN_POSITIVE)).sqrt();
+    let share = |j: usize| (data.mean_square(&torque, j, false) / data.scale(j, false).powi(2).max(f64::MIN_POSITIVE)).sqrt();
     (0..data.problem.joints.len()).map(share).fold(0.0, f64::max)
 }
 

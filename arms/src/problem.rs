@@ -3,6 +3,7 @@
 use crate::error::ArmError;
 use crate::inertial::Bodies;
 use crate::log::{Log, joints_of, read_log};
+use crate::stated::{Stated, Unused};
 use backdrive_plant::elements::Law;
 use backdrive_plant::model::Model;
 use backdrive_plant::recording::JointColumns;
@@ -19,6 +20,8 @@ pub struct Given {
     pub element: usize,
     /// The coordinate that it acts on.
     pub joint: usize,
+    /// 1 where the joint is its first end, -1 where it is the second.
+    pub sign: f64,
     /// Its law.
     pub law: Law,
 }
@@ -44,6 +47,10 @@ pub struct Problem {
     pub geared: Vec<bool>,
     /// Elements between a joint (or a body of its network) and ground.
     pub given: Vec<Given>,
+    /// Elements between two joints, whose torque is computed along the motion.
+    pub stated: Vec<Stated>,
+    /// Elements whose torque is not taken into account.
+    pub unused: Vec<Unused>,
     /// What of the model the regression takes as rigid or leaves aside, in sentences.
     pub notes: Vec<String>,
     /// Where the joints stand in the files.
@@ -106,23 +113,46 @@ impl Problem {
                 None => notes.push(format!("body \"{}\" hangs on no joint and is left aside by the regression", body.name)),
             }
         }
-        let mut given = Vec::new();
+        let (mut given, mut stated, mut unused) = (Vec::new(), Vec::new(), Vec::new());
         let mut geared = vec![false; joints.len()];
         for (index, element) in model.elements.iter().enumerate() {
-            match element.between {
-                [Some(body), None] | [None, Some(body)] => {
-                    if let Some(joint) = of_body(body) {
-                        given.push(Given { name: element.name.clone(), element: index, joint, law: element.law.clone() });
-                    }
+            let (name, law) = (element.name.clone(), element.law.clone());
+            let ends: Vec<(usize, f64)> =
+                element.between.into_iter().zip([1.0, -1.0]).filter_map(|(end, sign)| Some((end?, sign))).collect();
+            let on: Vec<(usize, f64)> = ends.iter().filter_map(|(body, sign)| Some((of_body(*body)?, *sign))).collect();
+            match on.as_slice() {
+                [(joint, sign)] if ends.len() == 1 => given.push(Given { name, element: index, joint: *joint, sign: *sign, law }),
+                [(a, _), (b, _)] if a == b => {
+                    geared[*a] = true;
+                    notes.push(format!("the regression takes \"{name}\" as rigid; the simulation has it"));
                 }
-                [Some(a), Some(b)] if of_body(a) == of_body(b) => {
-                    of_body(a).into_iter().for_each(|joint| geared[joint] = true);
-                    notes.push(format!("the regression takes \"{}\" as rigid; the simulation has it", element.name));
+                [_, _] => stated.push(Stated { name, ends: on, law }),
+                _ if ends.is_empty() => {}
+                _ => {
+                    let bodies: Vec<&str> =
+                        ends.iter().filter(|(body, _)| of_body(*body).is_none()).map(|(body, _)| model.place_name(Some(*body))).collect();
+                    let why = format!("it acts on {}, which is no joint, and whose motion is not logged", bodies.join(" and "));
+                    unused.push(Unused { name, kind: law.kind().name.to_string(), why });
                 }
-                _ => notes.push(format!("the regression leaves \"{}\" aside, which joins two joints; the simulation has it", element.name)),
             }
         }
         let (robot, tree) = (arm.robot.clone(), arm.tree.clone());
-        Ok(Problem { model, model_file, robot, tree, bodies, joints, armature, geared, given, notes, columns, fit, held_out })
+        Ok(Problem {
+            model,
+            model_file,
+            robot,
+            tree,
+            bodies,
+            joints,
+            armature,
+            geared,
+            given,
+            stated,
+            unused,
+            notes,
+            columns,
+            fit,
+            held_out,
+        })
     }
 }

@@ -9,7 +9,9 @@ use crate::physics::{At, AtJoints, Physics, Sight, Term};
 use crate::problem::Problem;
 use crate::rigid::{Signals, across, difference, regressor, torques, tree_of};
 use crate::soft::inertia;
+use crate::stated::Unused;
 use crate::system::{Column, System, scaled_solve};
+use crate::usable::{Clipped, clipped, leave_out, unsigned};
 use backdrive_plant::elements::Law;
 use backdrive_plant::robot::Tree;
 use nalgebra::{DMatrix, DVector, Vector3};
@@ -47,14 +49,22 @@ pub struct Data<'a> {
     pub seen: Vec<Parameters>,
     trees: Vec<Tree>,
     pub(crate) load: Vec<Signals>,
-    inertia: Vec<Signals>,
+    pub(crate) inertia: Vec<Signals>,
     by_position: Vec<Vec<Signals>>,
     curved: Vec<Vec<Signals>>,
-    by_tilt: Vec<Vec<Signals>>,
+    pub(crate) by_tilt: Vec<Vec<Signals>>,
     by_payload: Vec<Vec<Signals>>,
     cache: RefCell<HashMap<String, Vec<Column>>>,
     /// Whether rows count where a joint rests.
     whole: bool,
+    /// Torque that stands at a limit, whose samples are left out.
+    pub clipped: Vec<Clipped>,
+    /// By joint: whether its torque was logged without its sign, so that nothing is claimed there.
+    pub unsigned: Vec<bool>,
+    /// Elements of the nominal model whose torque is not taken into account.
+    pub unused: Vec<Unused>,
+    /// By joint: what its torque is compared with, N m or N: the rms of that of the logs; of a joint without a motor of gravity's or of its inertia's.
+    pub(crate) passive: Vec<Option<f64>>,
 }
 
 impl<'a> Data<'a> {
@@ -65,8 +75,13 @@ impl<'a> Data<'a> {
     pub fn new(problem: &'a Problem, corner: Option<f64>, whole: bool) -> Result<Data<'a>, ArmError> {
         let logs: Vec<_> = problem.fit.iter().chain(&problem.held_out).collect();
         let rates = Rates::of(&logs, corner);
-        let motions: Vec<Motion> = logs.iter().map(|log| Motion::of(log, &rates)).collect();
+        let mut motions: Vec<Motion> = logs.iter().map(|log| Motion::of(log, &rates)).collect();
         let joints = problem.joints.len();
+        let clipped = clipped(&logs, joints);
+        for (index, (motion, log)) in motions.iter_mut().zip(&logs).enumerate() {
+            let here: Vec<&Clipped> = clipped.iter().filter(|limit| limit.log == index).collect();
+            leave_out(motion, log, &here, &rates);
+        }
         let mut layout = Layout::new(joints);
         for (motion, log) in motions.iter().zip(&logs) {
             let count = rates.rows(&vec![0.0; motion.len()]).len();
@@ -100,6 +115,10 @@ impl<'a> Data<'a> {
             by_payload: Vec::new(),
             cache: RefCell::new(HashMap::new()),
             whole,
+            clipped,
+            unsigned: vec![false; joints],
+            unused: problem.unused.clone(),
+            passive: vec![None; joints],
         };
         data.torque = data.column(|m| data.motions[m].torque.iter().cloned().enumerate().collect());
         let mut by_parameter = Vec::new();
@@ -114,7 +133,12 @@ impl<'a> Data<'a> {
         }
         data.by_payload = by_parameter.into_iter().map(|mut p| p.split_off(p.len() - COUNT)).collect();
         data.see(&problem.bodies.nominal)?;
-        data.nominal = data.column(|m| data.load[m].iter().cloned().enumerate().collect());
+        let (along, unused) = data.stated();
+        data.unused.extend(unused);
+        let all = |m: usize| data.load[m].iter().cloned().enumerate().chain(along[m].iter().cloned()).collect();
+        data.nominal = data.column(all);
+        data.unsigned = unsigned(&logs, &data.motions, &data.load, joints);
+        data.passive = (0..joints).map(|j| problem.columns.get(j).is_some_and(|c| c.is_passive).then(|| data.passive_scale(j))).collect();
         Ok(data)
     }
 
@@ -178,6 +202,7 @@ impl<'a> Data<'a> {
         let mut out = vec![0.0; self.layout.rows];
         for m in 0..self.motions.len() {
             for (joint, mut signal) in signals(m) {
+                signal.iter_mut().zip(&self.motions[m].counts[joint]).for_each(|(x, counts)| *x *= counts);
                 if !self.whole {
                     signal.iter_mut().zip(&self.motions[m].moves[joint]).for_each(|(x, moves)| *x *= moves);
                 }
@@ -385,8 +410,8 @@ impl Data<'_> {
     /// Weights from residuals.
     pub fn weights(&self, residual: &[f64]) -> Weights {
         let joints = 0..self.layout.joints;
-        let floor = |j: usize| 1e-9 + 1e-6 * self.mean_square(&self.torque, j, false).sqrt();
-        let sd = joints.clone().map(|j| self.mean_square(residual, j, false).sqrt().max(floor(j))).collect();
+        let floor = |j: usize| 1e-9 + 1e-6 * self.scale(j, false);
+        let sd = joints.clone().map(|j| self.mean_square(residual, j, false).sqrt().max(floor(j)) * self.doubt(j)).collect();
         let time =
             joints.map(|j| (0..self.fit_count).map(|m| correlation_time(&residual[self.layout.of(m, j)])).fold(1.0, f64::max)).collect();
         Weights { sd, time }

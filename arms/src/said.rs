@@ -38,7 +38,7 @@ fn hertz(f: f64) -> String {
 }
 
 /// The verdict in a sentence.
-pub(crate) fn sentence(word: Word, findings: &[Finding], arm: &ArmPart, held: bool) -> String {
+pub(crate) fn sentence(word: Word, findings: &[Finding], arm: &ArmPart, held: bool, unsigned: &[&str]) -> String {
     // What a simulation speaks against is not asserted beside others.
     let against = |f: &&Finding| f.closed_loop.is_some_and(|ratio| ratio > AGAINST);
     let asserted: Vec<&Finding> = match findings.iter().all(|f| against(&f)) {
@@ -52,7 +52,10 @@ pub(crate) fn sentence(word: Word, findings: &[Finding], arm: &ArmPart, held: bo
     let before: Vec<String> = arm.joints.iter().map(|j| format!("{:.1} %", 100.0 * j.refit)).collect();
     let tail = format!("of the {unseen} torque {} remain, joint by joint", left.join(", "));
     let open: Vec<String> = arm.joints.iter().filter_map(unexplained).collect();
-    let besides = if open.is_empty() { String::new() } else { format!(" Nothing that was tried explains {}.", open.join("; ")) };
+    let mut besides = if open.is_empty() { String::new() } else { format!(" Nothing that was tried explains {}.", open.join("; ")) };
+    if !unsigned.is_empty() {
+        besides += &format!(" Nothing is claimed at {}, whose torque was logged without its sign.", unsigned.join(", "));
+    }
     match word {
         Word::Missing => format!("The model leaves out {}; {tail} ({} without).{besides}", named.join(", "), before.join(", ")),
         Word::Ambiguous => {
@@ -69,6 +72,12 @@ pub(crate) fn sentence(word: Word, findings: &[Finding], arm: &ArmPart, held: bo
         }
         Word::Unexplained => format!("Something is missing that no physics tried explains: {}.", open.join("; ")),
         Word::Parameters => format!("No physics is missing; the model's parameters are off, and refitted {tail}."),
+        Word::CannotTell if !unsigned.is_empty() => {
+            let which = unsigned.join(", ");
+            format!(
+                "What is missing cannot be told: the torque of {which} was logged without its sign. Log the signed torque or current; {tail}."
+            )
+        }
         Word::CannotTell => format!("The search was interrupted before anything was found; {tail}."),
         Word::NothingMissing => {
             let noise: Vec<String> = arm.joints.iter().filter_map(|j| Some(format!("{:.1} %", 100.0 * j.noise?))).collect();

@@ -78,7 +78,7 @@ pub fn search(data: &mut Data, without: &[String], most: usize, stop: &AtomicBoo
     let failed = || ArmError::Robot("the regression has no solution; are all joints logged in motion?".to_string());
     let pool: Vec<Term> = candidates(data.problem, &data.motions[..data.fit_count])
         .into_iter()
-        .filter(|t| !without.iter().any(|w| w == t.physics.facts().name))
+        .filter(|t| !without.iter().any(|w| w == t.physics.facts().name) && may_be(data, t))
         .collect();
     let nominal = data.nominal_structure();
     let mut weights = first_weights(data, &nominal).ok_or_else(failed)?;
@@ -115,6 +115,18 @@ pub fn search(data: &mut Data, without: &[String], most: usize, stop: &AtomicBoo
     Ok(Search { as_given, refit, best, weights, tried, gains, rivals, freed })
 }
 
+/// Whether the logs can say anything of a term: nothing of a joint whose torque has no sign, nor of a motor that is not there.
+fn may_be(data: &Data, term: &Term) -> bool {
+    use crate::physics::At;
+    let of_a_motor = matches!(term.physics, Physics::Gain | Physics::Coupling | Physics::Delay | Physics::Compliance | Physics::Backlash);
+    let may = |j: usize| !data.unsigned[j] && !(of_a_motor && data.is_passive(j));
+    match term.at {
+        At::Joint(j) => may(j),
+        At::Pair(j, k) => may(j) && may(k),
+        At::Base => !data.unsigned.contains(&true),
+    }
+}
+
 /// Terms that a search has added, by index.
 pub fn added(structure: &Structure) -> Vec<usize> {
     (0..structure.terms.len()).filter(|i| structure.terms[*i].given.is_none()).collect()
@@ -133,7 +145,7 @@ fn first_weights(data: &Data, nominal: &Structure) -> Option<Weights> {
         }
     }
     let start = Weights {
-        sd: (0..data.problem.joints.len()).map(|j| (0.1 * data.mean_square(&data.torque, j, false).sqrt()).max(1e-9)).collect(),
+        sd: (0..data.problem.joints.len()).map(|j| (0.1 * data.scale(j, false)).max(1e-9) * data.doubt(j)).collect(),
         time: vec![1.0; data.problem.joints.len()],
     };
     let mut weights = start;

@@ -81,7 +81,7 @@ pub fn verdict(parts: Parts) -> Result<Verdict, ArmError> {
     let word = match (findings.is_empty(), alike) {
         (false, true) => Word::Ambiguous,
         (false, false) => Word::Missing,
-        (true, _) if cut_short => Word::CannotTell,
+        (true, _) if cut_short || data.unsigned.contains(&true) => Word::CannotTell,
         (true, _) if left.iter().any(|l| l.shows.is_some()) => Word::Unexplained,
         (true, _) if refit_helps && !moved.is_empty() => Word::Parameters,
         (true, _) => Word::NothingMissing,
@@ -89,13 +89,15 @@ pub fn verdict(parts: Parts) -> Result<Verdict, ArmError> {
     let residuals: Vec<Vec<f64>> = [&search.as_given, &search.refit, &search.best].map(|f| whole.residual_of(f)).to_vec();
     let arm = arm_part(data, whole, search, &residuals, &loops, left)?;
     let held_out = held_out(whole, &residuals);
-    let sentence = sentence(word, &findings, &arm, held);
+    let unsigned: Vec<&str> =
+        data.unsigned.iter().zip(&data.problem.joints).filter(|(is, _)| **is).map(|(_, name)| name.as_str()).collect();
+    let sentence = sentence(word, &findings, &arm, held, &unsigned);
     Ok(Verdict {
         schema: SCHEMA,
         word,
         sentence,
         shows: None,
-        parameters: if word == Word::NothingMissing { BTreeMap::new() } else { moved },
+        parameters: if word == Word::NothingMissing || !unsigned.is_empty() { BTreeMap::new() } else { moved },
         remaining: Some(remaining(&arm)),
         error_budget: Vec::new(),
         held_out,
@@ -353,7 +355,7 @@ fn arm_part(
         .into_iter()
         .enumerate()
         .map(|(j, left)| {
-            let torque_rms = whole.mean_square(&whole.torque, j, held).sqrt();
+            let torque_rms = whole.scale(j, held);
             let share = |k: usize| (whole.mean_square(&residuals[k], j, held)).sqrt() / torque_rms.max(f64::MIN_POSITIVE);
             let of_loop = |k: usize| loops[k].as_ref().and_then(|l: &Vec<f64>| l.get(j).copied());
             ArmJoint {
@@ -385,7 +387,10 @@ fn held_out(whole: &Data, residuals: &[Vec<f64>]) -> HeldOut {
             let rows = whole.layout.of(m, j);
             let torque = &whole.torque[rows.clone()];
             let mean = torque.iter().sum::<f64>() / torque.len().max(1) as f64;
-            let deviation: f64 = torque.iter().map(|x| (x - mean).powi(2)).sum();
+            let deviation: f64 = match whole.is_passive(j) {
+                true => whole.scale(j, true).powi(2) * torque.len() as f64,
+                false => torque.iter().map(|x| (x - mean).powi(2)).sum(),
+            };
             let of = |k: usize| residuals[k][rows.clone()].iter().map(|x| x * x).sum::<f64>();
             let all = [of(0), of(1), of(2)];
             let share = |k: usize| Some((all[k] / deviation.max(f64::MIN_POSITIVE)).sqrt());

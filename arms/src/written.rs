@@ -138,6 +138,10 @@ fn at_joint(fit: &Fit, reading: &Reading, joint: usize, physics: Physics) -> Opt
 fn elements(data: &Data, fit: &Fit, reading: &Reading, model: &mut Model, notes: &mut Vec<String>) {
     let problem = data.problem;
     for joint in 0..problem.joints.len() {
+        // Nothing is known of a joint whose torque has no sign: it stays as the file has it.
+        if data.unsigned[joint] {
+            continue;
+        }
         let value = |physics| at_joint(fit, reading, joint, physics).map(|f| f.0);
         let second = |physics| at_joint(fit, reading, joint, physics).map(|f| fit.values[fit.places[f.2].start + 1] / reading.gain[joint]);
         let shape = |physics| at_joint(fit, reading, joint, physics).and_then(|f| f.1.shape.first().copied());

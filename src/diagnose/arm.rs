@@ -3,7 +3,7 @@
 use super::arm_options;
 use crate::cli;
 use crate::diagnose_page::arm::{Shown, page};
-use crate::failure::Failure;
+use crate::failure::{Failure, code};
 use crate::interrupt;
 use crate::output;
 use crate::progress;
@@ -20,6 +20,7 @@ use backdrive_plant::set::RecordingSet;
 use backdrive_report::{number, si};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::Ordering;
 use std::time::Instant;
 
 /// The set and the model, where the model has a robot; `None` for a device of one axis, and where the set is wrong, which is told there.
@@ -47,11 +48,11 @@ pub fn diagnose(options: &cli::Diagnose, set: &RecordingSet, model: &Path, repor
     // What cannot be written is told before the work, not after it.
     output::folder(&options.out)?;
     report.map_or(Ok(()), output::writable)?;
+    let stop = interrupt::heard()?;
     let problem = Problem::open(set, Some(model)).map_err(Failure::input)?;
     let usual = Settings::default();
     let effects = options.effects.map_or(usual.effects, usize::from);
-    let stop = interrupt::heard()?;
-    let settings = Settings { without: arm_options::without(options), effects, stop, ..usual };
+    let settings = Settings { without: arm_options::without(options), effects, stop: stop.clone(), ..usual };
     let found = progress::busy("diagnosing the arm", || diagnosed(&problem, &settings)).map_err(Failure::input)?;
     notes.extend(found.notes.iter().cloned());
     let write = |name: &str, text: &str| output::file(&options.out.join(name), text);
@@ -75,6 +76,9 @@ pub fn diagnose(options: &cli::Diagnose, set: &RecordingSet, model: &Path, repor
             output::line(format_args!("\n{}\n", explained(&found.tried)))?;
         }
         output::line(format_args!("wrote     {}: {} ({seconds:.1} s)", options.out.display(), written.join(", ")))?;
+    }
+    if stop.load(Ordering::SeqCst) {
+        return Err(Failure { code: code::INTERRUPTED, message: "stopped; what was found until then is written".to_string() });
     }
     Ok(found.verdict.word)
 }

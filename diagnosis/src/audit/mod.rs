@@ -10,6 +10,7 @@ mod units;
 pub use rates::rates;
 pub(crate) use remark::file_name;
 pub use remark::{Remark, Weight};
+pub use signals::limits_reached;
 
 use crate::problem::{Problem, Record};
 use backdrive_plant::model::InputKind;

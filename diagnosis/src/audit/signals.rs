@@ -24,6 +24,23 @@ pub(super) fn clipped_share(samples: &[f64]) -> (f64, f64, f64) {
     if moving > tuning().recordings.moving { (share(low) + share(high), low, high) } else { (0.0, low, high) }
 }
 
+/// Ends of its range at which a signal stands for longer than a smooth one does: the level, and the share of samples there. In the band beside an end of the
+/// same width a smooth signal has two fifths as many samples, a limited one next to none; so has one of coarse steps.
+pub fn limits_reached(samples: &[f64]) -> Vec<(f64, f64)> {
+    if clipped_share(samples).0 <= tuning().recordings.clipped {
+        return Vec::new();
+    }
+    let (low, high) = extremes(samples);
+    let band = (1e-4 * (high - low)).max(crate::noise::step_of(samples).unwrap_or(0.0));
+    let within = |level: f64, from: f64, to: f64| samples.iter().filter(|s| (from..to).contains(&((**s - level).abs() / band))).count();
+    let is_limit = |level: f64| {
+        let (at, beside) = (within(level, 0.0, 0.5), within(level, 0.5, 1.5));
+        let share = at as f64 / samples.len().max(1) as f64;
+        (share > 0.5 * tuning().recordings.clipped && at > 4 * beside).then_some((level, share))
+    };
+    [low, high].into_iter().filter_map(is_limit).collect()
+}
+
 /// Whether samples lie anywhere between the steps of a grid.
 pub(super) fn off_grid(samples: &[f64], step: f64) -> bool {
     let (low, high) = extremes(samples);
@@ -108,6 +125,12 @@ mod tests {
         assert!(clipped_share(&sine).0 < 0.02);
         assert!(clipped_share(&limited).0 > 0.3);
         assert_eq!(clipped_share(&square).0, 0.0);
+        assert!(limits_reached(&sine).is_empty() && limits_reached(&square).is_empty());
+        assert_eq!(limits_reached(&limited).iter().map(|l| l.0).collect::<Vec<_>>(), [-0.8, 0.8]);
+        let one_sided: Vec<f64> = sine.iter().map(|x| x.min(0.9)).collect();
+        assert_eq!(limits_reached(&one_sided).iter().map(|l| l.0).collect::<Vec<_>>(), [0.9]);
+        let coarse: Vec<f64> = sine.iter().map(|x| (x / 0.05).round() * 0.05).collect();
+        assert!(limits_reached(&coarse).is_empty(), "{:?}", limits_reached(&coarse));
     }
 
     #[test]

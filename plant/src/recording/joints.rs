@@ -13,6 +13,8 @@ pub struct JointColumns {
     pub has_velocity: bool,
     /// Torque per current that the set states, N m/A or N/A, where the current was logged in the place of the torque.
     pub torque_constant: Option<f64>,
+    /// Whether the set says `torque = 0`: the joint has no motor, and no column holds its torque.
+    pub is_passive: bool,
 }
 
 impl JointColumns {
@@ -33,7 +35,7 @@ impl JointColumns {
 
     /// Reads a column of each of these headings as it stands; without a heading for it, no velocity.
     pub fn of_headings(name: &str, position: &str, velocity: Option<&str>, torque: &str, columns: &mut Columns) -> JointColumns {
-        let joint = JointColumns { name: name.to_string(), has_velocity: velocity.is_some(), torque_constant: None };
+        let joint = JointColumns { name: name.to_string(), has_velocity: velocity.is_some(), torque_constant: None, is_passive: false };
         let mut add = |signal: String, heading: &str| columns.push((signal, ColumnRule::of(Source::Column(heading.to_string()))));
         add(joint.position(), position);
         add(joint.torque(), torque);
@@ -44,7 +46,19 @@ impl JointColumns {
     }
 }
 
-/// Reads `[joints.NAME]` tables: `position`, `torque` or `current` with `torque_constant`, and perhaps `velocity`; each a heading or a table as in
+/// Whether a key holds the number 0; other numbers are no torque of a log.
+fn is_zero(table: &mut Table, key: &str) -> Result<bool, FileError> {
+    if !table.contains(key) || table.is_string(key) || table.is_table(key) || table.is_list(key) {
+        return Ok(false);
+    }
+    match table.number(key, Range::Any)? {
+        Some(0.0) => Ok(true),
+        Some(other) => Err(table.error_at(key, format!("expected the heading of a column, a table with column, or with topic and field, or 0 for a joint without a motor; is {other}"))),
+        None => Ok(false),
+    }
+}
+
+/// Reads `[joints.NAME]` tables: `position`, `torque` (0 for a joint without a motor) or `current` with `torque_constant`, and perhaps `velocity`; each a heading or a table as in
 /// `[columns]`. The rules are added to `columns`.
 pub(crate) fn read_joints(mut table: Table, columns: &mut Columns) -> Result<Vec<JointColumns>, FileError> {
     let mut joints = Vec::new();
@@ -52,12 +66,18 @@ pub(crate) fn read_joints(mut table: Table, columns: &mut Columns) -> Result<Vec
         let mut below = table.table(&name)?.ok_or_else(|| table.missing(&name))?;
         let position = read_one(&mut below, "position")?.ok_or_else(|| below.missing("position"))?;
         let velocity = read_one(&mut below, "velocity")?;
-        let (torque, current) = (read_one(&mut below, "torque")?, read_one(&mut below, "current")?);
+        let is_passive = is_zero(&mut below, "torque")?;
+        let torque = if is_passive { None } else { read_one(&mut below, "torque")? };
+        let current = read_one(&mut below, "current")?;
         let constant = below.number("torque_constant", Range::Any)?;
         let torque = match (torque, current, constant) {
-            (Some(torque), None, None) => torque,
+            (None, None, None) if is_passive => None,
+            (None, _, _) if is_passive => {
+                return Err(below.error_at("torque", "is 0, which says that the joint has no motor; leave current and torque_constant out"));
+            }
+            (Some(torque), None, None) => Some(torque),
             (None, Some(current), Some(constant)) if constant != 0.0 => {
-                ColumnRule { scale: Some(current.scale.unwrap_or(1.0) * constant), offset: current.offset * constant, ..current }
+                Some(ColumnRule { scale: Some(current.scale.unwrap_or(1.0) * constant), offset: current.offset * constant, ..current })
             }
             (None, Some(_), Some(_)) => return Err(below.error_at("torque_constant", "must not be 0")),
             (None, Some(_), None) => return Err(below.missing("torque_constant")),
@@ -68,9 +88,11 @@ pub(crate) fn read_joints(mut table: Table, columns: &mut Columns) -> Result<Vec
             (None, None, _) => return Err(below.missing("torque")),
         };
         below.finish()?;
-        let joint = JointColumns { name, has_velocity: velocity.is_some(), torque_constant: constant };
+        let joint = JointColumns { name, has_velocity: velocity.is_some(), torque_constant: constant, is_passive };
         columns.push((joint.position(), position));
-        columns.push((joint.torque(), torque));
+        if let Some(torque) = torque {
+            columns.push((joint.torque(), torque));
+        }
         if let Some(velocity) = velocity {
             columns.push((joint.velocity(), velocity));
         }
