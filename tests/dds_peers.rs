@@ -127,7 +127,7 @@ fn missing_both_ways(hosts: &Hosts, peer: &impl Fn(&[String]) -> Command, bag: &
     let first = listening(peer(&words.into_iter().chain(wanted).collect::<Vec<_>>()));
     let mut run = with_domain(hosts.on(0, env!("CARGO_BIN_EXE_backdrive")));
     run.arg("run").arg(Path::new(env!("CARGO_MANIFEST_DIR")).join("launch/contact-hosts.toml"));
-    run.args(["--transport", "ros2", "--rate", "100", "--duration", "4", "--bag"]).arg(bag);
+    run.args(["--transport", "ros2", "--rate", "100", "--duration", "4", "--overwrite", "--bag"]).arg(bag);
     let done = run.env("TMPDIR", bag.parent().unwrap()).output().unwrap();
     // 7: too many samples came late for a judgement of the loop, which is not what is asked here.
     assert!(matches!(done.status.code(), Some(0 | 7)), "{}: {}", done.status, String::from_utf8_lossy(&done.stderr));
