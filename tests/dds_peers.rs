@@ -4,8 +4,10 @@
 mod netns;
 
 use backdrive_bags::Reader;
-use backdrive_msgs::Message;
-use backdrive_nodes::transport::ros2::{Key, Known, Member};
+use backdrive_msgs::ros::live;
+use backdrive_msgs::topic::{Kind, Topic};
+use backdrive_msgs::{Message, Sample};
+use backdrive_nodes::transport::ros2::{Identity, Key, Known, Member};
 use netns::Hosts;
 use netns::skipped::skipped;
 use serde_json::Value;
@@ -125,7 +127,7 @@ fn missing_both_ways(hosts: &Hosts, peer: &impl Fn(&[String]) -> Command, bag: &
     let first = listening(peer(&words.into_iter().chain(wanted).collect::<Vec<_>>()));
     let mut run = with_domain(hosts.on(0, env!("CARGO_BIN_EXE_backdrive")));
     run.arg("run").arg(Path::new(env!("CARGO_MANIFEST_DIR")).join("launch/contact-hosts.toml"));
-    run.args(["--transport", "ros2", "--rate", "100", "--duration", "4", "--bag"]).arg(bag);
+    run.args(["--transport", "ros2", "--rate", "100", "--duration", "4", "--overwrite", "--bag"]).arg(bag);
     let done = run.env("TMPDIR", bag.parent().unwrap()).output().unwrap();
     // 7: too many samples came late for a judgement of the loop, which is not what is asked here.
     assert!(matches!(done.status.code(), Some(0 | 7)), "{}: {}", done.status, String::from_utf8_lossy(&done.stderr));
@@ -212,13 +214,14 @@ fn a_sample_takes_about_as_long_as_between_cyclones() {
     let file = folder.path().join("identity.json");
     let own = Member { run: "a1".to_string(), key: Key::fresh().unwrap() };
     Known { own, several: false, others: Vec::new() }.write(&file).unwrap();
-    let tagged = |words: &[&str]| [&["as", file.to_str().unwrap()], words].concat();
+    let tagged: Vec<&str> = vec!["as", file.to_str().unwrap()];
     let mut table = Vec::new();
     // One after the other, twice: what the machine does besides meets both.
     for round in 0..2 {
-        for (name, ping, echo) in
-            [("backdrive, no tags", ping.to_vec(), vec!["echo"]), ("backdrive, tagged", tagged(&ping), tagged(&["echo"]))]
-        {
+        for (name, ping, echo) in [
+            ("backdrive, no tags", ping.to_vec(), vec!["echo"]),
+            ("backdrive, tagged", [&tagged, &ping[..]].concat(), [&tagged, &["echo"][..]].concat()),
+        ] {
             let mut echo = listening(ours(&hosts, 1, &echo));
             let result = told(ours(&hosts, 0, &ping).stdout(Stdio::piped()).spawn().unwrap());
             let _ = echo.kill();
@@ -310,7 +313,7 @@ fn assert_ended_by(who: &str, (code, told, result): (Option<i32>, String, Value)
 fn two_runs_in_one_domain_do_not_feel_each_other() {
     let Some(hosts) = Hosts::joined() else { return };
     let folder = tempfile::tempdir().unwrap();
-    let first = contact(&hosts, 0, folder.path(), "a.mcap", &["--duration", "6"]);
+    let first = contact(&hosts, 0, folder.path(), "a.mcap", &["--duration", "60"]);
     until_it_records(folder.path(), "a.mcap");
     // On another host, and on the same one.
     for host in [1, 0] {
@@ -318,9 +321,10 @@ fn two_runs_in_one_domain_do_not_feel_each_other() {
         assert_eq!(code, Some(5), "{told}");
         assert!(told.contains("speaks here too") && told.contains("another ROS domain"), "{told}");
     }
+    Command::new("kill").args(["-INT", &first.id().to_string()]).status().unwrap();
     let (code, told, result) = ended(first);
-    // 7: too many samples came late for a judgement, which is not what is asked here.
-    assert!(matches!(code, Some(0 | 7)), "{told}\n{result}");
+    // The first one was not disturbed.
+    assert_eq!(code, Some(130), "{told}\n{result}");
     assert_eq!(result["refused"].as_u64(), Some(0), "{told}");
     let (given, own, _) = forces(folder.path(), "a.mcap");
     assert!(given > 0.5 && given <= own + 0.05, "{given} N of {own} N");
@@ -377,4 +381,44 @@ fn a_recording_of_a_run_moves_nothing_in_it_and_nothing_in_the_next() {
     let _ = stranger.wait();
     assert_eq!(code, Some(5), "{told}");
     assert!(told.contains(FORCE) && told.contains("speaks here too"), "{told}");
+}
+
+#[test]
+fn a_tag_costs_a_few_microseconds() {
+    let own = Member { run: "6925b1f2001a2b3c4d5e".to_string(), key: Key::fresh().unwrap() };
+    let identity = Identity::new(&Known { own, several: false, others: Vec::new() }).unwrap();
+    let topic = Topic { name: FORCE.to_string(), kind: Kind::Sample };
+    for axes in [1, 8] {
+        let message = Message::Sample(Sample { step: 123_456, sequence: 123_456, ..Sample::new(axes) });
+        let (mut plain, mut tagged) = (Vec::new(), Vec::new());
+        // The median of many short blocks: other load meets few of them.
+        let median_us = |work: &mut dyn FnMut()| {
+            let mut times: Vec<f64> = (0..200)
+                .map(|_| {
+                    let begun = Instant::now();
+                    (0..50).for_each(|_| work());
+                    begun.elapsed().as_secs_f64() * 1e6 / 50.0
+                })
+                .collect();
+            times.sort_by(f64::total_cmp);
+            times[times.len() / 2]
+        };
+        let encode = median_us(&mut || live::encode(&message, "", &[], None, &mut plain).unwrap());
+        let tag = median_us(&mut || identity.encode(&topic, &message, "", &[], 7, &mut tagged).unwrap());
+        let read = median_us(&mut || {
+            live::decode(Kind::Sample, true, &plain).unwrap();
+        });
+        let check = median_us(&mut || {
+            assert!(identity.is_ours(&topic, true, &tagged));
+            live::decode(Kind::Sample, true, &tagged).unwrap();
+        });
+        eprintln!(
+            "{axes} axes, {} and {} bytes: encode {encode:.2} us, and tag {tag:.2} us; read {read:.2} us, and check {check:.2} us",
+            plain.len(),
+            tagged.len()
+        );
+        assert!(!identity.is_ours(&topic, true, &plain));
+        // A step at 5 kHz has 200 us.
+        assert!(tag - encode < 50.0 && check - read < 50.0, "tag {tag}, check {check}");
+    }
 }

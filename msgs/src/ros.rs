@@ -13,6 +13,7 @@ mod facts;
 mod frame;
 pub mod live;
 pub mod mark;
+mod time;
 mod twins;
 
 pub use facts::{Facts, RosError};
@@ -100,7 +101,7 @@ pub fn decode_steps(payload: &[u8]) -> Result<(String, Facts), RosError> {
 
 /// Whether the header of a JointState holds this stamp to the ns; where it does not, [`Facts::stamp_ns`] does.
 pub fn header_holds(stamp_ns: i64) -> bool {
-    twins::Time::from_ns(stamp_ns).to_ns() == stamp_ns
+    time::Time::from_ns(stamp_ns).to_ns() == stamp_ns
 }
 
 /// Reads a sample that [`encode`] wrote, of which `facts` are known from elsewhere. One that carries its own, as in older bags, is read

@@ -1,7 +1,7 @@
 //! The text of a JointState on the wire: what its type has no field for.
 
 use super::mark::Mark;
-use super::twins::Time;
+use super::time::Time;
 use crate::Sample;
 use std::io::Write;
 

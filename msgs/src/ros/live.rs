@@ -10,7 +10,8 @@
 //! floating point, so they are exact up to 2^53.
 
 use super::mark::Mark;
-use super::twins::{Form, JointState, JointStateIn, Time};
+use super::time::Time;
+use super::twins::{Form, JointState, JointStateIn};
 use super::{RosError, read_cdr};
 use crate::text::Text;
 use crate::topic::Kind;
