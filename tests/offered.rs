@@ -98,6 +98,7 @@ impl Offers {
 #[test]
 fn what_is_offered_after_runs_and_answers_works_as_it_stands() {
     let place = place();
+    std::fs::create_dir(place.path("out")).unwrap();
     let mut offers = Offers::default();
     let mut ask = |arguments: &[&str], page: Option<&str>| {
         let html: Vec<&str> = page.map(|page| vec!["--html", page]).unwrap_or_default();
