@@ -80,6 +80,9 @@ pub struct Traces {
     margins: Margins,
 }
 
+/// What a small dither cannot see.
+const AT_AMPLITUDE: &str = "; at the amplitude of the dither, so friction may hide a nearer limit";
+
 /// The margins that a running loop reported.
 #[derive(Debug, Default)]
 struct Margins {
@@ -115,9 +118,9 @@ impl Margins {
         let at = |margin: &Margin| format!("{}, at {:.1} s", of(margin), margin.step as f64 * period_s);
         match (&self.last, &self.lowest, &self.unknown) {
             (Some(last), Some(lowest), _) if lowest.step != last.step => {
-                format!("{} (the last that was known); lowest {}", at(last), at(lowest))
+                format!("{} (the last that was known); lowest {}{}", at(last), at(lowest), AT_AMPLITUDE)
             }
-            (Some(last), ..) => format!("{} (the last that was known)", at(last)),
+            (Some(last), ..) => format!("{} (the last that was known){AT_AMPLITUDE}", at(last)),
             (None, _, Some(unknown)) if unknown.known == known::NO_DITHER => {
                 "not known: it is measured by a dither on the force channel, and this run has none (--dither adds one)".to_string()
             }

@@ -98,6 +98,7 @@ impl Offers {
 #[test]
 fn what_is_offered_after_runs_and_answers_works_as_it_stands() {
     let place = place();
+    std::fs::create_dir(place.path("out")).unwrap();
     let mut offers = Offers::default();
     let mut ask = |arguments: &[&str], page: Option<&str>| {
         let html: Vec<&str> = page.map(|page| vec!["--html", page]).unwrap_or_default();
@@ -108,7 +109,10 @@ fn what_is_offered_after_runs_and_answers_works_as_it_stands() {
     let run = ["run", "launch/contact.toml", "--transport", "inproc", "--duration", "2.4"];
     let none = ["--canceller", "none", "--lambda", "6"];
     ask(&[&run[..], &none, &["--bag", "out/it's shaking.mcap"]].concat(), Some("run.html"));
-    ask(&[&run[..], &["--master", "plant/models/rigid-mass.toml", "--canceller", "none", "--bag", "calm.mcap"]].concat(), Some("calm.html"));
+    ask(
+        &[&run[..], &["--master", "plant/models/rigid-mass.toml", "--canceller", "none", "--bag", "calm.mcap"]].concat(),
+        Some("calm.html"),
+    );
     ask(&["why", "out/it's shaking.mcap"], Some("why.html"));
     ask(&["why", "out/it's shaking.mcap", "--json"], None);
     ask(&["stability", "out/it's shaking.mcap"], Some("shaking.html"));
@@ -136,7 +140,8 @@ fn what_is_offered_after_a_damaged_bag_works_as_it_stands() {
     }
     let recover: Vec<String> = offers.0.iter().filter(|c| c.starts_with("backdrive bag recover cut.mcap --bag ")).cloned().collect();
     assert!(!recover.is_empty(), "{:?}", offers.0);
-    let recovered = place.command("bash").env("PATH", Path::new(env!("CARGO_BIN_EXE_backdrive")).parent().unwrap()).args(["-c", &recover[0]]).output();
+    let recovered =
+        place.command("bash").env("PATH", Path::new(env!("CARGO_BIN_EXE_backdrive")).parent().unwrap()).args(["-c", &recover[0]]).output();
     let code = recovered.unwrap().status.code();
     // Something of a bag that was cut is lost, and that is said by the exit code.
     assert!(matches!(code, Some(0 | 4)), "{code:?}");
@@ -152,7 +157,9 @@ fn what_is_offered_for_recordings_of_ones_own_works_as_it_stands() {
         outputs = [ { name = \"angle\", kind = \"position\", of = \"rotor\", noise = 1e-4 } ]\n";
     place.write("motor.toml", motor);
     std::fs::create_dir(place.path("my motor")).unwrap();
-    for (name, drive) in [("sweep", "sweep:amplitude=0.03,from=0.5,to=20,duration=2"), ("ramps", "triangle:amplitude=0.02,period=1,cycles=2")] {
+    for (name, drive) in
+        [("sweep", "sweep:amplitude=0.03,from=0.5,to=20,duration=2"), ("ramps", "triangle:amplitude=0.02,period=1,cycles=2")]
+    {
         let out = format!("my motor/{name}.csv");
         let ended = place.backdrive(&["simulate", "motor.toml", drive, "--rate", "500", "--noise", "1", "--out", &out]);
         assert_eq!(ended.code, Some(0), "{ended:?}");

@@ -45,25 +45,34 @@ fn a_gain_beyond_the_edge_is_named_and_the_lower_one_stops_it() {
     let remedies = said["remedies"].as_array().unwrap();
     let gain = remedies.iter().find(|r| r["changes"][0]["change"] == "gain" && r["stops"] == true).unwrap();
     let lambda = gain["changes"][0]["lambda"].as_f64().unwrap();
-    // What is said to stop it stops the graph itself, by the options that stand beside it.
-    // Where a clamp acts the run says so, and is not called stable.
-    let told: Vec<&Value> = remedies.iter().filter(|r| r["outcome"] == "stable" && r["options"].is_string()).collect();
-    assert!(!told.is_empty() && said["remedies"][0]["stops"] == true, "{said}");
-    for remedy in told {
-        let options = remedy["options"].as_str().unwrap().replace("MASTER", "plant/models/impulse-engine.toml");
-        let mut changes: Vec<&str> = options.split_whitespace().collect();
-        for given in [["--lambda", "6"], ["--canceller", "none"]] {
-            if !changes.contains(&given[0]) {
-                changes.extend(given);
-            }
+    // What is said to stop it does so by the commands beside it, as they stand. Where a clamp acts the run says so, and is not called stable.
+    let steps = said["next"].as_array().unwrap();
+    let program = Path::new(env!("CARGO_BIN_EXE_backdrive")).parent().unwrap().display().to_string();
+    let search = format!("{program}:{}", std::env::var("PATH").unwrap_or_default());
+    let mut stopped = 0;
+    for step in steps.iter().filter(|step| step["do"].as_str().unwrap().contains(": stable")) {
+        for command in step["commands"].as_array().unwrap() {
+            let mut shell = Command::new("bash");
+            shell.arg("-c").arg(command.as_str().unwrap()).current_dir(folder.path()).env("PATH", &search);
+            let again = shell.output().unwrap();
+            assert_eq!(again.status.code(), Some(0), "{command}: {}", String::from_utf8_lossy(&again.stdout));
+            stopped += 1;
         }
-        let bag_text = folder.path().join("again.mcap").display().to_string();
-        let fixed = ["run", "launch/contact.toml", "--transport", "inproc", "--overwrite", "--bag", &bag_text];
-        let again = backdrive(&[&fixed, &changes[..]].concat());
-        assert_eq!(again.status.code(), Some(0), "{changes:?}: {}", String::from_utf8_lossy(&again.stdout));
     }
+    assert!(stopped > 0 && said["remedies"][0]["stops"] == true, "{said}");
+    // A remedy that throws the device is not the first, and says that it does.
+    let throws: Vec<&Value> = remedies.iter().filter(|r| r["stops"] == true && !r["throws"].is_null()).collect();
+    let hand = throws.iter().find(|r| r["changes"][0]["change"] == "estimated_hand").unwrap_or_else(|| panic!("{said}"));
+    assert!(said["remedies"][0]["throws"].is_null() && hand["throws"]["beyond_m"].as_f64().unwrap() > 2e-3, "{said}");
+    let place = |r: &&Value| remedies.iter().position(|other| other == *r).unwrap();
+    let calm = remedies.iter().filter(|r| r["stops"] == true && r["throws"].is_null());
+    assert!(calm.map(|r| place(&r)).max() < throws.iter().map(place).min());
     let page = std::fs::read_to_string(&html).unwrap();
-    assert!(page.contains("What would stop it") && page.contains(&format!("--lambda {lambda:.4}")));
+    assert!(
+        page.contains("What would stop it")
+            && page.contains(&format!("--lambda {lambda:.3}"))
+            && page.contains("beyond the recorded range")
+    );
 }
 
 #[test]

@@ -20,8 +20,9 @@ pub fn next(done: &Done, graph: &Graph, source: Option<&Path>) -> Vec<Step> {
         (Some(bag), _) => (Vec::new(), Some(bag.to_path_buf())),
         (None, Some(_)) => {
             let bag = free(&PathBuf::from("replayed.mcap"));
-            let replay = Offered::again().without("--html", true).without("--json", false).option_writes("--bag", &bag);
-            (vec![replay.build()], Some(bag))
+            let replay = Offered::again().without("--html", true).without("--json", false).without("--overwrite", false);
+            // Each step begins with it, and a user may take more than one.
+            (vec![replay.option_writes("--bag", &bag).flag("--overwrite").build()], Some(bag))
         }
         (None, None) => (Vec::new(), None),
     };
