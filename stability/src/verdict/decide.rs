@@ -187,7 +187,8 @@ impl Answer {
     fn hold_back(&mut self) {
         let Some(Outcome::NotJudged { why }) = self.recorded_outcome else { return };
         // A hand that never holds still moves the loop all the same, and a frequency response is told from that.
-        if self.verdict != Word::Stable || why == Unjudged::NoHold {
+        // Nor does a recording at lambda = 0 speak against a loop that it never closed.
+        if self.verdict != Word::Stable || matches!(why, Unjudged::NoHold | Unjudged::NoFeedback) {
             return;
         }
         self.verdict = Word::CannotTell;
