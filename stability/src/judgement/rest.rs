@@ -1,12 +1,10 @@
 //! Whether a loop comes to rest while the hand holds still: by the master's position, and by the forces where the sensor's step hides the motion.
 
 use super::dither::{dithered, judge_drift};
-use super::swings::{Course, DIES, GROWS, STEADY_PER_S, Swings};
+use super::swings::{Course, DIES, GROWS, STEADY_PER_S, Swings, WANDER};
 use crate::oscillation::{Oscillation, oscillation, without_slow_motion};
 use crate::outcome::{LEAST_AMPLITUDE, LOWEST_HZ, NOISE, Outcome, Trace, Unit};
 
-/// A master that moves less than this while the hand holds still is at rest, m or rad.
-pub(super) const WANDER: f64 = 20e-6;
 /// A line this far above the lowest frequency is none of a quick hand's.
 const BEYOND_THE_HAND: f64 = 1.3;
 /// What falls by a factor of `DIES` over three quarters falls by 0.89 in one; what falls by less than this in the last one stays.
