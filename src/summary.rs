@@ -159,11 +159,12 @@ impl Traces {
         // Rows in which any axis touches.
         let touching: BTreeSet<usize> =
             traces.iter().flat_map(|t| t.contact.iter().enumerate().filter(|(_, f)| **f != 0.0).map(|(i, _)| i)).collect();
+        let outcome = self.loops.outcome();
         Summary {
             loop_gain: graph.gains.mu * graph.gains.lambda,
             last_loop_gain: self.loops.last_loop_gain(),
-            outcome: self.loops.outcome(),
-            no_loop: self.loops.no_loop(),
+            outcome,
+            no_loop: self.loops.no_loop().filter(|_| outcome.is_none()),
             force_units: [NodeKind::Slave, NodeKind::Master].map(|kind| force_unit(graph, kind)),
             peak_contact_force: peak(|t| &t.contact),
             peak_feedback_force: peak(|t| &t.feedback),

@@ -300,12 +300,15 @@ impl Collector {
         }
     }
 
-    /// The verdict on what went by: the worst of the axes. `None` where there is no loop.
+    /// The verdict on what went by: the worst of the axes. `None` where there is no loop and nothing shakes.
     pub fn outcome(&self) -> Option<Outcome> {
-        if self.no_loop().is_some() {
-            return None;
+        let judged = || Outcome::worst(self.traces().iter().map(judge)).unwrap_or(Outcome::NotJudged { why: Unjudged::Empty });
+        match self.no_loop() {
+            None => Some(judged()),
+            // A slave that shakes by itself shakes whether its force comes back or not.
+            Some(_) if self.has != HasLoop::No => Some(judged()).filter(Outcome::is_unstable),
+            Some(_) => None,
         }
-        Some(Outcome::worst(self.traces().iter().map(judge)).unwrap_or(Outcome::NotJudged { why: Unjudged::Empty }))
     }
 
     /// The signals, one row per step.

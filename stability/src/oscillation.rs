@@ -19,6 +19,10 @@ pub struct Oscillation {
     pub growth_per_s: f64,
     /// Amplitude in the first quarter.
     pub amplitude_before: f64,
+    /// Amplitude in the third quarter.
+    pub amplitude_third: f64,
+    /// Growth of the envelope in the later half, 1/s.
+    pub later_growth_per_s: f64,
 }
 
 /// Analyses a piece of a signal sampled every `period_s`; lines below `lowest_hz` count as motion, not as oscillation.
@@ -44,6 +48,8 @@ pub fn oscillation(signal: &[f64], period_s: f64, lowest_hz: f64) -> Option<Osci
         frequency_hz,
         growth_per_s: growth(&fast, period_s, lowest_hz),
         amplitude_before: half_range(&fast[..quarter]),
+        amplitude_third: half_range(&fast[2 * quarter..3 * quarter]),
+        later_growth_per_s: growth(&fast[fast.len() / 2..], period_s, lowest_hz),
     })
 }
 

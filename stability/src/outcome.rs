@@ -108,7 +108,7 @@ pub enum Outcome {
     Stable,
     /// It oscillates on and neither grows nor dies.
     LimitCycle {
-        /// Half the peak-to-peak of the master's position, m or rad.
+        /// Half the peak-to-peak of the master's position, m or rad; of the slave's by mu where that moves more and the forces alone show it.
         amplitude_m: f64,
         /// Hz.
         frequency_hz: f64,

@@ -86,6 +86,10 @@ impl Happening {
             trace.position.truncate(rows);
             trace.contact.truncate(rows);
         }
+        // Whatever else kept it from being judged, it was no loop.
+        if session.is_one_way() && matches!(outcome, Outcome::NotJudged { .. }) {
+            return Happening::NotJudged { why: Unjudged::NoFeedback };
+        }
         Happening::of_outcome(outcome, &traces)
     }
 

@@ -1,8 +1,7 @@
 //! A run while a dither plays: what it explains of the motion is none of the loop's.
 
 use super::holds::{LEAST_HOLD_S, TRANSIENT_S};
-use super::rest::WANDER;
-use super::swings::GROWS;
+use super::swings::{GROWS, WANDER};
 use crate::outcome::{LOWEST_HZ, NOISE, Outcome, Trace};
 use crate::spectra::welch;
 

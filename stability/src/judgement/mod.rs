@@ -5,13 +5,13 @@
 //! | where it looks | the hand holds still and the loop is closed, for 0.3 s and 16 samples beyond a transient of 0.15 s |
 //! | the loop is closed | while the slave touches something; always, where the law reflects motion (every coupling but `direct`) |
 //! | a fast oscillation | above 8 Hz; half its peak-to-peak in the last quarter above 2 um and four encoder steps |
-//! | it dies | its last quarter below 0.7 of its first, its envelope falling by more than 0.2 per second |
+//! | it dies | its last quarter below 0.7 of its first, its envelope falling by more than 0.2 per second; and its last quarter below 0.94 of the third, or its later half falling as fast |
 //! | it grows | its last quarter above 1.5 of its first, its envelope rising by more than 0.2 per second: unstable |
 //! | otherwise | a limit cycle |
 //! | nobody recorded the hand | it counts as holding on while the slave touches something, losses of 50 ms bridged; only what is above 10.4 Hz is the loop's, or regular in the forces above 8 Hz |
 //! | slow motion | the last quarter spans more than 20 um and four encoder steps, and does not settle; four swings or more die or grow as above, by their later half |
-//! | forces | where the position shows nothing: a force that swings regularly (sizes and periods vary by less than 0.35) by more than 5 % of its largest in the hold, 1 % of its largest in the run, and 0.05 N (0.005 N m) |
-//! | limited | a clamp acted in more than 1 % of the time in which the loop was closed, or the master left its travel; of a loop that is always closed a limit cycle comes first |
+//! | forces | where the position shows nothing, and four steps of its sensor are more than 20 um or the slave moves by more than they are: a force that swings regularly (sizes and periods vary by less than 0.35) by more than 5 % of its largest in the hold, 1 % of its largest in the run, and 0.05 N (0.005 N m) |
+//! | limited | a clamp acted in more than 1 % of the contact (of a loop that is always closed: or of the holds), or the master left its travel; of a loop that is always closed a limit cycle comes first |
 //! | a noisy sensor | its noise adds 5 standard deviations to what an amplitude and 10 to what a span must exceed |
 //! | the hand never holds still | of a loop that is always closed: whether every oscillation that the motion stirs dies (`moving`) |
 //! | nothing to judge | no contact, no hold, or only holds with a gap in them: not judged, which is never stable |
@@ -49,9 +49,9 @@ pub fn judge_with_decay(trace: &Trace) -> (Outcome, Option<Decay>) {
         return (Outcome::Unstable { growth_per_s: runaway_growth(trace) }, None);
     }
     let always = trace.closes == Closes::Always;
-    let closed: Vec<usize> = (0..trace.contact.len()).filter(|i| always || trace.contact[*i] != 0.0).collect();
-    let clamped = closed.iter().filter(|i| trace.clamped.get(**i).copied().unwrap_or(false)).count();
-    let clamped_share = if closed.is_empty() { 0.0 } else { clamped as f64 / closed.len() as f64 };
+    let touched = trace.contact.iter().any(|f| *f != 0.0);
+    let in_contact = share_clamped(trace, (0..trace.contact.len()).filter(|i| trace.contact[*i] != 0.0));
+    let clamped_share = if always { in_contact.max(share_clamped_at_rest(trace)) } else { in_contact };
     let beyond_travel = trace.travel.is_some_and(|[low, high]| trace.position.iter().any(|x| *x < low || *x > high));
     let limited = (clamped_share > MOST_CLAMPED || beyond_travel).then_some(Outcome::Limited { clamped_share, beyond_travel });
     if let Some(limited) = limited.filter(|_| !always) {
@@ -59,14 +59,31 @@ pub fn judge_with_decay(trace: &Trace) -> (Outcome, Option<Decay>) {
     }
     let (judged, decay) = while_closed(trace, always);
     let fault = trace.gaps.fault(trace.position.len(), trace.period_s);
-    let nothing = || match closed.is_empty() {
+    let nothing = || match touched || always {
         _ if trace.position.is_empty() => Unjudged::Empty,
-        true => Unjudged::NoContact,
-        false => Unjudged::NoHold,
+        true => Unjudged::NoHold,
+        false => Unjudged::NoContact,
     };
     let judged = judged.unwrap_or_else(|| Outcome::NotJudged { why: nothing() }).held_back(fault);
     let shakes = judged.is_unstable();
     (limited.filter(|_| !shakes).unwrap_or(judged), decay)
+}
+
+/// Share of these steps in which a clamp acted.
+fn share_clamped(trace: &Trace, steps: impl Iterator<Item = usize>) -> f64 {
+    let (all, clamped) = steps
+        .fold((0_usize, 0_usize), |(all, clamped), i| (all + 1, clamped + usize::from(trace.clamped.get(i).copied().unwrap_or(false))));
+    clamped as f64 / all.max(1) as f64
+}
+
+/// Of a loop that is always closed: of the steps in which the hand holds still, which leaves out a knock at the start; of all of them where it
+/// never does.
+fn share_clamped_at_rest(trace: &Trace) -> f64 {
+    let holds = if trace.intent.is_empty() { Vec::new() } else { holds(trace) };
+    match holds.is_empty() {
+        true => share_clamped(trace, 0..trace.position.len()),
+        false => share_clamped(trace, holds.into_iter().flat_map(|(from, to)| from..to)),
+    }
 }
 
 /// By its holds; of a pair whose hand never holds still, or whose hand nobody recorded, by what it does while the hand moves.
@@ -163,6 +180,63 @@ mod tests {
         assert!((amplitude_m - 2e-4).abs() < 1e-5 && (frequency_hz - 60.0).abs() < 0.2);
         let Outcome::Unstable { growth_per_s } = judge(&trace(|t| 0.005 + 1e-5 * (1.5 * t).exp() * sine(t))) else { panic!() };
         assert!((growth_per_s - 1.5).abs() < 0.1);
+    }
+
+    #[test]
+    fn what_falls_to_a_level_at_which_it_stays_is_a_limit_cycle() {
+        let Outcome::LimitCycle { amplitude_m, .. } = judge(&trace(|t| 0.005 + (2e-4 + 2e-3 * (-8.0 * t).exp()) * sine(t))) else {
+            panic!()
+        };
+        assert!((amplitude_m - 2e-4).abs() < 1e-5, "{amplitude_m}");
+        assert_eq!(judge(&trace(|t| 0.005 + 2e-3 * (-0.6 * t).exp() * sine(t))), Outcome::Stable);
+    }
+
+    #[test]
+    fn a_law_that_reflects_motion_is_judged_in_free_motion() {
+        let free = |position: &dyn Fn(f64) -> f64| {
+            let whole = trace(position);
+            Trace { closes: Closes::Always, contact: vec![0.0; 10_000], unit: crate::outcome::Unit::Radian, ..whole }
+        };
+        assert_eq!(judge(&free(&|_| 0.005)), Outcome::Stable);
+        let cycle = judge(&free(&|t| 0.005 + 2e-4 * sine(t)));
+        assert_eq!(cycle.to_string(), "limit cycle of ±0.200 mrad at 60.0 Hz");
+        // At its motor's limit it is never stable, and what shakes says more than the limit.
+        let clamped = |position: &dyn Fn(f64) -> f64| judge(&Trace { clamped: vec![true; 10_000], ..free(position) }).word();
+        assert_eq!((clamped(&|_| 0.005), clamped(&|t| 0.005 + 2e-4 * sine(t))), ("limited", "limit_cycle"));
+    }
+
+    #[test]
+    fn a_force_that_swings_regularly_is_a_limit_cycle_whatever_the_encoder_hides() {
+        let coarse = |force: &dyn Fn(f64) -> f64| {
+            let contact = (0..10_000).map(|i| -1.0 + force(f64::from(i) * 2e-4)).collect();
+            judge(&Trace { resolution: 1e-3, contact, ..trace(|t| 0.005 + 2e-4 * sine(t)) })
+        };
+        let Outcome::LimitCycle { frequency_hz, .. } = coarse(&|t| 0.3 * sine(t)) else { panic!() };
+        assert!((frequency_hz - 60.0).abs() < 0.5, "{frequency_hz}");
+        assert_eq!(coarse(&|_| 0.0), Outcome::Stable);
+        assert_eq!(coarse(&|t| 0.3 * (-8.0 * t).exp() * sine(t)), Outcome::Stable);
+        // Noise of a force sensor: a sum of lines whose phases do not fit.
+        let noise = |t: f64| (1..40).map(|k| (f64::from(k * k) * 1.7 + 40.0 * f64::from(k) * t * 6.1).sin()).sum::<f64>();
+        assert_eq!(coarse(&|t| 0.02 * noise(t)), Outcome::Stable);
+    }
+
+    #[test]
+    fn at_a_low_rate_the_loop_s_own_slow_oscillation_is_judged() {
+        let slow = |position: &dyn Fn(f64) -> f64| {
+            let rows = 40;
+            judge(&Trace {
+                period_s: 1.0 / 20.0,
+                intent: vec![0.006; rows],
+                position: (0..rows).map(|i| position(i as f64 / 20.0)).collect(),
+                contact: vec![-1.0; rows],
+                clamped: vec![false; rows],
+                ..trace(|_| 0.005)
+            })
+        };
+        let wave = |t: f64| (std::f64::consts::TAU * 3.3 * t).sin();
+        assert_eq!(slow(&|t| 0.005 + 1e-3 * wave(t)).word(), "limit_cycle");
+        assert_eq!(slow(&|t| 0.005 + 1e-3 * (-1.5 * t).exp() * wave(t)).word(), "stable");
+        assert_eq!(slow(&|t| 0.005 + 1e-4 * (0.9 * t).exp() * wave(t)).word(), "unstable");
     }
 
     #[test]

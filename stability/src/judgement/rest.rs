@@ -1,14 +1,14 @@
 //! Whether a loop comes to rest while the hand holds still: by the master's position, and by the forces where the sensor's step hides the motion.
 
 use super::dither::{dithered, judge_drift};
-use super::swings::{Course, DIES, GROWS, STEADY_PER_S, Swings};
+use super::swings::{Course, DIES, GROWS, STEADY_PER_S, Swings, WANDER};
 use crate::oscillation::{Oscillation, oscillation, without_slow_motion};
 use crate::outcome::{LEAST_AMPLITUDE, LOWEST_HZ, NOISE, Outcome, Trace, Unit};
 
-/// A master that moves less than this while the hand holds still is at rest, m or rad.
-pub(super) const WANDER: f64 = 20e-6;
 /// A line this far above the lowest frequency is none of a quick hand's.
 const BEYOND_THE_HAND: f64 = 1.3;
+/// What falls by a factor of `DIES` over three quarters falls by 0.89 in one; what falls by less than this in the last one stays.
+const STAYS: f64 = 0.94;
 /// A motion of less than this many steps of the sensor may be its rounding.
 const STEPS: f64 = 4.0;
 /// A force that swings by less than this share of its largest in the hold is not felt to (differences of force that are just noticed: 7 %; Pang, Tan
@@ -48,7 +48,9 @@ fn floor(trace: &Trace) -> f64 {
 
 pub(super) fn judge_fast(found: &Oscillation, trace: &Trace) -> Outcome {
     let grows = found.amplitude > GROWS * found.amplitude_before && found.growth_per_s > STEADY_PER_S;
-    let dies = found.amplitude < DIES * found.amplitude_before && found.growth_per_s < -STEADY_PER_S;
+    // What falls from a large beginning to a level at which it stays does not die.
+    let stays = found.amplitude >= STAYS * found.amplitude_third && found.later_growth_per_s >= -STEADY_PER_S;
+    let dies = found.amplitude < DIES * found.amplitude_before && found.growth_per_s < -STEADY_PER_S && !stays;
     if found.amplitude <= floor(trace) || dies {
         Outcome::Stable
     } else if grows {
@@ -93,6 +95,11 @@ fn judge_force(trace: &Trace, from: usize, to: usize) -> Outcome {
     if trace.dither.get(from..to).is_some_and(|d| d.iter().any(|f| *f != 0.0)) {
         return Outcome::Stable;
     }
+    // A fine sensor hides nothing of a master that moves; a slave may shake while dry friction holds the master.
+    let quarter = (to - from) / 4;
+    if floor(trace) <= WANDER && moved(&trace.slave, to - quarter..to) / mu(trace) <= floor(trace) {
+        return Outcome::Stable;
+    }
     let judged = [&trace.contact, &trace.feedback].into_iter().map(|force| judge_one_force(trace, force, from, to));
     Outcome::worst(judged).unwrap_or(Outcome::Stable)
 }
@@ -118,15 +125,24 @@ fn judge_one_force(trace: &Trace, force: &[f64], from: usize, to: usize) -> Outc
     if !swings.oscillates() || swings.last_row() < late.len() - quarter || !swings.regular() {
         return Outcome::Stable;
     }
-    let moved = |x: &[f64]| x.get(to - quarter..to).map_or(0.0, |x| 0.5 * range(x));
+    let last = to - quarter..to;
     match swings.course() {
         Course::Dies => Outcome::Stable,
         Course::GoesOn => {
-            let amplitude_m = moved(&trace.position).max(moved(&trace.slave) / trace.mu.abs().max(f64::MIN_POSITIVE));
+            let amplitude_m = moved(&trace.position, last.clone()).max(moved(&trace.slave, last) / mu(trace));
             Outcome::LimitCycle { amplitude_m, frequency_hz: swings.frequency_hz(), unit: trace.unit }
         }
         Course::Grows(growth_per_s) => Outcome::Unstable { growth_per_s },
     }
+}
+
+/// Half of what a signal spans in some rows; 0 of rows that it does not have.
+fn moved(signal: &[f64], rows: std::ops::Range<usize>) -> f64 {
+    signal.get(rows).map_or(0.0, |rows| 0.5 * range(rows))
+}
+
+fn mu(trace: &Trace) -> f64 {
+    trace.mu.abs().max(f64::MIN_POSITIVE)
 }
 
 fn range(piece: &[f64]) -> f64 {

@@ -11,6 +11,9 @@ pub(super) const OSCILLATES: usize = 4;
 /// Of the amplitudes of a narrow band of noise the coefficient of variation is 0.52 (Rayleigh), of an oscillation's 0.
 const REGULAR: f64 = 0.35;
 
+/// A master that moves less than this while the hand holds still is at rest, m or rad.
+pub(super) const WANDER: f64 = 20e-6;
+
 /// The way from one turn to the next.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Swing {

@@ -187,9 +187,10 @@ impl Answer {
     fn hold_back(&mut self) {
         let Some(Outcome::NotJudged { why }) = self.recorded_outcome else { return };
         // A hand that never holds still moves the loop all the same, and a frequency response is told from that.
+        // Nor does a recording at lambda = 0 speak against a loop that it never closed.
         // What contradicts itself is no record at all: that is the first thing to know of it.
         let comes_first = self.verdict == Word::CannotTell && why == Unjudged::Contradictory;
-        if self.verdict != Word::Stable && !comes_first || why == Unjudged::NoHold {
+        if self.verdict != Word::Stable && !comes_first || matches!(why, Unjudged::NoHold | Unjudged::NoFeedback) {
             return;
         }
         self.verdict = Word::CannotTell;

@@ -9,11 +9,10 @@ use crate::unjudged::{Gaps, Unjudged};
 
 /// What the recording itself did: the same function as for a live run. What is missing in a recording is no run-away.
 pub fn recorded_outcome(session: &Session) -> Option<Outcome> {
-    if session.is_one_way() {
-        return Some(Outcome::NotJudged { why: Unjudged::NoFeedback });
-    }
     let here = recorded_traces(session).into_iter().map(|trace| judge(&trace));
-    Outcome::worst(here.chain(session.elsewhere).map(|outcome| outcome.held_back(session.cut_short)))
+    let outcome = Outcome::worst(here.chain(session.elsewhere).map(|outcome| outcome.held_back(session.cut_short)))?;
+    let open = session.is_one_way() && outcome.is_stable();
+    Some(if open { Outcome::NotJudged { why: Unjudged::NoFeedback } } else { outcome })
 }
 
 /// What a verdict on a recording is drawn from, per axis.
