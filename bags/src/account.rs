@@ -278,7 +278,9 @@ impl Hearing {
         });
         let mut rates: Vec<f64> = rates.collect();
         rates.sort_by(f64::total_cmp);
-        rates.get(rates.len() / 2).copied()
+        let middle = rates.get(rates.len() / 2).copied()?;
+        // Stamps are whole nanoseconds: further digits are their rounding.
+        format!("{middle:.9e}").parse().ok()
     }
 
     fn account(self, reader: &Reader) -> Account {
