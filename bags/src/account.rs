@@ -278,7 +278,9 @@ impl Hearing {
         });
         let mut rates: Vec<f64> = rates.collect();
         rates.sort_by(f64::total_cmp);
-        rates.get(rates.len() / 2).copied()
+        let middle = rates.get(rates.len() / 2).copied()?;
+        // Stamps are whole nanoseconds: further digits are their rounding.
+        format!("{middle:.9e}").parse().ok()
     }
 
     fn account(self, reader: &Reader) -> Account {
@@ -292,7 +294,7 @@ impl Hearing {
         reader.contradictions().iter().for_each(|what| contradiction(what.clone()));
         if let Some(header) = reader.header().filter(|header| header.clock != Clock::Imported) {
             let tolerance = if self.lockstep { RATE_OF_LOCKSTEP } else { RATE_OF_REALTIME };
-            let apart = |rate: f64| rate_hz.is_some_and(|found| !((found / rate - 1.0).abs() <= tolerance));
+            let apart = |rate: f64| rate_hz.is_some_and(|found| rate.is_nan() || (found / rate - 1.0).abs() > tolerance);
             let found = rate_hz.map_or("nothing".to_owned(), |hz| format!("{hz:.6} Hz"));
             if let Some(rate) = self.plan.rate_hz.filter(|rate| apart(*rate)) {
                 contradiction(format!("its graph runs at {rate} Hz, and the steps of its messages follow each other at {found}"));

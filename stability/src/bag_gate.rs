@@ -1,8 +1,9 @@
 //! What in a bag of ours forbids a green answer: one function, so that every verb that judges gives the same.
 
 use crate::by_itself::against::{Against, against};
-use crate::model_check::{PartCheck, check};
+use crate::model_check::check;
 use crate::outcome::Outcome;
+use crate::part_check::PartCheck;
 use crate::session::Session;
 use crate::signal_role::SessionError;
 use crate::unjudged::Unjudged;

@@ -21,6 +21,7 @@ pub mod moving;
 pub mod nyquist;
 pub mod oscillation;
 pub mod outcome;
+mod part_check;
 mod phases;
 pub mod resimulate;
 pub mod roles;

@@ -1,7 +1,7 @@
 //! The signals of a recorded loop, one value per step: what every answer is drawn from.
 
-use crate::model_check::PartCheck;
 use crate::outcome::{Closes, Outcome, Unit};
+use crate::part_check::PartCheck;
 use crate::sensors::SensorFault;
 use crate::unjudged::Unjudged;
 

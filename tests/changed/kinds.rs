@@ -41,7 +41,17 @@ fn numbers(bag: &mut Bag, random: &mut ChaCha8Rng, change: impl Fn(usize, usize,
         return None;
     }
     let of = was.len();
+    let before = bag.clone();
     bag.numbers(topic, which, |index, number| change(index, of, number, &was));
+    // What rests where it was frozen, or was nearly 0, is not changed by that.
+    let mean = was.iter().sum::<f64>() / of as f64;
+    let rms = |values: &mut dyn Iterator<Item = f64>| (values.map(|x| x * x).sum::<f64>() / of as f64).sqrt();
+    let spread = rms(&mut was.iter().map(|x| x - mean));
+    let changed = rms(&mut bag.values(topic, which).iter().zip(&was).map(|(is, was)| if is.is_nan() { spread } else { is - was }));
+    if changed < 0.1 * spread {
+        *bag = before;
+        return None;
+    }
     Some(Costs::Numbers)
 }
 

@@ -107,7 +107,8 @@ pub fn why(question: &Question, hear: &(dyn Fn(&str) + Sync), cancel: &AtomicBoo
     let happening = Happening::of(session, recorded.rows);
     // What contradicts itself is no record of this loop: where, is known, and a search of physics in it or the loop run again says nothing.
     let contradictory = happening == Happening::NotJudged { why: Unjudged::Contradictory };
-    let patience = if contradictory { Duration::ZERO } else { question.patience };
+    let is_lossy = matches!(happening, Happening::NotJudged { why } if why.is_loss());
+    let patience = if is_lossy { Duration::ZERO } else { question.patience };
     let Differences { found, notes } = differences(graph, recorded, &Look { small: SMALL, patience }, hear, cancel)?;
     let mut answer = Answer {
         bag: session.name.clone(),

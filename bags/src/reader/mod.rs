@@ -1,5 +1,6 @@
 //! Reads any MCAP file, whoever wrote it and however it ended.
 
+mod attachments;
 pub(crate) mod channels;
 pub(crate) mod entry;
 mod messages;
@@ -15,6 +16,7 @@ use crate::framing::Frames;
 use crate::header::{BagHeader, RUN};
 use crate::span::Spans;
 use crate::steps::Said;
+use attachments::Attachments;
 use channels::Channels;
 use mcap::records::{Metadata, Record, op};
 use records::{parse, records};
@@ -221,25 +223,6 @@ impl Reader {
             offset: 0,
             done: false,
         })
-    }
-}
-
-/// Files that a bag holds.
-#[derive(Debug, Default)]
-pub(crate) struct Attachments {
-    texts: HashMap<String, String>,
-    /// Names under which there are two that differ.
-    doubled: Vec<String>,
-}
-
-impl Attachments {
-    pub(crate) fn see(&mut self, name: String, data: &[u8]) {
-        let text = String::from_utf8_lossy(data).into_owned();
-        match self.texts.get(&name) {
-            Some(other) if *other != text => self.doubled.push(name),
-            Some(_) => {}
-            None => drop(self.texts.insert(name, text)),
-        }
     }
 }
 

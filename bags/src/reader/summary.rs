@@ -1,6 +1,6 @@
 //! What a bag says of itself at its end, read without its messages: a bag of any size is looked at in the same time.
 
-use super::Attachments;
+use super::attachments::Attachments;
 use super::channels::Channels;
 use super::records::parse;
 use crate::framing::Frame;

@@ -6,7 +6,7 @@
 use super::alone::{PutOut, alone, alone_at};
 use super::compared::{AsIf, Compared, Sensor, compare};
 use super::recorded::{Quantity, Recorded};
-use crate::model_check::PartCheck;
+use crate::part_check::PartCheck;
 use backdrive_bags::{BagError, Reader};
 use backdrive_msgs::Gains;
 use backdrive_nodes::graph::{Graph, Node, NodeKind, Settings};
@@ -206,7 +206,7 @@ fn sentence(place: &Place, compared: &Compared, recorded: &[f64], predicted: &[f
     let size = predicted.iter().filter(|x| x.is_finite()).fold(0.0_f64, |m, x| m.max(x.abs()));
     let differs = |row: &usize| {
         let (is, due) = (recorded[*row], predicted[*row]);
-        due.is_finite() && !((is - due).abs() <= 1e-3 * size)
+        due.is_finite() && (is.is_nan() || (is - due).abs() > 1e-3 * size)
     };
     let rows: Vec<usize> = (0..recorded.len().min(predicted.len())).filter(differs).collect();
     let (first, last) = (rows.first().copied().unwrap_or(0), rows.last().copied().unwrap_or(0));

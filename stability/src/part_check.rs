@@ -1,0 +1,41 @@
+//! A device, or a way, beside its model.
+
+use serde::Serialize;
+
+/// How well a device's model tells what was recorded of the device.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct PartCheck {
+    /// `master`, `slave`, or `force path`: the way from F_s to the reflected part of F_f, with its gain and delay.
+    pub part: &'static str,
+    /// Number of the axis.
+    pub axis: usize,
+    /// What is compared: the master's position, the force on the slave, or the reflected force.
+    pub quantity: &'static str,
+    /// Root mean square of recorded less predicted, in contact; m, rad, N or N m.
+    pub error_rms: f64,
+    /// Root mean square of what the reflected force did to the master, or of the contact force; same unit.
+    pub effect_rms: f64,
+    /// What the sensor's rounding and noise alone explain of the error, same unit.
+    pub floor_rms: f64,
+    /// Whether the model tells the device: the error is within three floors, or below [`AGREES_WITHIN`] of the effect.
+    pub agrees: bool,
+}
+
+/// Share of the effect below which an error is small.
+pub const AGREES_WITHIN: f64 = 0.02;
+
+impl std::fmt::Display for PartCheck {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let share = 100.0 * self.error_rms / self.effect_rms.max(f64::MIN_POSITIVE);
+        match self.part {
+            "master" => write!(f, "the master's model misses {share:.1} % of the motion that the reflected force makes"),
+            "master's motor" => {
+                write!(f, "{share:.1} % of the force applied to the master is not what its model makes of the force command")
+            }
+            "handle's motion" => write!(f, "the master's model misses {share:.1} % of the motion of what the hand holds"),
+            "slave's motion" => write!(f, "the slave's model misses {share:.1} % of its motion"),
+            "slave" => write!(f, "the slave's model misses {share:.1} % of the contact force"),
+            _ => write!(f, "{share:.1} % of the reflected force is not lambda times the contact force as late as the graph says"),
+        }
+    }
+}
