@@ -181,6 +181,8 @@ fn strike(what: &Strike) -> Came {
         (true, _, Signal::SIGTERM) => &[4, 5, 6, 7],
         (true, _, _) => &[0, 1, 4, 5, 6, 7],
         _ if what.way == Way::Here => &[],
+        // A node ignores it, once it has begun.
+        _ if struck && what.signal == Signal::SIGINT && what.whom != "supervisor" => &[0, 1, 4, 6, 7, 130],
         _ if endless => &[130],
         _ => &[0, 1, 4, 7],
     };
