@@ -167,11 +167,14 @@ fn clean_removes_what_dead_runs_left_and_no_more() {
     let start = |bag: &str| place.start(&[&["run", graph.as_str(), "--bag", bag], &options[..]].concat());
     let alive = start("alive.mcap");
     system::until_recorded(&place.path("alive.mcap"), "/master/measured_js", 1);
-    let living = place.runs();
+    let (living, nodes) = (place.runs(), place.processes());
     let mut dead = start("dead.mcap");
     system::until_recorded(&place.path("dead.mcap"), "/master/measured_js", 1);
     let died: Vec<String> = place.runs().into_iter().filter(|r| !living.contains(r)).collect();
     assert_eq!((living.len(), died.len()), (1, 1));
+    // All of it is killed at once: a node that lives on removes the run itself.
+    kill(dead.pid(), Signal::SIGSTOP);
+    place.processes().iter().filter(|p| !nodes.contains(p)).for_each(|p| kill(p.pid, Signal::SIGKILL));
     dead.child.kill().unwrap();
     dead.child.wait().unwrap();
     until("its nodes to be gone", || place.processes().len() == 6);

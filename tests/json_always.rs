@@ -114,7 +114,8 @@ fn a_program_that_is_no_node_a_full_disk_and_a_bag_that_exists_are_json() {
 #[test]
 fn an_interrupted_run_is_json() {
     let place = Place::new();
-    let text = graph_text("launch/contact.toml").replace("kind = \"slave\"\n", "kind = \"slave\"\ncommand = [\"sh\", \"-c\", \"sleep 60\"]\n");
+    let text =
+        graph_text("launch/contact.toml").replace("kind = \"slave\"\n", "kind = \"slave\"\ncommand = [\"sh\", \"-c\", \"sleep 60\"]\n");
     place.write("waits.toml", &text);
     place.write("graph.toml", &graph_text("launch/contact.toml"));
     for graph in ["waits.toml", "graph.toml"] {

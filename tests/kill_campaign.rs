@@ -181,6 +181,8 @@ fn strike(what: &Strike) -> Came {
         (true, _, Signal::SIGTERM) => &[4, 5, 6, 7],
         (true, _, _) => &[0, 1, 4, 5, 6, 7],
         _ if what.way == Way::Here => &[],
+        // A node ignores it, once it has begun.
+        _ if struck && what.signal == Signal::SIGINT && what.whom != "supervisor" => &[0, 1, 4, 6, 7, 130],
         _ if endless => &[130],
         _ => &[0, 1, 4, 7],
     };
@@ -237,7 +239,8 @@ fn whatever_is_struck_a_run_ends_clean_and_without_a_force() {
         let what = draw(&mut random, number);
         let came = strike(&what);
         println!("{number}: {what:?}: {came:?}");
-        *told.entry(format!("{:?} {} {}", what.way, what.whom, what.signal)).or_default() += 1;
+        let code = came.code.map_or("by the signal".to_string(), |code| code.to_string());
+        *told.entry(format!("{:?} {} {}: {code}", what.way, what.whom, what.signal)).or_default() += 1;
         after.extend(came.after);
         bags += usize::from(came.has_bag);
         longest = longest.max(came.took_s);

@@ -1,6 +1,6 @@
 //! The place of a process in a run, over all lives of its process.
 
-use crate::child::Child;
+use crate::child::{Child, End};
 use crate::member::Member;
 use crate::pace::Pace;
 use crate::plan::NodePlan;
@@ -164,6 +164,15 @@ impl Slot {
 
     pub fn steps(&self) -> u64 {
         self.members.first().and_then(|m| m.status.as_ref()).map_or(0, |s| s.steps)
+    }
+
+    /// How its process ended, as it says itself or as the system says.
+    pub fn how(&self, end: End) -> String {
+        match (&self.failed, self.done) {
+            (Some((error, _)), _) => error.clone(),
+            (None, true) => format!("ended by itself after {} steps", self.steps()),
+            (None, false) => end.words(),
+        }
     }
 
     pub fn wrote(&mut self, line: String) {

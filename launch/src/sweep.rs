@@ -246,7 +246,7 @@ mod tests {
         let temp = tempfile::tempdir()?;
         let home = RunHome::at(temp.path().join("runs"));
         home.create("", 1)?.remove()?;
-        // Foreign names, a file with the name of a run, a link with the name of a run, and a directory that is being made.
+        // Foreign names, a file with the name of a run, a link with the name of a run, and a directory that holds something and has no lock.
         let precious = temp.path().join("precious");
         std::fs::create_dir(&precious)?;
         std::fs::write(precious.join("thesis"), "x")?;
@@ -254,8 +254,8 @@ mod tests {
         std::fs::create_dir(home.dir().join("notes"))?;
         std::fs::write(home.dir().join("0123456789abcdef0123"), "")?;
         std::os::unix::fs::symlink(&precious, home.dir().join("0123456789abcdef0124"))?;
-        std::fs::create_dir(home.dir().join(format!("{UNBORN}0123456789abcdef0125")))?;
         std::fs::create_dir(home.dir().join("0123456789abcdef0126"))?;
+        std::fs::write(home.dir().join("0123456789abcdef0126/file"), "x")?;
         let foreign = Path::new("/dev/shm").join(format!("bd-test-{}", std::process::id()));
         std::fs::write(&foreign, "x")?;
         // And one that is dead and links to something precious.
@@ -268,7 +268,43 @@ mod tests {
         assert!(foreign.exists());
         std::fs::remove_file(&foreign)?;
         assert!(precious.join("thesis").exists());
-        assert_eq!(std::fs::read_dir(home.dir())?.count(), 5);
+        assert_eq!(std::fs::read_dir(home.dir())?.count(), 4);
+        Ok(())
+    }
+
+    #[test]
+    fn a_start_or_an_end_that_was_cut_short_anywhere_is_removed() -> Outcome {
+        let temp = tempfile::tempdir()?;
+        let home = RunHome::at(temp.path().join("runs"));
+        home.create("", 1)?.remove()?;
+        // What a run has, in the order in which it is made; an end leaves the same, from the end on.
+        let parts = [LOCK, "processes.lock", "graph.toml", "middleware", PIDS];
+        for (number, name) in [UNBORN, ""].iter().enumerate() {
+            for made in 0..=parts.len() {
+                let id = format!("0123456789abcdef{number}{made:03}");
+                let root = home.dir().join(format!("{name}{id}"));
+                std::fs::create_dir(&root)?;
+                for part in &parts[..made] {
+                    if *part == "middleware" { std::fs::create_dir(root.join(part))? } else { std::fs::write(root.join(part), "")? }
+                }
+                // The probe of shared memory is made once there is a lock.
+                let probe = Path::new("/dev/shm").join(format!("{}probe", prefix_of(&id)));
+                if made >= 2 {
+                    std::fs::write(&probe, "x")?;
+                }
+                let swept = home.sweep(LIMIT);
+                assert_eq!(swept.failed, [""; 0], "{root:?}");
+                assert!(!root.exists() && !probe.exists(), "{root:?}");
+            }
+        }
+        // One that is being made is locked, and stays.
+        let root = home.dir().join(format!("{UNBORN}0123456789abcdef0999"));
+        std::fs::create_dir(&root)?;
+        std::fs::write(root.join(LOCK), "")?;
+        let lock = try_lock(&root.join(LOCK))?.ok_or("it is locked")?;
+        assert_eq!(home.sweep(LIMIT).removed.len(), 0);
+        assert!(root.exists());
+        drop(lock);
         Ok(())
     }
 

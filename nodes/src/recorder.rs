@@ -28,6 +28,9 @@ const AT_ONCE: usize = 512;
 /// After a stop, or when nobody speaks any more, how long it still listens.
 const LINGER: Duration = Duration::from_millis(50);
 
+/// How long it still listens after a stop while others speak on: it was asked to end alone, and has a bag to close.
+const SPOKEN_ON: Duration = Duration::from_secs(1);
+
 /// Steps after which it gives credit again, however much there is to take.
 const CREDIT_EVERY: u64 = 256;
 
@@ -295,7 +298,9 @@ impl RunningRecorder {
             if complete || stopped() || ends_at.is_some() {
                 // Events and status may still be on their way; they are few, and their publishers end now.
                 let end = *ends_at.get_or_insert_with(|| Instant::now() + LINGER);
-                if (self.is_deserted() || Instant::now() >= end) && taken == 0 {
+                let deserted = self.is_deserted();
+                let spoken_on = !deserted && Instant::now() >= end + SPOKEN_ON;
+                if (deserted || Instant::now() >= end) && taken == 0 || spoken_on {
                     return self.hand_on(start, i64::MAX);
                 }
             }

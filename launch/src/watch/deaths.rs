@@ -18,11 +18,14 @@ const LONGEST_BACKOFF: Duration = Duration::from_secs(2);
 impl Supervisor {
     pub(crate) fn ended(&mut self, index: usize, end: End, now: Instant) {
         let started = self.start.is_some();
+        let early = self.is_early(index, now);
         let slot = &mut self.slots[index];
         slot.child = None;
         let name = slot.plan.label();
         let asked = slot.asked;
-        if slot.done && end.signal.is_none() || asked >= Asked::Stop && slot.failed.is_none() && end.code == Some(0) {
+        if early && started && end.signal.is_none() {
+            self.died(index, end, now);
+        } else if !early && slot.done && end.signal.is_none() || asked >= Asked::Stop && slot.failed.is_none() && end.code == Some(0) {
             slot.end = if slot.done { "done" } else { "stopped" }.to_string();
             slot.enter(Phase::Ended, now);
             self.one_is_done(index, now);
@@ -35,21 +38,42 @@ impl Supervisor {
             }
         } else if !started {
             slot.enter(Phase::Ended, now);
-            slot.end = slot.failed.as_ref().map_or_else(|| end.words(), |(error, _)| error.clone());
+            let how = slot.how(end);
             let stderr = slot.stderr.iter().cloned().collect();
             let error = match slot.failed.clone() {
                 Some((error, code)) => LaunchError::NodeFailed { node: name, error, code },
-                None => LaunchError::DiedAtStart { node: name, how: end.words(), stderr },
+                None => LaunchError::DiedAtStart { node: name, how: how.clone(), stderr },
             };
+            slot.end = how;
             if !self.stopping {
                 self.give_up(error);
             }
         } else if self.stopping && !slot.plan.records && end.signal.is_none() {
             // One that has lost its peers because the run ends is no death of its own.
-            slot.end = slot.failed.as_ref().map_or_else(|| end.words(), |(error, _)| error.clone());
+            slot.end = slot.how(end);
             slot.enter(Phase::Ended, now);
         } else {
             self.died(index, end, now);
+        }
+    }
+
+    /// Whether a node that says that it is done has ended before its time although nobody asked: somebody sent it a signal, or it is a
+    /// program with an idea of its own. In lockstep the others end with it, as with one that is done.
+    fn is_early(&self, index: usize, now: Instant) -> bool {
+        let slot = &self.slots[index];
+        if !slot.done || slot.asked != Asked::No || self.stopping || self.finishing.is_some() {
+            return false;
+        }
+        if self.start.is_none() {
+            return true;
+        }
+        match self.plan.timing.steps {
+            // Without a planned end a recorder goes when it is asked to.
+            None => slot.plan.records,
+            Some(planned) if slot.steps() >= planned => false,
+            // One that was held up over the end of the run has left out its last steps.
+            Some(_) if self.plan.realtime() => self.planned_end().is_some_and(|end| now < end),
+            Some(_) => slot.plan.records,
         }
     }
 
@@ -58,7 +82,7 @@ impl Supervisor {
         let t_s = self.start.map_or(0.0, |s| seconds_since(now, s.at));
         let slot = &mut self.slots[index];
         let name = slot.plan.label();
-        let how = slot.failed.as_ref().map_or_else(|| end.words(), |(error, _)| format!("failed: {error}"));
+        let how = if slot.failed.is_some() { format!("failed: {}", slot.how(end)) } else { slot.how(end) };
         self.deaths.push(Death {
             node: name.clone(),
             t_s,

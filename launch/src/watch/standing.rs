@@ -15,11 +15,15 @@ const OVERDUE: Duration = Duration::from_secs(1);
 impl Supervisor {
     /// In real time the planned end is a time of day. Where every node stands still none says that it has come.
     pub(crate) fn see_planned_end(&mut self, now: Instant) {
-        let (Some(start), Some(steps), true) = (self.start, self.plan.timing.steps, self.plan.realtime()) else { return };
-        let lasts = Duration::try_from_secs_f64(steps as f64 / self.plan.timing.rate_hz).unwrap_or(Duration::MAX);
-        if now.saturating_duration_since(start.at) > lasts.saturating_add(OVERDUE) {
+        if self.plan.realtime() && self.planned_end().is_some_and(|end| now.saturating_duration_since(end) > OVERDUE) {
             self.finishing.get_or_insert(now);
         }
+    }
+
+    /// When the last of the planned steps is due, in real time.
+    pub(crate) fn planned_end(&self) -> Option<Instant> {
+        let lasts = Duration::try_from_secs_f64(self.plan.timing.steps? as f64 / self.plan.timing.rate_hz).ok()?;
+        self.start?.at.checked_add(lasts)
     }
 
     /// Continues what somebody has stopped, so that it can end in order and a recorder closes its bag. What is stopped again is killed.
