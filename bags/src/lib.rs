@@ -24,6 +24,7 @@ mod framing;
 mod header;
 mod index;
 mod info;
+mod json_message;
 mod lerobot;
 mod merge;
 mod number_type;
