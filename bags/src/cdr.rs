@@ -2,12 +2,15 @@
 
 use crate::cdr_bytes::Cdr;
 pub(crate) use crate::cdr_bytes::{Count, Type};
+use crate::json_message;
 use std::collections::HashMap;
 
 /// A ROS 2 message definition with everything that it refers to.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Schema {
     pub(crate) types: Vec<Vec<Field>>,
+    /// Messages are JSON, which says itself what it holds: then there are no types.
+    is_json: bool,
 }
 
 #[derive(Debug, Clone, PartialEq)]
@@ -35,6 +38,13 @@ enum Entry {
 }
 
 impl FieldPath {
+    /// In a message of JSON only the first entry of a path matters here: whether it is by place or by name.
+    fn of_json(path: &str) -> FieldPath {
+        let first = path.split_once('[').filter(|(list, _)| !list.contains('.')).and_then(|(_, rest)| rest.split_once(']'));
+        let entry = first.map(|(entry, _)| entry.parse().map_or_else(|_| Entry::Named(entry.to_owned()), Entry::At));
+        FieldPath { text: path.to_owned(), steps: vec![(0, entry)], is_time: false }
+    }
+
     /// Whether it takes an entry of a list of the message by its place.
     pub fn is_by_place(&self) -> bool {
         matches!(self.steps.first(), Some((_, Some(Entry::At(_)))))
@@ -53,6 +63,11 @@ pub(crate) const MOST_NESTED: usize = 16;
 const MOST_NUMBERS: usize = 256;
 
 impl Schema {
+    /// That of messages in JSON.
+    pub fn json() -> Schema {
+        Schema { types: Vec::new(), is_json: true }
+    }
+
     /// Reads a ros2msg schema: the definition of `type_name`, then its dependencies behind lines of `=`.
     ///
     /// Errors: a sentence that names the line.
@@ -71,13 +86,16 @@ impl Schema {
         }
         let places: HashMap<&str, usize> = sections.iter().enumerate().rev().map(|(index, (name, _))| (name.as_str(), index)).collect();
         let types = sections.iter().map(|(name, lines)| fields(name, lines, &places)).collect::<Result<_, _>>()?;
-        Ok(Schema { types })
+        Ok(Schema { types, is_json: false })
     }
 
     /// Finds a field by its path.
     ///
     /// Errors: a sentence that says what there is instead.
     pub fn find(&self, path: &str) -> Result<FieldPath, String> {
+        if self.is_json {
+            return json_message::check(path).map(|()| FieldPath::of_json(path));
+        }
         let (mut at, mut steps) = (0, Vec::new());
         let (mut inside, mut has_names) = (false, self.name_list().is_some());
         // A dot in brackets is one of a joint's name.
@@ -127,6 +145,9 @@ impl Schema {
 
     /// Paths of all numbers in a message like this one, at most 256: lists have the length that they have in it.
     pub fn numbers(&self, payload: &[u8]) -> Result<Vec<String>, String> {
+        if self.is_json {
+            return Ok(json_message::parse(payload)?.numbers(MOST_NUMBERS));
+        }
         let mut found = Vec::new();
         let mut cdr = Cdr::new(payload)?;
         self.list(&mut cdr, 0, "", &mut found, 0)?;
@@ -137,6 +158,9 @@ impl Schema {
     ///
     /// Integers beyond 2⁵³ are rounded. A time is in s. Errors: a sentence, the message ends early.
     pub fn read(&self, path: &FieldPath, payload: &[u8]) -> Result<Option<f64>, String> {
+        if self.is_json {
+            return json_message::parse(payload)?.number(&path.text);
+        }
         self.read_with(path, payload, |cdr, of| match of {
             Type::Message(_) => Ok(cdr.time_ns()? as f64 * 1e-9),
             of => cdr.number(of),
@@ -147,11 +171,17 @@ impl Schema {
     ///
     /// `None` as of [`Schema::read`], and for a field that is no time.
     pub(crate) fn read_time_ns(&self, path: &FieldPath, payload: &[u8]) -> Result<Option<i64>, String> {
+        if self.is_json {
+            return Ok(json_message::parse(payload)?.time_ns(&path.text));
+        }
         if path.is_time { self.read_with(path, payload, |cdr, _| cdr.time_ns()) } else { Ok(None) }
     }
 
     /// Where the messages have a list of the names of their joints, as a JointState has.
     pub(crate) fn name_list(&self) -> Option<usize> {
+        if self.is_json {
+            return Some(0); // any message may have one
+        }
         self.types.first()?.iter().position(|field| field.name == "name" && field.of == Type::Text && field.count != Count::One)
     }
 
@@ -159,6 +189,9 @@ impl Schema {
     ///
     /// Errors: a sentence, the message ends early.
     pub fn joint_names(&self, payload: &[u8]) -> Result<Vec<String>, String> {
+        if self.is_json {
+            return Ok(json_message::parse(payload)?.joint_names());
+        }
         let Some((place, fields)) = self.name_list().zip(self.types.first()) else { return Ok(Vec::new()) };
         let mut cdr = Cdr::new(payload)?;
         fields[..place].iter().try_for_each(|field| self.skip_field(&mut cdr, field, 0))?;

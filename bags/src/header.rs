@@ -70,6 +70,8 @@ pub struct BagHeader {
     pub topics: Vec<TopicInfo>,
     /// Of a table that was imported: what the numbers of a column were in it, by where they stand now (`/recording/x.position[0]`); doubles are left out.
     pub column_types: BTreeMap<String, NumberType>,
+    /// Of a table that was imported: the SI unit of a column whose heading stated one, by where it stands now; without an entry nothing states the unit.
+    pub column_units: BTreeMap<String, String>,
 }
 
 impl BagHeader {
@@ -95,6 +97,9 @@ impl BagHeader {
         ]);
         if !self.column_types.is_empty() {
             metadata.insert("column_types".to_owned(), serde_json::to_string(&self.column_types)?);
+        }
+        if !self.column_units.is_empty() {
+            metadata.insert("column_units".to_owned(), serde_json::to_string(&self.column_units)?);
         }
         Ok(metadata)
     }
@@ -128,6 +133,10 @@ impl BagHeader {
             // Bags of before have none.
             column_types: match metadata.get("column_types") {
                 Some(text) => json(text).map_err(|what| wrong("column_types", what))?,
+                None => BTreeMap::new(),
+            },
+            column_units: match metadata.get("column_units") {
+                Some(text) => json(text).map_err(|what| wrong("column_units", what))?,
                 None => BTreeMap::new(),
             },
         })

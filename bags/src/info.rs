@@ -76,6 +76,8 @@ pub struct TopicSummary {
     pub rate_hz: Option<f64>,
     /// Messages known to be missing; unknown for other people's messages.
     pub lost: Option<u64>,
+    /// Why no command reads its messages, and what to do, where that is so.
+    pub unread: Option<String>,
 }
 
 /// Sums a bag up from what stands at its end, without reading its messages: in the same time whatever its size. Damage among the
@@ -162,6 +164,7 @@ fn sum_up(reader: &Reader, heard: Heard) -> BagInfo {
                 .filter(|(first, last)| last > first)
                 .map(|(first, last)| (counts[index] - 1) as f64 / ((last - first) as f64 * 1e-9)),
             lost: lost[index],
+            unread: topic.unread(),
         })
         .collect();
     let first = spans.iter().flatten().map(|span| span.0).min();
@@ -220,6 +223,9 @@ impl fmt::Display for BagInfo {
                 Some(lost) => format!("  {lost} LOST"),
             };
             writeln!(f, "  {:width$}  {:types$}  {:>9}  {rate:>9} Hz{lost}", topic.name, topic.type_name, topic.messages)?;
+        }
+        for unread in self.topics.iter().filter_map(|topic| topic.unread.as_ref()) {
+            writeln!(f, "  NOT READ: {unread}")?;
         }
         let verdict = match (self.complete, self.lost) {
             (_, Some(lost)) if lost > 0 => format!("INCOMPLETE: {lost} messages lost"),

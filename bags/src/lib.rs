@@ -26,6 +26,7 @@ mod framing;
 mod header;
 mod index;
 mod info;
+mod json_message;
 mod lerobot;
 mod memory;
 mod merge;

@@ -218,7 +218,7 @@ fn a_bad_table_is_told_with_its_line() {
             "t;x\n0;1,5\n1;2,5\n",
             "no column of numbers beside the times; column \"x\" holds something that is no number, first in line 2: \"1,5\"; write decimal points",
         ),
-        ("time, s;x, mm\n0,1;1,5\n0,2;2,5\n", "there is no column \"t\", and none with numbers; there is time, s, x, mm"),
+        ("time, s;x, mm\n0,1;1,5\n0,2;2,5\n", "there is no column \"t\", and none with numbers; there is time, x"),
         ("# t x\n0 1\n1 2\n", "there is no heading"),
         ("t,x,t\n0,1,5\n1,2,6\n", "line 1: two columns are called \"t\""),
         ("t,q[0],q(0)\n0,1,5\n1,2,6\n", "both go to position[0] of /recording/q_0_; say with --map"),
@@ -288,15 +288,51 @@ fn a_heading_that_is_asked_for_whole_names_its_unit_all_the_same() {
     assert_eq!(found.t, [0.0, 1e6 * 1e-9, 2e6 * 1e-9]);
 }
 
+/// An element of a MATLAB file.
+fn element(kind: u32, data: &[u8]) -> Vec<u8> {
+    let mut bytes = [kind.to_le_bytes(), (data.len() as u32).to_le_bytes()].concat();
+    bytes.extend(data);
+    bytes.resize(bytes.len().next_multiple_of(8), 0);
+    bytes
+}
+
+#[test]
+fn a_lone_matrix_of_a_matlab_file_is_refused_with_what_to_do_or_read() {
+    let dir = tempfile::tempdir().expect("a directory");
+    let (table, bag) = (dir.path().join("x.mat"), dir.path().join("x.mcap"));
+    // Five rows of time, angle and torque, column by column.
+    let values: Vec<u8> = (0..15).flat_map(|place| (f64::from(place % 5) * [0.5, 2.0, -1.0][place as usize / 5]).to_le_bytes()).collect();
+    let size = [5_u32.to_le_bytes(), 3_u32.to_le_bytes()].concat();
+    let mut file = b"MATLAB 5.0 MAT-file".to_vec();
+    file.resize(124, b' ');
+    file.extend([0, 1, b'I', b'M']);
+    file.extend(element(14, &[element(6, &[6, 0, 0, 0, 0, 0, 0, 0]), element(5, &size), element(1, b"X"), element(9, &values)].concat()));
+    std::fs::write(&table, file).expect("it writes");
+    let import = |options: ImportOptions| import_table(&table, &bag, &ImportOptions { overwrite: true, ..options });
+    let names = |names: &[&str]| Some(names.iter().map(|name| (*name).to_owned()).collect::<Vec<_>>());
+    let error = import(ImportOptions::default()).expect_err("nothing is called t").to_string();
+    for says in ["X is a matrix of 3 columns, X[0] to X[2]", "as --time \"X[0]\"", "--rate HZ"] {
+        assert!(error.contains(says), "{error}");
+    }
+    let error = import(ImportOptions { headings: names(&["t", "q"]), ..ImportOptions::default() }).expect_err("too few").to_string();
+    assert!(error.contains("--columns names 2 columns, and the file has 3: X[0], X[1], X[2]"), "{error}");
+    let at = |topic: &str| signals(&Reader::open(&bag).expect("it opens"), &[Signal::new("x", topic, "position[0]")]).expect("it is there");
+    for (options, topic, times) in [
+        (ImportOptions { time: "X[0]".to_owned(), ..ImportOptions::default() }, "/recording/X_1_", 0.5),
+        (ImportOptions { time: "X[0] [ms]".to_owned(), ..ImportOptions::default() }, "/recording/X_1_", 0.5e-3),
+        (ImportOptions { headings: names(&["t", "q", "tau"]), ..ImportOptions::default() }, "/recording/q", 0.5),
+        (ImportOptions { rate_hz: Some(100.0), ..ImportOptions::default() }, "/recording/X_1_", 0.01),
+    ] {
+        import(options).expect("it imports");
+        let found = at(topic);
+        assert_eq!(found.columns[0], [0.0, 2.0, 4.0, 6.0, 8.0]);
+        assert!((found.t[3] - 3.0 * times).abs() < 1e-12, "{topic}: {:?}", found.t);
+    }
+}
+
 /// As MATLAB writes a table or a string: an object, which has no size, and at the end what it holds, which has no name.
 #[test]
 fn objects_in_a_matlab_file_do_not_hide_its_vectors() {
-    fn element(kind: u32, data: &[u8]) -> Vec<u8> {
-        let mut bytes = [kind.to_le_bytes(), (data.len() as u32).to_le_bytes()].concat();
-        bytes.extend(data);
-        bytes.resize(bytes.len().next_multiple_of(8), 0);
-        bytes
-    }
     let flags = |class: u8| element(6, &[class, 0, 0, 0, 0, 0, 0, 0]);
     let size = |rows: u32| element(5, &[rows.to_le_bytes(), 1_u32.to_le_bytes()].concat());
     let vector = |name: &str, kind: u8, stored: u32, data: &[u8], rows| {

@@ -13,6 +13,7 @@ pub fn export(asked: &BagExport) -> Result<u8, Failure> {
         Some(ExportTo::Lerobot) => return dataset(asked),
         Some(ExportTo::Parquet) => TableFormat::Parquet,
         Some(ExportTo::Mat) => TableFormat::Mat,
+        None if TableFormat::of_ending(&asked.out) == Some(TableFormat::Numpy) => TableFormat::Numpy,
         Some(ExportTo::Csv) | None => TableFormat::Csv,
     };
     let usage = |message: &str| Failure { code: 2, message: message.to_owned() };
@@ -77,6 +78,7 @@ fn apart(out: &Path, bag: &Path) -> Result<(), Failure> {
 
 fn ending(out: &Path) -> Option<ExportTo> {
     Some(match TableFormat::of_ending(out)? {
+        TableFormat::Numpy => return None,
         TableFormat::Csv => ExportTo::Csv,
         TableFormat::Parquet => ExportTo::Parquet,
         TableFormat::Mat => ExportTo::Mat,

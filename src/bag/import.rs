@@ -46,9 +46,21 @@ pub fn import(asked: &BagImport) -> Result<u8, Failure> {
     for (from, kind) in kinds.iter().filter(|(_, kind)| *kind != Kind::Lerobot) {
         check_target(&into(from, *kind), asked.overwrite).map_err(Failure::bag)?;
     }
-    let most_bytes = asked.memory << 20;
-    let (time, variable, overwrite) = (asked.time.clone(), asked.variable.clone(), asked.overwrite);
-    let table = ImportOptions { time, columns, variable, overwrite, most_bytes };
+    if let (Some(rate), true) = (asked.rate, asked.time != "t") {
+        let message = format!("--rate {rate} is for tables in which no column is the time, and --time names {:?}; keep one", asked.time);
+        return Err(Failure { code: 2, message });
+    }
+    let headings = (!asked.columns.is_empty()).then(|| asked.columns.iter().map(|name| name.trim().to_owned()).collect());
+    let (overwrite, most_bytes) = (asked.overwrite, asked.memory << 20);
+    let table = ImportOptions {
+        time: asked.time.clone(),
+        columns,
+        variable: asked.variable.clone(),
+        headings,
+        rate_hz: asked.rate,
+        overwrite,
+        most_bytes,
+    };
     let contract = asked.contract.as_deref().map(Contract::read).transpose()?.unwrap_or_default();
     let episodes = (!asked.episode.is_empty()).then(|| asked.episode.clone());
     let dataset = LerobotOptions { contract, episodes, overwrite, most_bytes };
@@ -115,13 +127,14 @@ fn kind_of(from: &Path, asked: &BagImport) -> Result<Kind, Failure> {
         _ => Kind::Table,
     };
     let no_table = [("--map", !asked.map.is_empty()), ("--variable", asked.variable.is_some()), ("--time", asked.time != "t")];
+    let no_table = [&no_table[..], &[("--columns", !asked.columns.is_empty()), ("--rate", asked.rate.is_some())]].concat();
     let no_dataset = [("--contract", asked.contract.is_some()), ("--episode", !asked.episode.is_empty())];
     let wrong = |options: &[(&str, bool)], is_for: &str| match options.iter().find(|(_, given)| *given) {
         Some((option, _)) => Err(Failure { code: 2, message: format!("{}: {option} is for {is_for}", from.display()) }),
         None => Ok(()),
     };
     if kind != Kind::Table {
-        wrong(&no_table, "tables: CSV, parquet and MATLAB files")?;
+        wrong(&no_table, "tables: CSV, parquet, MATLAB and NumPy files")?;
     }
     if kind != Kind::Lerobot {
         wrong(&no_dataset, "LeRobot datasets")?;

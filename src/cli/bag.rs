@@ -20,7 +20,7 @@ pub enum Bag {
         #[arg(long)]
         json: bool,
     },
-    /// Recordings of other formats into bags: CSV, parquet, MATLAB, LeRobot datasets, ROS bags.
+    /// Recordings of other formats into bags: CSV, parquet, MATLAB, NumPy, LeRobot datasets, ROS bags.
     Import(BagImport),
     /// A bag's signals as CSV, parquet or a MATLAB file, or bags as a LeRobot dataset.
     Export(BagExport),
@@ -95,12 +95,12 @@ pub enum Bag {
 /// `backdrive bag import`
 #[derive(Debug, Args)]
 #[command(
-    after_help = "Examples:\n  backdrive bag import sweep.csv --bag sweep.mcap\n  backdrive bag import log.parquet --time time --bag log.mcap\n  backdrive bag import rig.mat --variable run1 --bag rig.mcap\n  backdrive bag import my_dataset --episode 0 --episode 3 --bag episodes\n  backdrive bag import session_db3 --bag session.mcap\n\nA file tells by its first bytes what it is, a folder by what is in it. The bag remembers what the numbers of a column were (single precision, whole \
+    after_help = "Examples:\n  backdrive bag import sweep.csv --bag sweep.mcap\n  backdrive bag import log.parquet --time time --bag log.mcap\n  backdrive bag import rig.mat --variable run1 --bag rig.mcap\n  backdrive bag import log.npz --bag log.mcap\n  backdrive bag import log.csv --columns 'angle (deg),speed,torque' --rate 1000 --bag log.mcap\n  backdrive bag import my_dataset --episode 0 --episode 3 --bag episodes\n  backdrive bag import session_db3 --bag session.mcap\n\nA file tells by its first bytes what it is, a folder by what is in it. The bag remembers what the numbers of a column were (single precision, whole \
                   numbers, ...), and `bag export` writes them so again. Of every recording the clock is looked at: a jump and uneven steps are a warning; times that \
                   repeat or go back are an error of a table and a warning of ROS topics.\n\nExit codes: 0 imported, 2 usage, 3 a recording is wrong or the bag exists, 5 the bag cannot be written."
 )]
 pub struct BagImport {
-    /// CSV, parquet or MATLAB files with a column `t`, s; folders of LeRobot datasets (version 3) or of rosbag2 in sqlite3; ROS 1 bags.
+    /// CSV, parquet, MATLAB or NumPy files with a column `t`, s; folders of LeRobot datasets (version 3) or of rosbag2 in sqlite3; ROS 1 bags.
     #[arg(required = true)]
     pub recordings: Vec<PathBuf>,
     /// The new bag; of several recordings, or of a LeRobot dataset, the folder in which each, or each episode, becomes one.
@@ -115,6 +115,12 @@ pub struct BagImport {
     /// Of a table: the column with the times, s, or in the unit of its heading; `t [ns]` says the unit of a column t.
     #[arg(long, default_value = "t", value_name = "COLUMN")]
     pub time: String,
+    /// Of a table without a heading: the names of its columns, in their order; a name may state its unit.
+    #[arg(long, value_name = "NAME,...", value_delimiter = ',')]
+    pub columns: Vec<String>,
+    /// Of a table in which no column is the time: rows per second.
+    #[arg(long, value_name = "HZ", value_parser = super::values::positive, allow_negative_numbers = true)]
+    pub rate: Option<f64>,
     /// Of a MATLAB file: the structure whose fields the columns are.
     #[arg(long, value_name = "NAME")]
     pub variable: Option<String>,

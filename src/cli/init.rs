@@ -9,11 +9,15 @@ pub const HELP: &str = "Examples:
   backdrive init mine
   backdrive init mine --motion rotation --driven current --drive current --constant 0.035 --position encoder --per-count 1.5708e-3 --yes
   backdrive init rig --motion translation --driven motion --drive x --force load --attached spring --yes
+  backdrive init log --columns 'angle [deg],speed [deg/s],torque [N m]' --rate 1000 --motion rotation --drive torque --position angle --yes
   backdrive diagnose mine --out mine/diagnosis
 
 Writes model.toml and set.toml into the folder of the recordings and checks them as diagnose would before it searches. On a terminal it asks for what
 no option says; elsewhere what is missing is an error that names its option, or with --yes the default, where there is one. Columns are named by
-their headings, with or without their unit; of bags they are TOPIC.FIELD, such as /joint_states.position[0].
+their headings, with or without their unit; of bags they are TOPIC.FIELD, such as /joint_states.position[0]. A heading states its unit in brackets, in
+parentheses or behind a slash: q [deg], q (deg), q / deg. Without any unit SI units are assumed and named, and values that contradict that are refused.
+
+Tables without a heading or without times (--columns, --rate) and .npz, .npy, .mat and .parquet files become bags in the folder bags/ beside the set.
 
 Exit codes: 0 written and fine; 2 usage; 3 a recording is wrong, a file exists, or diagnose would refuse what was written; 5 a file cannot be written.";
 
@@ -23,12 +27,18 @@ pub struct Init {
     /// Folder of the recordings, and of the files that are written.
     #[arg(value_name = "FOLDER", default_value = ".")]
     pub folder: PathBuf,
-    /// A recording (CSV or MCAP); may be given several times. Without this all in the folder.
+    /// A recording (CSV, MCAP, NumPy, MATLAB or parquet); may be given several times. Without this all in the folder.
     #[arg(long, value_name = "FILE")]
     pub recording: Vec<PathBuf>,
     /// The recording that no fit sees. Without this the one that is driven neither most nor least.
     #[arg(long, value_name = "FILE")]
     pub held_out: Option<PathBuf>,
+    /// Names of the columns of tables that have no heading, in their order; a name may state its unit.
+    #[arg(long, value_name = "NAME,...", value_delimiter = ',')]
+    pub columns: Vec<String>,
+    /// Rows per second of tables in which no column is the time.
+    #[arg(long, value_name = "HZ", value_parser = positive, allow_negative_numbers = true)]
+    pub rate: Option<f64>,
     /// Whether it moves along a line or turns.
     #[arg(long, value_enum)]
     pub motion: Option<Motion>,

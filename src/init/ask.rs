@@ -33,6 +33,11 @@ impl<R: BufRead, W: Write> Asker<R, W> {
         Asker { answers, told, is_terminal, takes_defaults, said: Vec::new() }
     }
 
+    /// Whether defaults are taken without asking.
+    pub fn takes_defaults(&self) -> bool {
+        self.takes_defaults
+    }
+
     /// Options that would give the same answers.
     pub fn said(&self) -> &[(String, String)] {
         &self.said

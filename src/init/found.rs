@@ -1,10 +1,11 @@
 //! The recordings that are there, and what their columns may be.
 
+use super::made::{self, Made};
+use crate::cli::Init;
 use crate::failure::Failure;
-use backdrive_bags::{Reader, columns_of};
+use backdrive_bags::{Reader, Signal, columns_of};
 use backdrive_plant::recording::units::{self, Kind, Unit};
 use backdrive_plant::recording::{Source, read_headings};
-use backdrive_plant::set::recordings_in;
 use backdrive_plant::tomlfile::unknown;
 use std::path::{Path, PathBuf};
 
@@ -15,30 +16,42 @@ pub struct Column {
     pub name: String,
     /// Where it stands.
     pub source: Source,
-    /// The unit that its heading names.
+    /// What a person calls it: its name without a unit and without what stands before it in a bag.
+    short: String,
+    /// The unit that its heading names, or named in the table that a bag was made of.
     pub unit: Option<Unit>,
+    /// The unit that its heading states, where that is not known.
+    pub unknown_unit: Option<String>,
+    /// Whether its type says that its values are in SI units.
+    pub is_si: bool,
 }
 
 impl Column {
     fn of_heading(heading: String) -> Column {
+        let (short, stated) = units::split(&heading);
+        let (short, unit) = (short.to_string(), stated.and_then(|unit| units::parse(unit).ok()));
         // A unit that is not known is asked for.
-        let unit = units::split(&heading).1.and_then(|unit| units::parse(unit).ok());
-        Column { source: Source::Column(heading.clone()), name: heading, unit }
+        let unknown_unit = stated.filter(|_| unit.is_none()).map(str::to_string);
+        Column { source: Source::Column(heading.clone()), short, name: heading, unit, unknown_unit, is_si: false }
     }
 
-    fn of_topic(topic: String, field: String) -> Column {
-        Column { name: format!("{topic}.{field}"), source: Source::Topic { topic, field }, unit: None }
+    fn of_topic(reader: &Reader, signal: Signal) -> Column {
+        let Signal { name: title, topic, field, .. } = signal;
+        let name = format!("{topic}.{field}");
+        let unit = reader.header().and_then(|header| header.column_units.get(&name)).and_then(|unit| units::parse(unit).ok());
+        // A table that was made a bag keeps the names of its columns.
+        let short = match topic.starts_with("/recording/") && !title.starts_with(&topic) {
+            true => title,
+            false => field.split(['[', '.']).next().unwrap_or(&field).to_string(),
+        };
+        let is_joint_state = reader.topic(&topic).is_ok_and(|topic| topic.type_name.ends_with("JointState"));
+        let is_si = is_joint_state && !topic.starts_with("/recording/");
+        Column { name, source: Source::Topic { topic, field }, short, unit, unknown_unit: None, is_si }
     }
 
     /// Its name without a unit and without what stands before it in a bag: what a person calls it.
     pub fn short_name(&self) -> &str {
-        match &self.source {
-            Source::Column(heading) => units::split(heading).0,
-            // A table that was made a bag keeps the names of its columns.
-            Source::Topic { topic, field } => {
-                topic.strip_prefix("/recording/").unwrap_or_else(|| field.split(['[', '.']).next().unwrap_or(field))
-            }
-        }
+        &self.short
     }
 }
 
@@ -52,24 +65,33 @@ pub struct Recordings {
     pub columns: Vec<Column>,
     /// What only some of them hold, by name.
     pub partial: Vec<String>,
+    /// Topics whose messages are not read: a sentence each.
+    pub unread: Vec<String>,
+    /// Bags that were made of tables of other kinds.
+    pub made: Option<Made>,
 }
 
 /// Looks at the headings of the recordings that were named, or at those of all in the folder.
 ///
 /// # Errors
 /// When there are none, one cannot be read, or tables and bags are mixed.
-pub fn recordings(folder: &Path, named: &[PathBuf]) -> Result<Recordings, Failure> {
+pub fn recordings(options: &Init) -> Result<Recordings, Failure> {
+    let (folder, named) = (options.folder.as_path(), options.recording.as_slice());
     let shown = folder.display();
     if !folder.is_dir() {
         return Err(Failure::input(format!("{shown}: there is no such folder; make it and put the recordings there, or name another")));
     }
     let paths: Vec<PathBuf> = match named {
-        [] => recordings_in(folder)?.iter().map(|name| folder.join(name)).collect(),
+        [] => made::recordings_in(folder)?,
         named => named.iter().map(|path| if path.exists() { path.clone() } else { folder.join(path) }).collect(),
     };
     if paths.is_empty() {
-        return Err(Failure::input(format!("{shown}: has no recordings (.csv or .mcap); name them with --recording")));
+        return Err(Failure::input(format!(
+            "{shown}: has no recordings (.csv, .mcap, .npz, .mat or .parquet); name them with --recording"
+        )));
     }
+    let made = made::make(options, &paths)?;
+    let paths = made.as_ref().map_or(paths, Made::paths);
     let is_bag = |path: &PathBuf| path.extension().is_some_and(|e| e.eq_ignore_ascii_case("mcap"));
     if paths.iter().any(is_bag) && !paths.iter().all(is_bag) {
         return Err(Failure::input(format!(
@@ -77,12 +99,13 @@ pub fn recordings(folder: &Path, named: &[PathBuf]) -> Result<Recordings, Failur
              tables with `backdrive bag import`"
         )));
     }
-    let mut all: Vec<Vec<Column>> = Vec::new();
+    let (mut all, mut unread): (Vec<Vec<Column>>, Vec<String>) = Default::default();
     for path in &paths {
         all.push(match is_bag(path) {
             true => {
                 let reader = Reader::open(path).map_err(Failure::input)?;
-                columns_of(&reader, None).map_err(Failure::input)?.into_iter().map(|s| Column::of_topic(s.topic, s.field)).collect()
+                unread.extend(reader.topics().iter().filter_map(|topic| topic.unread()));
+                columns_of(&reader, None).map_err(Failure::input)?.into_iter().map(|signal| Column::of_topic(&reader, signal)).collect()
             }
             false => read_headings(path)?.into_iter().filter(|h| !h.is_empty()).map(Column::of_heading).collect(),
         });
@@ -97,13 +120,17 @@ pub fn recordings(folder: &Path, named: &[PathBuf]) -> Result<Recordings, Failur
             false => partial.push(column.name.clone()),
         }
     }
+    if let (true, true, Some(unread)) = (columns.is_empty(), partial.is_empty(), unread.first()) {
+        return Err(Failure::input(format!("{shown}: the recordings have no numbers that are read: {unread}")));
+    }
     if columns.is_empty() {
         return Err(Failure::input(format!(
             "{shown}: the recordings have no column in common; name those that belong together with --recording"
         )));
     }
-    let names = paths.iter().map(|path| name_in(folder, path)).collect();
-    Ok(Recordings { paths, names, columns, partial })
+    let names = made.as_ref().map_or_else(|| paths.iter().map(|path| name_in(folder, path)).collect(), Made::names);
+    unread.dedup();
+    Ok(Recordings { paths, names, columns, partial, unread, made })
 }
 
 /// A path as it is called from a folder; a whole one where it lies elsewhere.
@@ -159,7 +186,7 @@ mod tests {
 
     fn of(headings: &[&str]) -> Recordings {
         let columns = headings.iter().map(|h| Column::of_heading((*h).to_string())).collect();
-        Recordings { paths: Vec::new(), names: Vec::new(), columns, partial: vec!["only_here".to_string()] }
+        Recordings { paths: Vec::new(), names: Vec::new(), columns, partial: vec!["only_here".to_string()], unread: Vec::new(), made: None }
     }
 
     #[test]

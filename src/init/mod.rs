@@ -3,7 +3,9 @@
 mod ask;
 mod estimate;
 mod found;
+mod made;
 mod plan;
+mod stated;
 mod write;
 
 use crate::cli::{self, Attached, Driven, Start};
@@ -36,18 +38,25 @@ const ESTIMATE: &str = "estimate";
 /// Asks, writes, checks, and says what to do next.
 pub fn init(options: &cli::Init) -> Result<u8, Failure> {
     let (model, set) = (options.folder.join(MODEL), options.folder.join(SET));
-    let found = recordings(&options.folder, &options.recording)?;
     may_replace(&model, options.overwrite)?;
     may_replace(&set, options.overwrite)?;
+    let found = recordings(options)?;
+    // A bag has its times by itself.
+    let made = cli::Init { time: None, time_unit: None, ..options.clone() };
+    let options = if found.made.is_some() { &made } else { options };
     let stdin = std::io::stdin();
     let is_terminal = stdin.is_terminal() && std::io::stderr().is_terminal();
     let mut asker = Asker::new(stdin.lock(), std::io::stderr(), is_terminal, options.yes);
     let plan = plan(&mut asker, options, &found)?;
     let records = read(&plan, &found)?;
+    let assumed = stated::check(&plan, &records)?;
     let seen = seen(&mut asker, options, &plan, &found, &records)?;
 
     let folder = options.folder.canonicalize().unwrap_or_else(|_| options.folder.clone());
     let name = folder.file_name().map_or("device".to_string(), |n| n.to_string_lossy().into_owned());
+    if let Some(made) = &found.made {
+        made.keep()?;
+    }
     output::file(&model, write::model(&plan, &seen, &name))?;
     output::file(&set, write::set(&plan, &seen, MODEL))?;
 
@@ -60,7 +69,7 @@ pub fn init(options: &cli::Init) -> Result<u8, Failure> {
         output::json(&json!({
             "model": model, "set": set, "fit": seen.fit, "held_out": seen.held_out,
             "start": { "inertia": seen.numbers.inertia, "damping": seen.numbers.damping, "stiffness": seen.numbers.stiffness, "from": seen.from },
-            "doubt": seen.doubt, "notes": opened.notes, "audit": remarks.iter().map(Remark::from).collect::<Vec<_>>(), "next": next,
+            "doubt": seen.doubt, "assumed": assumed, "notes": opened.notes, "audit": remarks.iter().map(Remark::from).collect::<Vec<_>>(), "next": next,
         }))?;
         return Ok(0);
     }
@@ -68,12 +77,24 @@ pub fn init(options: &cli::Init) -> Result<u8, Failure> {
     output::line(format_args!("start     {}", told_numbers(&plan, &seen)))?;
     let cautions: Vec<String> = remarks.iter().filter(|r| r.weight > Weight::Note).map(|r| r.to_string()).collect();
     let partial = found.partial.iter().map(|name| format!("{name}: is not in all of the recordings, so that it was not offered"));
-    let told: Vec<String> = seen.doubt.clone().into_iter().chain(cautions).chain(opened.notes).chain(partial).collect();
+    let told: Vec<String> = seen
+        .doubt
+        .clone()
+        .into_iter()
+        .chain(assumed)
+        .chain(cautions)
+        .chain(opened.notes)
+        .chain(partial)
+        .chain(found.unread.clone())
+        .collect();
     if told.is_empty() {
         output::line("check     fine: diagnose takes them, and nothing in the recordings speaks against it")?;
     }
     for (index, text) in told.iter().enumerate() {
         output::line(format_args!("{:<9} {text}", if index == 0 { "check" } else { "" }))?;
+    }
+    if let Some(made) = &found.made {
+        output::line(format_args!("made      {}: bags of the tables", made.names().join(", ")))?;
     }
     output::line(format_args!("wrote     {wrote}: look at them"))?;
     next.iter().try_for_each(|next| output::line(format_args!("next      {next}")))?;
@@ -84,6 +105,12 @@ pub fn init(options: &cli::Init) -> Result<u8, Failure> {
             .recording
             .iter()
             .fold(Offered::verb("init").reads(&options.folder), |again, file| again.word("--recording").reads(file));
+        let of_tables = [
+            ("columns", (!options.columns.is_empty()).then(|| options.columns.join(","))),
+            ("rate", options.rate.map(|rate| rate.to_string())),
+        ];
+        let of_tables = of_tables.into_iter().filter_map(|(option, value)| Some((option, value?)));
+        let again = of_tables.fold(again, |again, (option, value)| again.word(format!("--{option}")).word(value));
         let again = sayable.fold(again, |again, (option, answer)| again.word(format!("--{option}")).word(answer));
         // What was written now would be in its way.
         let again = again.flag("--yes").flag("--overwrite").build();

@@ -20,6 +20,8 @@ pub struct Signal {
     pub unit: Option<Unit>,
     /// A motor's constant or the size of a count.
     pub scale: Option<f64>,
+    /// The option that states its unit, where nothing does and SI units are assumed: with the unit.
+    pub assumed: Option<(String, Unit)>,
 }
 
 impl Signal {
@@ -127,7 +129,7 @@ fn time<R: BufRead, W: Write>(talk: &mut Talk<R, W>, options: &Init) -> Result<O
     match is_table || options.time.is_some() {
         true => talk.signal(&Asked {
             option: "time",
-            words: "Which column is the time?",
+            words: "Which column is the time? (where none is, say with --rate HZ how many rows a second has)",
             kinds: &[Kind::Time],
             likely: &TIMES,
             column: &options.time,
@@ -307,28 +309,39 @@ impl<R: BufRead, W: Write> Talk<'_, R, W> {
             if fits { Ok(Some(column)) } else { Err(format!("{unit}, and {} is needed", either(asked.kinds))) }
         })?;
         let Some(column) = column else { return Ok(None) };
+        let mut assumed = None;
         let unit = match (column.unit, asked.unit) {
             (Some(_), None) => None,
             (Some(unit), Some(other)) => return Err(usage(format!("--{}-unit {other}: the heading says {}", asked.option, unit.name))),
             (None, given) => {
                 let option = format!("{}-unit", asked.option);
-                let words = format!("In which unit is {}?", column.name);
+                let words = match &column.unknown_unit {
+                    Some(unknown) => format!("In which unit is {}? The unit \"{unknown}\" of its heading is not known", column.name),
+                    None => format!("In which unit is {}?", column.name),
+                };
                 // Many write the unit behind the name: `time_ms`.
-                let behind = column.short_name().rsplit_once('_').and_then(|(_, unit)| units::parse(unit).ok());
-                let likely = behind.filter(|unit| asked.kinds.contains(&unit.kind)).map_or(asked.si, |unit| unit.name);
-                let question = Question { option: &option, words: &words, choices: Vec::new(), default: Some(likely.to_string()) };
-                Some(self.asker.ask(&question, given.clone(), |text| {
+                let behind = units::hinted(column.short_name()).filter(|unit| asked.kinds.contains(&unit.kind));
+                let likely = behind.map_or(asked.si, |unit| unit.name);
+                // What the heading states and is not known is no SI unit.
+                let default = Some(likely.to_string()).filter(|_| column.unknown_unit.is_none());
+                let question = Question { option: &option, words: &words, choices: Vec::new(), default };
+                let is_stated = given.is_some() || behind.is_some() || column.is_si || !self.asker.takes_defaults();
+                let unit = self.asker.ask(&question, given.clone(), |text| {
                     let unit = units::parse(text)?;
                     let fits = asked.kinds.contains(&unit.kind);
                     if fits { Ok(unit) } else { Err(format!("is {}, and {} is needed", unit.kind.text(), either(asked.kinds))) }
-                })?)
+                })?;
+                assumed = Some((option, unit)).filter(|_| !is_stated);
+                Some(unit)
             }
         };
         self.taken.push(column.clone());
         let name = if asked.option == "time" { "t".to_string() } else { self.unique(column.short_name()) };
         // What is said once more in SI units needs no saying.
-        let unit = unit.filter(|unit| unit.factor != 1.0 || [Kind::Current, Kind::Count].contains(&unit.kind));
-        Ok(Some(Signal { name, column, unit, scale: None }))
+        let is_needed =
+            |unit: &Unit| unit.factor != 1.0 || [Kind::Current, Kind::Count].contains(&unit.kind) || column.unknown_unit.is_some();
+        let unit = unit.filter(is_needed);
+        Ok(Some(Signal { name, column, unit, scale: None, assumed }))
     }
 
     /// A name that no other signal of the model has.

@@ -35,14 +35,34 @@ pub struct TopicRef {
 }
 
 impl TopicRef {
+    /// A sentence where its messages are of a kind that is not read at all, with what to do; `None` where they can be read.
+    pub fn unread(&self) -> Option<String> {
+        if self.kind.is_some() {
+            return None;
+        }
+        let error = self.parse_schema().err()?;
+        if self.encoding == "cdr" && self.schema_encoding == "ros2msg" {
+            return Some(format!("topic {} is not read: {error}", self.name));
+        }
+        let (topic, encoding) = (&self.name, if self.encoding.is_empty() { "of no stated encoding" } else { &self.encoding });
+        let schema = if self.schema_encoding.is_empty() { "no schema".to_owned() } else { format!("a schema of {}", self.schema_encoding) };
+        Some(format!(
+            "topic {topic} is not read: its messages are {encoding} with {schema}, and cdr with ros2msg and json are read; write its numbers as CSV or \
+             .npz (Python: mcap.reader.make_reader with a decoder factory of that encoding) and import that"
+        ))
+    }
+
     /// Its schema, for reading fields by name.
     ///
-    /// Errors: it is no ros2msg CDR topic, or the schema cannot be parsed.
+    /// Errors: it is neither a ros2msg CDR topic nor JSON, or the schema cannot be parsed.
     pub fn parse_schema(&self) -> Result<Schema, BagError> {
         let wrong = |what: String| BagError::Field { topic: self.name.clone(), field: String::new(), what };
+        if self.encoding == "json" {
+            return Ok(Schema::json());
+        }
         if self.encoding != "cdr" || self.schema_encoding != "ros2msg" {
             return Err(wrong(format!(
-                "messages are {:?} with a {:?} schema; fields can be read of \"cdr\" with \"ros2msg\"",
+                "messages are {:?} with a {:?} schema; fields can be read of \"cdr\" with \"ros2msg\" and of \"json\"",
                 self.encoding, self.schema_encoding
             )));
         }

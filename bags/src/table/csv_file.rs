@@ -5,7 +5,7 @@ use super::types::{Cells, Column, Lines, Table, name_of};
 use crate::BagError;
 use crate::memory::Memory;
 use crate::number_type::NumberType;
-use backdrive_plant::recording::{TextTable, comma_remark};
+use backdrive_plant::recording::{NO_HEADING, TextTable, comma_remark, is_no_heading};
 use std::path::Path;
 
 /// Reads a CSV file, whose cells are separated by commas, semicolons, tabs or spaces. A column with a cell that is no number holds none, unless it is asked for: then that is an
@@ -15,10 +15,21 @@ pub(crate) fn read(path: &Path, options: &ImportOptions) -> Result<Table, BagErr
     let file = backdrive_plant::input_file::open(path).map_err(BagError::io(path))?;
     let mut table = TextTable::new(std::io::BufReader::new(file)).map_err(BagError::io(path))?;
     let mut record = csv::StringRecord::new();
-    let heading = table.next(&mut record).map_err(wrong)?.unwrap_or(1);
-    let mut columns: Vec<Read> = record.iter().map(|heading| Read::new(heading, options)).collect();
+    let first = table.next(&mut record).map_err(wrong)?;
+    let heading = first.unwrap_or(1);
+    let mut columns: Vec<Read> = match &options.headings {
+        None if is_no_heading(record.iter()) => return Err(wrong((heading, NO_HEADING.to_owned()))),
+        None => record.iter().map(|heading| Read::new(heading, options)).collect(),
+        Some(names) => {
+            named(names, &record).map_err(|what| wrong((heading, what)))?;
+            names.iter().map(|name| Read::new(name, options)).collect()
+        }
+    };
     let (mut lines, memory) = (Vec::new(), Memory::new(options.most_bytes));
-    while let Some(line) = table.next(&mut record).map_err(wrong)? {
+    // The first row is a heading unless the headings were given.
+    let mut next = first.filter(|_| options.headings.is_some());
+    loop {
+        let Some(line) = next.take().map_or_else(|| table.next(&mut record), |line| Ok(Some(line))).map_err(wrong)? else { break };
         memory.take_numbers(record.len() as u64 + 1).map_err(|what| wrong((line, what)))?;
         lines.push(line);
         for (cell, column) in record.iter().zip(&mut columns) {
@@ -26,6 +37,18 @@ pub(crate) fn read(path: &Path, options: &ImportOptions) -> Result<Table, BagErr
         }
     }
     Ok(Table { columns: columns.into_iter().map(Read::column).collect(), notes: Vec::new(), lines: Some(Lines { heading, rows: lines }) })
+}
+
+/// Whether a table without a heading can have these names.
+fn named(names: &[String], first: &csv::StringRecord) -> Result<(), String> {
+    if !first.is_empty() && !first.iter().any(|cell| cell.parse::<f64>().is_ok()) {
+        let there = first.iter().collect::<Vec<_>>().join(", ");
+        return Err(format!("the table has a heading already ({there}); leave --columns out"));
+    }
+    match first.len() == names.len() {
+        true => Ok(()),
+        false => Err(format!("--columns names {} columns ({}), and the table has {}", names.len(), names.join(", "), first.len())),
+    }
 }
 
 /// A column that is being read.

@@ -1,7 +1,7 @@
 //! The formats of tables, and how a file tells which one it is.
 
 use super::mapping::{ImportOptions, ImportReport};
-use super::{csv_file, from_bag, mat_in, mat_out, parquet_in, parquet_out, to_bag};
+use super::{csv_file, from_bag, mat_in, mat_out, npz_in, parquet_in, parquet_out, to_bag};
 use crate::memory::Memory;
 use crate::{BagError, Reader};
 use backdrive_plant::input_file;
@@ -15,6 +15,8 @@ pub enum TableFormat {
     Csv,
     /// Apache Parquet; columns keep their types.
     Parquet,
+    /// NumPy: an archive of arrays (`.npz`) or one array (`.npy`); it is read and not written.
+    Numpy,
     /// MATLAB MAT, version 5, as `save` writes it up to `-v7`; columns keep their types.
     Mat,
 }
@@ -37,6 +39,9 @@ impl TableFormat {
         if start.starts_with(b"PAR1") {
             return Ok(TableFormat::Parquet);
         }
+        if start.starts_with(npz_in::MAGIC) || (start.starts_with(b"PK\x03\x04") && npz_in::is_npz(path)) {
+            return Ok(TableFormat::Numpy);
+        }
         if start.starts_with(b"MATLAB 5.0 MAT-file") {
             return Ok(TableFormat::Mat);
         }
@@ -48,7 +53,11 @@ impl TableFormat {
             return wrong("is an HDF5 file, which is not read; write its columns as CSV or parquet (pandas: read_hdf, to_parquet)");
         }
         if start.starts_with(&mcap::MAGIC[..6]) {
-            return wrong("is an MCAP file already: every command takes it as it is");
+            let unread = Reader::open(path).map(|reader| reader.topics().iter().filter_map(|topic| topic.unread()).collect::<Vec<_>>());
+            return wrong(&match unread.unwrap_or_default().as_slice() {
+                [] => "is an MCAP file already: every command takes it as it is".to_owned(),
+                unread => format!("is an MCAP file already, and {}", unread.join("; ")),
+            });
         }
         let packed: [(&[u8], &str); 4] = [
             (b"\x28\xb5\x2f\xfd", "is compressed by zstd; unpack it with `zstd -d`"),
@@ -60,6 +69,9 @@ impl TableFormat {
             return wrong(what);
         }
         match promised {
+            Some(TableFormat::Numpy) => {
+                wrong("is not a NumPy file: it is neither an archive of arrays nor one array; save it again with numpy.savez")
+            }
             Some(TableFormat::Parquet) => wrong("is not a parquet file: it does not start with the bytes PAR1"),
             Some(TableFormat::Mat) => wrong(
                 "is not a MATLAB file of version 5: it does not start with \"MATLAB 5.0 MAT-file\"; save it again with save(..., '-v7')",
@@ -72,12 +84,13 @@ impl TableFormat {
         }
     }
 
-    /// What a file's ending promises: `.csv`, `.parquet`, `.mat`.
+    /// What a file's ending promises: `.csv`, `.parquet`, `.mat`, `.npz` or `.npy`.
     pub fn of_ending(path: &Path) -> Option<TableFormat> {
         match path.extension()?.to_str()?.to_ascii_lowercase().as_str() {
             "csv" => Some(TableFormat::Csv),
             "parquet" => Some(TableFormat::Parquet),
             "mat" => Some(TableFormat::Mat),
+            "npz" | "npy" => Some(TableFormat::Numpy),
             _ => None,
         }
     }
@@ -94,11 +107,20 @@ pub fn import_table(table: &Path, bag: &Path, options: &ImportOptions) -> Result
     if let Some(variable) = options.variable.as_ref().filter(|_| format != TableFormat::Mat) {
         return Err(BagError::Usage(format!("{}: is no MATLAB file, so it has no structure {variable:?}", table.display())));
     }
-    let read = match format {
+    let mut read = match format {
         TableFormat::Csv => csv_file::read(table, options)?,
+        TableFormat::Numpy => npz_in::read(table, options)?,
         TableFormat::Parquet => parquet_in::read(table, Memory::new(options.most_bytes))?,
         TableFormat::Mat => mat_in::read(table, options)?,
     };
+    if let Some(names) = options.headings.as_ref().filter(|_| format != TableFormat::Csv) {
+        if names.len() != read.columns.len() {
+            let there = read.columns.iter().map(|column| column.name.as_str()).collect::<Vec<_>>().join(", ");
+            let what = format!("--columns names {} columns, and the file has {}: {there}", names.len(), read.columns.len());
+            return Err(BagError::File { path: table.to_owned(), what });
+        }
+        read.columns.iter_mut().zip(names).for_each(|(column, name)| column.name.clone_from(name));
+    }
     to_bag::write_bag(table, &read, bag, options)
 }
 
@@ -119,12 +141,16 @@ pub fn import_csv(table: &Path, bag: &Path, options: &ImportOptions) -> Result<I
 /// # Errors
 /// A topic that is not there, nothing to write, a damaged bag, `out` exists or cannot be written.
 pub fn export_table(reader: &Reader, out: &Path, format: TableFormat, topics: Option<&[String]>) -> Result<(u64, Vec<String>), BagError> {
-    let table = from_bag::table_of(reader, topics)?;
-    let notes = match format {
+    let mut table = from_bag::table_of(reader, topics)?;
+    let mut notes = std::mem::take(&mut table.notes);
+    notes.extend(match format {
+        TableFormat::Numpy => {
+            return Err(BagError::Usage("NumPy files are read and not written; name one of .csv, .parquet or .mat".to_owned()));
+        }
         TableFormat::Csv => csv_file::write(&table, out).map(|()| Vec::new())?,
         TableFormat::Parquet => parquet_out::write(&table, out).map(|()| Vec::new())?,
         TableFormat::Mat => mat_out::write(&table, out)?,
-    };
+    });
     Ok((table.rows() as u64, notes))
 }
 

@@ -12,8 +12,11 @@ pub(crate) fn table_of(reader: &Reader, topics: Option<&[String]>) -> Result<Tab
         reader.topic(name)?;
     }
     let wanted = columns_of(reader, topics)?;
+    let asked = |name: &str| topics.is_none_or(|topics| topics.iter().any(|topic| topic == name));
+    let unread: Vec<String> = reader.topics().iter().filter(|topic| asked(&topic.name)).filter_map(|topic| topic.unread()).collect();
     if wanted.is_empty() {
-        return Err(BagError::Usage(format!("{} has no numbers to export", reader.path().display())));
+        let why = if unread.is_empty() { String::new() } else { format!(": {}", unread.join("; ")) };
+        return Err(BagError::Usage(format!("{} has no numbers to export{why}", reader.path().display())));
     }
     let found = gather(reader, &wanted, false, usize::MAX)?;
     // Recovered bags may have rows in which a whole number is missing: then the column is one of doubles.
@@ -36,5 +39,5 @@ pub(crate) fn table_of(reader: &Reader, topics: Option<&[String]>) -> Result<Tab
     if let Cells::Numbers(values, _) = &mut columns[0].cells {
         *values = found.t;
     }
-    Ok(Table { columns, notes: Vec::new(), lines: None })
+    Ok(Table { columns, notes: unread, lines: None })
 }

@@ -55,6 +55,10 @@ pub struct ImportOptions {
     pub columns: Vec<ColumnMap>,
     /// Of a MATLAB file, the structure whose fields the columns are; `None` where they are variables of their own.
     pub variable: Option<String>,
+    /// Names of the columns of a table that has no headings, in its order; a name may state its unit, `q (deg)`.
+    pub headings: Option<Vec<String>>,
+    /// Rows per second of a table in which no column is the time, Hz.
+    pub rate_hz: Option<f64>,
     /// Replace a bag that exists.
     pub overwrite: bool,
     /// Bytes that the unpacked numbers may take, see [`crate::MOST_BYTES`].
@@ -63,7 +67,15 @@ pub struct ImportOptions {
 
 impl Default for ImportOptions {
     fn default() -> ImportOptions {
-        ImportOptions { time: "t".to_owned(), columns: Vec::new(), variable: None, overwrite: false, most_bytes: MOST_BYTES }
+        ImportOptions {
+            time: "t".to_owned(),
+            columns: Vec::new(),
+            variable: None,
+            headings: None,
+            rate_hz: None,
+            overwrite: false,
+            most_bytes: MOST_BYTES,
+        }
     }
 }
 

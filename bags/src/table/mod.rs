@@ -1,5 +1,6 @@
 //! To and from tables: CSV, parquet and MATLAB files.
 
+mod arrays;
 mod bag_columns;
 mod csv_file;
 mod formats;
@@ -9,11 +10,13 @@ mod mat_array;
 mod mat_format;
 mod mat_in;
 mod mat_out;
+mod npz_in;
 mod parquet_in;
 mod parquet_out;
 mod time_column;
 mod to_bag;
 mod types;
+mod zip_members;
 
 pub use bag_columns::columns_of;
 pub use formats::{TableFormat, export_csv, export_table, import_csv, import_table};

@@ -10,8 +10,8 @@ use std::path::Path;
 
 /// The times of the rows.
 pub(super) struct Times<'a> {
-    /// Place of their column.
-    pub(super) place: usize,
+    /// Place of their column; `None` where the rate tells them.
+    pub(super) place: Option<usize>,
     /// s, rising.
     pub(super) values: Cow<'a, [f64]>,
     pub(super) of: NumberType,
@@ -25,14 +25,29 @@ const NO_SECONDS: f64 = 1000.0;
 /// Finds the column that is asked for: by its heading, by its name, or as `NAME [unit]` where its heading names no unit.
 pub(super) fn times_of<'a>(path: &Path, table: &'a Table, options: &ImportOptions) -> Result<Times<'a>, BagError> {
     let asked = options.time.as_str();
+    if let Some(rate) = options.rate_hz {
+        return by_rate(path, table, asked, rate);
+    }
     let (place, unit) = match table.find(path, asked)? {
         Some(place) => (place, unit_of(&table.columns[place].name)),
         None => match unit_of(asked).map(|unit| table.find(path, name_of(asked)).map(|place| (place, unit))).transpose()? {
             Some((Some(place), unit)) => (place, Some(unit)),
-            _ => return Err(table.no_column(path, asked, ": name the one with the times with --time")),
+            _ => {
+                return Err(table.no_column(
+                    path,
+                    asked,
+                    ": name the one with the times with --time, or say with --rate HZ how many rows a second has",
+                ));
+            }
         },
     };
     let heading = &table.columns[place].name;
+    // A unit that is stated and not known is no reason to take the times for seconds.
+    let unit = match unit {
+        None => units::of_times(heading)
+            .map_err(|what| table.wrong_columns(path, format!("column {heading:?}: {what}; or say it as --time \"{heading} [ms]\"")))?,
+        unit => unit,
+    };
     if let Some(unit) = unit.filter(|unit| unit.kind != Kind::Time) {
         let what = format!("column {heading:?} is in {}, {}, expected a time such as s or ms", unit.name, unit.kind.text());
         return Err(table.wrong_columns(path, what));
@@ -62,7 +77,25 @@ pub(super) fn times_of<'a>(path: &Path, table: &'a Table, options: &ImportOption
         return Err(table.wrong_columns(path, what.to_owned()));
     }
     check(path, table, name, &values)?;
-    Ok(Times { place, values, of, note })
+    Ok(Times { place: Some(place), values, of, note })
+}
+
+/// Times of evenly spaced rows, from 0.
+fn by_rate<'a>(path: &Path, table: &Table, asked: &str, rate: f64) -> Result<Times<'a>, BagError> {
+    if !rate.is_finite() || rate <= 0.0 {
+        return Err(BagError::Usage(format!("--rate {rate:?}: expected rows per second, above 0")));
+    }
+    if table.find(path, asked)?.is_some() {
+        let what = format!("there is a column {asked:?} with the times; leave --rate out, or name that column otherwise");
+        return Err(table.wrong_columns(path, what));
+    }
+    let rows = table.columns.iter().map(|column| column.cells.len()).max().unwrap_or(0);
+    if rows == 0 {
+        return Err(table.wrong_columns(path, "there are no rows with numbers".to_owned()));
+    }
+    let values: Vec<f64> = (0..rows).map(|row| row as f64 / rate).collect();
+    check(path, table, "--rate", &values)?;
+    Ok(Times { place: None, values: values.into(), of: NumberType::Double, note: None })
 }
 
 /// How many of a unit of time make a second.

@@ -9,6 +9,7 @@ use crate::signals::TIME_TOPIC;
 use crate::{BagError, Recorder, RecorderOptions, TopicInfo, clock_remarks};
 use backdrive_msgs::topic::{Kind, Topic};
 use backdrive_msgs::{MAX_AXES, Message, Sample, source_id};
+use backdrive_plant::recording::units::{self, Unit};
 use std::collections::{BTreeMap, HashMap};
 use std::path::Path;
 
@@ -21,8 +22,8 @@ struct Known<'a> {
     name: &'a str,
     /// As they stand in the table.
     values: &'a [f64],
-    /// Its unit in SI units.
-    factor: f64,
+    /// The unit that its heading states.
+    unit: Option<Unit>,
     of: NumberType,
 }
 
@@ -47,10 +48,17 @@ pub(crate) fn write_bag(path: &Path, table: &Table, bag: &Path, options: &Import
         let name = name_of(&column.name);
         match &column.cells {
             Cells::Numbers(values, of) => {
-                let factor = unit_of(&column.name).map_or(1.0, |unit| unit.factor);
-                known.insert(place, Known { name, values, factor, of: *of });
+                let unit = unit_of(&column.name);
+                let is_meant = options.columns.is_empty() || options.columns.iter().any(|map| map.column == column.name);
+                if let (None, (_, Some(text)), true) = (unit, units::split(&column.name), is_meant && Some(place) != clock.place) {
+                    notes.push(format!(
+                        "column {:?}: the unit {text:?} is not known, so its numbers stay as they are in the file",
+                        column.name
+                    ));
+                }
+                known.insert(place, Known { name, values, unit, of: *of });
             }
-            Cells::Large { .. } if place == clock.place => {}
+            Cells::Large { .. } if Some(place) == clock.place => {}
             Cells::Large { per_second: Some(_), .. } => skipped.push((name, "points in time, of which a bag has one column,")),
             Cells::Large { .. } => skipped.push((name, "whole numbers beyond 2^53, which a bag does not hold exactly,")),
             Cells::Other(holds) => skipped.push((name, holds)),
@@ -58,7 +66,7 @@ pub(crate) fn write_bag(path: &Path, table: &Table, bag: &Path, options: &Import
     }
     let mut info = vec![topic_info(TIME_TOPIC, "t")];
     let mut places = HashMap::from([(TIME_TOPIC.to_owned(), 0)]);
-    let mut types = BTreeMap::new();
+    let (mut types, mut stated) = (BTreeMap::new(), BTreeMap::new());
     let mut remember = |topic: &str, quantity: Quantity, axis: usize, of: NumberType| {
         if of != NumberType::Double {
             types.insert(format!("{topic}.{}[{axis}]", quantity.field()), of);
@@ -97,8 +105,15 @@ pub(crate) fn write_bag(path: &Path, table: &Table, bag: &Path, options: &Import
             info[place].axes.push(format!("axis{axis}"));
         }
         // A scale that somebody gives goes before the unit of the heading.
-        let (scale, offset) = if (map.scale, map.offset) == (1.0, 0.0) { (column.factor, 0.0) } else { (map.scale, map.offset) };
+        let (scale, offset) = if (map.scale, map.offset) == (1.0, 0.0) {
+            (column.unit.map_or(1.0, |unit| unit.factor), 0.0)
+        } else {
+            (map.scale, map.offset)
+        };
         let scaled = Some((scale, offset)).filter(|scaled| *scaled != (1.0, 0.0));
+        if let Some(unit) = column.unit.filter(|_| (map.scale, map.offset) == (1.0, 0.0)) {
+            stated.insert(format!("{}.{}[{}]", map.topic, map.quantity.field(), map.axis), units::si(unit.kind).name.to_owned());
+        }
         if scaled.is_none() {
             remember(&map.topic, map.quantity, map.axis, column.of);
         }
@@ -112,6 +127,7 @@ pub(crate) fn write_bag(path: &Path, table: &Table, bag: &Path, options: &Import
         rate_hz: if span > 0.0 { (times.len() - 1) as f64 / span } else { 0.0 },
         topics: info,
         column_types: types,
+        column_units: stated,
         ..BagHeader::default()
     };
     record(bag, &header, times, &sources, options.overwrite)?;
@@ -127,7 +143,7 @@ fn placed<'a, 'b>(
     table: &Table,
     known: &'b HashMap<usize, Known<'a>>,
     skipped: &[(&str, &str)],
-    time: usize,
+    time: Option<usize>,
     options: &ImportOptions,
 ) -> Result<Vec<(&'b Known<'a>, ColumnMap)>, BagError> {
     if options.columns.is_empty() {
@@ -135,7 +151,8 @@ fn placed<'a, 'b>(
             let (name, topic) = (column.name.to_owned(), topic_of(column.name));
             (column, ColumnMap { column: name, topic, quantity: Quantity::Position, axis: 0, scale: 1.0, offset: 0.0 })
         };
-        let own: Vec<_> = (0..table.columns.len()).filter(|place| *place != time).filter_map(|place| known.get(&place)).map(own).collect();
+        let own: Vec<_> =
+            (0..table.columns.len()).filter(|place| Some(*place) != time).filter_map(|place| known.get(&place)).map(own).collect();
         return match own.is_empty() {
             false => Ok(own),
             true => {

@@ -59,6 +59,15 @@ pub(crate) enum Cells {
 }
 
 impl Cells {
+    /// Rows with numbers.
+    pub(crate) fn len(&self) -> usize {
+        match self {
+            Cells::Numbers(values, _) => values.len(),
+            Cells::Large { values, .. } => values.len(),
+            Cells::Other(_) => 0,
+        }
+    }
+
     /// Whole numbers of 64 bits: as doubles where all are exactly that.
     pub(crate) fn of_whole(values: Vec<i64>, of: NumberType) -> Cells {
         match values.iter().all(|value| value.unsigned_abs() as f64 <= LARGEST_WHOLE) {
@@ -83,11 +92,7 @@ impl Column {
 impl Table {
     /// Rows of its first column.
     pub(crate) fn rows(&self) -> usize {
-        match self.columns.first().map(|column| &column.cells) {
-            Some(Cells::Numbers(values, _)) => values.len(),
-            Some(Cells::Large { values, .. }) => values.len(),
-            _ => 0,
-        }
+        self.columns.first().map_or(0, |column| column.cells.len())
     }
 
     /// Takes the first row off.
@@ -119,12 +124,8 @@ impl Table {
             let of = if matches!(column.cells, Cells::Other(_)) { &mut others } else { &mut numbers };
             of.push(name_of(&column.name));
         }
-        let is_number = |name: &&str| name.parse::<f64>().is_ok();
         let what = if self.columns.iter().all(|column| column.name.is_empty()) {
             "is empty, expected a heading such as t,force,position".to_owned()
-        } else if self.lines.is_some() && numbers.iter().chain(&others).all(is_number) {
-            "there is no heading: expected names of columns such as t,force,position, found numbers; a line that begins with # is a comment"
-                .to_owned()
         } else if numbers.is_empty() {
             format!("there is no column {asked:?}, and none with numbers; there is {}", others.join(", "))
         } else {

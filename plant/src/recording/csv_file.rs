@@ -32,13 +32,28 @@ pub fn read_headings(path: &Path) -> Result<Vec<String>, FileError> {
     Ok(heading_of(&mut table, &name)?.1.iter().map(str::to_string).collect())
 }
 
+/// What is said of a table whose first row holds numbers.
+pub const NO_HEADING: &str = "there is no heading: expected names of columns such as t,force,position, found numbers; \
+     write one, or name the columns of `backdrive bag import` or `backdrive init` with --columns t,force,position (and --rate HZ where no column is \
+     the time); a line that begins with # is a comment";
+
+/// Whether a table's first row holds numbers, which are no names of columns.
+pub fn is_no_heading<'a>(cells: impl Iterator<Item = &'a str>) -> bool {
+    let mut named = cells.filter(|cell| !cell.is_empty()).peekable();
+    named.peek().is_some() && named.all(|cell| cell.parse::<f64>().is_ok())
+}
+
 /// The heading, and its line.
 fn heading_of<R: BufRead>(table: &mut TextTable<R>, name: &str) -> Result<(usize, StringRecord), FileError> {
     let mut heading = StringRecord::new();
     let line = table.next(&mut heading).map_err(|(line, what)| FileError::at(name, line as usize, "", what))?;
-    match heading.iter().all(str::is_empty) {
-        true => Err(FileError::at(name, line.unwrap_or(1) as usize, "", "is empty, expected a heading such as t,force,position")),
-        false => Ok((line.unwrap_or(1) as usize, heading)),
+    let line = line.unwrap_or(1) as usize;
+    if heading.iter().all(str::is_empty) {
+        return Err(FileError::at(name, line, "", "is empty, expected a heading such as t,force,position"));
+    }
+    match is_no_heading(heading.iter()) {
+        true => Err(FileError::at(name, line, "", NO_HEADING)),
+        false => Ok((line, heading)),
     }
 }
 
@@ -82,6 +97,7 @@ pub fn read_csv(path: &Path, signals: Option<&[&str]>, columns: &Columns, piece:
     let (heading_line, headings) = heading_of(&mut table, &name)?;
     let file = Headings { name: &name, line: heading_line, headings: &headings };
     let time = file.find("t", columns)?;
+    let time = file.timed(time, columns)?;
     if let Some(unit) = time.unit.filter(|unit| unit.kind != Kind::Time) {
         return Err(FileError::at(
             &name,
@@ -214,6 +230,17 @@ impl Headings<'_> {
         };
         let offset = rule.map_or(0.0, |r| r.offset);
         Ok(Wanted { signal: signal.to_string(), heading, index, factor, offset, unit })
+    }
+
+    /// The column of the times: `time_ms` is in ms where nothing else says its unit.
+    fn timed(&self, time: Wanted, columns: &Columns) -> Result<Wanted, FileError> {
+        let is_ruled = columns.iter().any(|(signal, rule)| signal == "t" && (rule.unit.is_some() || rule.scale.is_some()));
+        match units::of_times(&time.heading) {
+            _ if is_ruled || time.unit.is_some() => Ok(time),
+            Ok(Some(unit)) => Ok(Wanted { factor: unit.factor, unit: Some(unit), ..time }),
+            Ok(None) => Ok(time),
+            Err(message) => Err(FileError::at(self.name, self.line, &time.heading, message)),
+        }
     }
 
     /// Every signal that `columns` names, and every other column by its own heading.

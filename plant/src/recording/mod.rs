@@ -10,7 +10,7 @@ mod text_table;
 pub mod units;
 
 pub use columns::{Cell, ColumnRule, Columns, Piece, Source, read_columns};
-pub use csv_file::{read_csv, read_headings, read_signals_of, write_csv};
+pub use csv_file::{NO_HEADING, is_no_heading, read_csv, read_headings, read_signals_of, write_csv};
 pub use hold::{resample, segments};
 pub use joints::JointColumns;
 pub(crate) use joints::read_joints;

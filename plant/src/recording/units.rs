@@ -97,6 +97,7 @@ pub const UNITS: &[Unit] = &[
     unit("rad/s", Kind::AngularSpeed, 1.0),
     unit("deg/s", Kind::AngularSpeed, DEGREE),
     unit("rev/s", Kind::AngularSpeed, TURN),
+    unit("mrad/s", Kind::AngularSpeed, 1e-3),
     unit("rpm", Kind::AngularSpeed, TURN / 60.0),
     unit("m/s^2", Kind::Acceleration, 1.0),
     unit("mm/s^2", Kind::Acceleration, 1e-3),
@@ -119,36 +120,107 @@ pub const UNITS: &[Unit] = &[
     unit("counts", Kind::Count, 1.0),
 ];
 
+/// Spellings beside the names of [`UNITS`], in small letters; here upper case does not count.
+const SPELLINGS: &[(&str, &str)] = &[
+    ("sec secs second seconds", "s"),
+    ("msec millisecond milliseconds", "ms"),
+    ("usec microsecond microseconds", "us"),
+    ("nsec nanosecond nanoseconds", "ns"),
+    ("minute minutes", "min"),
+    ("meter meters metre metres", "m"),
+    ("millimeter millimeters millimetre millimetres", "mm"),
+    ("micrometer micrometers micrometre micrometres micron microns", "um"),
+    ("inch inches", "in"),
+    ("radian radians rads rad", "rad"),
+    ("degree degrees degs deg", "deg"),
+    ("revolution revolutions turn turns rev revs", "rev"),
+    ("rad/sec radians/s radians/sec", "rad/s"),
+    ("deg/sec degrees/s degrees/sec deg/s", "deg/s"),
+    ("rpm rev/min 1/min", "rpm"),
+    ("newton newtons", "N"),
+    ("newtonmeter newtonmeters newtonmetre newtonmetres newton-meters newton-metres", "N m"),
+    ("amp amps ampere amperes", "A"),
+    ("milliamp milliamps milliampere milliamperes", "mA"),
+    ("count cts tick ticks counts", "counts"),
+];
+
 /// The unit that a text names: `N*m`, `N.m`, `Nm` and `N·m` are `N m`; `µm` is `um`; `°` is `deg`; `m/s²` and `m/s2` are `m/s^2`.
+/// Words such as `Degrees` or `sec` are known in any case; the case of symbols counts, because `mN` and `MN` differ.
 ///
 /// # Errors
 /// A sentence that lists what is known.
 pub fn parse(text: &str) -> Result<Unit, String> {
     let plain = |text: &str| -> String {
-        let text = text.replace(['µ', 'μ'], "u").replace("°", "deg").replace('²', "^2").replace("s2", "s^2");
-        text.chars().filter(|c| !c.is_whitespace() && !['*', '.', '·'].contains(c)).collect()
+        let text = text.replace(['µ', 'μ'], "u").replace(['°', 'º'], "deg").replace('²', "^2").replace("s2", "s^2").replace("**", "^");
+        text.chars().filter(|c| !c.is_whitespace() && !['*', '.', '·', '⋅'].contains(c)).collect()
     };
-    let asked = match text.trim() {
-        "sec" => "s".to_string(),
-        "degrees" | "degree" => "deg".to_string(),
-        "count" | "cts" | "ticks" => "counts".to_string(),
-        other => plain(other),
-    };
+    let asked = plain(text);
+    let word = asked.to_lowercase();
+    let spelt = SPELLINGS.iter().find(|(spellings, _)| spellings.split(' ').any(|spelling| spelling == word)).map(|(_, name)| plain(name));
+    let asked = spelt.unwrap_or(asked);
     UNITS.iter().find(|unit| plain(unit.name) == asked).copied().ok_or_else(|| {
         let known: Vec<&str> = UNITS.iter().map(|u| u.name).collect();
         format!("unknown unit \"{}\"; known are {}", text.trim(), known.join(", "))
     })
 }
 
-/// A heading's name and the text of its unit: `x [mm]` is `x` in `mm`; `x []`, `position[0]` and `x` have none.
+/// What often stands in parentheses behind a name and is no unit.
+const REMARKS: &str = " raw filtered unfiltered smoothed measured meas desired commanded command cmd actual act reference ref target setpoint estimated est model \
+                       simulated sim left right master slave leader follower front rear motor joint link load sensor encoder x y z ";
+
+/// A heading's name and the text of its unit.
+///
+/// The unit stands in brackets, in parentheses, or behind a slash or a comma: `x [mm]`, `x (mm)`, `x / mm`, `x/mm`, `v / (m/s)` and `x, mm`.
+/// In brackets and parentheses, and behind a slash between spaces, any text is a unit, so that an unknown one is refused and not taken
+/// for SI. Behind a bare slash or a comma only a known one is, because names such as `arm/x` have slashes. `x []`, `position[0]`, `q(1)`,
+/// `x (filtered)` and `x` have none.
 pub fn split(heading: &str) -> (&str, Option<&str>) {
-    let parts = heading.strip_suffix(']').and_then(|rest| rest.rsplit_once('['));
-    match parts {
-        Some((name, unit)) if name.ends_with(char::is_whitespace) || unit.parse::<usize>().is_err() => {
-            (name.trim_end(), Some(unit.trim()).filter(|u| !u.is_empty() && *u != "-"))
+    let unit = |name: &'_ str, unit: &'_ str| -> bool { !name.trim().is_empty() && parse(unit).is_ok() };
+    for (open, close) in [('[', ']'), ('(', ')')] {
+        let Some((name, text)) = heading.strip_suffix(close).and_then(|rest| rest.rsplit_once(open)) else { continue };
+        let is_entry = text.parse::<usize>().is_ok() && (open == '(' || !name.ends_with(char::is_whitespace));
+        let is_remark = open == '(' && REMARKS.contains(&format!(" {} ", text.trim().to_lowercase()));
+        if is_entry || is_remark || name.trim().is_empty() {
+            return (heading, None);
         }
-        _ => (heading, None),
+        // `v / (m/s)`: the slash belongs to neither.
+        let name = name.trim_end();
+        let name = name.strip_suffix('/').map_or(name, str::trim_end);
+        return (name, Some(text.trim()).filter(|u| !u.is_empty() && *u != "-"));
     }
+    if let Some((name, text)) = heading.split_once(" / ").filter(|(name, text)| !name.trim().is_empty() && !text.trim().is_empty()) {
+        return (name.trim_end(), Some(text.trim()));
+    }
+    let bare = heading.split_once('/').or_else(|| heading.rsplit_once(", "));
+    match bare.filter(|(name, text)| unit(name, text)) {
+        Some((name, text)) => (name.trim_end(), Some(text.trim())),
+        None => (heading, None),
+    }
+}
+
+/// The unit that many write behind a name, as in `time_ms` or `angle_deg`. It is a hint and no statement: `x_m` may be the master's x.
+pub fn hinted(name: &str) -> Option<Unit> {
+    name.rsplit_once('_').and_then(|(_, unit)| parse(unit).ok())
+}
+
+/// The unit of a heading under which times stand: what it states, else what stands behind its name.
+///
+/// # Errors
+/// The unit is not known, or measures no time.
+pub fn of_times(heading: &str) -> Result<Option<Unit>, String> {
+    let (name, stated) = split(heading);
+    match stated {
+        None => Ok(hinted(name).filter(|unit| unit.kind == Kind::Time)),
+        Some(text) => match parse(text)? {
+            unit if unit.kind == Kind::Time => Ok(Some(unit)),
+            unit => Err(format!("is in {}, {}, expected a time such as s or ms", unit.name, unit.kind.text())),
+        },
+    }
+}
+
+/// The SI unit of a kind; a current and a count are their own.
+pub fn si(kind: Kind) -> Unit {
+    UNITS.iter().find(|unit| unit.kind == kind && unit.factor == 1.0).copied().unwrap_or(unit("counts", Kind::Count, 1.0))
 }
 
 /// What a model's signal, or the time `t`, measures; `None` for what the model does not have.
@@ -204,5 +276,53 @@ mod tests {
         assert_eq!(split("x []"), ("x", None));
         assert_eq!(split("position[0]"), ("position[0]", None));
         assert_eq!(split("x"), ("x", None));
+    }
+
+    #[test]
+    fn a_unit_is_read_in_every_usual_place() {
+        for (name, unit) in
+            [("time", "ms"), ("q1", "deg"), ("tau_1", "Nm"), ("v", "m/s"), ("a", "m/s^2"), ("w", "rad/s"), ("phi", "°"), ("x", "µm")]
+        {
+            let bracketed = [format!("{name} [{unit}]"), format!("{name}[{unit}]"), format!("{name} ({unit})"), format!("{name}({unit})")];
+            let slashed = [format!("{name} / {unit}"), format!("{name}/{unit}"), format!("{name} / ({unit})"), format!("{name}, {unit}")];
+            for heading in bracketed.iter().chain(&slashed) {
+                assert_eq!(split(heading), (name, Some(unit)), "{heading}");
+                assert!(parse(unit).is_ok(), "{unit}");
+            }
+        }
+        for (heading, meant) in [
+            ("Time(MSEC)", "ms"),
+            ("q (Deg)", "deg"),
+            ("q (Degrees)", "deg"),
+            ("t (Seconds)", "s"),
+            ("tau (N*m)", "N m"),
+            ("w (deg/sec)", "deg/s"),
+        ] {
+            assert_eq!(parse(split(heading).1.unwrap()).unwrap().name, meant, "{heading}");
+        }
+    }
+
+    #[test]
+    fn an_unknown_unit_is_stated_and_a_name_is_no_unit() {
+        // Stated, so that whoever needs the column refuses it by this text.
+        for heading in ["q (grad)", "q(grad)", "q [grad]", "q / grad"] {
+            assert_eq!(split(heading), ("q", Some("grad")), "{heading}");
+            assert!(parse("grad").unwrap_err().starts_with("unknown unit \"grad\""));
+        }
+        // 1 MN is no mN.
+        assert!(parse("MN").is_err() && parse("MS").is_err());
+        for heading in
+            ["q(1)", "x (filtered)", "x (Measured)", "arm/x", "/joint_states/position[0]", "robot/arm/q", "x_m", "(deg)", "/m", "force (2)"]
+        {
+            assert_eq!(split(heading), (heading, None));
+        }
+    }
+
+    #[test]
+    fn times_have_their_unit_stated_or_behind_their_name() {
+        let name = |heading: &str| of_times(heading).map(|unit| unit.map(|unit| unit.name));
+        assert_eq!((name("time_ms"), name("t (us)"), name("stamp"), name("t_deg")), (Ok(Some("ms")), Ok(Some("us")), Ok(None), Ok(None)));
+        assert!(name("t (deg)").unwrap_err().contains("expected a time") && name("t (h)").unwrap_err().contains("unknown unit \"h\""));
+        assert_eq!((si(Kind::Angle).name, si(Kind::Torque).name, si(Kind::Current).name), ("rad", "N m", "A"));
     }
 }
