@@ -140,8 +140,9 @@ fn what_is_offered_after_a_damaged_bag_works_as_it_stands() {
     }
     let recover: Vec<String> = offers.0.iter().filter(|c| c.starts_with("backdrive bag recover cut.mcap --bag ")).cloned().collect();
     assert!(!recover.is_empty(), "{:?}", offers.0);
-    let recovered =
-        place.command("bash").env("PATH", Path::new(env!("CARGO_BIN_EXE_backdrive")).parent().unwrap()).args(["-c", &recover[0]]).output();
+    let program = Path::new(env!("CARGO_BIN_EXE_backdrive")).parent().unwrap().display().to_string();
+    let search = format!("{program}:{}", std::env::var("PATH").unwrap_or_default());
+    let recovered = place.command("bash").env("PATH", search).args(["-c", &recover[0]]).output();
     let code = recovered.unwrap().status.code();
     // Something of a bag that was cut is lost, and that is said by the exit code.
     assert!(matches!(code, Some(0 | 4)), "{code:?}");

@@ -103,7 +103,8 @@ fn dithered(options: &cli::Stability, asked: Option<&Graph>, advice: &str) -> Ve
         return Vec::new();
     }
     let bag = free(Path::new("dithered.mcap"));
-    let run = Offered::verb("run").reads(&options.recording).option("--dither", excitation).option_writes("--bag", &bag);
+    let run =
+        Offered::verb("run").reads(&options.recording).option("--dither", excitation).option_writes("--bag", &bag).flag("--overwrite");
     vec![run.build(), Offered::verb("stability").reads_later(&bag).build()]
 }
 

@@ -39,7 +39,7 @@ pub fn next(found: &Answer, asked: &Asked) -> Vec<Step> {
     if stop.is_empty() && found.happening.is_trouble() {
         let dithered = asked.runs.then(|| {
             let bag = free(Path::new("dithered.mcap"));
-            let run = Offered::verb("run").reads(asked.recording).flag("--dither").option_writes("--bag", &bag).build();
+            let run = Offered::verb("run").reads(asked.recording).flag("--dither").option_writes("--bag", &bag).flag("--overwrite").build();
             [run, Offered::verb("stability").reads_later(&bag).build()]
         });
         let text = "None of the remedies that were tried stops it in the re-simulation. Record the loop with a dither and measure its stability limit.";
