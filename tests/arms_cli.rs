@@ -150,13 +150,12 @@ fn what_is_written_of_a_urdf_arm_keeps_axes_and_limits() {
 fn interrupted_it_writes_what_it_has_and_ends_with_130() {
     let place = Place::new();
     set(&place.path(""), &Beside { dry: [0.2, 0.3], ..AS_STATED }, "", |_| {});
-    // Ten times as much to do.
     let set = "model = 'arm.toml'\nfit = ['a.csv', 'b.csv', 'a2.csv', 'b2.csv', 'a3.csv', 'b3.csv']\nheld_out = ['c.csv']\n";
     place.write("set.toml", set);
     for (from, to) in [("a.csv", "a2.csv"), ("b.csv", "b2.csv"), ("a.csv", "a3.csv"), ("b.csv", "b3.csv")] {
         std::fs::copy(place.path(from), place.path(to)).unwrap();
     }
-    let run = place.spawn(&["diagnose", ".", "--out", "out", "--no-report"]);
+    let run = place.start(&["diagnose", ".", "--out", "out", "--no-report"]);
     std::thread::sleep(std::time::Duration::from_millis(500));
     system::kill(run.pid(), nix::sys::signal::Signal::SIGINT);
     let done = run.end();

@@ -26,6 +26,7 @@ fn motion() -> Motion {
         torque: Vec::new(),
         told: Vec::new(),
         moves: Vec::new(),
+        counts: Vec::new(),
         payload: None,
     }
 }
