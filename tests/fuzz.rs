@@ -119,6 +119,22 @@ const MJCF: &str = r#"<mujoco model="arm">
 </mujoco>
 "#;
 
+/// A bag of somebody else's with JSON messages.
+fn json_bag() -> Vec<u8> {
+    let mut bytes = Vec::new();
+    let mut mcap = mcap::WriteOptions::new().create(std::io::Cursor::new(&mut bytes)).unwrap();
+    let channel_id = mcap.add_channel(0, "/joint_states", "json", &std::collections::BTreeMap::new()).unwrap();
+    for i in 0..40_u32 {
+        let text = format!("{{\"name\": [\"j1\", \"j2\"], \"position\": [{i}, 0.5], \"deep\": {{\"effort\": {i}.25}}, \"ok\": true}}");
+        let time = u64::from(i) * 1_000_000;
+        let header = mcap::records::MessageHeader { channel_id, sequence: i, log_time: time, publish_time: time };
+        mcap.write_to_known_channel(&header, text.as_bytes()).unwrap();
+    }
+    mcap.finish().unwrap();
+    drop(mcap);
+    bytes
+}
+
 /// A definition of a message with everything that a definition can hold.
 const DEFINITION: &str = "std_msgs/Header header\nuint8 KIND=3\nstring[] name\nfloat64[] position\nfloat32[3] fixed\nbool<=4 few\nOwn[] own\n\
                           ================================================================================\nMSG: std_msgs/Header\n\
@@ -181,6 +197,8 @@ fn targets(place: &Place) -> Vec<Target> {
         }),
         target("parquet", "table.parquet", vec![parquet], false, import),
         target("mat", "table.mat", vec![mat], false, import),
+        target("npz", "table.npz", vec![read(Path::new(&file("tests/cases/npz/log.npz")))], false, import),
+        target("mcap with json", "bag.mcap", vec![json_bag()], false, read_bag),
         lerobot("meta/info.json"),
         lerobot("data/chunk-000/file-000.parquet"),
         target("model", "model.toml", vec![model("models/impulse-engine.toml"), model("models/rigid-mass.toml")], true, |path| {

@@ -79,7 +79,7 @@ fn an_unknown_unit_is_asked_for_by_name() {
     let of = ["--drive", "tau", "--position", "q"];
     is_refused(&init(&place, &of), 2, &["say --position-unit", "\"grad\"", "is not known"]);
     recorded(&place, "time (h),tau (Nm),q (rad)", 1.0 / 3600.0, 1.0);
-    is_refused(&init(&place, &of), 2, &&["say --time-unit", "\"h\" of its heading is not known"]);
+    is_refused(&init(&place, &of), 2, &["say --time-unit", "\"h\" of its heading is not known"]);
     // Whoever says it is believed.
     recorded(&place, "time (s),tau (Nm),q (gon)", 1.0, 1.0);
     is_right(&place, &init(&place, &[&of[..], &["--position-unit", "rad"]].concat()));

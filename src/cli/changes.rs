@@ -257,7 +257,6 @@ const DEFAULT_DITHER: &str = "multisine:peak=0.05,from=1,to=500,period=2";
 
 #[cfg(test)]
 mod tests {
-    use super::*;
     use crate::cli::{Cli, Command};
     use clap::Parser;
 
