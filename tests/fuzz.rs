@@ -174,7 +174,13 @@ fn targets(place: &Place) -> Vec<Target> {
             let options = LerobotOptions { overwrite: true, most_bytes: MOST_BYTES, ..LerobotOptions::default() };
             import_lerobot(folder, &folder.join("bags"), &options).is_ok()
         };
-        target(if at.ends_with("json") { "lerobot info" } else { "lerobot data" }, at, vec![read(&dataset.join(at))], at.ends_with("json"), parse)
+        target(
+            if at.ends_with("json") { "lerobot info" } else { "lerobot data" },
+            at,
+            vec![read(&dataset.join(at))],
+            at.ends_with("json"),
+            parse,
+        )
     };
     let urdf = |name: &str| read(Path::new(&file(&format!("plant/robots/{name}"))));
     let model = |name: &str| read(Path::new(&file(&format!("plant/{name}"))));
@@ -204,14 +210,22 @@ fn targets(place: &Place) -> Vec<Target> {
         target("model", "model.toml", vec![model("models/impulse-engine.toml"), model("models/rigid-mass.toml")], true, |path| {
             Model::from_toml(&text_of(path), "model.toml").is_ok()
         }),
-        target("graph", "graph.toml", vec![graph_text("launch/contact.toml").into(), graph_text("launch/three-joint.toml").into()], true, |path| {
-            Graph::load(path, &Overrides::default()).is_ok()
-        }),
+        target(
+            "graph",
+            "graph.toml",
+            vec![graph_text("launch/contact.toml").into(), graph_text("launch/three-joint.toml").into()],
+            true,
+            |path| Graph::load(path, &Overrides::default()).is_ok(),
+        ),
         target("set", "set.toml", vec![set.into()], true, |path| RecordingSet::open(path).is_ok()),
         target("roles", "roles.toml", vec![roles.into()], true, |path| Roles::from_toml(&text_of(path), "roles.toml").is_ok()),
-        target("contract", "contract.toml", vec!["measured = \"observation.state\"\nangle = \"deg\"\n[joints]\na = \"b\"\n".into()], true, |path| {
-            Contract::read(path).is_ok()
-        }),
+        target(
+            "contract",
+            "contract.toml",
+            vec!["measured = \"observation.state\"\nangle = \"deg\"\n[joints]\na = \"b\"\n".into()],
+            true,
+            |path| Contract::read(path).is_ok(),
+        ),
         target("urdf", "arm.urdf", vec![urdf("two-joint-arm.urdf"), urdf("seven-joint-arm.urdf")], true, |path| robot(path, "urdf")),
         target("mjcf", "arm.xml", vec![MJCF.into()], true, |path| robot(path, "mjcf")),
     ]

@@ -5,6 +5,7 @@ mod common;
 use backdrive_nodes::graph::{Graph, NodeKind, Settings};
 use backdrive_plant::excitation::Excitation;
 use backdrive_stability::frequency::{ExchangedParts, Frequency, Options, Verdict, analyse};
+use backdrive_stability::outcome::{Closes, Unit};
 use backdrive_stability::session::{AxisSignals, Session};
 use common::{cancel_with, edge, growth, linear, response, run};
 
@@ -50,6 +51,8 @@ fn session(graph: &Graph, lambda: f64, dither: &str) -> Session {
         travel: None,
         resolution: 0.0,
         noise: 0.0,
+        unit: Unit::Metre,
+        closes: Closes::InContact,
     };
     Session {
         name: "live".into(),

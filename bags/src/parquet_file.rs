@@ -183,16 +183,16 @@ impl ParquetFile {
             let read = guarded(|| {
                 let reader = self.reader.get_row_group(index)?.get_column_reader(place)?;
                 match reader {
-                ColumnReader::BoolColumnReader(of) => read_all(of, rows, memory, &mut found, &mut flags),
-                ColumnReader::Int32ColumnReader(of) => read_all(of, rows, memory, &mut found, &mut small),
-                ColumnReader::Int64ColumnReader(of) => read_all(of, rows, memory, &mut found, &mut whole),
-                ColumnReader::Int96ColumnReader(of) => read_all(of, rows, memory, &mut found, &mut days),
-                ColumnReader::FloatColumnReader(of) => read_all(of, rows, memory, &mut found, &mut single),
-                ColumnReader::DoubleColumnReader(of) => read_all(of, rows, memory, &mut found, &mut double),
-                ColumnReader::FixedLenByteArrayColumnReader(of) => read_all(of, rows, memory, &mut found, &mut bytes),
-                ColumnReader::ByteArrayColumnReader(_) => {
-                    Err(ParquetError::General("it holds bytes where numbers were expected".to_owned()))
-                }
+                    ColumnReader::BoolColumnReader(of) => read_all(of, rows, memory, &mut found, &mut flags),
+                    ColumnReader::Int32ColumnReader(of) => read_all(of, rows, memory, &mut found, &mut small),
+                    ColumnReader::Int64ColumnReader(of) => read_all(of, rows, memory, &mut found, &mut whole),
+                    ColumnReader::Int96ColumnReader(of) => read_all(of, rows, memory, &mut found, &mut days),
+                    ColumnReader::FloatColumnReader(of) => read_all(of, rows, memory, &mut found, &mut single),
+                    ColumnReader::DoubleColumnReader(of) => read_all(of, rows, memory, &mut found, &mut double),
+                    ColumnReader::FixedLenByteArrayColumnReader(of) => read_all(of, rows, memory, &mut found, &mut bytes),
+                    ColumnReader::ByteArrayColumnReader(_) => {
+                        Err(ParquetError::General("it holds bytes where numbers were expected".to_owned()))
+                    }
                 }
             });
             read.map_err(|why| self.wrong(column, format!("cannot be read: {why}; it is damaged")))?.map_err(failed)?;

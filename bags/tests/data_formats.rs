@@ -7,8 +7,8 @@
 mod python;
 
 use backdrive_bags::{
-    Contract, ImportOptions, LerobotOptions, Reader, Signal, TableFormat, columns_of, export_lerobot, export_table, import_lerobot,
-    import_rosbag, import_table, is_lerobot, is_rosbag, recording, signals,
+    Contract, ImportOptions, LerobotOptions, MOST_BYTES, Reader, Signal, TableFormat, columns_of, export_lerobot, export_table,
+    import_lerobot, import_rosbag, import_table, is_lerobot, is_rosbag, recording, signals,
 };
 use backdrive_plant::model::Hold;
 use backdrive_plant::recording::Piece;
@@ -227,7 +227,7 @@ fn a_dataset_of_lerobot_comes_and_goes() {
         "commanded_at = \"next\"\neffort = \"\"\n[angle]\nshoulder_pan = 0.5\nelbow_flex = \"rad\"\n[joints]\nelbow_flex = \"elbow\"\n";
     std::fs::write(written.path("contract.toml"), text).expect("it writes");
     let contract = Contract::read(&written.path("contract.toml")).expect("it is read");
-    let options = LerobotOptions { contract, episodes: Some(vec![2]), overwrite: false };
+    let options = LerobotOptions { contract, episodes: Some(vec![2]), ..LerobotOptions::default() };
     let one = import_lerobot(&dataset, &written.path("one"), &options).expect("it is imported");
     let found = columns(&one[0].bag);
     let of = |name: &str| &found.iter().find(|(found, _)| found == name).unwrap_or_else(|| panic!("{name}: {found:?}")).1;

@@ -182,8 +182,8 @@ fn columns_go_where_they_are_sent() {
     let mut options = ImportOptions {
         time: "time_s".to_owned(),
         columns: vec![map("disp_in", Quantity::Position, 1, 0.0254), map("f", Quantity::Effort, 0, 1.0)],
-        variable: None,
         overwrite: false,
+        ..ImportOptions::default()
     };
     import_csv(&table, &bag, &options).expect("it imports");
     let reader = Reader::open(&bag).expect("it opens");

@@ -75,7 +75,8 @@ pub(crate) fn write_bag(path: &Path, table: &Table, bag: &Path, options: &Import
     remember(TIME_TOPIC, Quantity::Position, 0, clock.of);
     let maps = placed(path, table, &known, &skipped, clock.place, options)?;
     if maps.len() > MOST_COLUMNS {
-        let what = format!("has {} columns of numbers, and a bag holds at most {MOST_COLUMNS}; name those that count with --map", maps.len());
+        let what =
+            format!("has {} columns of numbers, and a bag holds at most {MOST_COLUMNS}; name those that count with --map", maps.len());
         return Err(table.wrong_columns(path, what));
     }
     let mut sources: Vec<Source> = Vec::with_capacity(maps.len());

@@ -72,7 +72,10 @@ impl Member<'_> {
         };
         read.map_err(|error| format!("cannot be unpacked: {error}"))?;
         if bytes.len() as u64 > most {
-            return Err(format!("is larger than the limit for what is left of the file, {} MiB; save a piece of it, or allow more with --memory (MiB)", most >> 20));
+            return Err(format!(
+                "is larger than the limit for what is left of the file, {} MiB; save a piece of it, or allow more with --memory (MiB)",
+                most >> 20
+            ));
         }
         match crc32fast::hash(&bytes) == self.crc {
             true => Ok(bytes),

@@ -28,6 +28,7 @@ pub fn recorder(behaviour: &str) -> NodePlan {
 
 pub fn plan(clock: Clock, steps: Option<u64>, nodes: Vec<NodePlan>) -> Plan {
     Plan {
+        held: Vec::new(),
         title: "toys".to_string(),
         text: "title = \"toys\"\n".to_string(),
         timing: Timing { rate_hz: 1000.0, clock, steps, peer_timeout_s: 1.0 },
