@@ -116,8 +116,8 @@ fn a_table_goes_through_every_format_and_comes_back() {
     // What is no recording as it is names the command that makes it one.
     place.write("m.toml", "name = \"arm\"\n[bodies]\nlink = 1.0\n");
     for (paths, command) in [
-        (&["arm.parquet"][..], "`backdrive bag import arm.parquet --bag arm.mcap` makes it one"),
-        (&["back.csv", "arm.mat"], "`backdrive bag import arm.mat --bag arm.mcap` makes it one"),
+        (&["arm.parquet"][..], "`backdrive bag import arm.parquet --bag arm-2.mcap` makes it one"),
+        (&["back.csv", "arm.mat"], "`backdrive bag import arm.mat --bag arm-2.mcap` makes it one"),
         (&["set"], "`backdrive bag import set --bag set-bags` makes it one"),
     ] {
         let told = place.backdrive(&[&["fit", "m.toml"], paths].concat());

@@ -136,7 +136,7 @@ fn json_bag() -> Vec<u8> {
 }
 
 /// A definition of a message with everything that a definition can hold.
-const DEFINITION: &str = "std_msgs/Header header\nuint8 KIND=3\nstring[] name\nfloat64[] position\nfloat32[3] fixed\nbool<=4 few\nOwn[] own\n\
+const DEFINITION: &str = "std_msgs/Header header\nuint8 KIND=3\nstring[] name\nfloat64[] position\nfloat32[3] fixed\nbool[<=4] few\nOwn[] own\n\
                           ================================================================================\nMSG: std_msgs/Header\n\
                           builtin_interfaces/Time stamp\nstring frame_id\n\
                           ================================================================================\nMSG: pkg/Own\nint16 value\nwstring text\n";

@@ -119,7 +119,7 @@ pub fn search(data: &mut Data, without: &[String], most: usize, stop: &AtomicBoo
 fn may_be(data: &Data, term: &Term) -> bool {
     use crate::physics::At;
     let of_a_motor = matches!(term.physics, Physics::Gain | Physics::Coupling | Physics::Delay | Physics::Compliance | Physics::Backlash);
-    let may = |j: usize| !data.unsigned[j] && !(of_a_motor && data.is_passive(j));
+    let may = |j: usize| !(data.unsigned[j] || of_a_motor && data.is_passive(j));
     match term.at {
         At::Joint(j) => may(j),
         At::Pair(j, k) => may(j) && may(k),

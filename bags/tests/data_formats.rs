@@ -8,10 +8,9 @@ mod python;
 
 use backdrive_bags::{
     Contract, ImportOptions, LerobotOptions, MOST_BYTES, Reader, Signal, TableFormat, columns_of, export_lerobot, export_table,
-    import_lerobot, import_rosbag, import_table, is_lerobot, is_rosbag, recording, signals,
+    import_lerobot, import_rosbag, import_table, is_lerobot, is_rosbag, signals,
 };
 use backdrive_plant::model::Hold;
-use backdrive_plant::recording::Piece;
 use python::python;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
@@ -64,8 +63,11 @@ fn bits(values: &[f64]) -> Vec<Value> {
 /// Columns of a bag by name, `t` first.
 fn columns(bag: &Path) -> Vec<(String, Vec<f64>)> {
     let reader = Reader::open(bag).expect("it opens");
-    let found = recording(&reader, None, &Vec::new(), &Piece::default(), &|_| Hold::Zero).expect("it is a recording");
-    std::iter::once(("t".to_owned(), found.t)).chain(found.signals).collect()
+    // Every bit of every number, also of those that no recording may hold.
+    let wanted: Vec<Signal> =
+        columns_of(&reader, None).expect("it is read").into_iter().map(|signal| Signal { hold: Hold::Zero, ..signal }).collect();
+    let found = signals(&reader, &wanted).expect("it is read");
+    std::iter::once(("t".to_owned(), found.t)).chain(found.names.into_iter().zip(found.columns)).collect()
 }
 
 /// Holds a bag against what was written.

@@ -31,6 +31,9 @@ const LINGER: Duration = Duration::from_millis(50);
 /// How long it still listens after a stop while others speak on: it was asked to end alone, and has a bag to close.
 const SPOKEN_ON: Duration = Duration::from_secs(1);
 
+/// How long the recorder leaves it to the nodes to report a stranger.
+const STRANGER_WAIT: Duration = Duration::from_millis(300);
+
 /// Steps after which it gives credit again, however much there is to take.
 const CREDIT_EVERY: u64 = 256;
 
@@ -273,7 +276,7 @@ impl RunningRecorder {
         tell: &mut dyn FnMut(Told),
     ) -> Result<(), RunError> {
         let (mut reported, mut lost_before) = (Instant::now(), 0);
-        let mut ends_at: Option<Instant> = None;
+        let (mut ends_at, mut stranger_since): (Option<Instant>, Option<Instant>) = (None, None);
         loop {
             let taken = self.take(start)?;
             let lost = self.sink.health().2;
@@ -281,7 +284,10 @@ impl RunningRecorder {
                 tell(Told::Event(self.loss(lost - lost_before)));
                 lost_before = lost;
             }
-            if let Some(error) = self.broken.take() {
+            // The node that a stranger would have moved publishes an event, which the bag holds; the recorder's own reaches the supervisor alone.
+            let is_stranger = matches!(self.broken, Some(TransportError::Stranger { .. }));
+            let waits = is_stranger && stranger_since.get_or_insert_with(Instant::now).elapsed() < STRANGER_WAIT;
+            if let Some(error) = self.broken.take_if(|_| !waits) {
                 let text = Text::new(&error.to_string());
                 tell(Told::Event(match error {
                     TransportError::Stranger { refused, moves, .. } => {

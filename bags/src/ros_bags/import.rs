@@ -26,7 +26,10 @@ fn has_ending(path: &Path, ending: &str) -> bool {
 
 fn begins(path: &Path, with: &[u8]) -> bool {
     let mut start = Vec::new();
-    backdrive_plant::input_file::open(path).is_ok_and(|file| file.take(with.len() as u64).read_to_end(&mut start).is_ok()) && start == with
+    // A pipe cannot be read twice.
+    path.is_file()
+        && backdrive_plant::input_file::open(path).is_ok_and(|file| file.take(with.len() as u64).read_to_end(&mut start).is_ok())
+        && start == with
 }
 
 /// Copies the messages of a ROS bag into an MCAP file that any ROS 2 tool opens: those of rosbag2 verbatim, those of ROS 1 in the form of ROS 2. A topic whose

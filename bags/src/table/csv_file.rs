@@ -28,8 +28,7 @@ pub(crate) fn read(path: &Path, options: &ImportOptions) -> Result<Table, BagErr
     let (mut lines, memory) = (Vec::new(), Memory::new(options.most_bytes));
     // The first row is a heading unless the headings were given.
     let mut next = first.filter(|_| options.headings.is_some());
-    loop {
-        let Some(line) = next.take().map_or_else(|| table.next(&mut record), |line| Ok(Some(line))).map_err(wrong)? else { break };
+    while let Some(line) = next.take().map_or_else(|| table.next(&mut record), |line| Ok(Some(line))).map_err(wrong)? {
         memory.take_numbers(record.len() as u64 + 1).map_err(|what| wrong((line, what)))?;
         lines.push(line);
         for (cell, column) in record.iter().zip(&mut columns) {

@@ -3,6 +3,7 @@
 use super::network::{Network, OnJoint, Tendon};
 use super::passive::NEVER;
 use crate::xml::{escaped, number, numbers};
+use backdrive_plant::robot::Arm;
 
 /// How MuJoCo is to integrate.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -45,6 +46,11 @@ pub(super) fn of_joint(joint: &OnJoint, angle: f64, integration: Integration) ->
 }
 
 /// Attributes as text, each with a space before it.
+/// Whether an arm's file is an MJCF, which is patched; a URDF is written anew.
+pub(super) fn is_mjcf(arm: &Arm) -> bool {
+    roxmltree::Document::parse(&arm.xml).is_ok_and(|d| d.root_element().has_tag_name("mujoco"))
+}
+
 pub(super) fn text(attributes: &[(&'static str, String)]) -> String {
     attributes.iter().map(|(name, value)| format!(" {name}=\"{value}\"")).collect()
 }

@@ -12,7 +12,7 @@ mod signals;
 use crate::left_out::{LeftOut, Part};
 use crate::xml::{comment, escaped, number, numbers};
 use crate::{ExportError, Exported, of_robot};
-use attributes::{Integration, tendons};
+use attributes::{Integration, is_mjcf, tendons};
 use backdrive_plant::model::Model;
 use backdrive_plant::robot::{Arm, JointKind, Robot};
 use layout::Layout;
@@ -143,10 +143,6 @@ fn follow(robot: &Robot, link: usize, order: &mut Vec<usize>) {
         }
         follow(robot, joint.child, order);
     }
-}
-
-fn is_mjcf(arm: &Arm) -> bool {
-    roxmltree::Document::parse(&arm.xml).is_ok_and(|d| d.root_element().has_tag_name("mujoco"))
 }
 
 /// What a URDF has besides links, joints and their inertia, and an MJCF written from these does not.

@@ -1,6 +1,6 @@
 //! Inputs as actuators, outputs as sensors.
 
-use super::attributes::{Integration, ends};
+use super::attributes::{Integration, ends, is_mjcf};
 use super::network::{Constant, Network};
 use crate::left_out::{Change, LeftOut, Part};
 use crate::names::unlike;
@@ -110,7 +110,7 @@ impl Signals {
     /// A motor on every joint of a robot, where the model itself has none at all and the robot's own file, as a URDF, cannot have any. A joint without effort
     /// has no motor. Where the model has inputs, a joint without one is passive.
     fn motors(&mut self, model: &Model, joints: &[String], names: &mut BTreeSet<String>) {
-        let Some(arm) = model.arm.as_ref().filter(|arm| !super::is_mjcf(arm)) else { return };
+        let Some(arm) = model.arm.as_ref().filter(|arm| !is_mjcf(arm)) else { return };
         if model.inputs.iter().any(|input| input.kind == InputKind::Force) {
             return;
         }

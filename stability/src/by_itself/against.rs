@@ -24,7 +24,7 @@ pub struct Against {
 }
 
 /// Steps that are looked at, the first of a bag: memory for every sample of it is needed.
-const MOST_STEPS: u64 = 400_000;
+const MOST_STEPS: u64 = 40_000;
 
 /// Outputs that follow from inputs, by kind of node: port, quantity, whether each value is one that was given.
 const COMPUTED: &[(NodeKind, &str, Quantity, bool)] = &[

@@ -151,7 +151,7 @@ mod tests {
         assert!(found.oscillates() && found.course() == Course::GoesOn, "{found:?}");
         assert!((found.frequency_hz() - 5.9).abs() < 0.3, "{}", found.frequency_hz());
         let wave = |t: f64| (std::f64::consts::TAU * 2.0 * t).sin();
-        assert_eq!(swings(|t| (-1.0 * t).exp() * wave(t), 100, 0.02).course(), Course::Dies);
+        assert_eq!(swings(|t| (-t).exp() * wave(t), 100, 0.02).course(), Course::Dies);
         let Course::Grows(per_s) = swings(|t| 0.2 * (0.8 * t).exp() * wave(t), 100, 0.02).course() else { panic!() };
         assert!((per_s - 0.8).abs() < 0.1, "{per_s}");
         assert!(!swings(|t| t, 100, 0.02).oscillates());
