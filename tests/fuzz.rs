@@ -97,9 +97,9 @@ fn read_bag(path: &Path) -> bool {
 }
 
 /// An arm's model that names the file beside it.
-fn robot(path: &Path, format: &str) -> bool {
+fn robot(path: &Path) -> bool {
     let name = path.file_name().unwrap().to_string_lossy();
-    let text = format!("name = \"arm\"\n[robot]\n{format} = \"{name}\"\n");
+    let text = format!("name = \"arm\"\n[robot]\nfile = \"{name}\"\n");
     Model::from_toml_in(&text, "arm.toml", path.parent()).is_ok()
 }
 
@@ -139,6 +139,7 @@ fn json_bag() -> Vec<u8> {
 const DEFINITION: &str = "std_msgs/Header header\nuint8 KIND=3\nstring[] name\nfloat64[] position\nfloat32[3] fixed\nbool[<=4] few\nOwn[] own\n\
                           ================================================================================\nMSG: std_msgs/Header\n\
                           builtin_interfaces/Time stamp\nstring frame_id\n\
+                          ================================================================================\nMSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec\n\
                           ================================================================================\nMSG: pkg/Own\nint16 value\nwstring text\n";
 
 fn targets(place: &Place) -> Vec<Target> {
@@ -226,8 +227,8 @@ fn targets(place: &Place) -> Vec<Target> {
             true,
             |path| Contract::read(path).is_ok(),
         ),
-        target("urdf", "arm.urdf", vec![urdf("two-joint-arm.urdf"), urdf("seven-joint-arm.urdf")], true, |path| robot(path, "urdf")),
-        target("mjcf", "arm.xml", vec![MJCF.into()], true, |path| robot(path, "mjcf")),
+        target("urdf", "arm.urdf", vec![urdf("two-joint-arm.urdf"), urdf("seven-joint-arm.urdf")], true, |path| robot(path)),
+        target("mjcf", "arm.xml", vec![MJCF.into()], true, |path| robot(path)),
     ]
 }
 

@@ -35,13 +35,20 @@ fn read_records(path: &Path, frame: &Frame, body: &[u8], strict: bool) -> (Vec<R
         let error = (!frame.cut).then(|| damaged(format!("a chunk record of {} bytes is too short for its own header", body.len())));
         return (Vec::new(), error);
     };
+    // Room is made for what a chunk says of its size before anything is unpacked.
+    let most = body.len().saturating_mul(256).clamp(LIKELY_CHUNK, LARGEST_CHUNK);
+    let unpacked = body.get(16..24).and_then(|bytes| bytes.first_chunk()).map_or(0, |bytes| u64::from_le_bytes(*bytes));
+    if unpacked > most as u64 {
+        let error = damaged(format!("a chunk of {} bytes says that it unpacks to {unpacked}", body.len()));
+        return (Vec::new(), (!frame.cut).then_some(error));
+    }
     // Of a whole chunk the checksum is verified before anything in it is believed: lengths in a damaged one ask for any amount of memory.
     let options = LinearReaderOptions::default()
         .with_skip_start_magic(true)
         .with_skip_end_magic(true)
         .with_validate_chunk_crcs(strict && !frame.cut)
         .with_prevalidate_chunk_crcs(strict && !frame.cut)
-        .with_record_length_limit(if strict { LARGEST_CHUNK } else { body.len().saturating_mul(256).min(LARGEST_CHUNK) });
+        .with_record_length_limit(most);
     let (mut reader, mut source) = (LinearReader::new_with_options(options), head.chain(data));
     let mut found = Vec::new();
     while let Some(event) = reader.next_event() {
@@ -73,6 +80,9 @@ fn read_records(path: &Path, frame: &Frame, body: &[u8], strict: bool) -> (Vec<R
 
 /// Uncompressed, bytes. Chunks are around 1 MB; what claims to be larger than this is damaged.
 const LARGEST_CHUNK: usize = 1 << 29;
+
+/// A chunk may be as large as this whatever it was packed to, bytes.
+const LIKELY_CHUNK: usize = 1 << 26;
 
 /// A chunk record up to its data, and the data. One that is cut off has as much data as there is, and no checksum.
 fn chunk_head(body: &[u8], cut: bool) -> Option<(Vec<u8>, &[u8])> {

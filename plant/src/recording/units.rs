@@ -191,8 +191,9 @@ pub fn split(heading: &str) -> (&str, Option<&str>) {
     if let Some((name, text)) = heading.split_once(" / ").filter(|(name, text)| !name.trim().is_empty() && !text.trim().is_empty()) {
         return (name.trim_end(), Some(text.trim()));
     }
-    let bare = heading.split_once('/').or_else(|| heading.rsplit_once(", "));
-    match bare.filter(|(name, text)| unit(name, text)) {
+    // `v, m/s` has a slash in its unit.
+    let behind_comma = heading.rsplit_once(", ").filter(|(name, text)| unit(name, text));
+    match behind_comma.or_else(|| heading.split_once('/').filter(|(name, text)| unit(name, text))) {
         Some((name, text)) => (name.trim_end(), Some(text.trim())),
         None => (heading, None),
     }

@@ -215,9 +215,14 @@ mod tests {
         assert!((frequency_hz - 60.0).abs() < 0.5, "{frequency_hz}");
         assert_eq!(coarse(&|_| 0.0), Outcome::Stable);
         assert_eq!(coarse(&|t| 0.3 * (-8.0 * t).exp() * sine(t)), Outcome::Stable);
-        // Noise of a force sensor: a sum of lines whose phases do not fit.
-        let noise = |t: f64| (1..40).map(|k| (f64::from(k * k) * 1.7 + 40.0 * f64::from(k) * t * 6.1).sin()).sum::<f64>();
-        assert_eq!(coarse(&|t| 0.02 * noise(t)), Outcome::Stable);
+        // Noise of a force sensor: white, by the mixing function of SplitMix64 (Steele, Lea and Flood 2014).
+        let noise = |t: f64| {
+            let mut x = ((t / 2e-4).round() as u64 + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+            x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+            x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+            (x ^ (x >> 31)) as f64 / u64::MAX as f64 - 0.5
+        };
+        assert_eq!(coarse(&|t| 0.3 * noise(t)), Outcome::Stable);
     }
 
     #[test]
