@@ -177,6 +177,8 @@ fn strike(what: &Strike) -> Came {
         (true, "supervisor", _) if what.way == Way::Here => &[],
         (true, "supervisor", _) => &[130],
         (true, _, Signal::SIGKILL) => &[6],
+        // A recorder that is asked to end listens on for a second: near the end of a run nothing is lost.
+        (true, "recorder", Signal::SIGTERM) => &[0, 1, 4, 5, 6, 7],
         // It ends by itself when asked, or goes on for its last steps.
         (true, _, Signal::SIGTERM) => &[4, 5, 6, 7],
         (true, _, _) => &[0, 1, 4, 5, 6, 7],
