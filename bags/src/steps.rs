@@ -8,7 +8,7 @@
 use crate::BagError;
 use backdrive_msgs::Sample;
 use backdrive_msgs::ros::{self, Facts};
-use std::collections::HashMap;
+use std::collections::{HashMap, VecDeque};
 use std::path::Path;
 
 /// The topic on which it is said; its messages are [`ros::STEPS`].
@@ -34,9 +34,12 @@ impl Expected {
     }
 }
 
-/// While reading: what was said last of each topic.
+/// As many of the last statements of a topic are remembered: another program may have written a sample behind the statement about the next one.
+const REMEMBERED: usize = 8;
+
+/// While reading: what was said last of each topic, the newest first.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Said(HashMap<String, Facts>);
+pub(crate) struct Said(HashMap<String, VecDeque<Facts>>);
 
 impl Said {
     /// Takes in a message of [`STEPS_TOPIC`].
@@ -45,18 +48,18 @@ impl Said {
     pub(crate) fn hear(&mut self, path: &Path, offset: u64, payload: &[u8]) -> Result<(), BagError> {
         let wrong = |source| BagError::Message { path: path.to_owned(), offset, topic: STEPS_TOPIC.to_owned(), source };
         let (topic, facts) = ros::decode_steps(payload).map_err(wrong)?;
-        self.0.insert(topic, facts);
+        let said = self.0.entry(topic).or_default();
+        said.truncate(REMEMBERED - 1);
+        said.push_front(facts);
         Ok(())
     }
 
     /// What is so of the sample of `topic` whose sequence number ends in these 32 bits; `None` where nothing was said of it.
     pub(crate) fn of(&self, topic: &str, sequence: u32) -> Option<Facts> {
-        let first = self.0.get(topic)?;
         // Some may be missing in between; none comes before the one of which it was said.
-        let ahead = sequence.wrapping_sub(first.sequence as u32);
-        if ahead > i32::MAX as u32 {
-            return None;
-        }
+        let ahead = |first: &Facts| sequence.wrapping_sub(first.sequence as u32);
+        let first = self.0.get(topic)?.iter().find(|first| ahead(first) <= i32::MAX as u32)?;
+        let ahead = ahead(first);
         let (step, sequence) = first.step.checked_add(ahead.into()).zip(first.sequence.checked_add(ahead.into()))?;
         Some(Facts { step, sequence, stamp_ns: first.stamp_ns.filter(|_| ahead == 0), ..*first })
     }
@@ -117,6 +120,10 @@ mod tests {
         said.hear(Path::new("x.mcap"), 0, &payload).unwrap();
         assert_eq!(said.of("/t", 8).map(|facts| (facts.step, facts.sequence)), Some((12, 8)));
         assert_eq!((said.of("/t", 4), said.of("/u", 5)), (None, None));
+        // A sample that another program wrote behind the statement about the next one.
+        ros::encode_steps("/t", &Sample { step: 20, sequence: 9, ..Sample::new(1) }, &mut payload).unwrap();
+        said.hear(Path::new("x.mcap"), 0, &payload).unwrap();
+        assert_eq!([9, 8].map(|sequence| said.of("/t", sequence).map(|facts| facts.step)), [Some(20), Some(12)]);
         said.forget();
         assert_eq!(said.of("/t", 5), None);
     }
