@@ -2,7 +2,7 @@
 //!
 //! Only rows in which the joint moves count: at rest dry friction is anything between its levels, and says nothing of a law.
 
-use crate::filter::{LowPass, derivative};
+use backdrive_diagnosis::low_pass::{LowPass, derivative};
 use crate::fit::Fit;
 use crate::log::Log;
 use crate::motion::{ORDER, power_below};

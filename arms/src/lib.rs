@@ -18,7 +18,6 @@ pub mod drawn;
 pub mod error;
 pub mod excitation;
 pub mod experiment;
-pub mod filter;
 pub mod fit;
 pub mod gram;
 pub mod inertial;

@@ -283,7 +283,7 @@ impl Sight<'_> {
                 vec![vec![(j, s), (other, on_other)]]
             }
             Physics::Delay => {
-                let late = crate::filter::derivative(&self.load[j], self.rates.period());
+                let late = backdrive_diagnosis::low_pass::derivative(&self.load[j], self.rates.period());
                 one(late.iter().map(|x| -x).collect())
             }
             // Per unit of what gives way, 1/k or the gap: where the shape is right, the number is that.

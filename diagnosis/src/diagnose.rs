@@ -3,6 +3,7 @@
 use crate::audit::{Remark, Weight, audit};
 use crate::candidate::price;
 use crate::contenders::with_contenders;
+use crate::equation_error::{OnForces, search_on_forces};
 use crate::hold;
 use crate::let_go::let_go;
 use crate::locate::{self, Location, locate};
@@ -63,14 +64,13 @@ pub fn diagnose(
         let text = "stands still throughout while others move: it is left out of every fit and of the verdict".to_string();
         remarks.push(Remark { weight: Weight::Caution, records: Vec::new(), signal, about: "constant", text });
     }
-    let (problem, fewer) = thinned(problem);
-    remarks.extend(fewer);
-    let (problem, search) = with_inputs_as_they_run(problem, settings, limit, report, &mut remarks)?;
-    report("fitting what could stand in its place");
-    let search = with_contenders(&problem, search, &settings.without, &Budget::new(tuning().experiment.contender_work, limit));
-    let mut search = search;
-    let_go(&problem, &mut search, limit);
-    without_what_may_be_nothing(&problem, &mut search);
+    let (problem, search) = match search_on_forces(&problem, settings, limit, report) {
+        Some((problem, search)) => {
+            remarks.extend(search.forces.as_ref().map(of_band));
+            (problem, search)
+        }
+        None => by_simulation(problem, settings, limit, report, &mut remarks)?,
+    };
     remarks.extend(timing(&problem, &search));
     report("locating the missing force");
     let location = located(&problem, &search);
@@ -79,6 +79,35 @@ pub fn diagnose(
     report("fitting each record by itself");
     let per_record = fit_each(&problem, &search.nominal, &search.noise_sd, &Budget::new(tuning().search.per_record, limit));
     Ok(Diagnosis { problem, remarks, search, location, verdict, files, per_record })
+}
+
+/// What a reader has to know of a search on forces.
+fn of_band(forces: &OnForces) -> Remark {
+    let bands = forces.bands_hz.iter().map(|hz| format!("{hz}")).collect::<Vec<_>>().join(", ");
+    let text = format!(
+        "motion and force are both recorded, so every law was held against the force along the motion, both low-passed (below {bands} Hz), and judged by stretches that \
+         were left out; numbers, errors and plots are those below {} Hz, and what no law explains there counts as noise",
+        forces.corner_hz
+    );
+    Remark { weight: Weight::Note, records: Vec::new(), signal: String::new(), about: "band", text }
+}
+
+/// Searches by simulation of the whole model.
+fn by_simulation(
+    problem: Problem,
+    settings: &Settings,
+    limit: Limit,
+    report: &(dyn Fn(&str) + Sync),
+    remarks: &mut Vec<Remark>,
+) -> Result<(Problem, Search), SearchError> {
+    let (problem, fewer) = thinned(problem);
+    remarks.extend(fewer);
+    let (problem, search) = with_inputs_as_they_run(problem, settings, limit, report, remarks)?;
+    report("fitting what could stand in its place");
+    let mut search = with_contenders(&problem, search, &settings.without, &Budget::new(tuning().experiment.contender_work, limit));
+    let_go(&problem, &mut search, limit);
+    without_what_may_be_nothing(&problem, &mut search);
+    Ok((problem, search))
 }
 
 /// Searches; where the recordings say that an input which the model file does not call held runs on between its samples, once more with it so. That is kept where it

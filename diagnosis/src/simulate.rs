@@ -60,6 +60,7 @@ pub fn predict_under(model: &Model, record: &Record, conditions: &Conditions) ->
     if let Some(logged) = logged {
         columns = columns.chunks_exact(length).flat_map(|column| logged.read(column)).collect();
     }
+    as_filtered(record, &mut columns);
     columns.iter().all(|y| y.is_finite()).then_some(columns)
 }
 
@@ -87,7 +88,18 @@ pub fn derivatives_under(model: &Model, moved: &[(Model, f64)], record: &Record,
             *column = column.chunks_exact(length).flat_map(|column| logged.read(column)).collect();
         }
     }
+    columns.iter_mut().for_each(|columns| as_filtered(record, columns));
     columns.iter().flatten().all(|y| y.is_finite()).then_some(columns)
+}
+
+/// What is predicted of a record's outputs, through the low-pass that its samples went through.
+fn as_filtered(record: &Record, columns: &mut [f64]) {
+    if let Some(low_pass) = record.low_pass.as_ref() {
+        for column in columns.chunks_exact_mut(record.len.max(1)) {
+            let filtered = low_pass.both_ways(column);
+            column.copy_from_slice(&filtered);
+        }
+    }
 }
 
 /// Position and velocity of each body at a sample of a record.

@@ -86,10 +86,12 @@ pub fn held_back(reader: &Reader, graph: &Graph, exchanged: bool) -> Result<(Opt
         Some(Outcome::NotJudged { why }) if why.is_loss() => Some(why),
         _ => None,
     };
-    let apart = || {
-        let checks = check(graph, &session).unwrap_or_default();
-        checks.iter().chain(&session.parts).any(|part| !part.agrees).then_some(Unjudged::ModelsApart)
-    };
-    let why = session.cut_short.or(lossy).or_else(|| if exchanged { None } else { apart() });
+    let why = session.cut_short.or(lossy).or_else(|| if exchanged { None } else { models_apart(graph, &session) });
     Ok((why, session.notes))
+}
+
+/// Whether a device of a recording does not do what its model does, so that a green answer about the graph would be one about another loop.
+pub fn models_apart(graph: &Graph, session: &Session) -> Option<Unjudged> {
+    let checks = check(graph, session).unwrap_or_default();
+    checks.iter().chain(&session.parts).any(|part| !part.agrees).then_some(Unjudged::ModelsApart)
 }

@@ -13,6 +13,7 @@ use crate::remedy::{Remedy, remedies};
 use crate::trial::{Hand, Trial};
 use backdrive_control::operator::Intent;
 use backdrive_nodes::graph::{DeviceFiles, Graph, NodeKind};
+use backdrive_stability::bag_gate::models_apart;
 use backdrive_stability::by_itself::alone::AloneError;
 use backdrive_stability::by_itself::compared::SMALL;
 use backdrive_stability::by_itself::recorded::{Recorded, Told};
@@ -147,6 +148,11 @@ pub fn why(question: &Question, hear: &(dyn Fn(&str) + Sync), cancel: &AtomicBoo
     let named = Named::of(&was.graph, graph, answer.master.is_none());
     answer.remedies.iter_mut().for_each(|remedy| remedy.options = options(&remedy.changes, &named));
     of_events(&mut answer, recorded);
+    // Nothing shakes in what was recorded, and the graph that it is a recording of is that of another loop.
+    if let (Happening::Nothing, Some(why)) = (answer.happening, models_apart(graph, session)) {
+        answer.happening = Happening::NotJudged { why };
+        answer.happens = answer.happening.to_string();
+    }
     Ok(answer)
 }
 

@@ -151,6 +151,59 @@ pub struct Facts {
     pub plausible: &'static [(&'static str, f64, f64)],
     /// Physics that it contains as a special or limiting case: who withholds one of these withholds it too.
     pub contains: &'static [&'static str],
+    /// Its forces along a motion as sums of a few, for each choice of its nonlinear numbers; none where it is only simulated.
+    pub(crate) spans: fn(&Hypothesis, &Seen) -> Vec<Span>,
+}
+
+/// What is known of a motion before any law is looked at along it.
+#[derive(Debug, Clone)]
+pub(crate) struct Seen {
+    /// From the lowest to the highest position, m or rad.
+    pub travel: f64,
+    /// Magnitudes of the velocity, m/s or rad/s, in rising order.
+    pub speeds: Vec<f64>,
+    /// Sample time, s.
+    pub period: f64,
+}
+
+impl Seen {
+    /// The speed that is not exceeded for so large a share of the time, m/s or rad/s.
+    pub fn speed(&self, share: f64) -> f64 {
+        let at = (share * self.speeds.len().saturating_sub(1) as f64).round() as usize;
+        self.speeds.get(at).copied().unwrap_or(0.0)
+    }
+}
+
+/// Forces along a motion that a law can have with the same nonlinear numbers: sums of the forces of a few sets of its parameters, each times a factor.
+#[derive(Debug, Clone)]
+pub(crate) struct Span {
+    /// Parameters whose forces span all of them.
+    pub values: Vec<Vec<f64>>,
+    /// The parameters with which the law has the sum of those forces, each times its factor.
+    pub sum: fn(&[f64], &[Vec<f64>]) -> Vec<f64>,
+}
+
+impl Span {
+    /// Of a law in proportion to its first parameter.
+    pub fn proportional(values: Vec<f64>) -> Span {
+        let sum = |factors: &[f64], values: &[Vec<f64>]| {
+            let mut sum = values.first().cloned().unwrap_or_default();
+            if let (Some(first), Some(factor)) = (sum.first_mut(), factors.first()) {
+                *first *= factor;
+            }
+            sum
+        };
+        Span { values: vec![values], sum }
+    }
+
+    /// Of a law in proportion to all its parameters together, each of which has a force of its own.
+    pub fn linear(values: Vec<Vec<f64>>) -> Span {
+        let sum = |factors: &[f64], values: &[Vec<f64>]| {
+            let of = |p: usize| factors.iter().zip(values).map(|(f, v)| f * v.get(p).copied().unwrap_or(0.0)).sum();
+            (0..values.first().map_or(0, Vec::len)).map(of).collect()
+        };
+        Span { values, sum }
+    }
 }
 
 impl Facts {
@@ -165,6 +218,10 @@ impl Facts {
         refine: |_, _, _| None,
         plausible: &[],
         contains: &[],
+        spans: |h, _| match (h.physics.facts.proportional, h.parameters.len(), h.starts.first()) {
+            (true, 1, Some(start)) => vec![Span::proportional(start.clone())],
+            _ => Vec::new(),
+        },
     };
 }
 

@@ -1,6 +1,7 @@
 //! Dry friction of another level in each direction.
 
 use crate::hypothesis::builder::{ElementBuilder, even};
+use crate::hypothesis::ForceSpan;
 use crate::hypothesis::{Against, Facts, Family, Mark, Physics, State};
 
 pub(super) const PHYSICS: Physics = Physics {
@@ -15,6 +16,10 @@ pub(super) const PHYSICS: Physics = Physics {
         twin: Some("lopsided dry friction and dry friction with a bias are the same force: a force sensor at rest would tell"),
         sliding: &["positive", "negative"],
         contains: &["coulomb"],
+        spans: |h, _| match h.starts.first() {
+            Some(start) if start.len() == 2 => vec![ForceSpan::linear(vec![vec![start[0], 0.0], vec![0.0, start[0]]])],
+            _ => Vec::new(),
+        },
         ..Facts::NONE
     },
     propose: |sites| {

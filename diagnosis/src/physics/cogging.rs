@@ -1,10 +1,16 @@
 //! A force that repeats with position: the poles of a motor, a screw's turn, gear teeth.
 
 use crate::hypothesis::builder::{ElementBuilder, any, even, log};
+use crate::hypothesis::ForceSpan;
 use crate::hypothesis::{Against, Facts, Family, Mark, Physics, State};
 
 /// Periods that fits start from, in a peak-to-peak travel, longest first; a ripple has to be seen to come again.
 const PERIODS: [f64; 13] = [0.71, 0.5, 0.35, 0.25, 0.18, 0.125, 0.088, 0.0625, 0.044, 0.031, 0.022, 0.016, 0.011];
+
+/// Periods in the travel that are looked at along a motion: from so many, in steps in which the phase at the ends moves by an eighth of a turn, so often.
+const FEWEST: f64 = 1.5;
+const STEP: f64 = 0.125;
+const RIPPLES: usize = 180;
 
 pub(super) const PHYSICS: Physics = Physics {
     name: "cogging",
@@ -14,7 +20,23 @@ pub(super) const PHYSICS: Physics = Physics {
     against: Against::Displacement,
     state: State::Periodic,
     mark: Mark::Ripple,
-    facts: Facts { proportional: true, ..Facts::NONE },
+    facts: Facts {
+        proportional: true,
+        spans: |h, seen| {
+            let Some(amplitude) = h.starts.first().and_then(|start| start.first()).copied() else { return Vec::new() };
+            let one = |per_travel: f64| {
+                let sum = |factors: &[f64], values: &[Vec<f64>]| {
+                    let (amplitude, period) = values.first().map_or((0.0, 1.0), |v| (v[0], v[1]));
+                    let of = |i: usize| factors.get(i).copied().unwrap_or(0.0);
+                    vec![amplitude * of(0).hypot(of(1)), period, of(1).atan2(of(0))]
+                };
+                let at = |phase: f64| vec![amplitude, seen.travel / per_travel, phase];
+                ForceSpan { values: vec![at(0.0), at(std::f64::consts::FRAC_PI_2)], sum }
+            };
+            (0..RIPPLES).map(|n| one(FEWEST + STEP * n as f64)).collect()
+        },
+        ..Facts::NONE
+    },
     propose: |sites| {
         let one = |site| {
             let new = ElementBuilder::new(sites, &PHYSICS, site)?;

@@ -1,11 +1,15 @@
 //! Friction that builds up over a distance.
 
 use crate::hypothesis::builder::{ElementBuilder, log};
+use crate::hypothesis::ForceSpan;
 use crate::hypothesis::{Against, Facts, Family, Mark, Physics, State};
 
 /// Forces over displacements of the recordings up to which friction builds up over a distance that could show: stiffer, it is dry friction, and a fit only
 /// imitates the steps of whoever simulated or sampled it.
 pub(super) const STIFFEST: f64 = 1e4;
+
+/// Displacements over which the friction builds up that are looked at along a motion, in its travel.
+const SLIPS: [f64; 8] = [0.0015, 0.0025, 0.004, 0.0065, 0.01, 0.016, 0.026, 0.06];
 
 pub(super) const PHYSICS: Physics = Physics {
     name: "dahl",
@@ -21,6 +25,17 @@ pub(super) const PHYSICS: Physics = Physics {
         memory: true,
         // Infinitely stiff, it is dry friction.
         contains: &["coulomb"],
+        spans: |h, seen| {
+            let Some(level) = h.starts.first().and_then(|start| start.get(1)).copied() else { return Vec::new() };
+            let one = |share: f64| {
+                let sum = |factors: &[f64], values: &[Vec<f64>]| {
+                    let factor = factors.first().copied().unwrap_or(1.0);
+                    values.first().map(|v| v.iter().map(|x| factor * x).collect()).unwrap_or_default()
+                };
+                ForceSpan { values: vec![vec![level / (share * seen.travel), level]], sum }
+            };
+            SLIPS.map(one).to_vec()
+        },
         ..Facts::NONE
     },
     propose: |sites| {

@@ -4,6 +4,7 @@
 //! motion then has a negative delay. That of the only output beside a motion is the motion's own: both shift one signal against the other.
 
 use crate::hypothesis::builder::{even, key, only_input_and_output};
+use crate::hypothesis::ForceSpan;
 use crate::hypothesis::{Against, Facts, Family, Mark, Physics, State};
 use backdrive_plant::model::InputKind;
 
@@ -20,6 +21,8 @@ pub(super) const PHYSICS: Physics = Physics {
         // A motor answers its command within some milliseconds, a bus or a camera within a fifth of a second. Below 0 only beside a prescribed motion.
         plausible: &[("delay", -3e-3, 0.2)],
         twin: Some("a delay at the only input and at the only output move the same signal: a second sensor would tell"),
+        // To first order.
+        spans: |_, seen| vec![ForceSpan::proportional(vec![seen.period])],
         ..Facts::NONE
     },
     propose: |sites| {

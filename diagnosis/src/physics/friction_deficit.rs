@@ -1,7 +1,13 @@
 //! Dry friction that is lower near rest.
 
 use crate::hypothesis::builder::{ElementBuilder, Freedom, log};
+use super::stribeck;
+use crate::hypothesis::ForceSpan;
 use crate::hypothesis::{Against, Facts, Family, Mark, Physics, State};
+
+/// The least speed that is looked at along a motion, in that of nine tenths of the time: a friction that turns its direction over a little displacement, and a
+/// motion that is known to a step, look like less friction at rest below that.
+const SLOWEST: f64 = 0.1;
 
 pub(super) const PHYSICS: Physics = Physics {
     name: "friction_deficit",
@@ -11,7 +17,21 @@ pub(super) const PHYSICS: Physics = Physics {
     against: Against::Velocity,
     state: State::Reversals,
     mark: Mark::NearRest,
-    facts: Facts { sliding: &["coulomb"], from_level: &["coulomb"], contains: &["coulomb"], ..Facts::NONE },
+    facts: Facts { sliding: &["coulomb"], from_level: &["coulomb"], contains: &["coulomb"], spans: |h, seen| {
+            let Some(level) = h.starts.first().and_then(|start| start.first()).copied() else { return Vec::new() };
+            // The level at speed, and that which is only there at speed.
+            let one = |share: f64| {
+                let velocity = seen.speed(share).max(SLOWEST * seen.speed(0.9));
+                let sum = |factors: &[f64], values: &[Vec<f64>]| {
+                    let (level, velocity) = values.first().map_or((0.0, 1.0), |v| (v[0], v[2]));
+                    let of = |i: usize| factors.get(i).copied().unwrap_or(0.0) * level;
+                    vec![of(0) + of(1), of(0), velocity]
+                };
+                ForceSpan { values: vec![vec![level, level * (1.0 - 1e-9), velocity], vec![level, 0.0, velocity]], sum }
+            };
+            stribeck::QUANTILES.map(one).to_vec()
+        },
+        ..Facts::NONE },
     propose: |sites| {
         let one = |site| {
             let new = ElementBuilder::new(sites, &PHYSICS, site)?;

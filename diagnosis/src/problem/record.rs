@@ -3,6 +3,7 @@
 use super::error::ProblemError;
 use super::logged::Logged;
 use super::outliers::{Outliers, beside, places};
+use crate::low_pass::LowPass;
 use crate::tuning::tuning;
 use backdrive_plant::model::{Hold, Input, Model, OutputKind};
 use backdrive_plant::recording::{Jitter, Recording};
@@ -41,6 +42,8 @@ pub struct Record {
     pub before: usize,
     /// The recording on the times at which it was logged, where its clock is irregular; its other samples are then brought onto an even grid of as many.
     pub logged: Option<Arc<Logged>>,
+    /// The low-pass that its inputs and outputs went through, and that a prediction of its outputs has to go through; see [`crate::equation_error`].
+    pub low_pass: Option<Arc<LowPass>>,
 }
 
 impl Record {
@@ -102,6 +105,7 @@ impl Record {
             skip: 0,
             before: 0,
             logged,
+            low_pass: None,
         })
     }
 

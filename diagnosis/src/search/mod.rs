@@ -106,6 +106,7 @@ pub fn search(problem: &Problem, settings: &Settings, limit: Limit, report: &(dy
         exhausted,
         journal,
         cut: work.budget.was_cut(),
+        forces: None,
         nominal: refitted,
     })
 }

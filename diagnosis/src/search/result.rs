@@ -2,6 +2,7 @@
 
 use super::journal::Entry;
 use crate::candidate::Candidate;
+use crate::equation_error::OnForces;
 use crate::error_budget::BudgetedError;
 use crate::hold::Told;
 use crate::hypothesis::Place;
@@ -68,6 +69,8 @@ pub struct Search {
     pub journal: Vec<Entry>,
     /// Whether it was interrupted, or the time on the clock ended it.
     pub cut: bool,
+    /// What laws on forces along a measured motion say; `None` where force and motion are not both known.
+    pub forces: Option<OnForces>,
 }
 
 /// Why a search cannot start.

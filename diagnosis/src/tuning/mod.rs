@@ -5,6 +5,7 @@
 
 mod claim;
 mod coupling;
+mod equation_error;
 mod experiment;
 mod fit;
 mod intervals;
@@ -17,6 +18,7 @@ mod table;
 
 pub use claim::Claim;
 pub use coupling::Coupling;
+pub use equation_error::EquationError;
 pub use experiment::Experiment;
 pub use fit::Fit;
 pub use intervals::Intervals;
@@ -37,6 +39,8 @@ pub struct Tuning {
     pub noise: Noise,
     /// How a structure is fitted.
     pub fit: Fit,
+    /// How laws are looked at on forces along a measured motion.
+    pub equation_error: EquationError,
     /// How a model is coupled to the measured motion.
     pub coupling: Coupling,
     /// How hypotheses are screened.
@@ -61,11 +65,12 @@ pub fn tuning() -> &'static Tuning {
 }
 
 impl Tuning {
-    fn groups(&mut self) -> [(&'static str, &mut dyn Group); 10] {
+    fn groups(&mut self) -> [(&'static str, &mut dyn Group); 11] {
         [
             ("recordings", &mut self.recordings),
             ("noise", &mut self.noise),
             ("fit", &mut self.fit),
+            ("equation_error", &mut self.equation_error),
             ("coupling", &mut self.coupling),
             ("screening", &mut self.screening),
             ("search", &mut self.search),

@@ -1,7 +1,7 @@
 //! Which of the structures is claimed, and which cannot be told from it.
 
 use super::plausible::{is_at_bound, is_plausible};
-use crate::candidate::{Candidate, advantage_over};
+use crate::candidate::{Candidate, advantage_over, key_of};
 use crate::compare::HeldOut;
 use crate::error_budget::{beside_noise, of_sensors};
 use crate::hypothesis::{Hypothesis, Physics};
@@ -14,6 +14,9 @@ use std::collections::HashSet;
 
 /// Which of the structures is claimed.
 pub fn chosen(search: &Search) -> &Candidate {
+    if let Some(forces) = &search.forces {
+        return search.found.iter().find(|c| key_of(&c.structure.added) == forces.claimed).unwrap_or(&search.nominal);
+    }
     let mut best = &search.nominal;
     for effects in 1..=search.found.iter().map(|c| c.structure.added.len()).max().unwrap_or(0) {
         let so_many = || search.found.iter().filter(|c| c.structure.added.len() == effects && is_plausible(c));
@@ -161,6 +164,10 @@ pub(super) fn alike<'s>(search: &'s Search, best: &Candidate) -> Vec<&'s Candida
         }
         (_, other) => !other.is_empty(),
     };
+    if let Some(forces) = &search.forces {
+        let is_alike = |c: &&Candidate| forces.alike.contains(&key_of(&c.structure.added));
+        return search.found.iter().filter(is_alike).take(tuning().claim.rivals).collect();
+    }
     let mut seen = HashSet::new();
     let close = |c: &&Candidate| {
         c.structure.added.len() == best.structure.added.len()

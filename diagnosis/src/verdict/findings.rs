@@ -18,7 +18,11 @@ use std::collections::BTreeMap;
 /// Each physics of a structure that is claimed, with its rivals, most important first. What comes late by a small share of a sample is a matter of timing,
 /// and not among them.
 pub(super) fn findings(problem: &Problem, search: &Search, best: &Candidate, spread: &Uncertainty) -> Vec<Finding> {
-    let claimed = (0..best.structure.added.len()).filter(|which| !is_timing_of(problem, best, *which));
+    let is_companion = |which: usize| {
+        let companions = search.forces.as_ref().map_or(&[][..], |forces| forces.companions.as_slice());
+        best.structure.added.get(which).is_some_and(|h| companions.contains(&h.id))
+    };
+    let claimed = (0..best.structure.added.len()).filter(|which| !is_timing_of(problem, best, *which) && !is_companion(*which));
     let one = |which| (without(search, best, which).fit.cost, finding(search, best, spread, which));
     let mut all: Vec<(f64, Finding)> = claimed.map(one).collect();
     all.sort_by(|a, b| b.0.total_cmp(&a.0));
@@ -48,7 +52,11 @@ fn finding(search: &Search, best: &Candidate, spread: &Uncertainty, which: usize
     let rivals = rivals(search, best, which);
     let near: Vec<(&Hypothesis, &Candidate)> = rivals.iter().map(|(h, c, _)| (h, *c)).collect();
     let figures = figures(search, best, which, &near);
-    let confidence = probability(&figures);
+    let on_forces = search.forces.as_ref().and_then(|forces| forces.beliefs.iter().find(|(id, _)| *id == hypothesis.id));
+    let (confidence, of_family) = match on_forces {
+        Some((_, belief)) => (belief.law, belief.kind),
+        None => (probability(&figures), probability_of_family(&figures)),
+    };
     // What is left of the probability goes to the rivals that were fitted, the more the nearer they come, and to what was not.
     let weights: Vec<f64> = rivals.iter().map(|(_, _, behind)| (-behind.max(0.0) / tuning().claim.softened).exp()).collect();
     let sum = 1.0 + weights.iter().sum::<f64>();
@@ -64,7 +72,7 @@ fn finding(search: &Search, best: &Candidate, spread: &Uncertainty, which: usize
         replaces: hypothesis.replaces.clone(),
         confidence: round_significant(confidence, 3),
         family: Some(hypothesis.physics.family),
-        family_confidence: round_significant(probability_of_family(&figures).max(confidence), 3),
+        family_confidence: round_significant(of_family.max(confidence), 3),
         alternatives: rivals.iter().zip(&weights).take(tuning().claim.alternatives).map(alternative).collect(),
         closed_loop: None,
     }
@@ -72,6 +80,9 @@ fn finding(search: &Search, best: &Candidate, spread: &Uncertainty, which: usize
 
 /// What is not told apart is not sure: the probability that a finding or one of its rivals is right is shared among them by how near they come.
 pub(super) fn share_with_rivals(search: &Search, best: &Candidate, rivals: &[&Candidate], findings: &mut [Finding]) {
+    if search.forces.is_some() {
+        return; // what is not told apart there is in the beliefs already
+    }
     let weight = |c: &Candidate| (-behind(search, c, best).max(0.0) / tuning().claim.softened).exp();
     for finding in findings {
         let is_it = |h: &Hypothesis| h.physics.name == finding.physics && h.place.same(&finding.place);

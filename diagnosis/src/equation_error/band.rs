@@ -1,0 +1,83 @@
+//! Recordings of a band: motion and force through the same low-pass, and as many samples as the band needs.
+
+use crate::low_pass::{LowPass, derivative};
+use crate::problem::{Problem, Record};
+use crate::tuning::tuning;
+use backdrive_plant::model::{InputKind, Model, OutputKind};
+use backdrive_plant::stepper::segments;
+use std::sync::Arc;
+
+/// From this share of the sample rate on a motion is taken for noise of its sensor.
+const HIGHEST: f64 = 0.35;
+
+/// Whether force and motion of a problem are both known: one body, moved as it was recorded, and the force that this took.
+pub(crate) fn is_known(problem: &Problem) -> bool {
+    let model = &problem.model;
+    let is_moved = matches!(model.inputs.as_slice(), [input] if input.kind == InputKind::Motion);
+    let is_force = |output: usize| matches!(model.outputs.get(output).map(|o| &o.kind), Some(OutputKind::Reaction(_)));
+    let measures_force = |record: &Record| crate::evaluator::measured(record).eq((0..model.outputs.len()).filter(|o| is_force(*o)).take(1));
+    model.bodies.len() == 1
+        && is_moved
+        && problem.unknown.is_empty()
+        && problem.fit.iter().chain(&problem.held_out).all(|record| measures_force(record) && record.conditions.is_empty())
+}
+
+/// Corners of the bands in which the motion is resolved, Hz, the lowest first.
+pub(crate) fn corners(problem: &Problem) -> Vec<f64> {
+    let tuning = &tuning().equation_error;
+    let rate = problem.fit.iter().map(|r| 1.0 / r.period).fold(f64::INFINITY, f64::min);
+    let longest = problem.fit.iter().map(|r| r.len as f64 * r.period).fold(0.0f64, f64::max);
+    let all = tuning.corners.iter().copied();
+    let mut held: Vec<f64> =
+        all.filter(|corner| *corner < tuning.highest_corner * rate && corner * longest > tuning.least_periods).collect();
+    while held.len() > 1 && held.last().is_some_and(|corner| noise_of_acceleration(problem, *corner) > tuning.most_noise) {
+        held.pop();
+    }
+    // The lowest say least, and what they say is in the others too.
+    held.drain(..held.len().saturating_sub(tuning.bands));
+    held
+}
+
+/// Share of the acceleration's power in a band that is noise of the motion's sensor, if that is as strong at all frequencies as it is at the highest.
+fn noise_of_acceleration(problem: &Problem, corner: f64) -> f64 {
+    let (mut noise, mut power) = (0.0, 0.0);
+    for record in &problem.fit {
+        let (Some(motion), rate) = (record.inputs.first(), 1.0 / record.period) else { continue };
+        let order = tuning().equation_error.order;
+        let low = LowPass::butterworth(order, HIGHEST * rate, rate).both_ways(motion);
+        let density = motion.iter().zip(&low).map(|(x, l)| (x - l) * (x - l)).sum::<f64>() / ((0.5 - HIGHEST) * rate);
+        noise += density * std::f64::consts::TAU.powi(4) * corner.powi(5) / 5.0;
+        let motion = LowPass::butterworth(order, corner, rate).both_ways(motion);
+        let acceleration = derivative(&derivative(&motion, record.period), record.period);
+        power += acceleration.iter().map(|a| a * a).sum::<f64>();
+    }
+    noise / power.max(f64::MIN_POSITIVE)
+}
+
+/// The problem in a band below a corner, Hz.
+pub(crate) fn in_band(problem: &Problem, corner: f64) -> Problem {
+    let of = |records: &[Record]| records.iter().map(|record| filtered(&problem.model, record, corner)).collect();
+    Problem { fit: of(&problem.fit), held_out: of(&problem.held_out), lag: vec![0; problem.lag.len()], ..problem.clone() }
+}
+
+fn filtered(model: &Model, record: &Record, corner: f64) -> Record {
+    let (order, rate) = (tuning().equation_error.order, 1.0 / record.period);
+    let low_pass = LowPass::butterworth(order, corner, rate);
+    let every = ((rate / (tuning().equation_error.samples * corner)) as usize).max(1);
+    let of = |samples: &Vec<f64>| low_pass.both_ways(samples).into_iter().step_by(every).collect::<Vec<f64>>();
+    let period = record.period * every as f64;
+    let inputs: Vec<Vec<f64>> = record.inputs.iter().map(of).collect();
+    let outputs: Vec<Option<Vec<f64>>> = record.outputs.iter().map(|o| o.as_ref().map(of)).collect();
+    let segments = model.inputs.iter().zip(&inputs).map(|(input, samples)| segments(input.hold, samples, period)).collect();
+    Record {
+        period,
+        len: record.len.div_ceil(every),
+        segments,
+        inputs,
+        outputs,
+        logged: None,
+        low_pass: Some(Arc::new(LowPass::butterworth(order, corner, 1.0 / period))),
+        skip: 0,
+        ..record.clone()
+    }
+}

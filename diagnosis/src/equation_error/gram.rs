@@ -1,0 +1,117 @@
+//! Least squares on sums of a few of many columns, by the products of the columns with each other, kept apart for each stretch of the recordings.
+
+use nalgebra::{DMatrix, DVector};
+use std::ops::Range;
+
+/// Products of columns, in stretches.
+pub(crate) struct Gram {
+    columns: usize,
+    total: Vec<f64>,
+    /// Samples of each stretch, and its products.
+    stretches: Vec<(usize, Vec<f64>)>,
+    /// Root mean square of each column: what it was divided by.
+    scales: Vec<f64>,
+}
+
+/// What is explained, and by what: the sum of some columns, by factors of others.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Sum {
+    /// Columns that are explained.
+    pub target: Vec<usize>,
+    /// Columns that explain it.
+    pub by: Vec<usize>,
+}
+
+impl Gram {
+    /// Of columns that are all as long, in these stretches of them.
+    pub fn of(columns: &[Vec<f64>], stretches: &[Range<usize>]) -> Gram {
+        use rayon::prelude::*;
+        let rms = |c: &Vec<f64>| (c.iter().map(|x| x * x).sum::<f64>() / c.len().max(1) as f64).sqrt();
+        let scales: Vec<f64> = columns.iter().map(|c| Some(rms(c)).filter(|s| *s > 0.0).unwrap_or(1.0)).collect();
+        let n = columns.len();
+        let product = |range: &Range<usize>| {
+            let part = DMatrix::from_fn(range.len(), n, |row, column| columns[column][range.start + row] / scales[column]);
+            (range.len(), part.tr_mul(&part).as_slice().to_vec())
+        };
+        let stretches: Vec<(usize, Vec<f64>)> = stretches.par_iter().map(product).collect();
+        let mut total = vec![0.0; n * n];
+        for (_, part) in &stretches {
+            total.iter_mut().zip(part).for_each(|(t, p)| *t += p);
+        }
+        Gram { columns: n, total, stretches, scales }
+    }
+
+    fn at(&self, products: &[f64], a: usize, b: usize) -> f64 {
+        products[a * self.columns + b]
+    }
+
+    /// Products of what explains, with what is explained, and of that with itself; each column in its own unit of root mean square, what is explained in its unit.
+    fn parts(&self, products: &[f64], sum: &Sum) -> (DMatrix<f64>, DVector<f64>, f64) {
+        let scale = |c: usize| self.scales[c];
+        let matrix = DMatrix::from_fn(sum.by.len(), sum.by.len(), |i, j| self.at(products, sum.by[i], sum.by[j]));
+        let with = |by: usize| sum.target.iter().map(|t| scale(*t) * self.at(products, by, *t)).sum::<f64>();
+        let vector = DVector::from_iterator(sum.by.len(), sum.by.iter().map(|by| with(*by)));
+        let own = sum.target.iter().flat_map(|a| sum.target.iter().map(move |b| scale(*a) * scale(*b) * self.at(products, *a, *b))).sum();
+        (matrix, vector, own)
+    }
+
+    /// Factors of the columns that explain best; `None` where they cannot be told apart.
+    fn solve(matrix: &DMatrix<f64>, vector: &DVector<f64>) -> Option<DVector<f64>> {
+        let n = vector.len();
+        if n == 0 {
+            return Some(vector.clone());
+        }
+        let ridge = 1e-10 * matrix.diagonal().max();
+        let regular = matrix + DMatrix::identity(n, n) * ridge;
+        Some(regular.cholesky()?.solve(vector)).filter(|p| p.iter().all(|x| x.is_finite()))
+    }
+
+    /// Factors of the columns that explain, each in its own unit, and the mean square of what is left.
+    pub fn fit(&self, sum: &Sum) -> Option<(Vec<f64>, f64)> {
+        let (matrix, vector, own) = self.parts(&self.total, sum);
+        let factors = Gram::solve(&matrix, &vector)?;
+        let samples: usize = self.stretches.iter().map(|(samples, _)| samples).sum();
+        let left = (own - 2.0 * factors.dot(&vector) + factors.dot(&(&matrix * &factors))).max(0.0) / samples.max(1) as f64;
+        Some((sum.by.iter().zip(factors.iter()).map(|(c, x)| x / self.scales[*c]).collect(), left))
+    }
+
+    /// Mean square of what is left of each stretch by factors that were found on all others.
+    pub fn left_out(&self, sum: &Sum) -> Option<Vec<f64>> {
+        let (matrix, vector, _) = self.parts(&self.total, sum);
+        let one = |(samples, products): &(usize, Vec<f64>)| {
+            let (own_matrix, own_vector, own) = self.parts(products, sum);
+            let factors = Gram::solve(&(&matrix - &own_matrix), &(&vector - &own_vector))?;
+            let left = own - 2.0 * factors.dot(&own_vector) + factors.dot(&(&own_matrix * &factors));
+            Some(left.max(0.0) / (*samples).max(1) as f64)
+        };
+        self.stretches.iter().map(one).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn left_out_stretches_are_those_of_a_fit_of_the_others() {
+        let n = 120;
+        let a: Vec<f64> = (0..n).map(|i| (0.3 * i as f64).sin()).collect();
+        let b: Vec<f64> = (0..n).map(|i| 1e-3 * (0.11 * i as f64).cos()).collect();
+        let y: Vec<f64> = (0..n).map(|i| 2.0 * a[i] - 500.0 * b[i] + 0.1 * (1.7 * i as f64).sin()).collect();
+        let stretches = [0..40, 40..80, 80..120];
+        let gram = Gram::of(&[y.clone(), a.clone(), b.clone()], &stretches);
+        let sum = Sum { target: vec![0], by: vec![1, 2] };
+        let (factors, left) = gram.fit(&sum).unwrap();
+        assert!((factors[0] - 2.0).abs() < 0.05 && (factors[1] + 500.0).abs() < 30.0, "{factors:?}");
+        assert!((left - 0.005).abs() < 0.001, "{left}");
+        let errors = gram.left_out(&sum).unwrap();
+        for (stretch, error) in stretches.iter().zip(errors) {
+            let rows: Vec<usize> = (0..n).filter(|i| !stretch.contains(i)).collect();
+            let matrix = DMatrix::from_fn(rows.len(), 2, |r, c| if c == 0 { a[rows[r]] } else { b[rows[r]] });
+            let target = DVector::from_iterator(rows.len(), rows.iter().map(|i| y[*i]));
+            let p = matrix.svd(true, true).solve(&target, 1e-14).unwrap();
+            let direct = stretch.clone().map(|i| (y[i] - p[0] * a[i] - p[1] * b[i]).powi(2)).sum::<f64>() / 40.0;
+            assert!((direct - error).abs() < 1e-6 * direct, "{direct} {error}");
+        }
+    }
+}

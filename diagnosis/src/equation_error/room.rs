@@ -1,0 +1,264 @@
+//! Every law that can be looked at on forces along a motion, as columns beside those of the nominal model's own numbers.
+
+use super::gram::{Gram, Sum};
+use crate::hypothesis::{Family, ForceSpan, Hypothesis, Scales, Seen, apply_edits};
+use crate::physics;
+use crate::problem::{Problem, Record};
+use crate::simulate::predict;
+use crate::structure::{Role, Structure};
+use crate::tuning::tuning;
+use backdrive_plant::model::Model;
+use backdrive_plant::write::Edit;
+use rayon::prelude::*;
+use std::collections::HashSet;
+use std::ops::Range;
+
+/// A law, or a few that go together, with each choice of nonlinear numbers.
+pub(crate) struct Law {
+    /// Which of the hypotheses.
+    pub hypotheses: Vec<usize>,
+    /// The choices.
+    variants: Vec<Variant>,
+    /// The column of what it takes the place of.
+    shift: Option<usize>,
+    /// Columns of the nominal model's numbers that it takes the place of.
+    drops: Vec<usize>,
+    /// Numbers that it adds.
+    pub numbers: usize,
+}
+
+struct Variant {
+    spans: Vec<ForceSpan>,
+    columns: Vec<usize>,
+}
+
+/// A law with a choice of its nonlinear numbers: which of [`Room::laws`], which of its variants.
+pub(crate) type Chosen = (usize, usize);
+
+/// Laws and recordings in a band.
+pub(crate) struct Room {
+    /// The recordings in the band.
+    pub problem: Problem,
+    /// Corner of the band, Hz.
+    pub corner: f64,
+    /// Physics at their places.
+    pub hypotheses: Vec<Hypothesis>,
+    /// Laws of those.
+    pub laws: Vec<Law>,
+    gram: Gram,
+    /// Columns of the nominal model's free numbers.
+    base: Vec<usize>,
+}
+
+/// How far the model moves and pushes on the recordings.
+fn scales(problem: &Problem) -> Option<Scales> {
+    let runs: Vec<(Vec<Vec<f64>>, f64)> = problem.fit.iter().map(|r| (r.inputs.clone(), r.period)).collect();
+    let largest = |output: usize| {
+        let samples = problem.fit.iter().filter_map(|r| r.outputs.get(output)?.as_deref()).flatten();
+        samples.fold(0.0f64, |most, y| most.max(y.abs()))
+    };
+    let measured: Vec<f64> = (0..problem.model.outputs.len()).map(largest).collect();
+    Some(Scales::of(&problem.model, &runs).ok()?.with_measured(&problem.model, &measured))
+}
+
+fn seen(problem: &Problem) -> Seen {
+    let motions = || problem.fit.iter().filter_map(|r| r.inputs.first().map(|q| (q, r.period)));
+    let (low, high) = motions().flat_map(|(q, _)| q).fold((f64::MAX, f64::MIN), |(l, h), q| (l.min(*q), h.max(*q)));
+    let mut speeds: Vec<f64> = motions().flat_map(|(q, period)| q.windows(2).map(move |p| (p[1] - p[0]).abs() / period)).collect();
+    speeds.sort_by(f64::total_cmp);
+    Seen { travel: high - low, speeds, period: problem.fit.first().map_or(1.0, |r| r.period) }
+}
+
+/// What may be missing and can be looked at on forces.
+fn hypotheses(problem: &Problem, without: &[String]) -> Option<Vec<Hypothesis>> {
+    let withheld: Vec<&str> = without.iter().map(String::as_str).collect();
+    let mut all = physics::without(physics::all(&problem.model, &scales(problem)?), &withheld);
+    let mut classes = HashSet::new();
+    all.retain(|h| {
+        let is_number = h.same_as.as_ref().is_some_and(|path| problem.stated.iter().any(|s| s.path == *path));
+        !is_number && classes.insert(h.class.clone())
+    });
+    Some(all)
+}
+
+/// Samples of the records that are compared, and the stretches that are left out in turn.
+struct Compared {
+    every: usize,
+    stretches: Vec<Range<usize>>,
+    samples: usize,
+}
+
+impl Compared {
+    fn of(problem: &Problem, corner: f64) -> Compared {
+        let tuning = &tuning().equation_error;
+        let period = problem.fit.first().map_or(1.0, |r| r.period);
+        let every = ((1.0 / (period * tuning.compared * corner)) as usize).max(1);
+        let (mut stretches, mut at) = (Vec::new(), 0);
+        for record in &problem.fit {
+            let (len, n) = (record.len.div_ceil(every), tuning.stretches);
+            stretches.extend((0..n).map(|k| at + k * len / n..at + (k + 1) * len / n).filter(|range| !range.is_empty()));
+            at += len;
+        }
+        Compared { every, stretches, samples: at }
+    }
+
+    /// Forces of a model along all records.
+    fn forces(&self, problem: &Problem, model: &Model) -> Option<Vec<f64>> {
+        let one = |record: &Record| predict(model, record, problem.coarse_substeps());
+        let mut all = Vec::with_capacity(self.samples);
+        for record in &problem.fit {
+            all.extend(one(record)?.into_iter().take(record.len).step_by(self.every));
+        }
+        Some(all)
+    }
+}
+
+impl Room {
+    /// All that can be looked at in a band; `None` where the nominal model cannot be run along the motion.
+    pub fn of(problem: &Problem, corner: f64, without: &[String]) -> Option<Room> {
+        let problem = super::band::in_band(problem, corner);
+        let compared = Compared::of(&problem, corner);
+        let nominal = Structure::new(&problem, &problem.fit, Vec::new());
+        let given: Vec<f64> = problem.stated.iter().map(|s| s.given).collect();
+        let start = nominal.values(&problem, &given, &[], &[]);
+        let model = nominal.model(&problem, &start)?;
+        let there = compared.forces(&problem, &model)?;
+        let measured = problem.fit.iter().flat_map(|r| {
+            let force = r.outputs.iter().flatten().next().map_or(&[][..], Vec::as_slice);
+            force.iter().step_by(compared.every)
+        });
+        let minus = |a: &[f64], b: &[f64]| -> Vec<f64> { a.iter().zip(b).map(|(a, b)| a - b).collect() };
+        let mut columns: Vec<Vec<f64>> = vec![measured.zip(&there).map(|(y, p)| y - p).collect()];
+        let mut base: Vec<(usize, String)> = Vec::new();
+        for (number, value) in nominal.free.iter().zip(&start) {
+            let Role::Stated(stated) = number.role else { continue };
+            let step = if *value == 0.0 { number.step } else { 1e-3 * value.abs() };
+            let mut moved = start.clone();
+            let at = nominal.free.iter().position(|n| n.role == number.role)?;
+            *moved.get_mut(at)? += step;
+            let Some(forces) = nominal.model(&problem, &moved).and_then(|m| compared.forces(&problem, &m)) else { continue };
+            let column: Vec<f64> = minus(&forces, &there).into_iter().map(|d| d / step).collect();
+            if column.iter().any(|x| *x != 0.0) {
+                base.push((columns.len(), problem.stated.get(stated)?.path.clone()));
+                columns.push(column);
+            }
+        }
+        let (hypotheses, seen) = (hypotheses(&problem, without)?, seen(&problem));
+        let mut laws: Vec<Law> = Vec::new();
+        for (index, h) in hypotheses.iter().enumerate() {
+            let spans = (h.physics.facts.spans)(h, &seen);
+            if spans.is_empty() {
+                continue;
+            }
+            let without = if h.replaces.is_empty() { model.clone() } else { without_elements(&model, &h.replaces)? };
+            let rest = if h.replaces.is_empty() { there.clone() } else { compared.forces(&problem, &without)? };
+            let shift = (!h.replaces.is_empty()).then(|| {
+                columns.push(minus(&there, &rest));
+                columns.len() - 1
+            });
+            let is_dropped = |path: &str| h.replaces.iter().any(|name| path.starts_with(&format!("elements.{name}.")));
+            let drops = base.iter().filter(|(_, path)| is_dropped(path)).map(|(column, _)| *column).collect();
+            let of = |values: &Vec<f64>| Some(minus(&compared.forces(&problem, &h.apply(&model, values).ok()?)?, &rest));
+            let forces: Vec<Option<Vec<Vec<f64>>>> = spans.par_iter().map(|span| span.values.iter().map(of).collect()).collect();
+            let mut variants = Vec::new();
+            for (span, forces) in spans.into_iter().zip(forces) {
+                let Some(forces) = forces.filter(|all| all.iter().all(|f| f.iter().any(|x| *x != 0.0))) else { continue };
+                variants.push(Variant { columns: (columns.len()..columns.len() + forces.len()).collect(), spans: vec![span] });
+                columns.extend(forces);
+            }
+            laws.push(Law { hypotheses: vec![index], variants, shift, drops, numbers: h.parameters.len() });
+        }
+        with_their_zero(&hypotheses, &mut laws);
+        let gram = Gram::of(&columns, &compared.stretches);
+        let base = base.into_iter().map(|(column, _)| column).collect();
+        Some(Room { problem, corner, hypotheses, laws, gram, base })
+    }
+
+    /// The physics of a law by which it is named.
+    pub fn named(&self, law: usize) -> &Hypothesis {
+        &self.hypotheses[self.laws[law].hypotheses[0]]
+    }
+
+    /// Whether laws may be looked at together: at one place one dry friction, one constant, one hold.
+    pub fn go_together(&self, a: usize, b: usize) -> bool {
+        let own = |law: usize| self.laws[law].hypotheses.iter().map(|h| &self.hypotheses[*h]);
+        let alike = |x: &Hypothesis, y: &Hypothesis| {
+            let rub = |h: &Hypothesis| h.physics.family == Family::Friction;
+            let lopsided = |h: &Hypothesis| h.physics.facts.twin.is_some() || h.physics.family == Family::Bias;
+            x.id == y.id || x.place.same(&y.place) && rub(x) && rub(y) || lopsided(x) && lopsided(y) || !x.compatible(y)
+        };
+        a != b && own(a).all(|x| own(b).all(|y| !alike(x, y)))
+    }
+
+    fn sum(&self, laws: &[Chosen]) -> Sum {
+        let law = |(law, _): &Chosen| &self.laws[*law];
+        let target = std::iter::once(0).chain(laws.iter().filter_map(|chosen| law(chosen).shift)).collect();
+        let dropped = |column: &usize| laws.iter().any(|chosen| law(chosen).drops.contains(column));
+        let own = laws.iter().flat_map(|(law, variant)| self.laws[*law].variants[*variant].columns.iter().copied());
+        Sum { target, by: self.base.iter().copied().filter(|column| !dropped(column)).chain(own).collect() }
+    }
+
+    /// What laws leave, force squared, and the parameters of the hypotheses of each; `None` where one of those is out of its range.
+    pub fn fit(&self, laws: &[Chosen]) -> Option<(f64, Vec<(usize, Vec<f64>)>)> {
+        let sum = self.sum(laws);
+        let (factors, left) = self.gram.fit(&sum)?;
+        let own: usize = laws.iter().map(|(law, variant)| self.laws[*law].variants[*variant].columns.len()).sum();
+        let mut factors = factors.get(sum.by.len() - own..)?;
+        let mut all = Vec::new();
+        for (law, variant) in laws {
+            let (law, variant) = (&self.laws[*law], &self.laws[*law].variants[*variant]);
+            for (h, span) in law.hypotheses.iter().zip(&variant.spans) {
+                let (now, rest) = factors.split_at_checked(span.values.len())?;
+                factors = rest;
+                let values = (span.sum)(now, &span.values);
+                let hypothesis = &self.hypotheses[*h];
+                let inside = |(p, v): (&crate::hypothesis::Parameter, &f64)| v.is_finite() && (p.range.0..=p.range.1).contains(v);
+                if !hypothesis.parameters.iter().zip(&values).all(inside) || hypothesis.apply(&self.problem.model, &values).is_err() {
+                    return None;
+                }
+                all.push((*h, values));
+            }
+        }
+        Some((left, all))
+    }
+
+    /// What laws leave of stretches that were left out: mean squares, force squared.
+    pub fn left_out(&self, laws: &[Chosen]) -> Option<Vec<f64>> {
+        self.gram.left_out(&self.sum(laws))
+    }
+
+    /// The choice of a law's nonlinear numbers that leaves least beside others.
+    pub fn best_beside(&self, others: &[Chosen], law: usize) -> Option<Chosen> {
+        let one = |variant: usize| {
+            let laws: Vec<Chosen> = others.iter().copied().chain([(law, variant)]).collect();
+            Some(((law, variant), self.fit(&laws)?.0))
+        };
+        (0..self.laws[law].variants.len()).filter_map(one).min_by(|a, b| a.1.total_cmp(&b.1)).map(|(chosen, _)| chosen)
+    }
+}
+
+/// A spring begins at a zero of its own, so each is looked at with a constant beside it.
+fn with_their_zero(hypotheses: &[Hypothesis], laws: &mut Vec<Law>) {
+    let is_constant = |law: &&Law| hypotheses[law.hypotheses[0]].physics.family == Family::Bias;
+    let Some((constant, span)) = laws.iter().find(is_constant).and_then(|law| {
+        let variant = law.variants.first()?;
+        Some(((law.hypotheses[0], variant.columns.clone()), variant.spans.first()?.clone()))
+    }) else {
+        return;
+    };
+    for law in laws.iter_mut().filter(|law| hypotheses[law.hypotheses[0]].physics.facts.holds) {
+        law.hypotheses.push(constant.0);
+        law.numbers += 1;
+        for variant in &mut law.variants {
+            variant.columns.extend(&constant.1);
+            variant.spans.push(span.clone());
+        }
+    }
+}
+
+fn without_elements(model: &Model, names: &[String]) -> Option<Model> {
+    let mut edited = model.clone();
+    let edits: Vec<Edit> = names.iter().map(|name| Edit::RemoveElement { name: name.clone() }).collect();
+    apply_edits(&mut edited, &edits).ok()?;
+    Some(edited)
+}

@@ -1,0 +1,45 @@
+//! How laws are looked at on forces along a measured motion.
+
+use super::table::group;
+
+group! {
+    /// How laws are looked at on forces along a measured motion.
+    EquationError {
+        /// Corners of the low-pass of motion and force that are looked at, from the lowest on.
+        corners: [f64; 6] = [1.5, 3.0, 6.0, 12.0, 24.0, 48.0], "Hz", Judgement("an octave apart: what a device does by hand or by its controller is between them");
+        /// Highest corner, in the sample rate.
+        highest_corner: f64 = 0.2, "sample rates", Numerics("a motion is differentiated twice; above that the samples do not hold it");
+        /// Share of the power of the acceleration that may be noise of the motion's sensor.
+        most_noise: f64 = 0.1, "-", Statistics("noise in what explains makes an inertia too small by the same share");
+        /// Bands that are looked at, from the highest on, at most.
+        bands: usize = 3, "bands", Judgement("an answer that hangs on the corner differs between them");
+        /// Periods of the corner in the longest recording, at least.
+        least_periods: f64 = 20.0, "periods", Statistics("stretches of fewer than two periods say nothing by themselves");
+        /// Order of the low-pass, which is run both ways.
+        order: usize = 4, "-", Judgement("as steep as identification of robots has it (Gautier); steeper ones ring");
+        /// Samples in a period of the corner that are simulated.
+        samples: f64 = 16.0, "samples", Numerics("a sign that changes between two samples is then off by less than the low-pass lets through");
+        /// Samples in a period of the corner that are compared.
+        compared: f64 = 4.0, "samples", Statistics("twice what the band holds");
+        /// Stretches of each recording that are left out in turn.
+        stretches: usize = 8, "stretches", Statistics("enough for a standard error, each with several reversals");
+        /// Structures whose extensions by one more law are looked at.
+        extended: usize = 8, "structures", Cost("all pairs are looked at; a third law is looked for beside the best of them");
+        /// Share of the error of left-out stretches by which a richer structure has to be better, per number.
+        worth: f64 = 0.015, "-", Judgement("real devices always give one percent of the error of forces to one more number");
+        /// The least share by which a richer structure has to be better.
+        least_gain: f64 = 0.03, "-", Judgement("as worth, of all its numbers");
+        /// Standard errors of the mean, stretch by stretch, by which a richer structure has to be better.
+        sure: f64 = 1.0, "standard errors", Statistics("the richer one was chosen as the best of many already, and pays for its numbers");
+        /// Numbers that a rival may have more than the chosen structure.
+        rival_numbers: usize = 2, "numbers", Judgement("what needs more than one law more explains anything");
+        /// Log-odds of a law: a constant, then one for each of its figures, see [`crate::equation_error::Figures`].
+        confidence: [f64; 7] = [0.0, 1.0, 0.0, 0.5, 0.0, 0.0, 0.0], "log-odds", Measured("`diagnosis/tests/concealed/calibrate_forces.py`; docs/diagnosis.md says on which cases");
+        /// The same of its kind.
+        kind_confidence: [f64; 7] = [0.0, 1.0, 0.0, 0.5, 0.0, 0.0, 0.0], "log-odds", Measured("as `confidence`");
+        /// Confidence of all laws of a structure from which others that predict as well are not told beside it.
+        claimed: f64 = 0.9, "probability", Judgement("as sure as a claim is called sure");
+        /// Structures that are simulated and whose numbers are refined.
+        simulated: usize = 8, "structures", Cost("those that left-out stretches hardly tell apart are fewer");
+    }
+}
