@@ -6,6 +6,7 @@
 
 use crate::caller;
 use crate::cli::Cli;
+pub use backdrive_bags::shell_word;
 use clap::Parser;
 use serde::{Serialize, Serializer};
 use std::ffi::OsString;
@@ -237,14 +238,6 @@ pub fn free(path: &Path) -> PathBuf {
     let ending = path.extension().map_or_else(String::new, |e| format!(".{}", e.to_string_lossy()));
     let numbered = (2_u32..).map(|number| path.with_file_name(format!("{stem}-{number}{ending}")));
     numbered.into_iter().find(|path| !taken(path)).unwrap_or_else(|| path.to_path_buf())
-}
-
-/// A word of a command line, in quotes where a shell would read it otherwise.
-pub fn shell_word(word: &str) -> String {
-    match word.chars().all(|c| c.is_alphanumeric() || "-_./:,=+@%".contains(c)) && !word.is_empty() {
-        true => word.to_string(),
-        false => format!("'{}'", word.replace('\'', "'\\''")),
-    }
 }
 
 #[cfg(test)]

@@ -291,7 +291,11 @@ fn bags() {
             case(&["replay", "foreign.mcap"], 3, &["foreign.mcap", "no graph to run"]),
             case(&["replay", "lone.mcap"], 3, &["lone.mcap", "no operator"]),
             case(&["replay", "stub.mcap"], 3, &["stub.mcap"]),
-            case(&["replay", "damaged.mcap"], 3, &["damaged.mcap, byte", "`backdrive bag recover` saves what is whole"]),
+            case(
+                &["replay", "damaged.mcap"],
+                3,
+                &["damaged.mcap, byte", "`backdrive bag recover damaged.mcap --bag damaged-saved.mcap` saves what is whole"],
+            ),
             case(&["replay", "good.mcap", "--bag", "good.mcap"], 3, &["good.mcap", "is the bag that is replayed"]),
             case(&["replay", "good.mcap", "--bag", "./tmp/../good.mcap"], 3, &["good.mcap", "is the bag that is replayed"]),
             case(&["replay", "good.mcap", "--bag", "graph.toml"], 3, &["graph.toml", "exists and is not a bag"]),
@@ -305,7 +309,11 @@ fn bags() {
     // A bag that was cut off is still a bag.
     let told = place.backdrive(&["bag", "info", "cut.mcap"]);
     assert_eq!(told.code, Some(4), "{told:?}");
-    assert!(told.stdout.contains("the file was not closed; `backdrive bag recover`"), "{}", told.stdout);
+    assert!(
+        told.stdout.contains("the file was not closed; `backdrive bag recover cut.mcap --bag cut-saved.mcap` makes a clean copy"),
+        "{}",
+        told.stdout
+    );
     let told = place.backdrive(&["bag", "info", "damaged.mcap", "--check"]);
     assert!(told.code == Some(4) && told.stdout.contains("damaged") && told.stdout.contains("byte"), "{told:?}");
     let told = place.backdrive(&["replay", "cut.mcap", "--json"]);

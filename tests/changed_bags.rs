@@ -136,6 +136,71 @@ fn a_force_command_that_its_graph_does_not_make_is_named_with_factor_and_time() 
     }
 }
 
+/// The push of the base once more at the end of a recording that is longer than what is looked at at once.
+#[test]
+fn a_contradiction_behind_the_first_forty_thousand_steps_is_named_with_its_time() {
+    let place = Place::new();
+    let again = "{ t = 1.95, x = 0.0 }, { t = 60.0, x = 0.0 }, { t = 60.2, x = 0.007 }, { t = 62.0, x = 0.007 }, { t = 62.2, x = 0.0 }";
+    let text = short_graph().replace("{ t = 1.95, x = 0.0 }", again).replace("duration_s = 2.0", "duration_s = 64.0");
+    place.write("long.toml", &text.replace("rate_hz = 500", "rate_hz = 1000").replace("lambda = 0.3", "lambda = 0.1"));
+    let done = place.backdrive(&["run", "long.toml", "--transport", "inproc", "--bag", "long.mcap"]);
+    assert_eq!(done.code, Some(0), "{done:?}");
+    let bag = Bag::load(&place.path("long.mcap"));
+    // What keeps a green answer back of every verb.
+    let said = |bag: &Bag| -> (bool, Vec<String>) {
+        let path = place.path("changed.mcap");
+        bag.save(&path);
+        let reader = backdrive_bags::Reader::open(&path).unwrap();
+        let graph = backdrive_nodes::graph::Graph::load(&place.path("long.toml"), &backdrive_nodes::graph::Overrides::default()).unwrap();
+        let (why, notes) = backdrive_stability::bag_gate::held_back(&reader, &graph, true).unwrap();
+        (why.is_some(), notes.into_iter().filter(|note| note.contains("contradicts its graph")).collect())
+    };
+    assert_eq!(said(&bag), (false, Vec::new()));
+    for (from, to) in [(60_000, 64_000), (1000, 64_000)] {
+        let mut bag = bag.clone();
+        bag.numbers(FORCE, Numbers::Effort, &|index, f| if (from..to).contains(&index) { 2.0 * f } else { f });
+        let (kept_back, lines) = said(&bag);
+        let [line] = lines.as_slice() else { panic!("{lines:?}") };
+        assert!(kept_back && line.contains(FORCE) && line.contains("2.0000 times"), "{line}");
+        let time = |word: &str| -> f64 {
+            let rest = line.split(word).nth(1).unwrap_or_else(|| panic!("{line}"));
+            rest.split(' ').next().and_then(|x| x.parse().ok()).unwrap_or_else(|| panic!("{line}"))
+        };
+        let (begins, ends) = (time(", from "), time(" s to "));
+        assert!((from as f64 * 1e-3..from as f64 * 1e-3 + 0.4).contains(&begins) && (61.9..64.0).contains(&ends), "{line}");
+    }
+}
+
+#[test]
+fn what_a_coupling_sends_over_its_link_is_held_against_what_it_was_given() {
+    let place = Place::new();
+    let done = place.backdrive(&[
+        "run",
+        &system::file("launch/coupling.toml"),
+        "--rate",
+        "1000",
+        "--duration",
+        "2",
+        "--transport",
+        "inproc",
+        "--bag",
+        "base.mcap",
+    ]);
+    assert!(matches!(done.code, Some(0 | 1 | 7)), "{done:?}");
+    let bag = Bag::load(&place.path("base.mcap"));
+    let done = place.backdrive(&["stability", "base.mcap"]);
+    assert!(!format!("{}{}", done.stdout, done.stderr).contains("not looked at: /coupling/to_"), "{done:?}");
+    assert!(!done.stdout.contains("contradicts its graph"), "{done:?}");
+    for topic in ["/coupling/to_far_js", "/coupling/to_near_js"] {
+        let mut bag = bag.clone();
+        bag.numbers(topic, Numbers::Position, &|_, x| 3.0 * x);
+        bag.save(&place.path("changed.mcap"));
+        let done = place.backdrive(&["stability", "changed.mcap"]);
+        let said = format!("{}{}", done.stdout, done.stderr);
+        assert!(done.code == Some(7) && said.contains(topic) && said.contains("3.0000 times"), "{topic}: {done:?}");
+    }
+}
+
 #[test]
 fn a_rate_that_is_none_gives_way_to_that_of_the_messages() {
     let place = Place::new();
@@ -341,7 +406,7 @@ fn wrong(costs: Costs, codes: &Codes, base: &Codes) -> Vec<String> {
     wrong
 }
 
-/// 30 changed bags by default, 100 with `BACKDRIVE_LONG=1`, 500 with `BACKDRIVE_FULL=1`, which also asks `why` of every one; `BACKDRIVE_CASES=29,303` makes
+/// 30 changed bags by default, 60 with `BACKDRIVE_LONG=1`, 500 with `BACKDRIVE_FULL=1`, which also asks `why` of every one; `BACKDRIVE_CASES=29,303` makes
 /// these alone.
 #[test]
 fn no_verb_is_green_of_a_bag_whose_change_matters_and_none_loses_its_answer_by_one_that_does_not() {
@@ -350,7 +415,7 @@ fn no_verb_is_green_of_a_bag_whose_change_matters_and_none_loses_its_answer_by_o
     let count = if full {
         500
     } else if long {
-        100
+        60
     } else {
         30
     };

@@ -205,10 +205,12 @@ fn cyclone_is_heard() {
 
 #[test]
 fn a_sample_takes_about_as_long_as_between_cyclones() {
+    if std::env::var("BACKDRIVE_LONG").as_deref() != Ok("1") {
+        return skipped("half a minute of round trips; BACKDRIVE_LONG=1 runs it");
+    }
     let Some(python) = python() else { return };
     let Some(hosts) = Hosts::joined() else { return };
-    let count = if std::env::var("BACKDRIVE_LONG").as_deref() == Ok("1") { "10000" } else { "2000" };
-    let ping = ["ping", count, "1000"];
+    let ping = ["ping", "3000", "1000"];
     // As nodes of one run do it.
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("identity.json");

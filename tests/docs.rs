@@ -1,8 +1,11 @@
 //! The tutorial and the how-to, done as they say: every block of commands in order, with the program on the path, and what the page says that they
 //! say and end with compared with what they do.
 
+#[path = "common/skipped.rs"]
+mod skipped;
 mod system;
 
+use skipped::skipped;
 use std::path::Path;
 use std::process::Command;
 use system::{Place, file};
@@ -88,6 +91,9 @@ fn a_line_is_compared_up_to_what_was_left_out() {
 
 #[test]
 fn the_tutorial_ends_in_what_it_promises() {
+    if !is_long() {
+        return skipped("searches of half a minute; BACKDRIVE_LONG=1 runs it");
+    }
     let place = Place::new();
     follow(&place, "docs/tutorial.md");
     let verdict: serde_json::Value =
@@ -99,6 +105,9 @@ fn the_tutorial_ends_in_what_it_promises() {
 
 #[test]
 fn a_recording_of_ones_own_ends_in_what_the_page_promises() {
+    if !is_long() {
+        return skipped("searches of half a minute; BACKDRIVE_LONG=1 runs it");
+    }
     let place = Place::new();
     follow(&place, "docs/own-recording.md");
     let size = |folder: &str, key: &str| {
@@ -110,6 +119,10 @@ fn a_recording_of_ones_own_ends_in_what_the_page_promises() {
     let near = |found: f64, hidden: f64| (found / hidden - 1.0).abs() < 0.03;
     assert!(near(size("out/mine", "force"), 4e-3), "{}", size("out/mine", "force"));
     assert!(near(size("out/rig", "positive"), 80.0) && near(size("out/rig", "negative"), 40.0), "{}", size("out/rig", "positive"));
+}
+
+fn is_long() -> bool {
+    std::env::var("BACKDRIVE_LONG").as_deref() == Ok("1")
 }
 
 /// A command that a page shows, and what its line says of running it.
@@ -159,7 +172,7 @@ fn run_in_order(shown: Vec<Shown>) -> Vec<(String, i32)> {
     }
     let program = Path::new(env!("CARGO_BIN_EXE_backdrive")).parent().unwrap().display().to_string();
     let search = format!("{program}:{}", std::env::var("PATH").unwrap_or_default());
-    let is_long = std::env::var("BACKDRIVE_LONG").as_deref() == Ok("1");
+    let is_long = is_long();
     let mut codes = Vec::new();
     for Shown { command, .. } in shown.into_iter().filter(|shown| is_long || !shown.is_long) {
         let mut shell = Command::new("bash");

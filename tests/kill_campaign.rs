@@ -1,7 +1,7 @@
 //! Processes of runs are killed, stopped, terminated and interrupted at random moments: every run ends in bounded time with the documented
 //! exit code, leaves nothing behind, its bag can be read, and the force at the hand is gone within 20 ms.
 //!
-//! Four by default, 24 with `BACKDRIVE_LONG=1`, 150 with `BACKDRIVE_FULL=1`; `BACKDRIVE_SEED` draws others.
+//! Four by default, 12 with `BACKDRIVE_LONG=1`, 150 with `BACKDRIVE_FULL=1`; `BACKDRIVE_SEED` draws others.
 
 mod system;
 
@@ -229,7 +229,7 @@ fn whatever_is_struck_a_run_ends_clean_and_without_a_force() {
     let count = if asked("BACKDRIVE_FULL") {
         150
     } else if asked("BACKDRIVE_LONG") {
-        24
+        12
     } else {
         4
     };

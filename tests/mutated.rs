@@ -1,5 +1,5 @@
 //! Files that are damaged at random, through every verb that reads them: an answer or an error with a documented exit code, within seconds
-//! and a gigabyte, and never a panic. BACKDRIVE_LONG=1 tries 2000 of them.
+//! and a gigabyte, and never a panic. BACKDRIVE_LONG=1 tries 800 of them.
 
 #[path = "common/mutation.rs"]
 mod mutation;
@@ -169,7 +169,7 @@ fn taken(place: &Place, folder: &Path, verb: &[String]) -> Result<i32, String> {
 #[test]
 fn damaged_files_end_in_an_answer_or_an_error_within_seconds_and_a_gigabyte() {
     let long = std::env::var("BACKDRIVE_LONG").as_deref() == Ok("1");
-    let count = if long { 2000 } else { 100 };
+    let count = if long { 800 } else { 100 };
     let place = Place::new();
     let kinds = kinds(&place);
     for kind in &kinds {

@@ -206,7 +206,7 @@ fn a_change_of_gains_ramps() {
     }
 }
 
-/// Twenty seconds each at 5 and at 10 kHz with BACKDRIVE_LONG=1, a minute each with BACKDRIVE_FULL=1, else nothing.
+/// Ten seconds each at 5 and at 10 kHz with BACKDRIVE_LONG=1, a minute each with BACKDRIVE_FULL=1, else nothing.
 ///
 /// A shared machine may take the processor away for longer than any buffer holds, so at 5 kHz one whole run in three
 /// attempts is enough, and at 10 kHz, which takes most of two processors, only this is asked: a run that is not whole says so.
@@ -215,7 +215,7 @@ fn at_5_and_at_10_khz_is_recorded_whole_what_ran_in_real_time() {
     let asked = |name: &str| std::env::var(name).is_ok_and(|v| v == "1");
     let seconds = match (asked("BACKDRIVE_FULL"), asked("BACKDRIVE_LONG")) {
         (true, _) => 60,
-        (false, true) => 20,
+        (false, true) => 10,
         (false, false) => return skipped("a minute in real time; BACKDRIVE_LONG=1 runs it"),
     };
     let (_alone, place) = (alone(), Place::new());

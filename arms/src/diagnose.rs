@@ -117,6 +117,13 @@ pub fn diagnose(problem: &Problem, settings: &Settings) -> Result<Found, ArmErro
             backdrive_diagnosis::words::place(&place(&data, term))
         ));
     }
+    if data.most_tolerance == 0 {
+        notes.push(format!(
+            "{} has no motor, so its friction is known only in proportion to its inertia. Much of the torque of another joint is unexplained, so \
+             that inertia is the one of the file",
+            problem.passive().join(", ")
+        ));
+    }
     if cut_short {
         notes.push("the search was interrupted: what else is missing was not looked for to the end".to_string());
     }
@@ -194,6 +201,10 @@ fn next(plan: &Plan, problem: &Problem) -> NextExperiment {
         payload = Some(Box::new(PlannedPayload { mass_kg: known.mass, at_m: [x, y, z], link }));
     }
     sentence += ", and hold one of them out. ";
+    let passive = problem.passive();
+    if !passive.is_empty() {
+        sentence += &format!("It moves the joints with a motor; leave {} free, and log its position. ", passive.join(", "));
+    }
     let between: Vec<String> = plan.between.iter().map(|[a, b]| format!("{a} from {b}")).collect();
     sentence += &match (plan.separation, plan.without_payload) {
         (Some(apart), without) => {
@@ -213,7 +224,7 @@ fn next(plan: &Plan, problem: &Problem) -> NextExperiment {
     };
     NextExperiment::Planned(Planned {
         file: EXPERIMENT_FILE.to_string(),
-        input: "all joints".to_string(),
+        input: if passive.is_empty() { "all joints" } else { "all joints with a motor" }.to_string(),
         excitation: format!("Fourier series of 5 harmonics, {seconds} s a period, within the joints' limits"),
         sentence,
         between: if between.is_empty() { problem.joints.clone() } else { plan.between.iter().flatten().cloned().collect() },

@@ -24,6 +24,8 @@ const LOOKED_AT: usize = 60;
 pub const RATE: f64 = 100.0;
 /// Share of the joint's range that is used, and where the file has no limits, rad or m to either side.
 const USED: f64 = 0.8;
+/// Share of the largest singular value below which a combination of parameters does not show at all.
+const UNSEEN: f64 = 1e-9;
 /// See [`USED`].
 const REACH: f64 = 1.5;
 
@@ -82,12 +84,14 @@ impl Excitation {
         motion(problem, &self.series, self.seconds, (self.seconds * rate).round() as usize)
     }
 
-    /// Times and positions of all joints, as CSV, at [`RATE`].
+    /// Times and positions of all joints with a motor, as CSV, at [`RATE`].
     pub fn csv(&self, problem: &Problem) -> String {
         let motion = self.motion(problem, RATE);
-        let mut csv = format!("t,{}\n", problem.joints.iter().map(|j| format!("{j}.position")).collect::<Vec<_>>().join(","));
+        let driven: Vec<usize> = (0..problem.joints.len()).filter(|j| !problem.is_passive(*j)).collect();
+        let names: Vec<String> = driven.iter().map(|j| format!("{}.position", problem.joints[*j])).collect();
+        let mut csv = format!("t,{}\n", names.join(","));
         for i in 0..motion.len() {
-            let row: Vec<String> = motion.position.iter().map(|q| format!("{:.6}", q[i])).collect();
+            let row: Vec<String> = driven.iter().map(|j| format!("{:.6}", motion.position[*j][i])).collect();
             // Writing to a String cannot fail.
             let _ = writeln!(csv, "{:.3},{}", i as f64 / RATE, row.join(","));
         }
@@ -109,6 +113,14 @@ fn motion(problem: &Problem, series: &[Series], seconds: f64, count: usize) -> M
         payload: None,
     };
     for (j, coefficients) in series.iter().enumerate() {
+        if problem.is_passive(j) {
+            // It cannot be led along a path. Where the others throw it is not known beforehand, so its own equation does not count here.
+            let hangs = at_rest(problem, j);
+            out.position.push(vec![hangs; count]);
+            out.velocity.push(vec![0.0; count]);
+            out.acceleration.push(vec![0.0; count]);
+            continue;
+        }
         let limits = problem.tree.coordinates().get(j).and_then(|c| problem.robot.joints.get(c.joint)).map(|joint| joint.limits);
         let [low, high] = limits.and_then(|l| l.range).unwrap_or([-REACH, REACH]);
         let (low, high) = (low.max(-2.0 * REACH), high.min(2.0 * REACH));
@@ -137,6 +149,13 @@ fn motion(problem: &Problem, series: &[Series], seconds: f64, count: usize) -> M
     out
 }
 
+/// Where a joint without a motor is while it is not moved: the middle of its logged positions, rad or m.
+fn at_rest(problem: &Problem, joint: usize) -> f64 {
+    let logs = || problem.fit.iter().chain(&problem.held_out).flat_map(|log| log.position[joint].iter());
+    let count = logs().count().max(1) as f64;
+    logs().sum::<f64>() / count
+}
+
 fn condition(problem: &Problem, bases: &[Base], motion: &Motion) -> Result<f64, ArmError> {
     let columns = regressor(&problem.robot, &problem.bodies, motion, &[])?;
     let rows = motion.len() * problem.joints.len();
@@ -149,5 +168,11 @@ fn condition(problem: &Problem, bases: &[Base], motion: &Motion) -> Result<f64, 
         .collect();
     let matrix = DMatrix::from_fn(rows, flat.len(), |i, j| flat[j][i]);
     let values = matrix.singular_values();
-    Ok(values.max() / values.min().max(f64::MIN_POSITIVE))
+    let most = values.max();
+    // What no motor can show is the same for every motion.
+    let least = match problem.passive().is_empty() {
+        true => values.min(),
+        false => values.iter().copied().filter(|x| *x > UNSEEN * most).fold(most, f64::min),
+    };
+    Ok(most / least.max(f64::MIN_POSITIVE))
 }

@@ -28,6 +28,7 @@ pub mod left;
 pub mod log;
 pub mod motion;
 mod offers;
+mod passive;
 pub mod physics;
 pub mod problem;
 pub mod regression;

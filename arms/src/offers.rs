@@ -1,7 +1,7 @@
 //! What a search fits: a structure with a term more or less, the shape of the term, the tolerance of the bodies, the displacement of friction; and what of it is
 //! possible at all.
 
-use crate::fit::{Fit, Structure, TOLERANCES, Weights};
+use crate::fit::{Fit, Structure, Weights};
 use crate::physics::{Physics, Term};
 use crate::regression::Data;
 
@@ -165,6 +165,6 @@ pub(crate) fn slipped(data: &Data, fit: Fit, weights: &Weights) -> Fit {
 
 /// The tolerance of the inertial parameters that is worth its numbers.
 pub(crate) fn tolerated(data: &Data, fit: Fit, weights: &Weights) -> Fit {
-    let others = (0..TOLERANCES.len()).filter_map(|tolerance| data.fit(&Structure { tolerance, ..fit.structure.clone() }, weights));
+    let others = (0..=data.most_tolerance).filter_map(|tolerance| data.fit(&Structure { tolerance, ..fit.structure.clone() }, weights));
     others.fold(fit.clone(), |best, other| if other.score < best.score - 1e-9 { other } else { best })
 }

@@ -155,4 +155,14 @@ impl Problem {
             held_out,
         })
     }
+
+    /// Whether a joint has no motor, as the set states it.
+    pub fn is_passive(&self, joint: usize) -> bool {
+        self.columns.get(joint).is_some_and(|columns| columns.is_passive)
+    }
+
+    /// Names of the joints without a motor.
+    pub fn passive(&self) -> Vec<&str> {
+        self.joints.iter().enumerate().filter(|(j, _)| self.is_passive(*j)).map(|(_, name)| name.as_str()).collect()
+    }
 }

@@ -1,7 +1,7 @@
 //! The regression of the measured torque: rows, columns, weights, and a structure fitted to them.
 
 use crate::error::ArmError;
-use crate::fit::{Fit, Structure, Weights};
+use crate::fit::{Fit, Structure, TOLERANCES, Weights};
 use crate::inertial::{COUNT, Parameters};
 use crate::layout::{Block, Layout, blocks};
 use crate::motion::{Motion, Rates};
@@ -65,6 +65,10 @@ pub struct Data<'a> {
     pub unused: Vec<Unused>,
     /// By joint: what its torque is compared with, N m or N: the rms of that of the logs; of a joint without a motor of gravity's or of its inertia's.
     pub(crate) passive: Vec<Option<f64>>,
+    /// Of each joint without a motor: how the size of its equation follows the inertial parameters.
+    pub(crate) size: Vec<Option<DVector<f64>>>,
+    /// The highest of [`TOLERANCES`] that the bodies may have.
+    pub(crate) most_tolerance: usize,
 }
 
 impl<'a> Data<'a> {
@@ -119,6 +123,8 @@ impl<'a> Data<'a> {
             unsigned: vec![false; joints],
             unused: problem.unused.clone(),
             passive: vec![None; joints],
+            size: vec![None; joints],
+            most_tolerance: TOLERANCES.len() - 1,
         };
         data.torque = data.column(|m| data.motions[m].torque.iter().cloned().enumerate().collect());
         let mut by_parameter = Vec::new();
@@ -138,7 +144,8 @@ impl<'a> Data<'a> {
         let all = |m: usize| data.load[m].iter().cloned().enumerate().chain(along[m].iter().cloned()).collect();
         data.nominal = data.column(all);
         data.unsigned = unsigned(&logs, &data.motions, &data.load, joints);
-        data.passive = (0..joints).map(|j| problem.columns.get(j).is_some_and(|c| c.is_passive).then(|| data.passive_scale(j))).collect();
+        data.passive = (0..joints).map(|j| problem.is_passive(j).then(|| data.passive_scale(j))).collect();
+        data.size = (0..joints).map(|j| data.passive[j].and_then(|_| data.size_of(j))).collect();
         Ok(data)
     }
 
@@ -313,19 +320,19 @@ impl Data<'_> {
     /// Fits a structure with these weights.
     pub fn fit(&self, structure: &Structure, weights: &Weights) -> Option<Fit> {
         let (columns, places) = self.all_columns(structure);
-        let system = self.system_of(&columns, structure, weights);
-        let values = system.solve(None)?;
+        let (system, values) = self.settled(&columns, structure, weights)?;
         let of_folds: Vec<Option<DVector<f64>>> = (0..system.folds.len()).map(|f| system.solve(Some(f))).collect();
-        let predicted = |values: &DVector<f64>, row: usize| columns.iter().zip(values.iter()).map(|(c, x)| c[row] * x).sum::<f64>();
-        let left: Vec<f64> = self.torque.iter().zip(&self.nominal).map(|(t, n)| t - n).collect();
-        let residual: Vec<f64> = (0..self.layout.rows).map(|row| left[row] - predicted(&values, row)).collect();
+        let residual = self.residual_with(&columns, values.as_slice());
         let mut unseen = residual.clone();
-        for block in &self.blocks {
-            let Some(Some(values)) = block.fold.and_then(|f| of_folds.get(f)) else { continue };
-            for joint in 0..self.layout.joints {
-                let first = self.layout.of(block.motion, joint).start;
-                for row in first + block.rows.start..first + block.rows.end {
-                    unseen[row] = left[row] - predicted(values, row);
+        for (fold, values) in of_folds.iter().enumerate() {
+            let Some(values) = values else { continue };
+            let sizes = self.sizes(values.as_slice());
+            for block in self.blocks.iter().filter(|block| block.fold == Some(fold)) {
+                for (joint, size) in sizes.iter().enumerate() {
+                    let first = self.layout.of(block.motion, joint).start;
+                    for row in first + block.rows.start..first + block.rows.end {
+                        unseen[row] = self.left_of(&columns, values.as_slice(), row) / size;
+                    }
                 }
             }
         }
@@ -352,13 +359,7 @@ impl Data<'_> {
     /// Residuals of a fit that was made on other rows of the same logs.
     pub fn residual_of(&self, fit: &Fit) -> Vec<f64> {
         let (columns, _) = self.all_columns(&fit.structure);
-        let predicted = |row: usize| columns.iter().zip(&fit.values).map(|(c, x)| c[row] * x).sum::<f64>();
-        (0..self.layout.rows).map(|row| self.torque[row] - self.nominal[row] - predicted(row)).collect()
-    }
-
-    fn system_of(&self, columns: &[Column], structure: &Structure, weights: &Weights) -> System {
-        let left: Vec<f64> = self.torque.iter().zip(&self.nominal).map(|(t, n)| t - n).collect();
-        System::new(&self.layout, &self.blocks, &left, columns, structure.tolerance, weights, self.inertial.len())
+        self.residual_with(&columns, &fit.values)
     }
 
     /// Inertial parameters of a fit, by body.
@@ -452,10 +453,10 @@ impl Data<'_> {
     /// A fit whose inertial parameters are set, in their sizes; all other numbers are fitted again. Standard errors stay those of the fit.
     pub fn fit_beside(&self, fit: &Fit, inertial: &[f64], weights: &Weights) -> Option<Fit> {
         let (columns, _) = self.all_columns(&fit.structure);
-        let system = self.system_of(&columns, &fit.structure, weights);
         let n = self.inertial.len();
         let rest = columns.len() - n;
         let mut values = DVector::from_iterator(columns.len(), inertial.iter().copied().chain(std::iter::repeat_n(0.0, rest)));
+        let system = self.linearised(&columns, &fit.structure, weights, values.as_slice());
         if rest > 0 {
             let whole = &system.total + DMatrix::from_diagonal(&system.prior);
             let right = (&system.total_right - &whole * &values).rows(n, rest).into_owned();
@@ -464,10 +465,7 @@ impl Data<'_> {
             values.rows_mut(n, rest).copy_from(&solved);
         }
         let mut out = fit.clone();
-        for row in 0..self.layout.rows {
-            let predicted: f64 = columns.iter().zip(values.iter()).map(|(c, x)| c[row] * x).sum();
-            out.residual[row] = self.torque[row] - self.nominal[row] - predicted;
-        }
+        out.residual = self.residual_with(&columns, values.as_slice());
         out.values = values.iter().copied().collect();
         Some(out)
     }
@@ -475,9 +473,7 @@ impl Data<'_> {
     /// The system of a structure, for [`Data::promise`].
     pub fn system(&self, structure: &Structure, weights: &Weights) -> Option<(System, DVector<f64>)> {
         let (columns, _) = self.all_columns(structure);
-        let system = self.system_of(&columns, structure, weights);
-        let values = system.solve(None)?;
-        Some((system, values))
+        self.settled(&columns, structure, weights)
     }
 }
 

@@ -3,6 +3,7 @@
 use crate::consistent::consistent;
 use crate::error::ArmError;
 use crate::fit::{Fit, Structure, TOLERANCES, Weights};
+use crate::left::{Left, left};
 use crate::offers::{is_possible, ranked, shaped, slipped, tolerated, torque_share, with, without, without_term};
 use crate::physics::{Physics, Term, candidates};
 use crate::regression::Data;
@@ -72,9 +73,28 @@ pub struct Rival {
 /// Looks for what is missing. `without`: names of physics that are not considered; `most`: physics that are added at most; `stop`: set by whoever interrupts,
 /// which ends the search with what was found until then.
 ///
+/// Where a joint has no motor and much of the torque of one with a motor remains, the bodies stay those of the file: a law that is missing is no measurement of
+/// a mass, and the friction of a joint without a motor is known only in the size of its inertia.
+///
 /// # Errors
 /// Where a fit cannot be computed at all.
 pub fn search(data: &mut Data, without: &[String], most: usize, stop: &AtomicBool) -> Result<Search, ArmError> {
+    let found = search_within(data, without, most, stop)?;
+    if !(0..data.problem.joints.len()).any(|j| data.is_passive(j)) || found.best.structure.tolerance == 0 {
+        return Ok(found);
+    }
+    // Bodies that no body can be explain any torque.
+    let Some(bodies) = consistent(data, &found.best, &found.weights) else { return Ok(found) };
+    let remains = |(j, left): (usize, &Left)| !data.is_passive(j) && left.shows.is_some();
+    if !left(data, &bodies).iter().enumerate().any(remains) {
+        return Ok(found);
+    }
+    data.most_tolerance = 0;
+    data.see(&data.problem.bodies.nominal)?;
+    search_within(data, without, most, stop)
+}
+
+fn search_within(data: &mut Data, without: &[String], most: usize, stop: &AtomicBool) -> Result<Search, ArmError> {
     let failed = || ArmError::Robot("the regression has no solution; are all joints logged in motion?".to_string());
     let pool: Vec<Term> = candidates(data.problem, &data.motions[..data.fit_count])
         .into_iter()
@@ -115,10 +135,14 @@ pub fn search(data: &mut Data, without: &[String], most: usize, stop: &AtomicBoo
     Ok(Search { as_given, refit, best, weights, tried, gains, rivals, freed })
 }
 
-/// Whether the logs can say anything of a term: nothing of a joint whose torque has no sign, nor of a motor that is not there.
+/// Whether the logs can say anything of a term: nothing of a joint whose torque has no sign, nor of a motor or a gear that is not there. (Without a motor the
+/// load at a joint is its friction: friction in proportion to the load would be in proportion to itself.)
 fn may_be(data: &Data, term: &Term) -> bool {
     use crate::physics::At;
-    let of_a_motor = matches!(term.physics, Physics::Gain | Physics::Coupling | Physics::Delay | Physics::Compliance | Physics::Backlash);
+    let of_a_motor = matches!(
+        term.physics,
+        Physics::Gain | Physics::Coupling | Physics::Delay | Physics::Compliance | Physics::Backlash | Physics::LoadFriction
+    );
     let may = |j: usize| !(data.unsigned[j] || of_a_motor && data.is_passive(j));
     match term.at {
         At::Joint(j) => may(j),
@@ -139,7 +163,7 @@ fn first_weights(data: &Data, nominal: &Structure) -> Option<Weights> {
     for joint in 0..data.problem.joints.len() {
         for physics in [Physics::Damper, Physics::Coulomb, Physics::LoadFriction, Physics::Spring] {
             let term = Term::new(physics, At::Joint(joint), Vec::new());
-            if !rich.terms.iter().any(|t| t.is_like(&term)) {
+            if may_be(data, &term) && !rich.terms.iter().any(|t| t.is_like(&term)) {
                 rich.terms.push(term);
             }
         }
@@ -281,7 +305,7 @@ fn exchange(data: &Data, pool: &[Term], best: &mut Fit, weights: &Weights) {
             let less = without(&best.structure, index);
             let mut better: Option<Fit> = None;
             let there = best.structure.tolerance;
-            for tolerance in there.saturating_sub(1)..(there + 2).min(TOLERANCES.len()) {
+            for tolerance in there.saturating_sub(1)..(there + 2).min(data.most_tolerance + 1) {
                 let less = Structure { tolerance, ..less.clone() };
                 // Without it at all, where another tolerance makes it needless.
                 let mut offers: Vec<Fit> = data.fit(&less, weights).into_iter().collect();

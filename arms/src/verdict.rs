@@ -91,7 +91,10 @@ pub fn verdict(parts: Parts) -> Result<Verdict, ArmError> {
     let held_out = held_out(whole, &residuals);
     let unsigned: Vec<&str> =
         data.unsigned.iter().zip(&data.problem.joints).filter(|(is, _)| **is).map(|(_, name)| name.as_str()).collect();
-    let sentence = sentence(word, &findings, &arm, held, &unsigned);
+    let mut sentence = sentence(word, &findings, &arm, held, &unsigned);
+    if word != Word::NothingMissing && unsigned.is_empty() {
+        sentence += &passive(data, &moved);
+    }
     Ok(Verdict {
         schema: SCHEMA,
         word,
@@ -111,6 +114,23 @@ pub fn verdict(parts: Parts) -> Result<Verdict, ArmError> {
         arm: Some(Box::new(arm)),
         findings,
     })
+}
+
+/// Of each joint without a motor the parameters that its equation has moved, in sentences.
+fn passive(data: &Data, moved: &BTreeMap<String, Moved>) -> String {
+    let of_joint = |j: usize| {
+        let given = data.problem.given.iter().filter(|given| given.joint == j);
+        let paths = given.flat_map(|given| {
+            let prefix = format!("elements.{}.", given.name);
+            moved.iter().filter(move |(path, _)| path.starts_with(&prefix))
+        });
+        let said: Vec<String> = paths
+            .map(|(path, m)| format!("{} is {:.3e} (file: {:.3e})", path.trim_start_matches("elements."), m.value, m.nominal))
+            .collect();
+        let joint = &data.problem.joints[j];
+        (!said.is_empty()).then(|| format!(" By the equation of {joint}, which has no motor, {}.", said.join(", ")))
+    };
+    (0..data.problem.joints.len()).filter(|j| data.is_passive(*j)).filter_map(of_joint).collect()
 }
 
 fn shown(fit: &Fit) -> &[f64] {

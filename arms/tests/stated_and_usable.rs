@@ -7,7 +7,7 @@ use backdrive_arms::problem::Problem;
 use backdrive_arms::regression::{Data, parts_of};
 use backdrive_diagnosis::audit::Weight;
 use backdrive_diagnosis::hypothesis::Place;
-use backdrive_diagnosis::verdict::{Parameter, Word};
+use backdrive_diagnosis::verdict::{NextExperiment, Parameter, Word};
 use backdrive_plant::robot::{RobotFile, Tree};
 use backdrive_plant::set::RecordingSet;
 use common::{AS_STATED, Beside, URDF, series, set, write};
@@ -248,6 +248,49 @@ fn swing(seed: u64, damping: f64) -> Columns {
     out
 }
 
+/// A pendulum on a shoulder whose torque no law explains: `stated` is the elbow's damping in the file, that of the arm is 0.01.
+fn beside_a_riddle(folder: &Path, stated: &str, at_shoulder: fn(f64) -> f64) {
+    set(
+        folder,
+        &AS_STATED,
+        "[joints.shoulder]\nposition = \"q1\"\ntorque = \"tau1\"\n[joints.elbow]\nposition = \"q2\"\ntorque = 0\n",
+        |_| {},
+    );
+    std::fs::write(folder.join("arm.urdf"), URDF.replace("<dynamics damping=\"0.04\"/>", stated)).unwrap();
+    for (seed, name) in ["a.csv", "b.csv", "c.csv"].iter().enumerate() {
+        let mut columns = swing(seed as u64 + 5, 0.01);
+        for i in 0..columns[0].len() {
+            columns[5][i] = at_shoulder(columns[1][i]);
+        }
+        write(&folder.join(name), &columns);
+    }
+}
+
+#[test]
+fn the_friction_of_a_joint_without_a_motor_is_its_own_whatever_the_others_torque_is() {
+    let folder = tempfile::tempdir().unwrap();
+    let place = folder.path();
+    let near = |x: f64| (x - 0.01).abs() < 5e-4;
+    {
+        beside_a_riddle(place, "<dynamics damping=\"0.04\"/>", |q| 3.0 * q.sin());
+        let found = found(place);
+        let damping =
+            found.verdict.parameters.get("elements.elbow_damping.damping").unwrap_or_else(|| panic!("{:?}", found.verdict.sentence));
+        assert!(near(damping.value) && damping.nominal == 0.04, "{damping:?}");
+        let said = "By the equation of elbow, which has no motor, elbow_damping.damping is ";
+        assert!(found.verdict.sentence.contains(said), "{}", found.verdict.sentence);
+        let elbow = &found.verdict.arm.as_ref().unwrap().joints[1];
+        assert!(elbow.diagnosed < 0.02, "{elbow:?}");
+    }
+    // Not stated by the file, it is missing.
+    beside_a_riddle(place, "", |q| 3.0 * q.sin());
+    let found = found(place);
+    let elbow = Place::Between("elbow".to_string(), "ground".to_string());
+    let damper = found.verdict.findings.iter().find(|f| f.physics == "damper" && f.place == elbow);
+    let Some(Parameter::One(damping)) = damper.and_then(|f| f.parameters.get("damping")) else { panic!("{}", found.verdict.sentence) };
+    assert!(near(damping.value), "{damping:?}");
+}
+
 #[test]
 fn a_joint_without_a_motor_is_diagnosed_by_its_equation() {
     let folder = tempfile::tempdir().unwrap();
@@ -268,6 +311,11 @@ fn a_joint_without_a_motor_is_diagnosed_by_its_equation() {
     assert!(found.verdict.sentence.contains("viscous friction at the elbow"), "{}", found.verdict.sentence);
     let elbow = &found.verdict.arm.as_ref().unwrap().joints[1];
     assert!(elbow.diagnosed < 0.05 && elbow.loop_diagnosed.is_none_or(|share| share < 0.5), "{elbow:?}");
+
+    // What is planned next moves no joint that has no motor.
+    let Some(NextExperiment::Planned(planned)) = &found.verdict.next_experiment else { panic!("{:?}", found.verdict.next_experiment) };
+    assert!(found.experiment.starts_with("t,shoulder.position\n"), "{}", &found.experiment[..80]);
+    assert!(planned.sentence.contains("leave elbow free") && planned.input == "all joints with a motor", "{planned:?}");
 
     let set = place.join("set.toml");
     let wrong = std::fs::read_to_string(&set).unwrap().replace("torque = 0\n", "torque = 0.5\n");

@@ -1,5 +1,6 @@
 //! What can go wrong with a bag.
 
+use crate::offer::recover_command;
 use backdrive_msgs::ros::RosError;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
@@ -44,7 +45,7 @@ pub enum BagError {
         path: PathBuf,
     },
     /// Bytes inside it are wrong.
-    #[error("{}, byte {offset}: {what}; `backdrive bag recover` saves what is whole", path.display())]
+    #[error("{}, byte {offset}: {what}; `{}` saves what is whole", path.display(), recover_command(path))]
     Damaged {
         /// The file.
         path: PathBuf,
@@ -74,7 +75,7 @@ pub enum BagError {
         source: RosError,
     },
     /// The bag can no longer be written, and everything pushed from now on is lost.
-    #[error("{name}: writing stopped: {what}; what was written before is kept (`backdrive bag recover`)")]
+    #[error("{name}: writing stopped: {what}; what was written before is kept: {}", recover_command(Path::new(name)))]
     Write {
         /// The file.
         name: String,

@@ -2,6 +2,7 @@
 
 use crate::account::{Account, Fault};
 use crate::header::Clock;
+use crate::offer::recover_command;
 use crate::reader::TopicRef;
 use crate::{BagError, Reader};
 use serde::Serialize;
@@ -242,7 +243,7 @@ impl fmt::Display for BagInfo {
             writeln!(f, "  note: {note}")?;
         }
         if !self.ended_cleanly {
-            writeln!(f, "  the file was not closed; `backdrive bag recover` makes a clean copy")?;
+            writeln!(f, "  the file was not closed; `{}` makes a clean copy", recover_command(Path::new(&self.path)))?;
             writeln!(f, "  it has no end that tells, so all of it was read")?;
         }
         if let Some(damage) = &self.damage {

@@ -31,6 +31,7 @@ mod lerobot;
 mod memory;
 mod merge;
 mod number_type;
+mod offer;
 mod order;
 mod parquet_file;
 mod parquet_writer;
@@ -62,6 +63,7 @@ pub use lerobot::{CommandedAt, Contract, Episode, LerobotOptions, LerobotReport,
 pub use memory::MOST_BYTES;
 pub use merge::{MergeReport, merge};
 pub use number_type::NumberType;
+pub use offer::shell_word;
 pub use play::{PlayOptions, PlayReport, Sink, play};
 pub use reader::{Entry, Messages, Reader, TopicRef};
 pub use recorder::{Health, Recorder, RecorderOptions, WhenFull};

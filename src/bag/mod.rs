@@ -49,7 +49,7 @@ fn save(damaged: &Path, bag: &Path, overwrite: bool) -> Result<u8, Failure> {
         output::note(format_args!("warning: {}: {fault}", bag.display()));
     }
     for place in &report.damaged {
-        output::note(format_args!("warning: damaged: {}", place.trim_end_matches("; `backdrive bag recover` saves what is whole")));
+        output::note(format_args!("warning: damaged: {}", place.split("; `backdrive bag recover ").next().unwrap_or(place)));
     }
     if report.unconfirmed > 0 {
         output::note(format_args!(

@@ -34,9 +34,9 @@ group! {
         /// Numbers that a rival may have more than the chosen structure.
         rival_numbers: usize = 2, "numbers", Judgement("what needs more than one law more explains anything");
         /// Log-odds of a law: a constant, then one for each of its figures, see [`crate::equation_error::Figures`].
-        confidence: [f64; 7] = [0.0, 1.0, 0.0, 0.5, 0.0, 0.0, 0.0], "log-odds", Measured("`diagnosis/tests/concealed/calibrate_forces.py`; docs/diagnosis.md says on which cases");
+        confidence: [f64; 7] = [-0.101, 0.384, 1.099, 0.986, 1.346, 0.0, -1.314], "log-odds", Measured("`diagnosis/tests/concealed/calibrate_forces.py`; docs/diagnosis.md says on which cases");
         /// The same of its kind.
-        kind_confidence: [f64; 7] = [0.0, 1.0, 0.0, 0.5, 0.0, 0.0, 0.0], "log-odds", Measured("as `confidence`");
+        kind_confidence: [f64; 7] = [-0.256, 0.078, 0.809, 1.739, 0.861, 0.0, -0.967], "log-odds", Measured("as `confidence`");
         /// Confidence of all laws of a structure from which others that predict as well are not told beside it.
         claimed: f64 = 0.9, "probability", Judgement("as sure as a claim is called sure");
         /// Structures that are simulated and whose numbers are refined.

@@ -3,9 +3,10 @@
 //! Our own nodes (canceller, scaling, coupling) compute: what they put out follows from what they were given, so that a recording in which it does not
 //! contradicts itself, or is not of this graph. Devices are models: where one does something else, the model is wrong, which is no contradiction.
 
-use super::alone::{PutOut, alone, alone_at};
+use super::alone::{Alone, PutOut};
 use super::compared::{AsIf, Compared, Sensor, compare};
-use super::recorded::{Quantity, Recorded};
+use super::recorded::Quantity;
+use super::windows::{Window, in_windows};
 use crate::part_check::PartCheck;
 use backdrive_bags::{BagError, Reader};
 use backdrive_msgs::Gains;
@@ -23,8 +24,8 @@ pub struct Against {
     pub notes: Vec<String>,
 }
 
-/// Steps that are looked at, the first of a bag: memory for every sample of it is needed.
-const MOST_STEPS: u64 = 40_000;
+/// Steps that are looked at at once: memory for every sample of them is needed.
+const WINDOW: u64 = 40_000;
 
 /// Outputs that follow from inputs, by kind of node: port, quantity, whether each value is one that was given.
 const COMPUTED: &[(NodeKind, &str, Quantity, bool)] = &[
@@ -34,6 +35,10 @@ const COMPUTED: &[(NodeKind, &str, Quantity, bool)] = &[
     (NodeKind::Scaling, "force", Quantity::Effort, true),
     (NodeKind::Coupling, "command", Quantity::Position, false),
     (NodeKind::Coupling, "force", Quantity::Effort, false),
+    (NodeKind::Coupling, "to_far", Quantity::Position, false),
+    (NodeKind::Coupling, "to_far", Quantity::Effort, false),
+    (NodeKind::Coupling, "to_near", Quantity::Position, false),
+    (NodeKind::Coupling, "to_near", Quantity::Effort, false),
 ];
 
 /// The same of devices: the name of the part.
@@ -56,86 +61,167 @@ const SMALL_IN_LOCKSTEP: f64 = 0.01;
 /// The bag cannot be read.
 pub fn against(reader: &Reader, graph: &Graph) -> Result<Against, BagError> {
     let mut found = Against::default();
-    let recorded = Recorded::read_up_to(reader, MOST_STEPS)?;
-    if reader.counts().iter().any(|count| *count > MOST_STEPS) {
-        let seconds = MOST_STEPS as f64 * graph.period_s();
-        found.notes.push(format!(
-            "what the nodes make of their inputs was held against the first {seconds:.0} s of the recording, and not against the rest"
-        ));
+    let all: Vec<usize> = (0..graph.nodes.len()).filter(|index| !told(graph, *index).is_empty()).collect();
+    let mut of_nodes = look_at(reader, graph, &all, false)?;
+    // Somebody may have set other gains than the graph plans while it ran: those in force were recorded.
+    let contradicted: Vec<usize> =
+        all.iter().zip(&of_nodes).filter(|(_, of)| !of.contradictions.is_empty()).map(|(index, _)| *index).collect();
+    if !contradicted.is_empty() {
+        for (index, again) in contradicted.iter().zip(look_at(reader, graph, &contradicted, true)?) {
+            if let Some(of) = all.iter().position(|at| at == index).filter(|_| again.has_gains && again.contradictions.is_empty()) {
+                of_nodes[of] = again;
+            }
+        }
     }
     let mut looked_at: Vec<String> = Vec::new();
-    for (index, node) in graph.nodes.iter().enumerate() {
-        let computed =
-            COMPUTED.iter().filter(|told| told.0 == node.kind).map(|(_, port, quantity, exact)| (*port, *quantity, *exact, None));
-        let devices =
-            DEVICES.iter().filter(|told| told.0 == node.kind).map(|(_, port, quantity, part)| (*port, *quantity, false, Some(*part)));
-        let told: Vec<Told> = computed.chain(devices).collect();
-        if told.is_empty() || !is_ours(node) {
-            continue;
-        }
-        let put = match alone(graph, &node.name, &recorded) {
-            Ok(put) => put,
-            Err(error) => {
-                found.notes.push(format!("{}: what it makes of its inputs was not looked at: {error}", node.name));
-                continue;
-            }
-        };
-        let look = Look { graph, index, recorded: &recorded };
-        let mut of_node = look.at(&told, &put);
-        // Somebody may have set other gains than the graph plans while it ran: those in force were recorded.
-        if !of_node.contradictions.is_empty()
-            && let Some(gains) = gains_of(&recorded, node)
-            && let Ok(put) = alone_at(graph, &node.name, &recorded, &gains)
-        {
-            let again = look.at(&told, &put);
-            if again.contradictions.is_empty() {
-                of_node = again;
-            }
-        }
-        looked_at.append(&mut of_node.looked_at);
-        found.contradictions.append(&mut of_node.contradictions);
-        found.parts.append(&mut of_node.parts);
-        found.notes.append(&mut of_node.notes);
+    for mut of in of_nodes {
+        looked_at.append(&mut of.looked_at);
+        found.contradictions.extend(of.contradictions.iter().map(Contradiction::sentence));
+        found.parts.append(&mut of.parts);
+        found.notes.append(&mut of.notes);
+    }
+    if !found.parts.is_empty() && reader.counts().iter().any(|count| *count > WINDOW + WINDOW / 2) {
+        let seconds = WINDOW as f64 * graph.period_s();
+        found.notes.push(format!("the devices were held against their models in the first {seconds:.0} s of the recording alone"));
     }
     found.notes.extend(not_looked_at(reader, graph, &looked_at));
+    Ok(found)
+}
+
+/// The outputs of a node that are looked at.
+fn told(graph: &Graph, index: usize) -> Vec<Told> {
+    let Some(node) = graph.nodes.get(index).filter(|node| is_ours(node)) else { return Vec::new() };
+    let computed = COMPUTED.iter().filter(|told| told.0 == node.kind).map(|(_, port, quantity, exact)| (*port, *quantity, *exact, None));
+    let devices = DEVICES.iter().filter(|told| told.0 == node.kind).map(|(_, port, quantity, part)| (*port, *quantity, false, Some(*part)));
+    computed.chain(devices).collect()
+}
+
+/// Runs nodes by themselves along the whole recording, window by window; devices along its first window. `recorded_gains`: with the gains that were in force
+/// instead of those that the graph plans.
+fn look_at(reader: &Reader, graph: &Graph, nodes: &[usize], recorded_gains: bool) -> Result<Vec<Found>, BagError> {
+    let mut found: Vec<Found> = nodes.iter().map(|_| Found::default()).collect();
+    let mut running: Vec<Option<Alone>> = nodes.iter().map(|_| None).collect();
+    let mut begun = false;
+    in_windows(reader, WINDOW, |window| {
+        let nodes = nodes.iter().filter_map(|index| Some((*index, graph.nodes.get(*index)?)));
+        for ((index, node), (of, running)) in nodes.zip(found.iter_mut().zip(&mut running)) {
+            let told = told(graph, index);
+            if !begun {
+                match Alone::new(graph, &node.name, &window.recorded) {
+                    Ok(alone) => *running = Some(alone),
+                    Err(error) => of.notes.push(format!("{}: what it makes of its inputs was not looked at: {error}", node.name)),
+                }
+            }
+            let Some(alone) = running.as_mut() else { continue };
+            let gains = if recorded_gains { gains_of(window, node) } else { Vec::new() };
+            of.has_gains |= !gains.is_empty();
+            let put = alone.run(&window.recorded, window.origin, &gains);
+            Look { graph, index, window }.at(&told, &put, of);
+            if told.iter().all(|(.., part)| part.is_some()) {
+                *running = None;
+            }
+        }
+        begun = true;
+    })?;
+    for (index, of) in nodes.iter().zip(&mut found) {
+        let Some(node) = graph.nodes.get(*index) else { continue };
+        let absent: std::collections::BTreeSet<String> = of.absent.drain(..).filter(|topic| !of.looked_at.contains(topic)).collect();
+        let note = |topic| format!("{topic} was not recorded, so what {} makes of its inputs was not looked at", node.name);
+        of.notes.extend(absent.into_iter().map(note));
+    }
     Ok(found)
 }
 
 /// An output that is looked at: port, quantity, whether each value is one that was given, and the part where it is a device.
 type Told = (&'static str, Quantity, bool, Option<&'static str>);
 
-/// A node that is looked at.
+/// A node that is looked at in a window.
 struct Look<'a> {
     graph: &'a Graph,
     index: usize,
-    recorded: &'a Recorded,
+    window: &'a Window,
 }
 
 /// What was found of it.
 #[derive(Default)]
 struct Found {
-    contradictions: Vec<String>,
+    contradictions: Vec<Contradiction>,
     parts: Vec<PartCheck>,
     notes: Vec<String>,
     looked_at: Vec<String>,
+    /// Topics without a sample in some window.
+    absent: Vec<String>,
+    /// Whether gains in force were recorded.
+    has_gains: bool,
+}
+
+/// An output that is not what its node makes of its inputs.
+struct Contradiction {
+    /// Topic and quantity.
+    what: String,
+    topic: String,
+    node: String,
+    how: How,
+    /// Times between which it lies, s.
+    from_s: f64,
+    to_s: f64,
+}
+
+enum How {
+    /// Nothing comes in so many steps in which something is put out.
+    Silent(usize),
+    /// In words.
+    Differs(String),
+}
+
+impl Contradiction {
+    fn sentence(&self) -> String {
+        let Contradiction { what, topic, node, from_s, to_s, .. } = self;
+        match &self.how {
+            How::Silent(due) => format!("{topic} says nothing in {due} steps in which {node} puts something out"),
+            How::Differs(how) => {
+                format!("{what} is {how} what {node} makes of its recorded inputs, from {from_s:.3} s to {to_s:.3} s")
+            }
+        }
+    }
+}
+
+impl Found {
+    /// What goes on from one window to the next is one contradiction.
+    fn contradicts(&mut self, new: Contradiction) {
+        let before = self.contradictions.iter_mut().find(|old| old.what == new.what);
+        match before {
+            Some(old) => {
+                old.to_s = old.to_s.max(new.to_s);
+                match (&mut old.how, new.how) {
+                    (How::Silent(due), How::Silent(more)) => *due += more,
+                    (How::Silent(_), differs) => (old.how, old.from_s) = (differs, new.from_s),
+                    (How::Differs(_), _) => {}
+                }
+            }
+            None => self.contradictions.push(new),
+        }
+    }
 }
 
 impl Look<'_> {
     /// Holds what was recorded of the node against what it put out by itself.
-    fn at(&self, told: &[Told], put: &[PutOut]) -> Found {
-        let Look { graph, index, recorded } = *self;
+    fn at(&self, told: &[Told], put: &[PutOut], found: &mut Found) {
+        let Look { graph, index, window } = *self;
         let node = &graph.nodes[index];
-        let mut found = Found::default();
         let lockstep = graph.timing.clock == Clock::Lockstep;
         let small = if lockstep { SMALL_IN_LOCKSTEP } else { SMALL_IN_REALTIME };
+        let first_row = (window.recorded.first - window.origin) as usize;
         for (port, quantity, exact, part) in told {
             let topic = graph.topic_of(index, port).name;
             let Some(predicted) = put.iter().find(|put| put.topic == topic) else { continue };
-            let Some(track) = recorded.track(&topic) else {
-                found.notes.push(format!("{topic} was not recorded, so what {} makes of its inputs was not looked at", node.name));
+            let Some(track) = window.recorded.track(&topic) else {
+                found.absent.push(topic);
                 continue;
             };
-            found.looked_at.push(topic.clone());
+            if !found.looked_at.contains(&topic) {
+                found.looked_at.push(topic.clone());
+            }
             for axis in 0..node.axes {
                 let predicted: Vec<f64> = predicted.samples.iter().map(|sample| quantity.of(sample, axis)).collect();
                 let column = track.column(*quantity, axis);
@@ -143,13 +229,14 @@ impl Look<'_> {
                     Some(part) => found.parts.extend(device(part, axis, *quantity, column, &predicted, small)),
                     None => {
                         let sensor = Sensor { exact: *exact && !lockstep, small, ..Sensor::default() };
-                        let place = Place { topic: &topic, node, axis, quantity: *quantity, period_s: graph.period_s() };
-                        found.contradictions.extend(contradiction(&place, graph, column, &predicted, &sensor));
+                        let place = Place { topic: &topic, node, axis, quantity: *quantity, period_s: graph.period_s(), first_row };
+                        if let Some(new) = contradiction(&place, graph, column, &predicted, &sensor) {
+                            found.contradicts(new);
+                        }
                     }
                 }
             }
         }
-        found
     }
 }
 
@@ -163,11 +250,11 @@ fn is_ours(node: &Node) -> bool {
 }
 
 /// Gains that a node had in force, as it told them.
-fn gains_of(recorded: &Recorded, node: &Node) -> Option<Vec<Gains>> {
+fn gains_of(window: &Window, node: &Node) -> Vec<Gains> {
     let topic = format!("/{}/gains", node.name);
-    let mut gains: Vec<Gains> = recorded.gains.iter().filter(|(of, _)| *of == topic).map(|(_, gains)| *gains).collect();
+    let mut gains: Vec<Gains> = window.gains.iter().filter(|(of, _)| *of == topic).map(|(_, gains)| *gains).collect();
     gains.sort_by_key(|gains| gains.step);
-    (!gains.is_empty()).then_some(gains)
+    gains
 }
 
 /// Where in a bag something was compared.
@@ -177,15 +264,16 @@ struct Place<'a> {
     axis: usize,
     quantity: Quantity,
     period_s: f64,
+    /// Row of the recording at which the window begins.
+    first_row: usize,
 }
 
-/// The sentence of a contradiction; `None` where there is none.
-fn contradiction(place: &Place, graph: &Graph, recorded: &[f64], predicted: &[f64], sensor: &Sensor) -> Option<String> {
+/// A contradiction; `None` where there is none.
+fn contradiction(place: &Place, graph: &Graph, recorded: &[f64], predicted: &[f64], sensor: &Sensor) -> Option<Contradiction> {
     let absent = || {
         let due = predicted.iter().filter(|x| x.is_finite() && **x != 0.0).count();
         let there = recorded.iter().filter(|x| x.is_finite()).count();
-        (due >= 64 && there * 50 < due)
-            .then(|| format!("{} says nothing in {due} steps in which {} puts something out", place.topic, place.node.name))
+        (due >= 64 && there * 50 < due).then(|| place.contradicted(How::Silent(due), 0, predicted.len()))
     };
     let Some(compared) = compare(recorded, predicted, sensor, place.period_s) else { return absent() };
     let bridged = (graph.stale_after_s / place.period_s) as usize;
@@ -199,10 +287,10 @@ fn contradiction(place: &Place, graph: &Graph, recorded: &[f64], predicted: &[f6
             is_realtime && compared.share < UNEXPLAINED_IN_REALTIME
         }
     };
-    (!fine).then(|| sentence(place, &compared, recorded, predicted))
+    (!fine).then(|| differs(place, &compared, recorded, predicted))
 }
 
-fn sentence(place: &Place, compared: &Compared, recorded: &[f64], predicted: &[f64]) -> String {
+fn differs(place: &Place, compared: &Compared, recorded: &[f64], predicted: &[f64]) -> Contradiction {
     let size = predicted.iter().filter(|x| x.is_finite()).fold(0.0_f64, |m, x| m.max(x.abs()));
     let differs = |row: &usize| {
         let (is, due) = (recorded[*row], predicted[*row]);
@@ -230,18 +318,28 @@ fn sentence(place: &Place, compared: &Compared, recorded: &[f64], predicted: &[f
         _ if is_factor => format!("{gain:.4} times"),
         _ => format!("{:.0} % apart from", 100.0 * compared.share),
     };
-    let of = match place.quantity {
-        Quantity::Position => "position",
-        Quantity::Effort => "force",
-    };
-    let axis = place.node.axis_names.get(place.axis).filter(|_| place.node.axes > 1).map_or(String::new(), |name| format!(", axis {name}"));
-    format!(
-        "{} (its {of}{axis}) is {how} what {} makes of its recorded inputs, from {:.3} s to {:.3} s",
-        place.topic,
-        place.node.name,
-        first as f64 * place.period_s,
-        last as f64 * place.period_s
-    )
+    place.contradicted(How::Differs(how), first, last)
+}
+
+impl Place<'_> {
+    /// Between two rows of the window.
+    fn contradicted(&self, how: How, first: usize, last: usize) -> Contradiction {
+        let of = match self.quantity {
+            Quantity::Position => "position",
+            Quantity::Effort => "force",
+        };
+        let axis =
+            self.node.axis_names.get(self.axis).filter(|_| self.node.axes > 1).map_or(String::new(), |name| format!(", axis {name}"));
+        let at = |row: usize| (self.first_row + row) as f64 * self.period_s;
+        Contradiction {
+            what: format!("{} (its {of}{axis})", self.topic),
+            topic: self.topic.to_owned(),
+            node: self.node.name.clone(),
+            how,
+            from_s: at(first),
+            to_s: at(last),
+        }
+    }
 }
 
 /// A device beside its model.

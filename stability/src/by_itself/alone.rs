@@ -12,6 +12,7 @@ use backdrive_nodes::build::{BuildError, plan};
 use backdrive_nodes::graph::Graph;
 use backdrive_nodes::sequence::{Sequence, SequenceError};
 use backdrive_nodes::stage::{NodePlan, OutputPort, Stage};
+use std::sync::{Arc, Mutex};
 
 /// Why a node cannot be run by itself.
 #[derive(Debug, thiserror::Error)]
@@ -33,17 +34,95 @@ pub struct PutOut {
     pub samples: Vec<Sample>,
 }
 
+/// Recorded samples that are played, and the step of the first of them.
+#[derive(Default)]
+struct Reel {
+    track: Option<Track>,
+    first: u64,
+}
+
 /// Plays recorded samples, one per step.
 struct Player {
-    track: Option<Track>,
+    reel: Arc<Mutex<Reel>>,
 }
 
 impl Core for Player {
     fn step(&mut self, tick: &Tick, _: &[Port], outputs: &mut [Sample], _: &mut Events) {
-        let sample = self.track.as_ref().and_then(|t| t.sample(tick.step as usize));
+        let Ok(reel) = self.reel.lock() else { return };
+        let row = tick.step.checked_sub(reel.first);
+        let sample = reel.track.as_ref().zip(row).and_then(|(track, row)| track.sample(row as usize));
         if let (Some(sample), Some(output)) = (sample, outputs.first_mut()) {
             *output = sample;
         }
+    }
+}
+
+/// A node by itself, fed window by window: what it remembers stays from one to the next.
+pub(crate) struct Alone {
+    sequence: Sequence,
+    reels: Vec<(String, Arc<Mutex<Reel>>)>,
+    /// Its outputs, with their numbers in the sequence.
+    outputs: Vec<(String, usize)>,
+    /// Rows that it has done.
+    rows: u64,
+    /// Gains that it has been given.
+    given: usize,
+}
+
+impl Alone {
+    /// Joins a node to players. `recorded` says how many axes each input has.
+    pub(crate) fn new(graph: &Graph, name: &str, recorded: &Recorded) -> Result<Alone, AloneError> {
+        let node = plan(graph, name)?;
+        let side = |part: &str| Topic { name: format!("/recorded/{part}"), kind: Kind::Event };
+        let mut inputs: Vec<Topic> = Vec::new();
+        for port in node.stages.iter().flat_map(|s| &s.inputs) {
+            if !inputs.contains(&port.topic) && !is_own(&node, &port.topic) && port.name != backdrive_nodes::stage::PACE_PORT {
+                inputs.push(port.topic.clone());
+            }
+        }
+        let reels: Vec<(String, Arc<Mutex<Reel>>)> = inputs.iter().map(|topic| (topic.name.clone(), Arc::default())).collect();
+        let stages = inputs.into_iter().zip(&reels).map(|(topic, (_, reel))| {
+            let axes = recorded.track(&topic.name).map_or(1, Track::axes);
+            let output = OutputPort { name: topic.name.clone(), topic, axes };
+            let core = Box::new(Player { reel: Arc::clone(reel) });
+            Stage { name: output.name.clone(), inputs: Vec::new(), outputs: vec![output], core }
+        });
+        let players = NodePlan {
+            name: "recorded".to_string(),
+            stages: stages.collect(),
+            events: side("events"),
+            status: side("status"),
+            gains_in: None,
+            gains_out: None,
+            margin_out: None,
+        };
+        let outputs: Vec<String> = node.stages.iter().flat_map(|s| &s.outputs).map(|o| o.topic.name.clone()).collect();
+        let sequence = Sequence::new(vec![players, node], &graph.timing)?;
+        let outputs = outputs.into_iter().filter_map(|o| sequence.sample_topic(&o).map(|number| (o, number))).collect();
+        Ok(Alone { sequence, reels, outputs, rows: 0, given: 0 })
+    }
+
+    /// The rows that follow those before. `origin`: step of the recording's first row; `gains`: in force from their steps on, in order.
+    pub(crate) fn run(&mut self, recorded: &Recorded, origin: u64, gains: &[Gains]) -> Vec<PutOut> {
+        for (topic, reel) in &self.reels {
+            if let Ok(mut reel) = reel.lock() {
+                *reel = Reel { track: recorded.track(topic).cloned(), first: self.rows };
+            }
+        }
+        let samples = || Vec::with_capacity(recorded.rows);
+        let mut put: Vec<PutOut> = self.outputs.iter().map(|(topic, _)| PutOut { topic: topic.clone(), samples: samples() }).collect();
+        for _ in 0..recorded.rows {
+            while let Some(due) = gains.get(self.given).filter(|due| due.step <= origin + self.rows) {
+                self.sequence.set_gains(Gains { step: self.rows, ramp_s: 0.0, ..*due });
+                self.given += 1;
+            }
+            self.sequence.step(None);
+            self.rows += 1;
+            for ((_, number), put) in self.outputs.iter().zip(&mut put) {
+                put.samples.extend(self.sequence.sample(*number).copied());
+            }
+        }
+        put
     }
 }
 
@@ -52,54 +131,7 @@ impl Core for Player {
 /// # Errors
 /// A node that cannot be built, such as one that only the user's own program knows.
 pub fn alone(graph: &Graph, name: &str, recorded: &Recorded) -> Result<Vec<PutOut>, AloneError> {
-    alone_at(graph, name, recorded, &[])
-}
-
-/// The same with gains in force from their steps on, in order, in the place of what the graph plans.
-///
-/// # Errors
-/// As [`alone`].
-pub fn alone_at(graph: &Graph, name: &str, recorded: &Recorded, gains: &[Gains]) -> Result<Vec<PutOut>, AloneError> {
-    let node = plan(graph, name)?;
-    let side = |part: &str| Topic { name: format!("/recorded/{part}"), kind: Kind::Event };
-    let mut inputs: Vec<Topic> = Vec::new();
-    for port in node.stages.iter().flat_map(|s| &s.inputs) {
-        if !inputs.contains(&port.topic) && !is_own(&node, &port.topic) && port.name != backdrive_nodes::stage::PACE_PORT {
-            inputs.push(port.topic.clone());
-        }
-    }
-    let stages = inputs.into_iter().map(|topic| {
-        let track = recorded.track(&topic.name).cloned();
-        let axes = track.as_ref().map_or(1, Track::axes);
-        let output = OutputPort { name: topic.name.clone(), topic, axes };
-        Stage { name: output.name.clone(), inputs: Vec::new(), outputs: vec![output], core: Box::new(Player { track }) }
-    });
-    let players = NodePlan {
-        name: "recorded".to_string(),
-        stages: stages.collect(),
-        events: side("events"),
-        status: side("status"),
-        gains_in: None,
-        gains_out: None,
-        margin_out: None,
-    };
-    let outputs: Vec<String> = node.stages.iter().flat_map(|s| &s.outputs).map(|o| o.topic.name.clone()).collect();
-    let mut sequence = Sequence::new(vec![players, node], &graph.timing)?;
-    let numbers: Vec<(String, usize)> = outputs.into_iter().filter_map(|o| sequence.sample_topic(&o).map(|n| (o, n))).collect();
-    let mut put: Vec<PutOut> =
-        numbers.iter().map(|(topic, _)| PutOut { topic: topic.clone(), samples: Vec::with_capacity(recorded.rows) }).collect();
-    let mut gains = gains.iter().peekable();
-    for row in 0..recorded.rows {
-        let now = recorded.first + row as u64;
-        while let Some(due) = gains.next_if(|due| due.step <= now) {
-            sequence.set_gains(Gains { step: row as u64, ramp_s: 0.0, ..*due });
-        }
-        sequence.step(None);
-        for ((_, number), put) in numbers.iter().zip(&mut put) {
-            put.samples.extend(sequence.sample(*number).copied());
-        }
-    }
-    Ok(put)
+    Ok(Alone::new(graph, name, recorded)?.run(recorded, recorded.first, &[]))
 }
 
 fn is_own(node: &NodePlan, topic: &Topic) -> bool {

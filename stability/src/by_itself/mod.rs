@@ -8,3 +8,4 @@ pub mod alone;
 pub mod compared;
 pub mod recorded;
 mod ways;
+mod windows;

@@ -59,34 +59,16 @@ impl Recorded {
     /// # Errors
     /// A bag that cannot be read.
     pub fn read(reader: &Reader) -> Result<Recorded, BagError> {
-        Recorded::read_up_to(reader, MOST_STEPS)
-    }
-
-    /// The same, its first `most` steps.
-    ///
-    /// # Errors
-    /// A bag that cannot be read.
-    pub fn read_up_to(reader: &Reader, most: u64) -> Result<Recorded, BagError> {
         let mut recorded = Recorded::default();
-        let mut of_topic: Vec<Option<usize>> = vec![None; reader.topics().len()];
+        let mut places: Vec<Option<usize>> = vec![None; reader.topics().len()];
         let mut first = None;
         for entry in reader.messages()? {
             let entry = entry?;
             match entry.message(reader.path())? {
                 Some(Message::Sample(sample)) => {
-                    let first = *first.get_or_insert(sample.step);
-                    let Some(row) = sample.step.checked_sub(first).filter(|r| *r < most) else { continue };
-                    let known = of_topic.get(entry.topic.index).copied().flatten();
-                    let place = known.unwrap_or_else(|| {
-                        recorded.tracks.push(Track::new(&entry.topic.name, sample.len()));
-                        recorded.tracks.len() - 1
-                    });
-                    if let Some(slot) = of_topic.get_mut(entry.topic.index) {
-                        *slot = Some(place);
-                    }
-                    recorded.rows = recorded.rows.max(row as usize + 1);
-                    if let Some(track) = recorded.tracks.get_mut(place) {
-                        track.put(row as usize, &sample);
+                    recorded.first = *first.get_or_insert(sample.step);
+                    if sample.step.checked_sub(recorded.first).is_some_and(|row| row < MOST_STEPS) {
+                        recorded.put(&mut places, entry.topic.index, &entry.topic.name, &sample);
                     }
                 }
                 Some(Message::Gains(gains)) => recorded.gains.push((entry.topic.name.clone(), gains)),
@@ -99,10 +81,45 @@ impl Recorded {
                 _ => {}
             }
         }
-        recorded.first = first.unwrap_or(0);
-        let rows = recorded.rows;
-        recorded.tracks.iter_mut().for_each(|t| t.reach(rows));
+        recorded.level();
         Ok(recorded)
+    }
+
+    /// Puts a sample into its row; one from before the first row is left out. `places`: where the track of each topic is.
+    pub(crate) fn put(&mut self, places: &mut [Option<usize>], topic: usize, name: &str, sample: &Sample) {
+        let Some(row) = sample.step.checked_sub(self.first) else { return };
+        let known = places.get(topic).copied().flatten();
+        let place = known.unwrap_or_else(|| {
+            self.tracks.push(Track::new(name, sample.len()));
+            self.tracks.len() - 1
+        });
+        if let Some(slot) = places.get_mut(topic) {
+            *slot = Some(place);
+        }
+        self.rows = self.rows.max(row as usize + 1);
+        if let Some(track) = self.tracks.get_mut(place) {
+            track.put(row as usize, sample);
+        }
+    }
+
+    /// Gives every track as many rows as there are.
+    pub(crate) fn level(&mut self) {
+        let rows = self.rows;
+        self.tracks.iter_mut().for_each(|t| t.reach(rows));
+    }
+
+    /// Keeps the first `rows` rows, and returns those behind them.
+    pub(crate) fn split_off(&mut self, rows: usize) -> Recorded {
+        self.rows = self.rows.max(rows);
+        self.level();
+        let rest = Recorded {
+            first: self.first + rows as u64,
+            rows: self.rows - rows,
+            tracks: self.tracks.iter_mut().map(|track| track.split_off(rows)).collect(),
+            ..Recorded::default()
+        };
+        self.rows = rows;
+        rest
     }
 
     /// The rows before everything leaves all bounds: `bounds` is what a position of `topic` keeps within. What comes after is no motion of a device any
@@ -173,6 +190,19 @@ impl Track {
         columns.for_each(|c| c.resize(rows, f64::NAN));
         self.flags.resize(rows, 0);
         self.came.resize(rows, false);
+    }
+
+    fn split_off(&mut self, rows: usize) -> Track {
+        let behind = |columns: &mut Vec<Vec<f64>>| columns.iter_mut().map(|column| column.split_off(rows)).collect();
+        Track {
+            topic: self.topic.clone(),
+            position: behind(&mut self.position),
+            velocity: behind(&mut self.velocity),
+            effort: behind(&mut self.effort),
+            flags: self.flags.split_off(rows),
+            came: self.came.split_off(rows),
+            sources: self.sources.clone(),
+        }
     }
 
     fn put(&mut self, row: usize, sample: &Sample) {

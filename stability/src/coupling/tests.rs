@@ -160,7 +160,8 @@ fn one_way_and_nothing_are_told() {
 fn intervals_hold_the_truth_about_as_often_as_they_say() {
     let truth = law(&POSITION, 1.2e-3, 0.5e-3);
     let (mut inside, mut all) = (0, 0);
-    for seed in 10..20 {
+    let last = if std::env::var("BACKDRIVE_LONG").as_deref() == Ok("1") { 20 } else { 14 };
+    for seed in 10..last {
         let mut recorded = session(&truth, &truth, seed, 4.0);
         // What a recorder adds to a force: noise with a memory, larger where more moves.
         let mut random = rand_chacha::ChaCha8Rng::seed_from_u64(1000 + seed);
@@ -177,7 +178,7 @@ fn intervals_hold_the_truth_about_as_often_as_they_say() {
             all += 1;
         }
     }
-    // 95 % of about 20: fewer than 15 would come by chance once in ten thousand times.
+    // 95 % of about 20: fewer than 15 would come by chance once in ten thousand times. Of 8, fewer than 6 once in two hundred; the seeds are fixed.
     assert!(inside * 20 >= all * 15, "{inside} of {all}");
 }
 

@@ -1,9 +1,10 @@
 //! The roles file: which field of which topic, or which column of a table, is which signal.
 
+use crate::outcome::Unit;
 use crate::signal_role::{SessionError, SignalRole};
 use backdrive_bags::Signal;
 use backdrive_plant::elements::Range;
-use backdrive_plant::model::Hold;
+use backdrive_plant::model::{Hold, Motion};
 use backdrive_plant::tomlfile::{FileError, Table};
 use std::path::Path;
 
@@ -31,6 +32,8 @@ pub struct Roles {
 pub struct AxisRoles {
     /// Name of the axis.
     pub name: String,
+    /// Whether it slides or turns; unknown where the roles file does not say.
+    pub unit: Unit,
     pub(super) signals: Vec<(SignalRole, Located)>,
 }
 
@@ -93,6 +96,7 @@ impl Roles {
 
     pub(super) fn read(mut top: Table) -> Result<Roles, FileError> {
         let names = top.strings("axes")?;
+        let units = read_units(&mut top)?;
         let mut signals = top.table("signals")?.ok_or_else(|| top.missing("signals"))?;
         let mut axes: Vec<AxisRoles> = Vec::new();
         let mut first_key = "";
@@ -111,7 +115,7 @@ impl Roles {
             }
             if axes.is_empty() {
                 first_key = key;
-                let blank = |index| AxisRoles { name: format!("axis{index}"), signals: Vec::new() };
+                let blank = |index| AxisRoles { name: format!("axis{index}"), unit: Unit::Unknown, signals: Vec::new() };
                 axes = (0..found.len()).map(blank).collect();
             }
             if found.len() != axes.len() {
@@ -129,6 +133,14 @@ impl Roles {
             for (axis, name) in axes.iter_mut().zip(names) {
                 axis.name = name;
             }
+        }
+        if units.len() > 1 && units.len() != axes.len() {
+            return Err(
+                top.error_at("motion", format!("has {} words, but [signals] has {} axes; one word serves all", units.len(), axes.len()))
+            );
+        }
+        for (axis, unit) in axes.iter_mut().zip(units.iter().cycle()) {
+            axis.unit = *unit;
         }
         let (mut mu, mut lambda, mut rate_hz) = (None, None, None);
         if let Some(mut gains) = top.table("gains")? {
@@ -159,6 +171,17 @@ pub(super) fn key_of(role: SignalRole) -> &'static str {
 
 pub(super) fn is_required(role: SignalRole) -> bool {
     KEYS.iter().any(|(_, r, required, _)| *r == role && *required)
+}
+
+/// `motion = "rotation"`: one word for all axes, or one per axis; none where the key is absent.
+fn read_units(table: &mut Table) -> Result<Vec<Unit>, FileError> {
+    let words = table.string_or_strings("motion")?.unwrap_or_default();
+    let unit = |word: &String| match word.as_str() {
+        "translation" => Ok(Unit::of(Motion::Translation)),
+        "rotation" => Ok(Unit::of(Motion::Rotation)),
+        _ => Err(table.error_at("motion", format!("expected \"translation\" (m, N) or \"rotation\" (rad, N m), found \"{word}\""))),
+    };
+    words.iter().map(unit).collect()
 }
 
 /// A string, a table, or a list of one of them, one entry per axis; none where the key is absent.
@@ -252,6 +275,16 @@ mod tests {
     }
 
     #[test]
+    fn an_axis_slides_or_turns_as_it_is_said() {
+        let units = |key: &str| -> Vec<Unit> {
+            Roles::from_toml(&format!("{key}{GOOD}"), "r.toml").unwrap().axes.iter().map(|axis| axis.unit).collect()
+        };
+        assert_eq!(units(""), [Unit::Unknown; 2]);
+        assert_eq!(units("motion = \"rotation\"\n"), [Unit::Radian; 2]);
+        assert_eq!(units("motion = [\"translation\", \"rotation\"]\n"), [Unit::Metre, Unit::Radian]);
+    }
+
+    #[test]
     fn what_is_wrong_is_said_with_its_line() {
         let says = |text: &str, what: &[&str]| {
             let error = Roles::from_toml(text, "r.toml").unwrap_err().to_string();
@@ -265,6 +298,8 @@ mod tests {
         says(&GOOD.replace("scale = -1.0", "scale = 0"), &["r.toml:4", "must not be 0"]);
         says(&GOOD.replace("mu = 2.0", "mu = -2.0"), &["mu", "above 0"]);
         says(&GOOD.replace("\"x\", \"y\"", "\"x\""), &["r.toml:1", "axes"]);
+        says(&format!("motion = \"turning\"\n{GOOD}"), &["r.toml:1", "motion", "rotation", "turning"]);
+        says(&format!("motion = [\"rotation\", \"rotation\", \"rotation\"]\n{GOOD}"), &["r.toml:1", "motion", "has 3 words", "2 axes"]);
         says(&format!("{GOOD}[resample]\nrate = 5\n"), &["resample", "rate"]);
         says(&format!("{TABLE}gauge = {{ column = \"g\", of = \"F_x\" }}\n"), &["sensors.gauge.of", "F_x"]);
         says(&TABLE.replace("tau_s = \"ts\"\n", ""), &["x_c", "commanded"]);

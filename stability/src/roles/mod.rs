@@ -34,7 +34,6 @@ mod table;
 pub use file::{AxisRoles, Roles};
 
 use crate::grid::{Grid, Ordered, step_of};
-use crate::outcome::Unit;
 use crate::session::{AxisSignals, Session};
 use crate::signal_role::{SessionError, SignalRole};
 use crate::unjudged::{BRIDGED_S, Unjudged};
@@ -86,7 +85,7 @@ impl Session {
         let mut next = 0;
         for told in &roles.axes {
             let mut axis =
-                AxisSignals { name: told.name.clone(), clamped: vec![false; grid.rows], unit: Unit::Unknown, ..AxisSignals::default() };
+                AxisSignals { name: told.name.clone(), clamped: vec![false; grid.rows], unit: told.unit, ..AxisSignals::default() };
             for (role, located) in &told.signals {
                 let Some(signal) = ordered.get(next) else { break };
                 next += 1;

@@ -87,6 +87,9 @@ mod tests {
         let roles = Roles::from_toml(ROLES, "roles.toml").unwrap();
         let session = Session::from_roles(&path, &roles).unwrap();
         let axis = &session.axes[0];
+        let turning = Roles::from_toml(&format!("motion = \"rotation\"\n{ROLES}"), "roles.toml").unwrap();
+        let turning = Session::from_roles(&path, &turning).unwrap();
+        assert_eq!((axis.unit.text(0.05), turning.axes[0].unit.text(0.05)), ("0.0500 (m or rad)".to_string(), "0.050 rad".to_string()));
         assert!((session.period_s - 1e-3).abs() < 1e-12 && session.len() == 4000);
         assert!((axis.slave.as_ref().unwrap()[1000] - axis.master[1000]).abs() < 1e-9, "millimetres, and a scale of 2");
         assert_eq!(axis.command, axis.master);
