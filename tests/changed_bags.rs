@@ -419,7 +419,8 @@ fn no_verb_is_green_of_a_bag_whose_change_matters_and_none_loses_its_answer_by_o
     } else {
         30
     };
-    let only: Option<Vec<usize>> = std::env::var("BACKDRIVE_CASES").ok().map(|list| list.split(',').map(|n| n.trim().parse().unwrap()).collect());
+    let only: Option<Vec<usize>> =
+        std::env::var("BACKDRIVE_CASES").ok().map(|list| list.split(',').map(|n| n.trim().parse().unwrap()).collect());
     let place = Place::new();
     let bases = bases(&place);
     let bases = if full || long { &bases[..] } else { &bases[..3] };

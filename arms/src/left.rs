@@ -2,11 +2,11 @@
 //!
 //! Only rows in which the joint moves count: at rest dry friction is anything between its levels, and says nothing of a law.
 
-use backdrive_diagnosis::low_pass::{LowPass, derivative};
 use crate::fit::Fit;
 use crate::log::Log;
 use crate::motion::{ORDER, power_below};
 use crate::regression::{Data, correlation_time};
+use backdrive_diagnosis::low_pass::{LowPass, derivative};
 use backdrive_diagnosis::verdict::Where;
 use nalgebra::DMatrix;
 use std::ops::Range;

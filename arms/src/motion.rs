@@ -4,8 +4,8 @@
 //! "parallel filtering" of Gautier, Dynamic identification of robots with power model, ICRA 1997), so that what the filter takes off is the same on both
 //! sides, and one sample in several is kept.
 
-use backdrive_diagnosis::low_pass::{LowPass, derivative};
 use crate::log::Log;
+use backdrive_diagnosis::low_pass::{LowPass, derivative};
 use backdrive_plant::model::Hold;
 use backdrive_plant::recording::resample;
 use backdrive_plant::robot::Payload;

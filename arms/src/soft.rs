@@ -10,9 +10,9 @@
 //! (the elastic joint of M. Spong, ASME J. Dyn. Sys. 109 (1987) 310-319, with the motor's motion given), with the other joints as they were measured. f is k δ with a little damping, or 0 within the gap and that of a stiff stop beyond. What this changes in the torque of every joint
 //! is then read from the inverse dynamics of the arm in its altered motion.
 
-use backdrive_diagnosis::low_pass::{LowPass, derivative};
 use crate::motion::{Motion, ORDER};
 use crate::rigid::{Signals, difference};
+use backdrive_diagnosis::low_pass::{LowPass, derivative};
 use backdrive_plant::robot::Tree;
 use std::f64::consts::TAU;
 

@@ -9,7 +9,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     for set in std::env::args().skip(1) {
         let problem = Problem::open(Path::new(&set), None)?;
         let found = figures_of(&problem).into_iter();
-        let laws: Vec<_> = found.map(|(physics, [law, kind])| serde_json::json!({ "physics": physics, "law": law.list(), "kind": kind.list() })).collect();
+        let laws: Vec<_> =
+            found.map(|(physics, [law, kind])| serde_json::json!({ "physics": physics, "law": law.list(), "kind": kind.list() })).collect();
         println!("{}", serde_json::json!({ "set": set, "claimed": laws }));
     }
     Ok(())

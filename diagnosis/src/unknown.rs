@@ -147,6 +147,7 @@ mod tests {
             before,
             outliers: Vec::new(),
             logged: None,
+            low_pass: None,
         }
     }
 

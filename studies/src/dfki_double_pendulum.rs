@@ -6,7 +6,7 @@
 use crate::run::{Ask, LIKELY, diagnose, diagnosed_model, errors_of, findings, instead, parameter, percent, read, said, total, write};
 use crate::table::Report;
 use crate::{Context, Study, StudyError, csv_columns};
-use backdrive_arms::filter::{LowPass, derivative};
+use backdrive_diagnosis::low_pass::{LowPass, derivative};
 use backdrive_diagnosis::problem::Problem;
 use backdrive_diagnosis::verdict::{MODEL_FILE, Verdict};
 

@@ -14,5 +14,5 @@ pub use apply::apply_edits;
 pub use scales::{Scales, Span};
 pub(crate) use sites::is_seen;
 pub(crate) use starts::{inherited, refined, starts_beside};
-pub(crate) use types::{Seen, Span as ForceSpan};
 pub use types::{Against, Facts, Family, Hypothesis, HypothesisError, Mark, Parameter, Physics, Place, State};
+pub(crate) use types::{Seen, Span as ForceSpan};

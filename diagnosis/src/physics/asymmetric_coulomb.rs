@@ -1,7 +1,7 @@
 //! Dry friction of another level in each direction.
 
-use crate::hypothesis::builder::{ElementBuilder, even};
 use crate::hypothesis::ForceSpan;
+use crate::hypothesis::builder::{ElementBuilder, even};
 use crate::hypothesis::{Against, Facts, Family, Mark, Physics, State};
 
 pub(super) const PHYSICS: Physics = Physics {

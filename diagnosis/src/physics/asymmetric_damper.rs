@@ -1,7 +1,7 @@
 //! Viscous friction of another slope in each direction: a valve that opens one way.
 
-use crate::hypothesis::builder::{ElementBuilder, even, first_value};
 use crate::hypothesis::ForceSpan;
+use crate::hypothesis::builder::{ElementBuilder, even, first_value};
 use crate::hypothesis::{Against, Facts, Family, Mark, Physics, State};
 
 pub(super) const PHYSICS: Physics = Physics {
@@ -12,11 +12,14 @@ pub(super) const PHYSICS: Physics = Physics {
     against: Against::Velocity,
     state: State::WithItsVariable,
     mark: Mark::Lopsided,
-    facts: Facts { contains: &["damper"], spans: |h, _| match h.starts.first() {
+    facts: Facts {
+        contains: &["damper"],
+        spans: |h, _| match h.starts.first() {
             Some(start) if start.len() == 2 => vec![ForceSpan::linear(vec![vec![start[0], 0.0], vec![0.0, start[0]]])],
             _ => Vec::new(),
         },
-        ..Facts::NONE },
+        ..Facts::NONE
+    },
     propose: |sites| {
         let places = sites.near().filter(|site| !sites.has(site, &["asymmetric_damper", "backlash"]));
         let one = |site| {

@@ -1,7 +1,7 @@
 //! A force that repeats with position: the poles of a motor, a screw's turn, gear teeth.
 
-use crate::hypothesis::builder::{ElementBuilder, any, even, log};
 use crate::hypothesis::ForceSpan;
+use crate::hypothesis::builder::{ElementBuilder, any, even, log};
 use crate::hypothesis::{Against, Facts, Family, Mark, Physics, State};
 
 /// Periods that fits start from, in a peak-to-peak travel, longest first; a ripple has to be seen to come again.

@@ -1,7 +1,7 @@
 //! Friction that builds up over a distance.
 
-use crate::hypothesis::builder::{ElementBuilder, log};
 use crate::hypothesis::ForceSpan;
+use crate::hypothesis::builder::{ElementBuilder, log};
 use crate::hypothesis::{Against, Facts, Family, Mark, Physics, State};
 
 /// Forces over displacements of the recordings up to which friction builds up over a distance that could show: stiffer, it is dry friction, and a fit only

@@ -3,8 +3,8 @@
 //! Where a motion drives the model its recording may come late beside the others, or the force beside it be a command that acts later: the
 //! motion then has a negative delay. That of the only output beside a motion is the motion's own: both shift one signal against the other.
 
-use crate::hypothesis::builder::{even, key, only_input_and_output};
 use crate::hypothesis::ForceSpan;
+use crate::hypothesis::builder::{even, key, only_input_and_output};
 use crate::hypothesis::{Against, Facts, Family, Mark, Physics, State};
 use backdrive_plant::model::InputKind;
 

@@ -1,8 +1,8 @@
 //! Dry friction that is lower near rest.
 
-use crate::hypothesis::builder::{ElementBuilder, Freedom, log};
 use super::stribeck;
 use crate::hypothesis::ForceSpan;
+use crate::hypothesis::builder::{ElementBuilder, Freedom, log};
 use crate::hypothesis::{Against, Facts, Family, Mark, Physics, State};
 
 /// The least speed that is looked at along a motion, in that of nine tenths of the time: a friction that turns its direction over a little displacement, and a
@@ -17,7 +17,11 @@ pub(super) const PHYSICS: Physics = Physics {
     against: Against::Velocity,
     state: State::Reversals,
     mark: Mark::NearRest,
-    facts: Facts { sliding: &["coulomb"], from_level: &["coulomb"], contains: &["coulomb"], spans: |h, seen| {
+    facts: Facts {
+        sliding: &["coulomb"],
+        from_level: &["coulomb"],
+        contains: &["coulomb"],
+        spans: |h, seen| {
             let Some(level) = h.starts.first().and_then(|start| start.first()).copied() else { return Vec::new() };
             // The level at speed, and that which is only there at speed.
             let one = |share: f64| {
@@ -31,7 +35,8 @@ pub(super) const PHYSICS: Physics = Physics {
             };
             stribeck::QUANTILES.map(one).to_vec()
         },
-        ..Facts::NONE },
+        ..Facts::NONE
+    },
     propose: |sites| {
         let one = |site| {
             let new = ElementBuilder::new(sites, &PHYSICS, site)?;

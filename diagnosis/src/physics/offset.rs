@@ -1,7 +1,7 @@
 //! A sensor that does not read 0 at 0.
 
-use crate::hypothesis::builder::{even, key};
 use crate::hypothesis::ForceSpan;
+use crate::hypothesis::builder::{even, key};
 use crate::hypothesis::{Against, Facts, Family, Mark, Physics, State};
 
 pub(super) const PHYSICS: Physics = Physics {
@@ -12,7 +12,10 @@ pub(super) const PHYSICS: Physics = Physics {
     against: Against::Time,
     state: State::WithItsVariable,
     mark: Mark::Bias,
-    facts: Facts { spans: |h, _| h.starts.first().map(|start| vec![ForceSpan::proportional(start.clone())]).unwrap_or_default(), ..Facts::NONE },
+    facts: Facts {
+        spans: |h, _| h.starts.first().map(|start| vec![ForceSpan::proportional(start.clone())]).unwrap_or_default(),
+        ..Facts::NONE
+    },
     propose: |sites| {
         let outputs = sites.model.outputs.iter().enumerate().filter(|(_, o)| o.offset == 0.0);
         let one = |(index, output): (usize, &backdrive_plant::model::Output)| {

@@ -1,7 +1,7 @@
 //! Dry friction that falls with speed.
 
-use crate::hypothesis::builder::{ElementBuilder, Freedom, log};
 use crate::hypothesis::ForceSpan;
+use crate::hypothesis::builder::{ElementBuilder, Freedom, log};
 use crate::hypothesis::{Against, Facts, Family, Mark, Physics, State};
 
 /// Shares of the time during which a motion is slower than the speed at which what is beyond at rest has fallen, as they are looked at along it.
@@ -17,7 +17,10 @@ pub(super) const PHYSICS: Physics = Physics {
     against: Against::Velocity,
     state: State::Reversals,
     mark: Mark::NearRest,
-    facts: Facts { sliding: &["coulomb"], from_level: &["coulomb", "static"], contains: &["coulomb"],
+    facts: Facts {
+        sliding: &["coulomb"],
+        from_level: &["coulomb", "static"],
+        contains: &["coulomb"],
         spans: |h, seen| {
             let Some(level) = h.starts.first().and_then(|start| start.first()).copied() else { return Vec::new() };
             // The level at speed, and what is beyond it at rest.
@@ -32,7 +35,8 @@ pub(super) const PHYSICS: Physics = Physics {
             };
             QUANTILES.map(one).to_vec()
         },
-        ..Facts::NONE },
+        ..Facts::NONE
+    },
     propose: |sites| {
         let one = |site| {
             let new = ElementBuilder::new(sites, &PHYSICS, site)?;

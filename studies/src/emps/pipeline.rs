@@ -3,7 +3,7 @@
 
 use super::prepare::{RATE, Record};
 use crate::StudyError;
-use backdrive_arms::filter::{LowPass, derivative};
+use backdrive_diagnosis::low_pass::{LowPass, derivative};
 use backdrive_plant::model::Model;
 use backdrive_plant::stepper::{Options, simulate};
 use nalgebra::{DMatrix, DVector};

@@ -8,7 +8,7 @@ use super::record::{ENDS, Record, mean};
 use super::sessions::{Judged, laws_without};
 use crate::StudyError;
 use crate::table::Report;
-use backdrive_arms::filter::derivative;
+use backdrive_diagnosis::low_pass::derivative;
 use backdrive_plant::model::{Hold, Input, InputKind, Model, Output, OutputKind};
 use backdrive_plant::stepper::{Options, Plant, Segment, simulate};
 use backdrive_stability::coupling::{Law, Running, Seen};
