@@ -61,6 +61,8 @@ group! {
         family_confidence: [f64; 12] = [-3.18, 1.6, 0.357, 0.0, 0.0, 1.02, -0.0964, 0.0, 0.0, -0.368, 0.0, 0.162], "log-odds", Measured("`diagnosis/tests/concealed/calibrate.py fit-family`, as `confidence`");
         /// Advantage over a rival, in units of the criterion, that makes it e times less likely than another one.
         softened: f64 = 20.0, "criterion", Judgement("an information criterion says 2; a simulator is never the device");
+        /// Confidence that a finding has at most where held-out recordings are predicted worse with it than by the model as given.
+        as_likely: f64 = 0.5, "probability", Judgement("as likely as not");
         /// Alternatives that are listed.
         alternatives: usize = 6, "structures", Cost("nobody reads more");
         /// Share of a finding's confidence from which a rival is named in the sentence.

@@ -39,6 +39,8 @@ group! {
         kind_confidence: [f64; 7] = [-0.256, 0.078, 0.809, 1.739, 0.861, 0.0, -0.967], "log-odds", Measured("as `confidence`");
         /// Confidence of all laws of a structure from which others that predict as well are not told beside it.
         claimed: f64 = 0.9, "probability", Judgement("as sure as a claim is called sure");
+        /// Share of the force that none of the laws explains above which something is missing that has no name.
+        much_left: f64 = 0.3, "-", Judgement("a tenth of the variance: friction of real joints that is left out takes more");
         /// Structures that are simulated and whose numbers are refined.
         simulated: usize = 8, "structures", Cost("those that left-out stretches hardly tell apart are fewer");
     }

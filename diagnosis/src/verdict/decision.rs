@@ -37,6 +37,10 @@ pub(super) struct Decision<'s> {
     pub(super) floors: Vec<f64>,
     /// Whether the model's text is to hold the fitted parameters.
     pub(super) changes: bool,
+    /// Whether what was found predicts held-out recordings worse than the model as given.
+    pub(super) predicts_worse: bool,
+    /// Share of the force that none of the laws explains, where they were looked at on forces: what counts as noise there.
+    pub(super) left_of_force: Option<f64>,
 }
 
 /// Marks structures of which an effect, by its own interval, may be nothing, as long as one of those would be claimed: what is claimed then has none.
@@ -95,17 +99,29 @@ pub(super) fn decide<'s>(problem: &Problem, search: &'s Search) -> Decision<'s> 
         best.whiteness_statistic > tuning().claim.wanders && best.levels.iter().any(|level| beyond(*level, tuning().noise.at_noise));
     let findings = findings(problem, search, best, &spread);
     let is_outdone = findings.first().is_some_and(Finding::has_likelier_rival);
+    let left_of_force = search.forces.as_ref().map(|_| left_of_force(problem, search));
     let word = match () {
         () if claims && (!alike.is_empty() || is_outdone) => Word::Ambiguous,
         () if claims => Word::Missing,
         () if !bursts.is_empty() => Word::Unexplained,
         () if unseen.is_some() => Word::Unexplained,
+        () if left_of_force.is_some_and(|share| share > tuning().equation_error.much_left) => Word::Unexplained,
         () if search.forces.is_none() && (!at_floor && best.correlation_time > tuning().claim.correlated || wanders) => Word::Unexplained,
         () if off => Word::Parameters,
-        () if !is_excited(problem, search) => Word::CannotTell,
+        () if left_of_force.is_none() && !is_excited(problem, search) => Word::CannotTell,
         () => Word::NothingMissing,
     };
-    Decision { word, best, spread, findings, alike, bursts, at_floor, unseen, floors, changes: off || added }
+    Decision { word, best, spread, findings, alike, bursts, at_floor, unseen, floors, changes: off || added, predicts_worse: false, left_of_force }
+}
+
+/// Share of the force that counts as noise: over its standard deviation in the fitted recordings.
+fn left_of_force(problem: &Problem, search: &Search) -> f64 {
+    let one = |(output, noise_sd): (usize, &f64)| {
+        let measured = problem.fit.iter().filter(|r| r.outputs.get(output).is_some_and(Option::is_some));
+        let spread = measured.filter_map(|r| r.spread.get(output)).fold(0.0f64, |a, b| a.max(*b));
+        (spread > 0.0).then(|| noise_sd / spread)
+    };
+    search.noise_sd.iter().enumerate().filter_map(one).fold(0.0, f64::max)
 }
 
 /// Root mean square of what a candidate leaves on the held-out recordings, where that is far beyond the noise and beyond what it leaves on the fitted ones: numbers

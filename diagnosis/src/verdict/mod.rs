@@ -81,13 +81,14 @@ pub fn verdict(
     limit: Limit,
 ) -> Result<(Verdict, Files), VerdictError> {
     let mut decision = decide(problem, search);
-    let (best, changes) = (decision.best, decision.changes);
+    let best = decision.best;
     let budget = Budget::new(tuning().search.experiment, limit);
     let (next_experiment, experiment) = next_experiment(problem, search, &mut decision, &budget);
     if matches!(decision.word, Word::Ambiguous | Word::CannotTell) {
         findings::share_with_rivals(search, best, &decision.alike, &mut decision.findings);
     }
-    let held_out = held_out(problem, search, best, changes);
+    let held_out = without_what_predicts_worse(problem, search, &mut decision);
+    let changes = decision.changes;
     let model = model_text(problem, best, &decision.spread, changes)?;
     let rivals = rival_models(problem, search, best);
     let verdict = Verdict {
@@ -110,4 +111,20 @@ pub fn verdict(
         arm: None,
     };
     Ok((verdict, Files { model, rivals, experiment }))
+}
+
+/// Errors on held-out recordings. Where what was found predicts them worse than the model as given does, that one is handed over as it is, and nothing is claimed as
+/// likelier than not.
+fn without_what_predicts_worse(problem: &Problem, search: &Search, decision: &mut decision::Decision) -> HeldOut {
+    let errors = held_out(problem, search, decision.best, decision.changes);
+    let is_worse = errors.nrmse_before.zip(errors.nrmse_after).is_some_and(|(before, after)| after > before);
+    if !decision.changes || problem.held_out.is_empty() || !is_worse {
+        return errors;
+    }
+    (decision.changes, decision.predicts_worse) = (false, true);
+    decision.findings.iter_mut().for_each(|finding| {
+        finding.confidence = finding.confidence.min(tuning().claim.as_likely);
+        finding.family_confidence = finding.family_confidence.min(tuning().claim.as_likely);
+    });
+    held_out(problem, search, decision.best, false)
 }

@@ -9,11 +9,24 @@ use backdrive_plant::write::round_significant;
 
 /// `planned`: whether there is a next experiment.
 pub(super) fn sentence(decision: &Decision, planned: bool) -> String {
+    let said = without_reserve(decision, planned);
+    if decision.predicts_worse {
+        return format!(
+            "{said}; recordings that no fit has seen are predicted worse with that than by the model as given, which is therefore handed over as it is"
+        );
+    }
+    said
+}
+
+fn without_reserve(decision: &Decision, planned: bool) -> String {
     let (best, findings) = (decision.best, decision.findings.as_slice());
     let level = best.levels.iter().fold(0.0f64, |a, b| a.max(*b));
     let times = round_significant(level, 2);
     // Below this the residual is the sensor's noise up to chance and rounding.
-    let end = if level < tuning().noise.unexplained {
+    let of_force = decision.left_of_force.map(|share| format!("{}", round_significant(100.0 * share, 2)));
+    let end = if let Some(percent) = &of_force {
+        format!("down to {percent} % of the force, which goes with none of the laws that were looked at")
+    } else if level < tuning().noise.unexplained {
         "down to the sensor noise".to_string()
     } else {
         format!("to {times} times the sensor noise")
