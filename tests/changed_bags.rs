@@ -158,7 +158,7 @@ fn a_contradiction_behind_the_first_forty_thousand_steps_is_named_with_its_time(
     assert_eq!(said(&bag), (false, Vec::new()));
     for (from, to) in [(60_000, 64_000), (1000, 64_000)] {
         let mut bag = bag.clone();
-        bag.numbers(FORCE, Numbers::Effort, &|index, f| if (from..to).contains(&index) { 2.0 * f } else { f });
+        bag.numbers(FORCE, Numbers::Effort, |index, f| if (from..to).contains(&index) { 2.0 * f } else { f });
         let (kept_back, lines) = said(&bag);
         let [line] = lines.as_slice() else { panic!("{lines:?}") };
         assert!(kept_back && line.contains(FORCE) && line.contains("2.0000 times"), "{line}");
@@ -193,7 +193,7 @@ fn what_a_coupling_sends_over_its_link_is_held_against_what_it_was_given() {
     assert!(!done.stdout.contains("contradicts its graph"), "{done:?}");
     for topic in ["/coupling/to_far_js", "/coupling/to_near_js"] {
         let mut bag = bag.clone();
-        bag.numbers(topic, Numbers::Position, &|_, x| 3.0 * x);
+        bag.numbers(topic, Numbers::Position, |_, x| 3.0 * x);
         bag.save(&place.path("changed.mcap"));
         let done = place.backdrive(&["stability", "changed.mcap"]);
         let said = format!("{}{}", done.stdout, done.stderr);

@@ -476,8 +476,8 @@ fn a_wall_clock_that_is_stepped_by_a_minute_stops_nobody() {
         if !built.is_ok_and(|s| s.success()) {
             return skipped("there is no C compiler to make a clock that can be stepped");
         }
-        // Longer than the ten seconds after which a participant says again that it is there: its first word may be lost.
-        let seconds: u64 = if is_long() { 24 } else { 16 };
+        // Twice the ten seconds after which a participant says again that it is there, for its first word may be lost, and after which an offset is told again.
+        let seconds: u64 = 24;
         let duration = seconds.to_string();
         let desk = run_on(&hosts, 0, folder.path(), &["--duration", &duration]);
         let mut robot = hosts.on(1, env!("CARGO_BIN_EXE_backdrive"));

@@ -4,9 +4,9 @@
 use crate::run::{Ask, diagnose, findings, parameter, said};
 use crate::table::Report;
 use crate::{Context, Study, StudyError, csv_columns};
-use backdrive_diagnosis::low_pass::LowPass;
 use backdrive_diagnosis::compare::{predictions, qualities};
 use backdrive_diagnosis::diagnose::Diagnosis;
+use backdrive_diagnosis::low_pass::LowPass;
 use backdrive_diagnosis::structure::Structure;
 use backdrive_diagnosis::verdict::chosen;
 

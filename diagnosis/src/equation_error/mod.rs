@@ -7,12 +7,13 @@ mod band;
 mod belief;
 mod explore;
 mod gram;
+mod on_forces;
 mod room;
 mod search;
 
 use band::{corners, is_known};
 pub use belief::{Belief, Figures};
-pub use search::OnForces;
+pub use on_forces::OnForces;
 pub(crate) use search::search_on_forces;
 
 use crate::problem::Problem;

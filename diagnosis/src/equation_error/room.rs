@@ -35,6 +35,9 @@ struct Variant {
 /// A law with a choice of its nonlinear numbers: which of [`Room::laws`], which of its variants.
 pub(crate) type Chosen = (usize, usize);
 
+/// Hypotheses, which of [`Room::hypotheses`], with their parameters.
+pub(crate) type Fitted = Vec<(usize, Vec<f64>)>;
+
 /// Laws and recordings in a band.
 pub(crate) struct Room {
     /// The recordings in the band.
@@ -199,7 +202,7 @@ impl Room {
     }
 
     /// What laws leave, force squared, and the parameters of the hypotheses of each; `None` where one of those is out of its range.
-    pub fn fit(&self, laws: &[Chosen]) -> Option<(f64, Vec<(usize, Vec<f64>)>)> {
+    pub fn fit(&self, laws: &[Chosen]) -> Option<(f64, Fitted)> {
         let sum = self.sum(laws);
         let (factors, left) = self.gram.fit(&sum)?;
         let own: usize = laws.iter().map(|(law, variant)| self.laws[*law].variants[*variant].columns.len()).sum();
@@ -238,7 +241,7 @@ impl Room {
 }
 
 /// A spring begins at a zero of its own, so each is looked at with a constant beside it.
-fn with_their_zero(hypotheses: &[Hypothesis], laws: &mut Vec<Law>) {
+fn with_their_zero(hypotheses: &[Hypothesis], laws: &mut [Law]) {
     let is_constant = |law: &&Law| hypotheses[law.hypotheses[0]].physics.family == Family::Bias;
     let Some((constant, span)) = laws.iter().find(is_constant).and_then(|law| {
         let variant = law.variants.first()?;

@@ -2,6 +2,7 @@
 
 use super::belief::{Belief, Same, belief, nearest};
 use super::explore::{Explored, Looked, better, explore};
+use super::on_forces::OnForces;
 use super::room::Room;
 use crate::candidate::{Candidate, candidate, key_of, sort};
 use crate::compare::unseen;
@@ -13,23 +14,6 @@ use crate::statistics::levels;
 use crate::structure::Structure;
 use crate::tuning::tuning;
 use crate::work::{Budget, Limit};
-
-/// What a search on forces says of its structures.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct OnForces {
-    /// The corner of the band of its fits, Hz.
-    pub corner_hz: f64,
-    /// The corners of all bands that were looked at, Hz.
-    pub bands_hz: Vec<f64>,
-    /// The structure that is claimed: ids of its effects, as [`crate::candidate`] joins them.
-    pub claimed: String,
-    /// How sure each of its effects is, by id.
-    pub beliefs: Vec<(String, Belief)>,
-    /// Effects that belong to another one, such as the zero of a spring, by id.
-    pub companions: Vec<String>,
-    /// Structures that predict left-out stretches as well as the claimed one.
-    pub alike: Vec<String>,
-}
 
 /// Searches on forces; `None` where force and motion are not both known. The problem that comes back is the one in the band of the fits.
 pub(crate) fn search_on_forces(

@@ -111,7 +111,20 @@ pub(super) fn decide<'s>(problem: &Problem, search: &'s Search) -> Decision<'s> 
         () if left_of_force.is_none() && !is_excited(problem, search) => Word::CannotTell,
         () => Word::NothingMissing,
     };
-    Decision { word, best, spread, findings, alike, bursts, at_floor, unseen, floors, changes: off || added, predicts_worse: false, left_of_force }
+    Decision {
+        word,
+        best,
+        spread,
+        findings,
+        alike,
+        bursts,
+        at_floor,
+        unseen,
+        floors,
+        changes: off || added,
+        predicts_worse: false,
+        left_of_force,
+    }
 }
 
 /// Share of the force that counts as noise: over its standard deviation in the fitted recordings.

@@ -52,6 +52,8 @@ const DEVICES: &[(NodeKind, &str, Quantity, &str)] = &[
 const SMALL_IN_REALTIME: f64 = 0.1;
 /// There, nor is one that nothing simple explains below this share.
 const UNEXPLAINED_IN_REALTIME: f64 = 0.5;
+/// Share of the steps in which a device's sensor may be silent in lockstep; as much as may be lost of a topic.
+const MOST_SILENT: f64 = 0.01;
 /// In lockstep nothing is left to chance.
 const SMALL_IN_LOCKSTEP: f64 = 0.01;
 
@@ -355,7 +357,10 @@ fn device(part: &'static str, axis: usize, quantity: Quantity, recorded: &[f64],
         Quantity::Position => "position",
         Quantity::Effort => "applied force",
     };
-    let agrees = error_rms <= 2.0 * small * effect_rms.max(rms(&|row| recorded[row]));
+    // In lockstep there is a value in every step: a sensor that is silent for longer than a few lost messages is not known to do what the model does.
+    let silent = recorded.iter().zip(predicted).filter(|(r, p)| !r.is_finite() && p.is_finite()).count();
+    let speaks = small > SMALL_IN_LOCKSTEP || silent as f64 <= MOST_SILENT * (silent + rows.len()) as f64;
+    let agrees = speaks && error_rms <= 2.0 * small * effect_rms.max(rms(&|row| recorded[row]));
     Some(PartCheck { part, axis, quantity, error_rms, effect_rms, floor_rms: 0.0, agrees })
 }
 

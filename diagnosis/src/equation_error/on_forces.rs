@@ -1,0 +1,20 @@
+//! What is kept of a search on forces.
+
+use super::belief::Belief;
+
+/// What a search on forces says of its structures.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct OnForces {
+    /// The corner of the band of its fits, Hz.
+    pub corner_hz: f64,
+    /// The corners of all bands that were looked at, Hz.
+    pub bands_hz: Vec<f64>,
+    /// The structure that is claimed: ids of its effects, as [`crate::candidate`] joins them.
+    pub claimed: String,
+    /// How sure each of its effects is, by id.
+    pub beliefs: Vec<(String, Belief)>,
+    /// Effects that belong to another one, such as the zero of a spring, by id.
+    pub companions: Vec<String>,
+    /// Structures that predict left-out stretches as well as the claimed one.
+    pub alike: Vec<String>,
+}

@@ -1,0 +1,119 @@
+//! Motion and force both recorded: laws are named from the forces along the motion, also where the motion is known to a step and the drive rests.
+
+use backdrive_diagnosis::diagnose::diagnose;
+use backdrive_diagnosis::problem::{Problem, Record};
+use backdrive_diagnosis::search::Settings;
+use backdrive_diagnosis::verdict::{Parameter, Verdict, Word};
+use backdrive_plant::model::Model;
+use backdrive_plant::recording::Recording;
+use backdrive_plant::set::Initial;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+
+const NOMINAL: &str = r#"
+name = "lever"
+motion = "rotation"
+[bodies]
+lever = 0.02
+[[elements]]
+name = "viscous"
+kind = "damper"
+between = ["lever", "ground"]
+damping = 0.05
+[[inputs]]
+name = "angle"
+kind = "motion"
+on = "lever"
+[[outputs]]
+name = "torque"
+kind = "reaction"
+of = "lever"
+"#;
+
+const RATE: f64 = 500.0;
+
+/// An angle and its first two derivatives.
+type Motion = Box<dyn Fn(f64) -> [f64; 3]>;
+
+/// A sum of waves: amplitude in rad, frequency in Hz, phase.
+fn waves(all: &'static [(f64, f64, f64)]) -> Motion {
+    Box::new(move |t| {
+        all.iter().fold([0.0; 3], |[q, v, a], (amplitude, hz, phase)| {
+            let w = std::f64::consts::TAU * hz;
+            let (sin, cos) = (w * t + phase).sin_cos();
+            [q + amplitude * sin, v + amplitude * w * cos, a - amplitude * w * w * sin]
+        })
+    })
+}
+
+/// What a diagnosis says of recordings of 12 s, of which every one begins with a rest of so many seconds in which nothing is exactly 0 but everything.
+fn said(hidden: impl Fn([f64; 3]) -> f64, noise: f64, rest_s: f64, step: f64) -> Verdict {
+    let model = Model::from_toml(NOMINAL, "lever.toml").unwrap();
+    let motions: [Motion; 3] = [
+        waves(&[(0.5, 0.31, 0.0), (0.2, 0.83, 1.0), (0.05, 2.1, 2.0)]),
+        waves(&[(0.6, 0.23, 0.5), (0.15, 1.1, 0.0), (0.04, 2.9, 1.0)]),
+        waves(&[(0.55, 0.27, 2.0), (0.18, 0.95, 0.3), (0.05, 2.4, 0.7)]),
+    ];
+    let mut random = ChaCha8Rng::seed_from_u64(5);
+    let records: Vec<Record> = motions
+        .iter()
+        .enumerate()
+        .map(|(index, motion)| {
+            let t: Vec<f64> = (0..6000).map(|k| f64::from(k) / RATE).collect();
+            let (mut angle, mut torque, mut slow) = (Vec::new(), Vec::new(), 0.0);
+            for time in &t {
+                let from = motion(0.0)[0];
+                let [q, v, a] = if *time < rest_s { [from, 0.0, 0.0] } else { motion(time - rest_s) };
+                // What a machine has beside its laws is slow as well as fast.
+                let fresh: f64 = StandardNormal.sample(&mut random);
+                slow = 0.98 * slow + 0.2 * fresh;
+                let noise = noise * (0.7 * slow + 0.7 * fresh);
+                angle.push((q / step).round() * step);
+                torque.push(if *time < rest_s { 0.0 } else { 0.02 * a + 0.05 * v + hidden([q, v, a]) + noise });
+            }
+            let signals = vec![("angle".to_string(), angle), ("torque".to_string(), torque)];
+            Record::new(&Recording::new(&format!("{index}.csv"), t, signals).unwrap(), &model, Vec::new()).unwrap()
+        })
+        .collect();
+    let (fit, held_out) = (records[..2].to_vec(), records[2..].to_vec());
+    let problem = Problem::new(NOMINAL.to_string(), "lever.toml".into(), model, fit, held_out, Initial::Free).unwrap();
+    diagnose(problem, &Settings::default(), None, &|_| ()).unwrap().verdict
+}
+
+fn number(verdict: &Verdict, physics: &str, key: &str) -> f64 {
+    let finding = verdict.findings.iter().find(|f| f.physics == physics).unwrap_or_else(|| panic!("no {physics}: {:?}", verdict.findings));
+    match &finding.parameters[key] {
+        Parameter::One(one) => one.value,
+        Parameter::List(list) => list.value[0],
+    }
+}
+
+#[test]
+fn friction_and_a_ripple_are_named_from_forces_with_their_numbers() {
+    let ripple = |q: f64| 0.06 * (std::f64::consts::TAU * q / 0.21 + 0.4).sin();
+    let verdict = said(|[q, v, _]| 0.1 * v.signum() + ripple(q), 0.02, 0.0, 1e-4);
+    assert!(matches!(verdict.word, Word::Missing | Word::Ambiguous), "{}", verdict.sentence);
+    assert_eq!(verdict.findings.len(), 2, "{:?}", verdict.findings);
+    assert!((number(&verdict, "coulomb", "force") - 0.1).abs() < 0.01);
+    assert!((number(&verdict, "cogging", "amplitude").abs() - 0.06).abs() < 0.01);
+    assert!((number(&verdict, "cogging", "period") - 0.21).abs() < 0.005);
+    assert!(verdict.findings.iter().all(|f| f.family_confidence > 0.9), "{:?}", verdict.findings);
+    let errors = &verdict.held_out;
+    assert!(errors.nrmse_after.unwrap() < 0.5 * errors.nrmse_before.unwrap(), "{errors:?}");
+}
+
+#[test]
+fn a_drive_that_logs_zeros_while_it_rests_hides_nothing() {
+    let verdict = said(|[_, v, _]| 0.1 * v.signum(), 0.02, 2.0, 1e-4);
+    assert!((number(&verdict, "coulomb", "force") - 0.1).abs() < 0.01);
+    assert!(verdict.findings[0].family_confidence > 0.9, "{:?}", verdict.findings);
+}
+
+#[test]
+fn a_device_that_lacks_nothing_is_left_alone_whatever_the_step_of_its_encoder() {
+    for step in [1e-5, 1e-3] {
+        let verdict = said(|_| 0.0, 0.01, 0.0, step);
+        assert!(verdict.findings.is_empty(), "step {step}: {} {:?}", verdict.sentence, verdict.findings);
+    }
+}
