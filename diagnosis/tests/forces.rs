@@ -73,7 +73,7 @@ fn said(hidden: impl Fn([f64; 3]) -> f64, noise: f64, rest_s: f64, step: f64) ->
                 torque.push(if *time < rest_s { 0.0 } else { 0.02 * a + 0.05 * v + hidden([q, v, a]) + noise });
             }
             let signals = vec![("angle".to_string(), angle), ("torque".to_string(), torque)];
-            Record::new(&Recording::new(&format!("{index}.csv"), t, signals).unwrap(), &model, Vec::new()).unwrap()
+            Record::new(&Recording::new(format!("{index}.csv"), t, signals).unwrap(), &model, Vec::new()).unwrap()
         })
         .collect();
     let (fit, held_out) = (records[..2].to_vec(), records[2..].to_vec());
