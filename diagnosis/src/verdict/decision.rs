@@ -37,10 +37,21 @@ pub(super) struct Decision<'s> {
     pub(super) floors: Vec<f64>,
     /// Whether the model's text is to hold the fitted parameters.
     pub(super) changes: bool,
-    /// Whether what was found predicts held-out recordings worse than the model as given.
-    pub(super) predicts_worse: bool,
+    /// Why nothing is claimed as likelier than not, where something was found.
+    pub(super) doubt: Option<Doubt>,
     /// Share of the force that none of the laws explains, where they were looked at on forces: what counts as noise there.
     pub(super) left_of_force: Option<f64>,
+}
+
+/// Why what was found is as likely as not.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Doubt {
+    /// The model as given predicts held-out recordings better.
+    WorseThanGiven,
+    /// The refitted nominal model predicts them better.
+    WorseThanRefit,
+    /// A number is at an end of what the fit may try.
+    AtAnEnd,
 }
 
 /// Marks structures of which an effect, by its own interval, may be nothing, as long as one of those would be claimed: what is claimed then has none.
@@ -111,20 +122,7 @@ pub(super) fn decide<'s>(problem: &Problem, search: &'s Search) -> Decision<'s> 
         () if left_of_force.is_none() && !is_excited(problem, search) => Word::CannotTell,
         () => Word::NothingMissing,
     };
-    Decision {
-        word,
-        best,
-        spread,
-        findings,
-        alike,
-        bursts,
-        at_floor,
-        unseen,
-        floors,
-        changes: off || added,
-        predicts_worse: false,
-        left_of_force,
-    }
+    Decision { word, best, spread, findings, alike, bursts, at_floor, unseen, floors, changes: off || added, doubt: None, left_of_force }
 }
 
 /// Share of the force that counts as noise: over its standard deviation in the fitted recordings.

@@ -32,11 +32,13 @@ pub use timing::timing;
 pub use types::*;
 
 use crate::audit;
+use crate::candidate::Candidate;
 use crate::locate::Location;
 use crate::problem::Problem;
 use crate::search::Search;
+use crate::structure::Role;
 use crate::work::{Budget, Limit};
-use decision::decide;
+use decision::{Doubt, decide};
 use experiments::next_experiment;
 use findings::{detectable, moved};
 use held_out::held_out;
@@ -117,14 +119,29 @@ pub fn verdict(
 /// likelier than not.
 fn without_what_predicts_worse(problem: &Problem, search: &Search, decision: &mut decision::Decision) -> HeldOut {
     let errors = held_out(problem, search, decision.best, decision.changes);
-    let is_worse = errors.nrmse_before.zip(errors.nrmse_after).is_some_and(|(before, after)| after > before);
-    if !decision.changes || problem.held_out.is_empty() || !is_worse {
-        return errors;
-    }
-    (decision.changes, decision.predicts_worse) = (false, true);
+    let is_worse_than = |other: Option<f64>| other.zip(errors.nrmse_after).is_some_and(|(other, after)| after > other);
+    let unseen = !problem.held_out.is_empty();
+    decision.doubt = match () {
+        () if decision.changes && unseen && is_worse_than(errors.nrmse_before) => Some(Doubt::WorseThanGiven),
+        () if decision.findings.is_empty() => None,
+        () if unseen && is_worse_than(errors.nrmse_refit) => Some(Doubt::WorseThanRefit),
+        () if search.forces.is_some() && is_at_an_end(decision.best) => Some(Doubt::AtAnEnd),
+        () => None,
+    };
+    let Some(doubt) = decision.doubt else { return errors };
     decision.findings.iter_mut().for_each(|finding| {
         finding.confidence = finding.confidence.min(tuning().claim.as_likely);
         finding.family_confidence = finding.family_confidence.min(tuning().claim.as_likely);
     });
+    if doubt != Doubt::WorseThanGiven {
+        return errors;
+    }
+    decision.changes = false;
     held_out(problem, search, decision.best, false)
+}
+
+/// Whether a number of the nominal model, or the size of an effect, is at an end of what the fit may try.
+fn is_at_an_end(best: &Candidate) -> bool {
+    let stated = best.structure.free.iter().zip(&best.fit.values).filter(|(number, _)| matches!(number.role, Role::Stated(_)));
+    stated.into_iter().any(|(number, value)| number.at_bound(*value).is_some()) || !plausible::is_plausible(best)
 }

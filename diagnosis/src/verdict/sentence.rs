@@ -1,6 +1,6 @@
 //! The verdict in one sentence.
 
-use super::decision::Decision;
+use super::decision::{Decision, Doubt};
 use super::types::{Finding, Word};
 use crate::hypothesis::Place;
 use crate::tuning::tuning;
@@ -10,31 +10,38 @@ use backdrive_plant::write::round_significant;
 /// `planned`: whether there is a next experiment.
 pub(super) fn sentence(decision: &Decision, planned: bool) -> String {
     let said = without_reserve(decision, planned);
-    if decision.predicts_worse {
-        return format!(
-            "{said}; recordings that no fit has seen are predicted worse with that than by the model as given, which is therefore handed over as it is"
-        );
-    }
-    said
+    let doubt = match decision.doubt {
+        None => return said,
+        Some(Doubt::WorseThanGiven) => {
+            "recordings that no fit has seen are predicted worse with that than by the model as given, which is therefore handed over as it is"
+        }
+        Some(Doubt::WorseThanRefit) => {
+            "recordings that no fit has seen are predicted better by the model with its numbers refitted and nothing added, so this is as likely as not"
+        }
+        Some(Doubt::AtAnEnd) => {
+            "a number is at the end of what the fit may try, so this is as likely as not: check the numbers of the model file"
+        }
+    };
+    format!("{}; {doubt}", said.replacen("the model leaves out", "the model may leave out", 1))
 }
 
 fn without_reserve(decision: &Decision, planned: bool) -> String {
     let (best, findings) = (decision.best, decision.findings.as_slice());
     let level = best.levels.iter().fold(0.0f64, |a, b| a.max(*b));
     let times = round_significant(level, 2);
+    let noise = if decision.left_of_force.is_some() { "what none of the laws explains" } else { "the sensor noise" };
     // Below this the residual is the sensor's noise up to chance and rounding.
     let of_force = decision.left_of_force.map(|share| format!("{}", round_significant(100.0 * share, 2)));
     let end = if let Some(percent) = &of_force {
         format!("down to {percent} % of the force, which goes with none of the laws that were looked at")
     } else if level < tuning().noise.unexplained {
-        "down to the sensor noise".to_string()
+        format!("down to {noise}")
     } else {
-        format!("to {times} times the sensor noise")
+        format!("to {times} times {noise}")
     };
-    let still =
-        if level < tuning().noise.unexplained { String::new() } else { format!("; the residual is still {times} times the sensor noise") };
+    let still = if level < tuning().noise.unexplained { String::new() } else { format!("; the residual is still {times} times {noise}") };
     let unseen = decision.unseen.map_or_else(String::new, |level| {
-        format!("; recordings that no fit has seen are predicted only to {} times the sensor noise", round_significant(level, 2))
+        format!("; recordings that no fit has seen are predicted only to {} times {noise}", round_significant(level, 2))
     });
     let all = findings.iter().map(asserted).collect::<Vec<_>>().join(", and ");
     match decision.word {
@@ -58,7 +65,7 @@ fn without_reserve(decision: &Decision, planned: bool) -> String {
             format!("the model leaves out {all}; with it the recordings are explained down to what the device repeats")
         }
         Word::Missing if still.is_empty() => format!("the model leaves out {all}; with it the recordings are explained {end}{unseen}"),
-        Word::Missing => format!("the model leaves out {all}; beside that a residual of {times} times the sensor noise remains{unseen}"),
+        Word::Missing => format!("the model leaves out {all}; beside that a residual of {times} times {noise} remains{unseen}"),
         Word::Unexplained => format!("something is missing that none of the laws tried explains; refitted, the model comes {end}{unseen}"),
         Word::Parameters => format!("nothing is missing, but the model's parameters are off; refitted they explain the recordings {end}"),
         Word::NothingMissing => format!("the model explains the recordings {end}"),
