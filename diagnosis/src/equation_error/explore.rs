@@ -52,7 +52,7 @@ pub(crate) fn explore(rooms: &[Room], most: usize) -> Option<Explored> {
     let look = |laws: Vec<usize>, before: &[Vec<Chosen>]| {
         let chosen: Option<Vec<Vec<Chosen>>> =
             rooms.iter().enumerate().map(|(r, room)| chosen(room, before.get(r).map_or(&[], Vec::as_slice), &laws)).collect();
-        looked(rooms, &scales, laws, chosen?)
+        looked(rooms, &scales, &vec![SMALLEST; rooms.len()], laws, chosen?)
     };
     let mut all: BTreeMap<Vec<usize>, Looked> = BTreeMap::new();
     all.insert(Vec::new(), look(Vec::new(), &[])?);
@@ -76,7 +76,14 @@ pub(crate) fn explore(rooms: &[Room], most: usize) -> Option<Explored> {
             before.truncate(tuning().equation_error.extended);
         }
     }
-    let mut all: Vec<Looked> = all.into_values().collect();
+    // Where a drive rests and logs zeros there is no error at all: what is far below what the best leaves says nothing, of whichever structure.
+    let best = all.values().min_by(|a, b| a.mean().total_cmp(&b.mean()))?.clone();
+    let floor = |((room, scale), chosen): ((&Room, &f64), &Vec<Chosen>)| {
+        Some(tuning().equation_error.floor * mean(&room.left_out(chosen)?) / scale)
+    };
+    let floors: Vec<f64> = rooms.iter().zip(&scales).zip(&best.chosen).map(floor).collect::<Option<_>>()?;
+    let floored = |l: Looked| looked(rooms, &scales, &floors, l.laws, l.chosen);
+    let mut all: Vec<Looked> = all.into_values().collect::<Vec<_>>().into_par_iter().filter_map(floored).collect();
     all.sort_by(|a, b| a.mean().total_cmp(&b.mean()));
     let enough = enough(&all);
     Some(Explored { all, enough })
@@ -86,13 +93,15 @@ fn mean(x: &[f64]) -> f64 {
     x.iter().sum::<f64>() / x.len().max(1) as f64
 }
 
-fn looked(rooms: &[Room], scales: &[f64], laws: Vec<usize>, chosen: Vec<Vec<Chosen>>) -> Option<Looked> {
+/// What is as small as rounding says nothing.
+const SMALLEST: f64 = 1e-12;
+
+fn looked(rooms: &[Room], scales: &[f64], floors: &[f64], laws: Vec<usize>, chosen: Vec<Vec<Chosen>>) -> Option<Looked> {
     let mut errors: Vec<f64> = Vec::new();
-    for ((room, scale), chosen) in rooms.iter().zip(scales).zip(&chosen) {
+    for (((room, scale), floor), chosen) in rooms.iter().zip(scales).zip(floors).zip(&chosen) {
         let own = room.left_out(chosen)?;
         errors.resize(own.len(), 0.0);
-        // What is as small as rounding says nothing.
-        errors.iter_mut().zip(own).for_each(|(sum, e)| *sum += (e / scale).max(1e-12).ln() / rooms.len() as f64);
+        errors.iter_mut().zip(own).for_each(|(sum, e)| *sum += (e / scale).max(floor.max(SMALLEST)).ln() / rooms.len() as f64);
     }
     let numbers = laws.iter().map(|law| rooms.first().map_or(0, |room| room.laws[*law].numbers)).sum();
     Some(Looked { laws, chosen, errors: errors.into_iter().map(f64::exp).collect(), numbers })

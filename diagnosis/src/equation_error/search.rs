@@ -40,6 +40,9 @@ pub(crate) fn search_on_forces(
     let budget = Budget::new(settings.work(), limit);
     let mean = |errors: Vec<f64>| errors.iter().sum::<f64>() / errors.len().max(1) as f64;
     let noise = mean(room.left_out(best.chosen.get(band)?)?).sqrt();
+    if is_beyond_these_laws(&problem, noise) {
+        return None;
+    }
     let mut evaluator = Evaluator { budget: budget.clone(), ..Evaluator::new(&problem) };
     for (own, record) in evaluator.noise_sd.iter_mut().enumerate().filter(|(o, _)| problem.fit.iter().any(|r| r.outputs[*o].is_some())) {
         let least = problem.fit.iter().filter_map(|r| r.spread.get(own)).fold(0.0f64, |a, b| a.max(*b));
@@ -98,6 +101,17 @@ pub(crate) fn search_on_forces(
     };
     drop(evaluator);
     Some((problem, search))
+}
+
+/// Whether the best of the laws leaves so much, of the force and beside the sensor's noise, that it has to be one of those that are only simulated.
+fn is_beyond_these_laws(problem: &Problem, left: f64) -> bool {
+    let tuning = &tuning().equation_error;
+    let outputs =
+        problem.noise_sd.iter().enumerate().filter(|(o, _)| problem.fit.iter().any(|r| r.outputs.get(*o).is_some_and(Option::is_some)));
+    outputs.into_iter().all(|(output, sensor)| {
+        let spread = problem.fit.iter().filter_map(|r| r.spread.get(output)).fold(0.0f64, |a, b| a.max(*b));
+        left > tuning.much_left * spread && left > tuning.beyond * sensor
+    })
 }
 
 /// The band in which the claimed structure takes the largest share; the highest where nothing is claimed.

@@ -23,6 +23,8 @@ group! {
         compared: f64 = 4.0, "samples", Statistics("twice what the band holds");
         /// Stretches of each recording that are left out in turn.
         stretches: usize = 8, "stretches", Statistics("enough for a standard error, each with several reversals");
+        /// Share of the mean error of the best structure below which the error of a stretch says nothing.
+        floor: f64 = 0.1, "-", Judgement("a tenth of the noise: a device that rests is predicted exactly by any law");
         /// Structures whose extensions by one more law are looked at.
         extended: usize = 8, "structures", Cost("all pairs are looked at; a third law is looked for beside the best of them");
         /// Share of the error of left-out stretches by which a richer structure has to be better, per number.
@@ -41,6 +43,8 @@ group! {
         claimed: f64 = 0.9, "probability", Judgement("as sure as a claim is called sure");
         /// Share of the force that none of the laws explains above which something is missing that has no name.
         much_left: f64 = 0.3, "-", Judgement("a tenth of the variance: friction of real joints that is left out takes more");
+        /// The same in the noise of the force's sensor, above which the search goes on by simulation, with the laws that are only simulated.
+        beyond: f64 = 10.0, "noise standard deviations", Judgement("what a machine does beside its laws is as fast as its sensor's noise in part; a memory that no column has is slow");
         /// Structures that are simulated and whose numbers are refined.
         simulated: usize = 8, "structures", Cost("those that left-out stretches hardly tell apart are fewer");
     }
