@@ -41,7 +41,7 @@ pub(crate) fn corners(problem: &Problem) -> Vec<f64> {
     held
 }
 
-/// Share of the acceleration's power in a band that is noise of the motion's sensor, if that is as strong at all frequencies as it is at the highest.
+/// Share of the acceleration's power in a band that is sensor noise of the motion. The noise is taken for white, with the density found near half the sample rate.
 fn noise_of_acceleration(problem: &Problem, corner: f64) -> f64 {
     let (mut noise, mut power) = (0.0, 0.0);
     for record in &problem.fit {

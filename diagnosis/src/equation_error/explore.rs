@@ -45,7 +45,7 @@ impl Explored {
     }
 }
 
-/// Looks at structures of up to so many laws. `None` where the nominal model's own numbers cannot be told apart in any band.
+/// Compares all structures of at most `most` laws. `None` if the nominal parameters are not identifiable.
 pub(crate) fn explore(rooms: &[Room], most: usize) -> Option<Explored> {
     let scales: Vec<f64> = rooms.iter().map(|room| Some(mean(&room.left_out(&[])?)).filter(|m| *m > 0.0)).collect::<Option<_>>()?;
     let laws: Vec<usize> = (0..rooms.first()?.laws.len()).collect();

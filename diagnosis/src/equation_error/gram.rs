@@ -55,7 +55,7 @@ impl Gram {
         (matrix, vector, own)
     }
 
-    /// Factors of the columns that explain best; `None` where they cannot be told apart.
+    /// Least-squares factors of the columns; `None` if the matrix is singular.
     fn solve(matrix: &DMatrix<f64>, vector: &DVector<f64>) -> Option<DVector<f64>> {
         let n = vector.len();
         if n == 0 {

@@ -7,7 +7,7 @@ use crate::hypothesis::{Against, Facts, Family, Mark, Physics, State};
 /// Periods that fits start from, in a peak-to-peak travel, longest first; a ripple has to be seen to come again.
 const PERIODS: [f64; 13] = [0.71, 0.5, 0.35, 0.25, 0.18, 0.125, 0.088, 0.0625, 0.044, 0.031, 0.022, 0.016, 0.011];
 
-/// Periods in the travel that are looked at along a motion: from so many, in steps in which the phase at the ends moves by an eighth of a turn, so often.
+/// Grid of periods per travel: the first value, its step (an eighth of a period at the ends of the travel), and the number of values.
 const FEWEST: f64 = 1.5;
 const STEP: f64 = 0.125;
 const RIPPLES: usize = 180;

@@ -81,7 +81,7 @@ fn finding(search: &Search, best: &Candidate, spread: &Uncertainty, which: usize
 /// What is not told apart is not sure: the probability that a finding or one of its rivals is right is shared among them by how near they come.
 pub(super) fn share_with_rivals(search: &Search, best: &Candidate, rivals: &[&Candidate], findings: &mut [Finding]) {
     if search.forces.is_some() {
-        return; // what is not told apart there is in the beliefs already
+        return; // the beliefs contain the rivals already
     }
     let weight = |c: &Candidate| (-behind(search, c, best).max(0.0) / tuning().claim.softened).exp();
     for finding in findings {

@@ -13,7 +13,7 @@ pub(super) fn sentence(decision: &Decision, planned: bool) -> String {
     let doubt = match decision.doubt {
         None => return said,
         Some(Doubt::WorseThanGiven) => {
-            "recordings that no fit has seen are predicted worse with that than by the model as given, which is therefore handed over as it is"
+            "the held-out recordings are predicted worse with it than by the model as given, so the model is written as given"
         }
         Some(Doubt::WorseThanRefit) => {
             "recordings that no fit has seen are predicted better by the model with its numbers refitted and nothing added, so this is as likely as not"
