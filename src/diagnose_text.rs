@@ -49,7 +49,7 @@ pub fn text(found: &Diagnosis) -> String {
     if let Some(left) = verdict.remaining.as_ref().filter(|_| !verdict.findings.is_empty()).and_then(remains) {
         line("remains", left);
     }
-    line(if found.problem.held_out.is_empty() { "fitted" } else { "held out" }, held_out(&verdict.held_out));
+    line(if found.problem.held_out.is_empty() { "fitted" } else { "held out" }, held_out(&verdict.held_out, found.search.noise()));
     if let Some(next) = &verdict.next_experiment {
         line("next", next_experiment(next));
     }
@@ -76,7 +76,7 @@ fn recordings(found: &Diagnosis) -> String {
         .model
         .outputs
         .iter()
-        .zip(&found.search.noise_sd)
+        .zip(&problem.noise_sd)
         .enumerate()
         .filter(|(index, _)| measured(*index))
         .map(|(_, (output, floor))| {
@@ -96,6 +96,7 @@ fn recordings(found: &Diagnosis) -> String {
 fn refit(found: &Diagnosis) -> String {
     let search = &found.search;
     let level = |levels: &[f64]| levels.iter().fold(0.0f64, |a, b| a.max(*b));
+    let noise = search.noise();
     let spread = Uncertainty::of(&search.nominal);
     let mut moved = rows(&found.problem, &search.nominal, &spread);
     moved.retain(|r| r.determined && r.moved_sd.is_some_and(f64::is_finite));
@@ -105,7 +106,7 @@ fn refit(found: &Diagnosis) -> String {
         format!("; {} moved most, {} to {} ({:.0} sd)", r.name, number(given), si(r.value, &r.unit), r.moved_sd.unwrap_or(0.0).abs())
     });
     format!(
-        "residual {} times the sensor noise as given, {} with the parameters refitted{most}; {}",
+        "residual {} times {noise} as given, {} with the parameters refitted{most}; {}",
         number(level(&search.levels_given)),
         number(level(&search.nominal.levels)),
         found.per_record.sentence()
@@ -113,10 +114,10 @@ fn refit(found: &Diagnosis) -> String {
 }
 
 /// Errors of prediction before and after.
-fn held_out(held: &HeldOut) -> String {
+fn held_out(held: &HeldOut, noise: &str) -> String {
     let value = |x: Option<f64>| x.map_or("?".to_string(), number);
     format!(
-        "nrmse {} as given, {} refitted, {} diagnosed; the sensors' own noise is {}",
+        "nrmse {} as given, {} refitted, {} diagnosed; {noise} is {}",
         value(held.nrmse_before),
         value(held.nrmse_refit),
         value(held.nrmse_after),

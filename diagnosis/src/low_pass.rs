@@ -31,7 +31,17 @@ impl LowPass {
         }
         sosfiltfilt_dyn(samples.iter(), &self.sections)
     }
+
+    /// Share of the power of white noise that passes both ways, 0 to 1.
+    pub fn share_of_white(&self) -> f64 {
+        let mut impulse = vec![0.0; IMPULSE];
+        impulse[IMPULSE / 2] = 1.0;
+        self.both_ways(&impulse).iter().map(|x| x * x).sum()
+    }
 }
+
+/// Samples of an impulse response, twice what the lowest corner in use rings for.
+const IMPULSE: usize = 16_384;
 
 /// First derivative by central differences, one-sided at both ends.
 pub fn derivative(samples: &[f64], period: f64) -> Vec<f64> {
@@ -85,6 +95,18 @@ mod tests {
         for i in 500..3500 {
             assert!((filtered[i] - gain * samples[i]).abs() < 1e-6, "{i}: {} {}", filtered[i], gain * samples[i]);
         }
+    }
+
+    #[test]
+    fn white_noise_passes_with_the_share_of_the_response_s_area() {
+        // Area below 1 / (1 + (tan(pi x) / tan(pi c))^8)^2 for c = 0.1, by the midpoint rule.
+        let tan = |x: f64| (std::f64::consts::PI * x).tan();
+        let steps = 20_000;
+        let at = |i: usize| 0.5 * (i as f64 + 0.5) / steps as f64;
+        let area: f64 = (0..steps).map(|i| (1.0 + (tan(at(i)) / tan(0.1)).powi(8)).powi(-2)).sum::<f64>() / steps as f64;
+        let found = LowPass::butterworth(4, 100.0, 1000.0).share_of_white();
+        assert!((found - area).abs() < 1e-6, "{found} {area}");
+        assert_eq!(LowPass::butterworth(4, 600.0, 1000.0).share_of_white(), 1.0);
     }
 
     #[test]

@@ -71,9 +71,10 @@ pub(super) fn section(page: &mut Page, found: &Diagnosis, best: &Candidate) {
             ]);
         }
     }
-    page.table(table.caption(
-        "Root mean square errors, as shares of each signal's standard deviation; the sensors' own noise is 1 in the last but one column.",
-    ));
+    page.table(table.caption(&format!(
+        "Root mean square errors, as shares of each signal's standard deviation; {} is 1 in the last but one column.",
+        search.noise()
+    )));
 }
 
 /// Whole record, the part where the models differ most, and what is left over in time and frequency.

@@ -63,9 +63,14 @@ pub(crate) fn in_band(problem: &Problem, corner: f64) -> Problem {
     Problem { fit: of(&problem.fit), held_out: of(&problem.held_out), lag: vec![0; problem.lag.len()], ..problem.clone() }
 }
 
+/// The low-pass of a band at a record's rate.
+pub(crate) fn low_pass(record: &Record, corner: f64) -> LowPass {
+    LowPass::butterworth(tuning().equation_error.order, corner, 1.0 / record.period)
+}
+
 fn filtered(model: &Model, record: &Record, corner: f64) -> Record {
     let (order, rate) = (tuning().equation_error.order, 1.0 / record.period);
-    let low_pass = LowPass::butterworth(order, corner, rate);
+    let low_pass = low_pass(record, corner);
     let every = ((rate / (tuning().equation_error.samples * corner)) as usize).max(1);
     let of = |samples: &Vec<f64>| low_pass.both_ways(samples).into_iter().step_by(every).collect::<Vec<f64>>();
     let period = record.period * every as f64;

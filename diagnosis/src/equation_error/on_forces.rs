@@ -1,6 +1,7 @@
 //! What is kept of a search on forces.
 
 use super::belief::Belief;
+use crate::tuning::tuning;
 
 /// What a search on forces says of its structures.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -15,6 +16,20 @@ pub struct OnForces {
     pub beliefs: Vec<(String, Belief)>,
     /// Effects that belong to another one, such as the zero of a spring, by id.
     pub companions: Vec<String>,
+    /// What the claimed structure leaves of left-out stretches, in noise standard deviations of the force's sensor in that band: rms.
+    pub left: f64,
     /// Structures that predict left-out stretches as well as the claimed one.
     pub alike: Vec<String>,
+}
+
+impl OnForces {
+    /// Whether what is left is the noise of the force's sensor.
+    pub fn is_at_noise(&self) -> bool {
+        self.left < tuning().noise.unexplained
+    }
+
+    /// What counts as noise, in words.
+    pub fn noise(&self) -> &'static str {
+        if self.is_at_noise() { "the sensor noise" } else { "what none of the laws explains" }
+    }
 }

@@ -8,7 +8,7 @@ use crate::candidate::{Candidate, candidate, key_of, sort};
 use crate::compare::unseen;
 use crate::evaluator::Evaluator;
 use crate::hypothesis::Hypothesis;
-use crate::problem::Problem;
+use crate::problem::{Problem, Record};
 use crate::search::{Search, Settings, Tried};
 use crate::statistics::levels;
 use crate::structure::Structure;
@@ -36,7 +36,7 @@ pub(crate) fn search_on_forces(
     let best = explored.best();
     let band = clearest(&rooms, &explored)?;
     let room = rooms.get(band)?;
-    let problem = room.problem.clone();
+    let (sensor, problem) = (sensor_noise(problem, room.corner), room.problem.clone());
     let budget = Budget::new(settings.work(), limit);
     let mean = |errors: Vec<f64>| errors.iter().sum::<f64>() / errors.len().max(1) as f64;
     let noise = mean(room.left_out(best.chosen.get(band)?)?).sqrt();
@@ -74,6 +74,7 @@ pub(crate) fn search_on_forces(
         claimed: key_of(added(room, best, band).iter().map(|(h, _)| h)),
         beliefs,
         companions: companions.collect(),
+        left: noise / sensor,
         alike,
     };
     let took = |l: &Looked| better(explored.nothing(), l).share;
@@ -101,6 +102,15 @@ pub(crate) fn search_on_forces(
     };
     drop(evaluator);
     Some((problem, search))
+}
+
+/// Noise standard deviation of the force's sensor in a band.
+fn sensor_noise(problem: &Problem, corner: f64) -> f64 {
+    let measured = |record: &Record| {
+        crate::evaluator::measured(record).filter_map(|output| problem.noise_sd.get(output)).fold(0.0f64, |a, b| a.max(*b))
+    };
+    let in_band = |record: &Record| measured(record) * super::band::low_pass(record, corner).share_of_white().sqrt();
+    problem.fit.iter().map(in_band).fold(f64::MIN_POSITIVE, f64::max)
 }
 
 /// Whether the best of the laws leaves so much, of the force and beside the sensor's noise, that it has to be one of those that are only simulated.

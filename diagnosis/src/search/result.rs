@@ -73,6 +73,13 @@ pub struct Search {
     pub forces: Option<OnForces>,
 }
 
+impl Search {
+    /// What counts as noise, in words.
+    pub fn noise(&self) -> &'static str {
+        self.forces.as_ref().map_or("the sensor noise", OnForces::noise)
+    }
+}
+
 /// Why a search cannot start.
 #[derive(Debug, thiserror::Error)]
 pub enum SearchError {

@@ -5,6 +5,7 @@ use super::findings::{findings, is_timing_of};
 use super::signals::bursts;
 use super::types::{Finding, Word};
 use crate::candidate::Candidate;
+use crate::equation_error::OnForces;
 use crate::error_budget::beside_noise;
 use crate::evaluator::Evaluator;
 use crate::intervals::Uncertainty;
@@ -41,6 +42,8 @@ pub(super) struct Decision<'s> {
     pub(super) doubt: Option<Doubt>,
     /// Share of the force that none of the laws explains, where they were looked at on forces: what counts as noise there.
     pub(super) left_of_force: Option<f64>,
+    /// What the search on forces says, where there was one.
+    pub(super) forces: Option<&'s OnForces>,
 }
 
 /// Why what was found is as likely as not.
@@ -122,7 +125,21 @@ pub(super) fn decide<'s>(problem: &Problem, search: &'s Search) -> Decision<'s> 
         () if left_of_force.is_none() && !is_excited(problem, search) => Word::CannotTell,
         () => Word::NothingMissing,
     };
-    Decision { word, best, spread, findings, alike, bursts, at_floor, unseen, floors, changes: off || added, doubt: None, left_of_force }
+    Decision {
+        word,
+        best,
+        spread,
+        findings,
+        alike,
+        bursts,
+        at_floor,
+        unseen,
+        floors,
+        changes: off || added,
+        doubt: None,
+        left_of_force,
+        forces: search.forces.as_ref(),
+    }
 }
 
 /// Share of the force that counts as noise: over its standard deviation in the fitted recordings.

@@ -2,6 +2,7 @@
 
 use super::decision::{Decision, Doubt};
 use super::types::{Finding, Word};
+use crate::equation_error::OnForces;
 use crate::hypothesis::Place;
 use crate::tuning::tuning;
 use crate::words;
@@ -29,9 +30,12 @@ fn without_reserve(decision: &Decision, planned: bool) -> String {
     let (best, findings) = (decision.best, decision.findings.as_slice());
     let level = best.levels.iter().fold(0.0f64, |a, b| a.max(*b));
     let times = round_significant(level, 2);
-    let noise = if decision.left_of_force.is_some() { "what none of the laws explains" } else { "the sensor noise" };
+    let noise = decision.forces.map_or("the sensor noise", OnForces::noise);
     // Below this the residual is the sensor's noise up to chance and rounding.
-    let of_force = decision.left_of_force.map(|share| format!("{}", round_significant(100.0 * share, 2)));
+    let of_force = decision
+        .left_of_force
+        .filter(|_| decision.forces.is_some_and(|forces| !forces.is_at_noise()))
+        .map(|share| format!("{}", round_significant(100.0 * share, 2)));
     let end = if let Some(percent) = &of_force {
         format!("down to {percent} % of the force, which goes with none of the laws that were looked at")
     } else if level < tuning().noise.unexplained {
