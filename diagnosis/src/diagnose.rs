@@ -3,7 +3,7 @@
 use crate::audit::{Remark, Weight, audit};
 use crate::candidate::price;
 use crate::contenders::with_contenders;
-use crate::equation_error::{OnForces, search_on_forces};
+use crate::equation_error::{OnForces, inverse, search_on_forces};
 use crate::hold;
 use crate::let_go::let_go;
 use crate::locate::{self, Location, locate};
@@ -12,7 +12,7 @@ use crate::problem::Problem;
 use crate::search::{Search, SearchError, Settings, search};
 use crate::thinned::thinned;
 use crate::tuning::tuning;
-use crate::verdict::{Files, Verdict, VerdictError, timing, verdict, without_what_may_be_nothing};
+use crate::verdict::{Files, Verdict, VerdictError, chosen, timing, verdict, without_what_may_be_nothing};
 use crate::work::{Budget, Limit};
 use std::sync::atomic::AtomicBool;
 
@@ -64,13 +64,8 @@ pub fn diagnose(
         let text = "stands still throughout while others move: it is left out of every fit and of the verdict".to_string();
         remarks.push(Remark { weight: Weight::Caution, records: Vec::new(), signal, about: "constant", text });
     }
-    let (problem, search) = match search_on_forces(&problem, settings, limit, report) {
-        Some((problem, search)) => {
-            remarks.extend(search.forces.as_ref().map(of_band));
-            (problem, search)
-        }
-        None => by_simulation(problem, settings, limit, report, &mut remarks)?,
-    };
+    let (problem, search) = searched(problem, settings, limit, report, &mut remarks)?;
+    remarks.extend(search.forces.as_ref().map(of_band));
     remarks.extend(timing(&problem, &search));
     report("locating the missing force");
     let location = located(&problem, &search);
@@ -79,6 +74,32 @@ pub fn diagnose(
     report("fitting each record by itself");
     let per_record = fit_each(&problem, &search.nominal, &search.noise_sd, &Budget::new(tuning().search.per_record, limit));
     Ok(Diagnosis { problem, remarks, search, location, verdict, files, per_record })
+}
+
+/// Searches on forces where they are known along the motion, else by simulation. A device that forces drive is searched both ways: what is simulated down to the
+/// sensors' noise is the sharper answer, and of what no law explains that far, forces say which law goes with it.
+fn searched(
+    problem: Problem,
+    settings: &Settings,
+    limit: Limit,
+    report: &(dyn Fn(&str) + Sync),
+    remarks: &mut Vec<Remark>,
+) -> Result<(Problem, Search), SearchError> {
+    if let Some(found) = search_on_forces(&problem, settings, limit, report) {
+        return Ok(found);
+    }
+    let on_forces = inverse(&problem).and_then(|turned| search_on_forces(&turned, settings, limit, report));
+    let mut of_simulation = Vec::new();
+    let less = Settings { effort: settings.effort * tuning().equation_error.effort_beside, ..settings.clone() };
+    let simulated = by_simulation(problem, if on_forces.is_some() { &less } else { settings }, limit, report, &mut of_simulation)?;
+    let is_explained = chosen(&simulated.1).levels.iter().all(|level| *level < tuning().noise.unexplained);
+    Ok(match on_forces.filter(|_| !is_explained) {
+        Some(found) => found,
+        None => {
+            remarks.extend(of_simulation);
+            simulated
+        }
+    })
 }
 
 /// What a reader has to know of a search on forces.

@@ -16,13 +16,16 @@ pub(crate) fn is_known(problem: &Problem) -> bool {
     let is_moved = matches!(model.inputs.as_slice(), [input] if input.kind == InputKind::Motion);
     let is_force = |output: usize| matches!(model.outputs.get(output).map(|o| &o.kind), Some(OutputKind::Reaction(_)));
     let measures_force = |record: &Record| crate::evaluator::measured(record).eq((0..model.outputs.len()).filter(|o| is_force(*o)).take(1));
-    // The numbers of a law with a memory are no factors of columns, not even nearly.
-    let has_memory = |kind: &str| crate::physics::physics_named(kind).is_some_and(|physics| physics.facts.memory);
     model.bodies.len() == 1
         && !model.elements.iter().any(|e| has_memory(e.law.kind().name))
         && is_moved
         && problem.unknown.is_empty()
         && problem.fit.iter().chain(&problem.held_out).all(|record| measures_force(record) && record.conditions.is_empty())
+}
+
+/// Whether the force of an element of this kind depends on the path: its numbers are no factors of columns, not even nearly.
+pub(super) fn has_memory(kind: &str) -> bool {
+    crate::physics::physics_named(kind).is_some_and(|physics| physics.facts.memory)
 }
 
 /// Corners of the bands in which the motion is resolved, Hz, the lowest first.

@@ -16,7 +16,7 @@ pub struct OnForces {
     pub beliefs: Vec<(String, Belief)>,
     /// Effects that belong to another one, such as the zero of a spring, by id.
     pub companions: Vec<String>,
-    /// What the claimed structure leaves of left-out stretches, in noise standard deviations of the force's sensor in that band: rms.
+    /// What the claimed structure leaves, its numbers refined by simulation, in noise standard deviations of the force's sensor in that band: rms.
     pub left: f64,
     /// Structures that predict left-out stretches as well as the claimed one.
     pub alike: Vec<String>,

@@ -61,7 +61,9 @@ fn scales(problem: &Problem) -> Option<Scales> {
         samples.fold(0.0f64, |most, y| most.max(y.abs()))
     };
     let measured: Vec<f64> = (0..problem.model.outputs.len()).map(largest).collect();
-    Some(Scales::of(&problem.model, &runs).ok()?.with_measured(&problem.model, &measured))
+    let mut scales = Scales::of(&problem.model, &runs).ok()?.with_measured(&problem.model, &measured);
+    scales.reads_drive = problem.inverse.is_some();
+    Some(scales)
 }
 
 fn seen(problem: &Problem) -> Seen {

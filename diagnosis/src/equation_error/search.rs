@@ -40,7 +40,8 @@ pub(crate) fn search_on_forces(
     let budget = Budget::new(settings.work(), limit);
     let mean = |errors: Vec<f64>| errors.iter().sum::<f64>() / errors.len().max(1) as f64;
     let noise = mean(room.left_out(best.chosen.get(band)?)?).sqrt();
-    if is_beyond_these_laws(&problem, noise) {
+    // Of what is turned round a simulation has said already what it can say.
+    if problem.inverse.is_none() && is_beyond_these_laws(&problem, noise) {
         return None;
     }
     let mut evaluator = Evaluator { budget: budget.clone(), ..Evaluator::new(&problem) };
@@ -68,13 +69,16 @@ pub(crate) fn search_on_forces(
         true => Vec::new(),
         false => chosen.iter().filter(is_alike).map(|l| key_of(added(room, l, band).iter().map(|(h, _)| h))).collect(),
     };
+    let claimed = key_of(added(room, best, band).iter().map(|(h, _)| h));
+    // As far as the refinement by simulation brings it.
+    let refined = found.iter().find(|c| c.structure.name() == claimed).map_or(1.0, |c| c.levels.iter().fold(0.0f64, |a, b| a.max(*b)));
     let forces = OnForces {
         corner_hz: room.corner,
         bands_hz: rooms.iter().map(|r| r.corner).collect(),
-        claimed: key_of(added(room, best, band).iter().map(|(h, _)| h)),
+        claimed,
         beliefs,
         companions: companions.collect(),
-        left: noise / sensor,
+        left: refined * noise / sensor,
         alike,
     };
     let took = |l: &Looked| better(explored.nothing(), l).share;

@@ -47,7 +47,12 @@ pub(crate) fn log(low: f64, high: f64) -> Freedom {
 impl<'a> ElementBuilder<'a> {
     /// A new element at a site. `None` where the registry has no such kind.
     pub fn new(sites: &'a Sites<'a>, physics: &'static Physics, site: &Site) -> Option<ElementBuilder<'a>> {
-        let kind = kind_named(physics.name)?;
+        ElementBuilder::of_kind(sites, physics, physics.name, site)
+    }
+
+    /// The same where the element's kind has another name than the physics.
+    pub fn of_kind(sites: &'a Sites<'a>, physics: &'static Physics, kind: &str, site: &Site) -> Option<ElementBuilder<'a>> {
+        let kind = kind_named(kind)?;
         let name = free_name(sites.model, &format!("{}_{}", physics.name, site.label()));
         Some(ElementBuilder {
             sites,

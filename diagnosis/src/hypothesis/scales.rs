@@ -30,6 +30,8 @@ pub struct Scales {
     pub duration: f64,
     /// How many times further things were measured to move than these simulations do, at least 1.
     pub reach: f64,
+    /// Whether a force that is read is what drives the device: what is constant in it is then a force of the device, and no offset of a sensor.
+    pub reads_drive: bool,
 }
 
 /// Sums of squares and peaks on the way to a [`Span`].
@@ -113,6 +115,7 @@ impl Scales {
             period: shortest,
             duration: longest,
             reach: 1.0,
+            reads_drive: false,
         })
     }
 

@@ -33,6 +33,8 @@ pub enum Family {
     Compliance,
     /// Stiffness that loses energy whatever the rate.
     Hysteresis,
+    /// A force that depends on how the device stands.
+    Gravity,
 }
 
 impl Family {
@@ -45,6 +47,7 @@ impl Family {
             Family::Stiffness => Some("stiffness"),
             Family::Damping => Some("viscous friction"),
             Family::Lag => Some("a delay or lag"),
+            Family::Gravity => Some("gravity"),
             Family::Bias | Family::Scale | Family::Inertia | Family::Limit | Family::Ripple | Family::Compliance => None,
         }
     }

@@ -17,7 +17,7 @@ pub(super) const PHYSICS: Physics = Physics {
     propose: |sites| {
         // On a body that is moved whatever the force, a constant one is what an offset of the force sensor is.
         let is_moved = |end: &Place| sites.model.inputs.iter().any(|i| i.kind == InputKind::Motion && Some(i.on) == *end);
-        let is_free = |site: &&Site| site.reach != Reach::Ground || !site.ends.iter().any(is_moved);
+        let is_free = |site: &&Site| sites.scales.reads_drive || site.reach != Reach::Ground || !site.ends.iter().any(is_moved);
         let places = sites.near().filter(|site| !sites.has(site, &["bias"])).filter(is_free);
         let one = |site| {
             let new = ElementBuilder::new(sites, &PHYSICS, site)?;

@@ -40,6 +40,7 @@ register!(
     gear_loss,
     friction_deficit,
     warm_friction,
+    gravity,
     cogging,
     backlash,
     contact,

@@ -3,6 +3,7 @@
 use crate::hypothesis::ForceSpan;
 use crate::hypothesis::builder::{even, key};
 use crate::hypothesis::{Against, Facts, Family, Mark, Physics, State};
+use backdrive_plant::model::{Output, OutputKind};
 
 pub(super) const PHYSICS: Physics = Physics {
     name: "offset",
@@ -17,8 +18,9 @@ pub(super) const PHYSICS: Physics = Physics {
         ..Facts::NONE
     },
     propose: |sites| {
-        let outputs = sites.model.outputs.iter().enumerate().filter(|(_, o)| o.offset == 0.0);
-        let one = |(index, output): (usize, &backdrive_plant::model::Output)| {
+        let is_drive = |o: &Output| sites.scales.reads_drive && matches!(o.kind, OutputKind::Reaction(_));
+        let outputs = sites.model.outputs.iter().enumerate().filter(|(_, o)| o.offset == 0.0 && !is_drive(o));
+        let one = |(index, output): (usize, &Output)| {
             let span = sites.scales.output(index);
             let unit = output.kind.unit();
             let room = even(-10.0 * span.peak, 10.0 * span.peak, 0.0);

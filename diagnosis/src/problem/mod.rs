@@ -14,8 +14,10 @@ pub use files::MOST_OF_A_BAG;
 pub use logged::Logged;
 pub use outliers::Outliers;
 pub use record::Record;
+pub(crate) use record::spread;
 pub use stated::Stated;
 
+use crate::equation_error::Inverse;
 use crate::hypothesis::Place;
 use crate::noise;
 use crate::tuning::tuning;
@@ -52,6 +54,8 @@ pub struct Problem {
     pub left_out: Vec<(String, usize)>,
     /// Noise standard deviation of each output, in its unit; see [`crate::noise`].
     pub noise_sd: Vec<f64>,
+    /// Its signals, where it is a device driven by forces that was turned round; see [`crate::equation_error`].
+    pub inverse: Option<Inverse>,
     /// Samples over which each output's displacement is compared instead of its position; 0 where the position itself is.
     pub lag: Vec<usize>,
 }
@@ -136,7 +140,8 @@ impl Problem {
         let stated = stated_numbers(&model, &text);
         let noise_sd = (0..model.outputs.len()).map(|output| noise::of_signal(&model, &fit, output)).collect();
         let lag = (0..model.outputs.len()).map(|output| lag_of(&model, &fit, output)).collect();
-        Ok(Problem { text, model_path, model, fit, held_out, stated, initial, unknown: Vec::new(), left_out: Vec::new(), noise_sd, lag })
+        let (unknown, left_out) = (Vec::new(), Vec::new());
+        Ok(Problem { text, model_path, model, fit, held_out, stated, initial, unknown, left_out, noise_sd, inverse: None, lag })
     }
 
     /// The same without the outputs that stand at one value throughout while another moves: a sensor that is dead or at its rail says nothing of the device, and

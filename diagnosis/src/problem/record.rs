@@ -167,7 +167,7 @@ fn without_outliers(recording: &Recording, model: &Model) -> (Recording, Vec<Out
 }
 
 /// Standard deviation; 1 where it is 0.
-fn spread(samples: &[f64]) -> f64 {
+pub(crate) fn spread(samples: &[f64]) -> f64 {
     let n = samples.len().max(1) as f64;
     let mean = samples.iter().sum::<f64>() / n;
     let variance = samples.iter().map(|x| (x - mean) * (x - mean)).sum::<f64>() / n;

@@ -53,6 +53,8 @@ pub(super) enum Doubt {
     WorseThanGiven,
     /// The refitted nominal model predicts them better.
     WorseThanRefit,
+    /// The model as given simulates the motion of held-out recordings better.
+    WorseSimulated,
     /// A number is at an end of what the fit may try.
     AtAnEnd,
 }
@@ -113,7 +115,7 @@ pub(super) fn decide<'s>(problem: &Problem, search: &'s Search) -> Decision<'s> 
         best.whiteness_statistic > tuning().claim.wanders && best.levels.iter().any(|level| beyond(*level, tuning().noise.at_noise));
     let findings = findings(problem, search, best, &spread);
     let is_outdone = findings.first().is_some_and(Finding::has_likelier_rival);
-    let left_of_force = search.forces.as_ref().map(|_| left_of_force(problem, search));
+    let left_of_force = search.forces.as_ref().map(|_| left_of_force(problem, search) * best.levels.iter().fold(0.0f64, |a, b| a.max(*b)));
     let word = match () {
         () if claims && (!alike.is_empty() || is_outdone) => Word::Ambiguous,
         () if claims => Word::Missing,
@@ -142,7 +144,7 @@ pub(super) fn decide<'s>(problem: &Problem, search: &'s Search) -> Decision<'s> 
     }
 }
 
-/// Share of the force that counts as noise: over its standard deviation in the fitted recordings.
+/// Share of the force that counts as noise, of its standard deviation in the fitted recordings.
 fn left_of_force(problem: &Problem, search: &Search) -> f64 {
     let one = |(output, noise_sd): (usize, &f64)| {
         let measured = problem.fit.iter().filter(|r| r.outputs.get(output).is_some_and(Option::is_some));

@@ -33,11 +33,13 @@ pub use types::*;
 
 use crate::audit;
 use crate::candidate::Candidate;
+use crate::compare::unseen;
 use crate::locate::Location;
 use crate::problem::Problem;
 use crate::search::Search;
-use crate::structure::Role;
+use crate::structure::{Role, Structure};
 use crate::work::{Budget, Limit};
+use backdrive_plant::model::Model;
 use decision::{Doubt, decide};
 use experiments::next_experiment;
 use findings::{detectable, moved};
@@ -123,6 +125,7 @@ fn without_what_predicts_worse(problem: &Problem, search: &Search, decision: &mu
     let unseen = !problem.held_out.is_empty();
     decision.doubt = match () {
         () if decision.changes && unseen && is_worse_than(errors.nrmse_before) => Some(Doubt::WorseThanGiven),
+        () if decision.changes && unseen && is_worse_simulated(problem, decision) => Some(Doubt::WorseSimulated),
         () if decision.findings.is_empty() => None,
         () if unseen && is_worse_than(errors.nrmse_refit) => Some(Doubt::WorseThanRefit),
         () if search.forces.is_some() && is_at_an_end(decision.best) => Some(Doubt::AtAnEnd),
@@ -133,11 +136,28 @@ fn without_what_predicts_worse(problem: &Problem, search: &Search, decision: &mu
         finding.confidence = finding.confidence.min(tuning().claim.as_likely);
         finding.family_confidence = finding.family_confidence.min(tuning().claim.as_likely);
     });
-    if doubt != Doubt::WorseThanGiven {
+    if !matches!(doubt, Doubt::WorseThanGiven | Doubt::WorseSimulated) {
         return errors;
     }
     decision.changes = false;
     held_out(problem, search, decision.best, false)
+}
+
+/// Whether, of a device that forces drive and whose laws were looked at on forces, the model that would be written simulates the held-out motion worse.
+fn is_worse_simulated(problem: &Problem, decision: &decision::Decision) -> bool {
+    let Some(recorded) = problem.inverse.as_ref().map(|inverse| inverse.recorded.as_ref()) else { return false };
+    let left = |model: Model| {
+        let fixed = Problem { model, stated: Vec::new(), ..recorded.clone() };
+        let structure = Structure::new(&fixed, &fixed.held_out, Vec::new());
+        let values = structure.values(&fixed, &[], &[], &[]);
+        Some(unseen(&fixed, &fixed.held_out, &structure, &values, &fixed.noise_sd)?.mean_square)
+    };
+    let written = model_text(problem, decision.best, &decision.spread, true).ok().and_then(|text| Model::from_toml(&text, MODEL_FILE).ok());
+    match (left(recorded.model.clone()), written.and_then(left)) {
+        (Some(given), Some(written)) => written > given,
+        (_, None) => true,
+        (None, Some(_)) => false,
+    }
 }
 
 /// Whether a number of the nominal model, or the size of an effect, is at an end of what the fit may try.

@@ -36,6 +36,10 @@ pub(super) fn model_text(problem: &Problem, best: &Candidate, spread: &Uncertain
         edits.extend(hypothesis.edits(&model, &rounded)?);
         model = hypothesis.apply(&model, &rounded)?;
     }
+    let edits = match &problem.inverse {
+        Some(inverse) => inverse.in_file(edits),
+        None => edits,
+    };
     Ok(patch(&problem.text, &edits)?)
 }
 
@@ -51,6 +55,9 @@ pub(super) fn rival_models(problem: &Problem, search: &Search, best: &Candidate)
     };
     let mut rivals: Vec<&Candidate> = search.found.iter().chain([&search.nominal]).filter(near).collect();
     rivals.sort_by(|a, b| a.fit.cost.total_cmp(&b.fit.cost));
-    let models = rivals.into_iter().filter_map(|c| c.structure.model(problem, &c.fit.values));
-    models.take(tuning().claim.rivals).map(|model| model.to_toml()).collect()
+    let text = |c: &Candidate| match problem.inverse {
+        Some(_) => model_text(problem, c, &Uncertainty::of(c), true).ok(),
+        None => Some(c.structure.model(problem, &c.fit.values)?.to_toml()),
+    };
+    rivals.into_iter().filter_map(text).take(tuning().claim.rivals).collect()
 }

@@ -16,6 +16,9 @@ pub(super) fn sentence(decision: &Decision, planned: bool) -> String {
         Some(Doubt::WorseThanGiven) => {
             "the held-out recordings are predicted worse with it than by the model as given, so the model is written as given"
         }
+        Some(Doubt::WorseSimulated) => {
+            "simulated from the force, the motion of the held-out recordings comes out worse with it than by the model as given, so the model is written as given"
+        }
         Some(Doubt::WorseThanRefit) => {
             "recordings that no fit has seen are predicted better by the model with its numbers refitted and nothing added, so this is as likely as not"
         }
