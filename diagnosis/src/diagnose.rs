@@ -4,6 +4,7 @@ use crate::audit::{Remark, Weight, audit};
 use crate::candidate::price;
 use crate::contenders::with_contenders;
 use crate::equation_error::{OnForces, inverse, search_on_forces};
+use crate::evaluator;
 use crate::hold;
 use crate::let_go::let_go;
 use crate::locate::{self, Location, locate};
@@ -76,8 +77,8 @@ pub fn diagnose(
     Ok(Diagnosis { problem, remarks, search, location, verdict, files, per_record })
 }
 
-/// Searches on forces where they are known along the motion, else by simulation. A device that forces drive is searched both ways: what is simulated down to the
-/// sensors' noise is the sharper answer, and of what no law explains that far, forces say which law goes with it.
+/// Searches on forces where they are known along the motion, else by simulation. A device that forces drive, and one of which no law on forces explains much, is
+/// searched both ways: what is simulated down to the sensors' noise, or to far less than is left on forces, is the sharper answer.
 fn searched(
     problem: Problem,
     settings: &Settings,
@@ -85,21 +86,36 @@ fn searched(
     report: &(dyn Fn(&str) + Sync),
     remarks: &mut Vec<Remark>,
 ) -> Result<(Problem, Search), SearchError> {
-    if let Some(found) = search_on_forces(&problem, settings, limit, report) {
-        return Ok(found);
-    }
-    let on_forces = inverse(&problem).and_then(|turned| search_on_forces(&turned, settings, limit, report));
-    let mut of_simulation = Vec::new();
+    let direct = search_on_forces(&problem, settings, limit, report);
+    let is_direct = direct.is_some();
+    let on_forces = direct.or_else(|| search_on_forces(&inverse(&problem)?, settings, limit, report));
+    let is_beyond = |search: &Search| search.forces.as_ref().is_some_and(|forces| forces.is_beyond);
+    let on_forces = match on_forces {
+        Some(found) if is_direct && !is_beyond(&found.1) => return Ok(found),
+        other => other,
+    };
     let less = Settings { effort: settings.effort * tuning().equation_error.effort_beside, ..settings.clone() };
+    let mut of_simulation = Vec::new();
     let simulated = by_simulation(problem, if on_forces.is_some() { &less } else { settings }, limit, report, &mut of_simulation)?;
     let is_explained = chosen(&simulated.1).levels.iter().all(|level| *level < tuning().noise.unexplained);
-    Ok(match on_forces.filter(|_| !is_explained) {
+    let is_sharper = |found: &(Problem, Search)| {
+        let unseen = |(problem, search): &(Problem, Search)| unseen_force(problem, search);
+        is_direct
+            && unseen(&simulated).zip(unseen(found)).is_some_and(|(simulated, found)| simulated < tuning().equation_error.sharper * found)
+    };
+    Ok(match on_forces.filter(|found| !is_explained && !is_sharper(found)) {
         Some(found) => found,
         None => {
             remarks.extend(of_simulation);
             simulated
         }
     })
+}
+
+/// Root mean square of what the chosen structure leaves of a measured force in held-out recordings, N or N m.
+fn unseen_force(problem: &Problem, search: &Search) -> Option<f64> {
+    let output = evaluator::measured(problem.held_out.first()?).next()?;
+    Some(search.noise_sd.get(output)? * chosen(search).unseen.as_ref()?.mean_square.sqrt())
 }
 
 /// What a reader has to know of a search on forces.

@@ -49,8 +49,14 @@ pub(crate) fn gate(reader: &Reader, graph: &Graph) -> Result<Gate, SessionError>
         _ => None,
     });
     let is_closed_by_plan = graph.timing.steps.is_some_and(|steps| account.last_step.is_some_and(|last| last + 1 >= steps));
-    let kept_back =
-        contradicts.then_some(Unjudged::Contradictory).or(end.filter(|_| !is_closed_by_plan)).or_else(|| lost(&account, reader));
+    // What was recorded as no number was not recorded.
+    let silent =
+        || parts.iter().map(|part| part.silent).max().filter(|steps| *steps > 0).map(|steps| Unjudged::Lost { messages: steps as u64 });
+    let kept_back = contradicts
+        .then_some(Unjudged::Contradictory)
+        .or(end.filter(|_| !is_closed_by_plan))
+        .or_else(|| lost(&account, reader))
+        .or_else(silent);
     Ok(Gate { kept_back, notes, parts })
 }
 

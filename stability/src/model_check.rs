@@ -186,5 +186,14 @@ fn compare(what: Compared, counts: impl Fn(usize) -> bool, recorded: &[f64], pre
     }
     let (error_rms, effect_rms) = (f64::sqrt(error / count), f64::sqrt(effect / count));
     let agrees = error_rms <= 3.0 * what.floor || error_rms <= AGREES_WITHIN * effect_rms;
-    Some(PartCheck { part: what.part, axis: what.axis, quantity: what.quantity, error_rms, effect_rms, floor_rms: what.floor, agrees })
+    Some(PartCheck {
+        part: what.part,
+        axis: what.axis,
+        quantity: what.quantity,
+        error_rms,
+        effect_rms,
+        floor_rms: what.floor,
+        silent: 0,
+        agrees,
+    })
 }

@@ -17,8 +17,15 @@ pub struct PartCheck {
     pub effect_rms: f64,
     /// What the sensor's rounding and noise alone explain of the error, same unit.
     pub floor_rms: f64,
+    /// Steps in which the device's sensor gave no number, where those are more than a few lost messages.
+    #[serde(skip_serializing_if = "is_none")]
+    pub silent: usize,
     /// Whether the model tells the device: the error is within three floors, or below [`AGREES_WITHIN`] of the effect.
     pub agrees: bool,
+}
+
+fn is_none(steps: &usize) -> bool {
+    *steps == 0
 }
 
 /// Share of the effect below which an error is small.
@@ -26,6 +33,9 @@ pub const AGREES_WITHIN: f64 = 0.02;
 
 impl std::fmt::Display for PartCheck {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        if self.silent > 0 {
+            return write!(f, "the {} of {} was recorded as no number in {} steps", self.quantity, self.part, self.silent);
+        }
         let share = 100.0 * self.error_rms / self.effect_rms.max(f64::MIN_POSITIVE);
         match self.part {
             "master" => write!(f, "the master's model misses {share:.1} % of the motion that the reflected force makes"),

@@ -7,8 +7,10 @@ use std::ops::Range;
 pub(crate) struct Gram {
     columns: usize,
     total: Vec<f64>,
-    /// Samples of each stretch, and its products.
+    /// Samples of each stretch, and its products: first those that fits see.
     stretches: Vec<(usize, Vec<f64>)>,
+    /// How many of them fits see.
+    seen: usize,
     /// Root mean square of each column: what it was divided by.
     scales: Vec<f64>,
 }
@@ -23,8 +25,8 @@ pub(crate) struct Sum {
 }
 
 impl Gram {
-    /// Of columns that are all as long, in these stretches of them.
-    pub fn of(columns: &[Vec<f64>], stretches: &[Range<usize>]) -> Gram {
+    /// Of columns that are all as long, in these stretches of them, of which fits see the first `seen`.
+    pub fn of(columns: &[Vec<f64>], stretches: &[Range<usize>], seen: usize) -> Gram {
         use rayon::prelude::*;
         let rms = |c: &Vec<f64>| (c.iter().map(|x| x * x).sum::<f64>() / c.len().max(1) as f64).sqrt();
         let scales: Vec<f64> = columns.iter().map(|c| Some(rms(c)).filter(|s| *s > 0.0).unwrap_or(1.0)).collect();
@@ -35,10 +37,10 @@ impl Gram {
         };
         let stretches: Vec<(usize, Vec<f64>)> = stretches.par_iter().map(product).collect();
         let mut total = vec![0.0; n * n];
-        for (_, part) in &stretches {
+        for (_, part) in stretches.iter().take(seen) {
             total.iter_mut().zip(part).for_each(|(t, p)| *t += p);
         }
-        Gram { columns: n, total, stretches, scales }
+        Gram { columns: n, total, stretches, seen, scales }
     }
 
     fn at(&self, products: &[f64], a: usize, b: usize) -> f64 {
@@ -70,21 +72,25 @@ impl Gram {
     pub fn fit(&self, sum: &Sum) -> Option<(Vec<f64>, f64)> {
         let (matrix, vector, own) = self.parts(&self.total, sum);
         let factors = Gram::solve(&matrix, &vector)?;
-        let samples: usize = self.stretches.iter().map(|(samples, _)| samples).sum();
+        let samples: usize = self.stretches.iter().take(self.seen).map(|(samples, _)| samples).sum();
         let left = (own - 2.0 * factors.dot(&vector) + factors.dot(&(&matrix * &factors))).max(0.0) / samples.max(1) as f64;
         Some((sum.by.iter().zip(factors.iter()).map(|(c, x)| x / self.scales[*c]).collect(), left))
     }
 
-    /// Mean square of what is left of each stretch by factors that were found on all others.
+    /// Mean square of what is left of each stretch by factors that were found on all others that fits see.
     pub fn left_out(&self, sum: &Sum) -> Option<Vec<f64>> {
         let (matrix, vector, _) = self.parts(&self.total, sum);
-        let one = |(samples, products): &(usize, Vec<f64>)| {
+        let of_all = Gram::solve(&matrix, &vector)?;
+        let one = |(index, (samples, products)): (usize, &(usize, Vec<f64>))| {
             let (own_matrix, own_vector, own) = self.parts(products, sum);
-            let factors = Gram::solve(&(&matrix - &own_matrix), &(&vector - &own_vector))?;
+            let factors = match index < self.seen {
+                true => Gram::solve(&(&matrix - &own_matrix), &(&vector - &own_vector))?,
+                false => of_all.clone(),
+            };
             let left = own - 2.0 * factors.dot(&own_vector) + factors.dot(&(&own_matrix * &factors));
             Some(left.max(0.0) / (*samples).max(1) as f64)
         };
-        self.stretches.iter().map(one).collect()
+        self.stretches.iter().enumerate().map(one).collect()
     }
 }
 
@@ -99,7 +105,7 @@ mod tests {
         let b: Vec<f64> = (0..n).map(|i| 1e-3 * (0.11 * i as f64).cos()).collect();
         let y: Vec<f64> = (0..n).map(|i| 2.0 * a[i] - 500.0 * b[i] + 0.1 * (1.7 * i as f64).sin()).collect();
         let stretches = [0..40, 40..80, 80..120];
-        let gram = Gram::of(&[y.clone(), a.clone(), b.clone()], &stretches);
+        let gram = Gram::of(&[y.clone(), a.clone(), b.clone()], &stretches, 3);
         let sum = Sum { target: vec![0], by: vec![1, 2] };
         let (factors, left) = gram.fit(&sum).unwrap();
         assert!((factors[0] - 2.0).abs() < 0.05 && (factors[1] + 500.0).abs() < 30.0, "{factors:?}");

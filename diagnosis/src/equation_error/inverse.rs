@@ -99,5 +99,16 @@ fn turned_record(model: &Model, output: usize, record: &Record) -> Option<Record
     let (inputs, outputs) = (vec![motion], vec![Some(force)]);
     let segments = inputs.iter().map(|samples| segments(Hold::Cubic, samples, record.period)).collect();
     let spread = outputs.iter().flatten().map(|samples| spread(samples)).collect();
-    Some(Record { inputs, outputs, segments, spread, begins: Vec::new(), skip: 0, before: 0, logged: None, outliers: Vec::new(), ..record.clone() })
+    Some(Record {
+        inputs,
+        outputs,
+        segments,
+        spread,
+        begins: Vec::new(),
+        skip: 0,
+        before: 0,
+        logged: None,
+        outliers: Vec::new(),
+        ..record.clone()
+    })
 }

@@ -18,6 +18,8 @@ pub struct OnForces {
     pub companions: Vec<String>,
     /// What the claimed structure leaves, its numbers refined by simulation, in noise standard deviations of the force's sensor in that band: rms.
     pub left: f64,
+    /// Whether so much is left, of the force and beside the sensor's noise, that a law that is only simulated may be what is missing.
+    pub is_beyond: bool,
     /// Structures that predict left-out stretches as well as the claimed one.
     pub alike: Vec<String>,
 }

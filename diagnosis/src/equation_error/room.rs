@@ -49,8 +49,19 @@ pub(crate) struct Room {
     /// Laws of those.
     pub laws: Vec<Law>,
     gram: Gram,
-    /// Columns of the nominal model's free numbers.
-    base: Vec<usize>,
+    base: Vec<Stated>,
+}
+
+/// A free number of the nominal model.
+struct Stated {
+    path: String,
+    given: f64,
+    /// Whether it cannot be below 0.
+    positive: bool,
+    /// The column of what one more of it adds.
+    column: usize,
+    /// The column of all that it adds as given: what is to be explained without it.
+    without: usize,
 }
 
 /// How far the model moves and pushes on the recordings.
@@ -88,31 +99,55 @@ fn hypotheses(problem: &Problem, without: &[String]) -> Option<Vec<Hypothesis>> 
 
 /// Samples of the records that are compared, and the stretches that are left out in turn.
 struct Compared {
-    every: usize,
+    /// Which samples of each record, fitted and held out.
+    which: Vec<Vec<usize>>,
     stretches: Vec<Range<usize>>,
+    /// How many of the stretches are of fitted records.
+    fitted: usize,
     samples: usize,
 }
 
+/// Those that are fitted, then those that no fit sees.
+fn records(problem: &Problem) -> impl Iterator<Item = &Record> {
+    problem.fit.iter().chain(&problem.held_out)
+}
+
 impl Compared {
-    fn of(problem: &Problem, corner: f64) -> Compared {
+    fn of(problem: &Problem, corner: f64, seen: &Seen) -> Compared {
         let tuning = &tuning().equation_error;
         let period = problem.fit.first().map_or(1.0, |r| r.period);
         let every = ((1.0 / (period * tuning.compared * corner)) as usize).max(1);
-        let (mut stretches, mut at) = (Vec::new(), 0);
-        for record in &problem.fit {
-            let (len, n) = (record.len.div_ceil(every), tuning.stretches);
+        let at_rest = tuning.at_rest * seen.speed(0.9);
+        let (mut which, mut stretches, mut fitted, mut at) = (Vec::new(), Vec::new(), 0, 0);
+        for (index, record) in records(problem).enumerate() {
+            let motion = record.inputs.first().map_or(&[][..], Vec::as_slice);
+            // Dry friction of a body at rest is anything up to its level, whatever its law.
+            let moves = |i: &usize| {
+                let (before, after) = (motion.get(i.saturating_sub(1)), motion.get(i + 1));
+                before.zip(after).is_none_or(|(before, after)| (after - before).abs() > 2.0 * period * at_rest)
+            };
+            let own: Vec<usize> = (0..record.len).step_by(every).filter(moves).collect();
+            let (len, n) = (own.len(), tuning.stretches);
             stretches.extend((0..n).map(|k| at + k * len / n..at + (k + 1) * len / n).filter(|range| !range.is_empty()));
             at += len;
+            which.push(own);
+            if index < problem.fit.len() {
+                fitted = stretches.len();
+            }
         }
-        Compared { every, stretches, samples: at }
+        Compared { which, stretches, fitted, samples: at }
+    }
+
+    /// Those of a signal of a record.
+    fn taken(&self, record: usize, signal: &[f64]) -> Vec<f64> {
+        self.which.get(record).into_iter().flatten().filter_map(|i| signal.get(*i)).copied().collect()
     }
 
     /// Forces of a model along all records.
     fn forces(&self, problem: &Problem, model: &Model) -> Option<Vec<f64>> {
-        let one = |record: &Record| predict(model, record, problem.coarse_substeps());
         let mut all = Vec::with_capacity(self.samples);
-        for record in &problem.fit {
-            all.extend(one(record)?.into_iter().take(record.len).step_by(self.every));
+        for (index, record) in records(problem).enumerate() {
+            all.extend(self.taken(index, &predict(model, record, problem.coarse_substeps())?));
         }
         Some(all)
     }
@@ -122,19 +157,20 @@ impl Room {
     /// All that can be looked at in a band; `None` where the nominal model cannot be run along the motion.
     pub fn of(problem: &Problem, corner: f64, without: &[String]) -> Option<Room> {
         let problem = super::band::in_band(problem, corner);
-        let compared = Compared::of(&problem, corner);
+        let seen = seen(&problem);
+        let compared = Compared::of(&problem, corner, &seen);
         let nominal = Structure::new(&problem, &problem.fit, Vec::new());
         let given: Vec<f64> = problem.stated.iter().map(|s| s.given).collect();
         let start = nominal.values(&problem, &given, &[], &[]);
         let model = nominal.model(&problem, &start)?;
         let there = compared.forces(&problem, &model)?;
-        let measured = problem.fit.iter().flat_map(|r| {
+        let measured = records(&problem).enumerate().flat_map(|(index, r)| {
             let force = r.outputs.iter().flatten().next().map_or(&[][..], Vec::as_slice);
-            force.iter().step_by(compared.every)
+            compared.taken(index, force)
         });
         let minus = |a: &[f64], b: &[f64]| -> Vec<f64> { a.iter().zip(b).map(|(a, b)| a - b).collect() };
         let mut columns: Vec<Vec<f64>> = vec![measured.zip(&there).map(|(y, p)| y - p).collect()];
-        let mut base: Vec<(usize, String)> = Vec::new();
+        let mut base: Vec<Stated> = Vec::new();
         for (number, value) in nominal.free.iter().zip(&start) {
             let Role::Stated(stated) = number.role else { continue };
             let step = if *value == 0.0 { number.step } else { 1e-3 * value.abs() };
@@ -144,11 +180,19 @@ impl Room {
             let Some(forces) = nominal.model(&problem, &moved).and_then(|m| compared.forces(&problem, &m)) else { continue };
             let column: Vec<f64> = minus(&forces, &there).into_iter().map(|d| d / step).collect();
             if column.iter().any(|x| *x != 0.0) {
-                base.push((columns.len(), problem.stated.get(stated)?.path.clone()));
-                columns.push(column);
+                let stated = problem.stated.get(stated)?;
+                let without = column.iter().map(|x| x * value).collect();
+                base.push(Stated {
+                    path: stated.path.clone(),
+                    given: *value,
+                    positive: stated.log,
+                    column: columns.len(),
+                    without: columns.len() + 1,
+                });
+                columns.extend([column, without]);
             }
         }
-        let (hypotheses, seen) = (hypotheses(&problem, without)?, seen(&problem));
+        let hypotheses = hypotheses(&problem, without)?;
         let mut laws: Vec<Law> = Vec::new();
         for (index, h) in hypotheses.iter().enumerate() {
             let spans = (h.physics.facts.spans)(h, &seen);
@@ -162,7 +206,7 @@ impl Room {
                 columns.len() - 1
             });
             let is_dropped = |path: &str| h.replaces.iter().any(|name| path.starts_with(&format!("elements.{name}.")));
-            let drops = base.iter().filter(|(_, path)| is_dropped(path)).map(|(column, _)| *column).collect();
+            let drops = base.iter().filter(|number| is_dropped(&number.path)).map(|number| number.column).collect();
             let of = |values: &Vec<f64>| Some(minus(&compared.forces(&problem, &h.apply(&model, values).ok()?)?, &rest));
             let forces: Vec<Option<Vec<Vec<f64>>>> = spans.par_iter().map(|span| span.values.iter().map(of).collect()).collect();
             let mut variants = Vec::new();
@@ -171,11 +215,10 @@ impl Room {
                 variants.push(Variant { columns: (columns.len()..columns.len() + forces.len()).collect(), spans: vec![span] });
                 columns.extend(forces);
             }
-            laws.push(Law { hypotheses: vec![index], variants, shift, drops, numbers: h.parameters.len() });
+            laws.push(Law { hypotheses: vec![index], variants, shift, drops, numbers: h.parameters.len() + h.physics.facts.fixed });
         }
         with_their_zero(&hypotheses, &mut laws);
-        let gram = Gram::of(&columns, &compared.stretches);
-        let base = base.into_iter().map(|(column, _)| column).collect();
+        let gram = Gram::of(&columns, &compared.stretches, compared.fitted);
         Some(Room { problem, corner, hypotheses, laws, gram, base })
     }
 
@@ -200,7 +243,22 @@ impl Room {
         let target = std::iter::once(0).chain(laws.iter().filter_map(|chosen| law(chosen).shift)).collect();
         let dropped = |column: &usize| laws.iter().any(|chosen| law(chosen).drops.contains(column));
         let own = laws.iter().flat_map(|(law, variant)| self.laws[*law].variants[*variant].columns.iter().copied());
-        Sum { target, by: self.base.iter().copied().filter(|column| !dropped(column)).chain(own).collect() }
+        let base = self.base.iter().map(|number| number.column);
+        self.within_reason(Sum { target, by: base.filter(|column| !dropped(column)).chain(own).collect() })
+    }
+
+    /// The same without numbers of the nominal model that would come out below 0 and cannot: a falling friction is not a negative viscous one.
+    fn within_reason(&self, mut sum: Sum) -> Sum {
+        loop {
+            let Some((factors, _)) = self.gram.fit(&sum) else { return sum };
+            let is_wrong = |number: &&Stated| {
+                let at = sum.by.iter().position(|column| *column == number.column);
+                number.positive && at.and_then(|at| factors.get(at)).is_some_and(|factor| number.given + factor < 0.0)
+            };
+            let Some(wrong) = self.base.iter().find(is_wrong) else { return sum };
+            sum.by.retain(|column| *column != wrong.column);
+            sum.target.push(wrong.without);
+        }
     }
 
     /// What laws leave, force squared, and the parameters of the hypotheses of each; `None` where one of those is out of its range.
@@ -218,13 +276,22 @@ impl Room {
                 let values = (span.sum)(now, &span.values);
                 let hypothesis = &self.hypotheses[*h];
                 let inside = |(p, v): (&crate::hypothesis::Parameter, &f64)| v.is_finite() && (p.range.0..=p.range.1).contains(v);
-                if !hypothesis.parameters.iter().zip(&values).all(inside) || hypothesis.apply(&self.problem.model, &values).is_err() {
+                if !hypothesis.parameters.iter().zip(&values).all(inside) || !self.is_written_so(hypothesis, &values) {
                     return None;
                 }
                 all.push((*h, values));
             }
         }
         Some((left, all))
+    }
+
+    /// Whether a model can hold these values as they are: where they contradict each other, they are another law's.
+    fn is_written_so(&self, hypothesis: &Hypothesis, values: &[f64]) -> bool {
+        let model = &self.problem.model;
+        let Some(written) = hypothesis.apply(model, values).ok().and_then(|edited| hypothesis.values_in(&edited, model)) else {
+            return false;
+        };
+        written.iter().zip(values).all(|(a, b)| (a - b).abs() <= 1e-6 * b.abs().max(f64::MIN_POSITIVE))
     }
 
     /// What laws leave of stretches that were left out: mean squares, force squared.

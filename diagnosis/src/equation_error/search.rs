@@ -11,7 +11,7 @@ use crate::hypothesis::Hypothesis;
 use crate::problem::{Problem, Record};
 use crate::search::{Search, Settings, Tried};
 use crate::statistics::levels;
-use crate::structure::Structure;
+use crate::structure::{FreeParameter, Role, Structure};
 use crate::tuning::tuning;
 use crate::work::{Budget, Limit};
 
@@ -31,25 +31,25 @@ pub(crate) fn search_on_forces(
     if rooms.windows(2).any(|pair| laws(&pair[0]) != laws(&pair[1])) {
         return None;
     }
-    let explored = explore(&rooms, settings.effects)?;
+    let mut explored = explore(&rooms, settings.effects)?;
     report("simulating those that predict left-out stretches best");
-    let best = explored.best();
     let band = clearest(&rooms, &explored)?;
     let room = rooms.get(band)?;
     let (sensor, problem) = (sensor_noise(problem, room.corner), room.problem.clone());
     let budget = Budget::new(settings.work(), limit);
     let mean = |errors: Vec<f64>| errors.iter().sum::<f64>() / errors.len().max(1) as f64;
-    let noise = mean(room.left_out(best.chosen.get(band)?)?).sqrt();
-    // Of what is turned round a simulation has said already what it can say.
-    if problem.inverse.is_none() && is_beyond_these_laws(&problem, noise) {
-        return None;
-    }
+    let noise = mean(room.left_out(explored.best().chosen.get(band)?)?).sqrt();
+    let is_beyond = is_beyond_these_laws(&problem, noise);
     let mut evaluator = Evaluator { budget: budget.clone(), ..Evaluator::new(&problem) };
     for (own, record) in evaluator.noise_sd.iter_mut().enumerate().filter(|(o, _)| problem.fit.iter().any(|r| r.outputs[*o].is_some())) {
         let least = problem.fit.iter().filter_map(|r| r.spread.get(own)).fold(0.0f64, |a, b| a.max(*b));
         *record = noise.max(tuning().recordings.least_noise * least);
     }
     let fitted = |l: &Looked| fitted(&evaluator, room, l.chosen.get(band)?);
+    while let Some(rest) = without_what_is_nothing(&explored, &fitted(explored.best())?, room) {
+        explored.enough = rest;
+    }
+    let best = explored.best();
     let nominal = fitted(explored.nothing())?;
     let given: Vec<f64> = problem.stated.iter().map(|s| s.given).collect();
     let start = nominal.structure.values(&problem, &given, &[], &[]);
@@ -79,6 +79,7 @@ pub(crate) fn search_on_forces(
         beliefs,
         companions: companions.collect(),
         left: refined * noise / sensor,
+        is_beyond,
         alike,
     };
     let took = |l: &Looked| better(explored.nothing(), l).share;
@@ -106,6 +107,20 @@ pub(crate) fn search_on_forces(
     };
     drop(evaluator);
     Some((problem, search))
+}
+
+/// Where refined by simulation a law of the claimed structure comes out as nothing: the place of the structure without it.
+fn without_what_is_nothing(explored: &Explored, refined: &Candidate, room: &Room) -> Option<usize> {
+    let is_nothing = |(number, value): (&FreeParameter, &f64)| {
+        let Role::Added(h, p) = number.role else { return None };
+        let hypothesis = refined.structure.added.get(h)?;
+        let parameter = hypothesis.parameters.get(p).filter(|p| p.key == hypothesis.physics.size && p.neutral.is_some())?;
+        let at_neutral = number.at_bound(*value).is_some() && number.at_bound(parameter.neutral?) == number.at_bound(*value);
+        at_neutral.then(|| hypothesis.id.clone())
+    };
+    let nothing = refined.structure.free.iter().zip(&refined.fit.values).find_map(is_nothing)?;
+    let rest: Vec<usize> = explored.best().laws.iter().copied().filter(|law| room.named(*law).id != nothing).collect();
+    explored.all.iter().position(|l| l.laws == rest && l.laws.len() < explored.best().laws.len())
 }
 
 /// Noise standard deviation of the force's sensor in a band.

@@ -154,6 +154,8 @@ pub struct Facts {
     pub plausible: &'static [(&'static str, f64, f64)],
     /// Physics that it contains as a special or limiting case: who withholds one of these withholds it too.
     pub contains: &'static [&'static str],
+    /// Numbers of its law that are known beforehand, and yet are claimed with it.
+    pub fixed: usize,
     /// Its forces along a motion as sums of a few, for each choice of its nonlinear numbers; none where it is only simulated.
     pub(crate) spans: fn(&Hypothesis, &Seen) -> Vec<Span>,
 }
@@ -221,6 +223,7 @@ impl Facts {
         refine: |_, _, _| None,
         plausible: &[],
         contains: &[],
+        fixed: 0,
         spans: |h, _| match (h.physics.facts.proportional, h.parameters.len(), h.starts.first()) {
             (true, 1, Some(start)) => vec![Span::proportional(start.clone())],
             _ => Vec::new(),

@@ -20,6 +20,8 @@ pub(super) const PHYSICS: Physics = Physics {
     mark: Mark::Ripple,
     facts: Facts {
         proportional: true,
+        // That it repeats once a turn: where the travel is short, a spring is the simpler reading of the same force.
+        fixed: 1,
         spans: |h, seen| match h.starts.first().and_then(|start| start.first()) {
             Some(amplitude) if seen.travel > LEAST_TRAVEL => {
                 let sum = |factors: &[f64], values: &[Vec<f64>]| {

@@ -360,8 +360,9 @@ fn device(part: &'static str, axis: usize, quantity: Quantity, recorded: &[f64],
     // In lockstep there is a value in every step: a sensor that is silent for longer than a few lost messages is not known to do what the model does.
     let silent = recorded.iter().zip(predicted).filter(|(r, p)| !r.is_finite() && p.is_finite()).count();
     let speaks = small > SMALL_IN_LOCKSTEP || silent as f64 <= MOST_SILENT * (silent + rows.len()) as f64;
+    let silent = if speaks { 0 } else { silent };
     let agrees = speaks && error_rms <= 2.0 * small * effect_rms.max(rms(&|row| recorded[row]));
-    Some(PartCheck { part, axis, quantity, error_rms, effect_rms, floor_rms: 0.0, agrees })
+    Some(PartCheck { part, axis, quantity, error_rms, effect_rms, floor_rms: 0.0, silent, agrees })
 }
 
 /// Topics of samples in the bag that no answer is drawn from.

@@ -1,0 +1,89 @@
+//! Small inputs that were once answered wrongly, kept beside the project: each has to come out as its `expect.md` says. Without them there is nothing to test.
+
+#[path = "../../tests/common/skipped.rs"]
+mod skipped;
+
+use backdrive_diagnosis::diagnose::{Diagnosis, diagnose};
+use backdrive_diagnosis::hypothesis::Family;
+use backdrive_diagnosis::problem::Problem;
+use backdrive_diagnosis::search::Settings;
+use backdrive_diagnosis::verdict::Parameter;
+use std::path::{Path, PathBuf};
+
+/// The folder of a case; `None`, with a message, where it is not there.
+fn case(name: &str) -> Option<PathBuf> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/cases").join(name);
+    if !folder.is_dir() {
+        skipped::skipped(format!("{} is not there", folder.display()));
+        return None;
+    }
+    Some(folder)
+}
+
+fn diagnosed(folder: &Path) -> Diagnosis {
+    let problem = Problem::open(&folder.join("set.toml"), None).unwrap();
+    diagnose(problem, &Settings::default(), None, &|_| ()).unwrap()
+}
+
+/// A parameter of the finding of this physics.
+fn number(found: &Diagnosis, physics: &str, key: &str) -> f64 {
+    let all = &found.verdict.findings;
+    let finding = all.iter().find(|f| f.physics == physics).unwrap_or_else(|| panic!("no {physics}: {}", found.verdict.sentence));
+    match &finding.parameters[key] {
+        Parameter::One(one) => one.value,
+        Parameter::List(list) => list.value[0],
+    }
+}
+
+fn near(found: f64, true_one: f64, share: f64) {
+    assert!((found / true_one - 1.0).abs() < share, "{found} for {true_one}");
+}
+
+#[test]
+fn exact_zeros_at_rest_hide_no_friction() {
+    let Some(folder) = case("30-exact-zeros-at-rest") else { return };
+    for set in ["exact", "tiny"] {
+        let found = diagnosed(&folder.join(set));
+        near(number(&found, "coulomb", "force"), 2.0e-3, 0.05);
+        assert!(found.verdict.findings[0].family_confidence > 0.9, "{}", found.verdict.sentence);
+    }
+}
+
+#[test]
+fn an_encoder_s_steps_do_not_take_the_inertia() {
+    let Some(folder) = case("31-encoder-steps-collapse-inertia") else { return };
+    let found = diagnosed(&folder);
+    near(number(&found, "coulomb", "force"), 12.5, 0.05);
+    let model = found.search.found[0].structure.model(&found.problem, &found.search.found[0].fit.values).unwrap();
+    near(model.bodies[0].inertia, 5.0, 0.1);
+}
+
+#[test]
+fn a_torque_that_was_logged_late_is_late_and_no_compliance() {
+    for (name, friction, late) in [("32-torque-8-ms-late", 0.16, 8e-3), ("33-lag-taken-for-compliance", 0.03, 4e-3)] {
+        let Some(folder) = case(name) else { return };
+        let found = diagnosed(&folder);
+        near(number(&found, "delay", "delay").abs(), late, 0.1);
+        near(number(&found, "coulomb", "force"), friction, 0.05);
+    }
+}
+
+#[test]
+fn gravity_has_its_name() {
+    let Some(folder) = case("34-gravity-taken-for-cogging") else { return };
+    let found = diagnosed(&folder);
+    near(number(&found, "gravity", "amplitude").abs(), 2.95, 0.05);
+    near(number(&found, "coulomb", "force"), 2.0, 0.05);
+    assert!(found.verdict.held_out.nrmse_after.unwrap() < 0.09);
+    assert!(found.verdict.findings.iter().any(|f| f.family == Some(Family::Gravity)));
+    assert!(found.files.model.contains("cogging"), "{}", found.files.model);
+}
+
+#[test]
+fn a_constant_that_was_left_out_hides_nothing() {
+    let Some(folder) = case("35-constant-left-out-hides-all") else { return };
+    let found = diagnosed(&folder);
+    near(number(&found, "offset", "offset"), -100.0, 0.05);
+    near(number(&found, "dahl", "coulomb"), 500.0, 0.05);
+    assert!(found.verdict.held_out.nrmse_after.unwrap() < 0.02);
+}
