@@ -53,7 +53,7 @@ mod writer;
 pub use account::{Account, Fault};
 pub use cdr::{FieldPath, Schema};
 pub use claim::check_target;
-pub use clock_check::clock_remarks;
+pub use clock_check::{ClockFault, ClockFaultKind, clock_faults, clock_remarks};
 pub use clock_offset::{CLOCK_OFFSET, ClockOffset};
 pub use completeness::{Completeness, TopicCompleteness};
 pub use diff::{DiffOptions, DiffReport, Divergence, TopicDiff, diff};
