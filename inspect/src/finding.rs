@@ -42,6 +42,8 @@ pub enum FindingKind {
     WrongScale,
     /// Two columns of a joint are exchanged.
     SwappedColumns,
+    /// A command is later than the position that follows it.
+    CommandLate,
     /// A velocity is late or early beside the derivative of its position.
     VelocityLag,
     /// A velocity is not the derivative of its position.

@@ -67,10 +67,10 @@ fn by_data(recording: &mut Recording) {
             let Some(found) = follow(&derivative(&coarse(*position), period), &coarse(*velocity), (-2, 2)) else { continue };
             if found.explained > EXPLAINED {
                 let why = format!("it is the derivative of {}", recording.signals[*position].name);
-                said.push((*velocity, Quantity::Velocity, 0.5 + 0.45 * found.explained, why));
+                said.push((*velocity, Quantity::Velocity, 0.3 + 0.45 * found.explained, why));
                 if unknown.contains(position) {
                     let why = format!("{} is its derivative", recording.signals[*velocity].name);
-                    said.push((*position, Quantity::Position, 0.5 + 0.45 * found.explained, why));
+                    said.push((*position, Quantity::Position, 0.3 + 0.45 * found.explained, why));
                 }
             }
         }
@@ -84,10 +84,10 @@ fn by_data(recording: &mut Recording) {
             // Late by half a step at least, or either could be the other's command.
             if found.explained > EXPLAINED && found.lag > 0.5 {
                 let why = format!("{} follows it {:.0} ms late", recording.signals[*position].name, 1e3 * found.lag * period);
-                said.push((*command, Quantity::Command, 0.4 + 0.45 * found.explained, why));
+                said.push((*command, Quantity::Command, 0.3 + 0.45 * found.explained, why));
                 if unknown.contains(position) && !said.iter().any(|(place, ..)| place == position) {
                     let why = format!("it follows {} late", recording.signals[*command].name);
-                    said.push((*position, Quantity::Position, 0.4 + 0.45 * found.explained, why));
+                    said.push((*position, Quantity::Position, 0.3 + 0.45 * found.explained, why));
                 }
             }
         }

@@ -4,9 +4,10 @@ use super::motion::{Band, excitation, of};
 use crate::advice;
 use crate::finding::{Finding, FindingKind, Weight};
 use crate::joints::Joint;
-use crate::numeric::{Follow, Profile, follow, width};
-use crate::recording::Recording;
+use crate::numeric::{Follow, Profile, follow, resolution, width};
+use crate::recording::{Recording, Signal};
 use backdrive_diagnosis::low_pass::LowPass;
+use backdrive_diagnosis::noise;
 
 /// Lags that are tried: a command may be this late, and the position this early (columns exchanged), s.
 const LATE_S: f64 = 1.0;
@@ -14,7 +15,7 @@ const EARLY_S: f64 = 0.5;
 /// Lags of most servos, s: within them a sign is claimed.
 const USUAL_S: [f64; 2] = [0.05, 0.4];
 /// By which factor the rest grows where a position is taken to be late that is early.
-const WORSE: f64 = 1.5;
+const WORSE: f64 = 3.0;
 /// Share of variance from which on a position follows its command.
 const EXPLAINED: f64 = 0.8;
 /// Motion below this frequency is followed by any servo at its full size, Hz.
@@ -27,8 +28,14 @@ const SLOW_EXPLAINED: f64 = 0.98;
 const NEAR: f64 = 0.3;
 /// A position is early by at least this, s, and by this many samples, to be taken for the command.
 const EARLY: f64 = 0.008;
+/// What a sensor measures has this many times the noise of what a computer wrote, or its step.
+const NOISIER: f64 = 1.5;
 /// Share of equal rows from which on command and position are the same column.
 const SAME: f64 = 0.99;
+/// What names and units say is this sure at least.
+const NAMED: f64 = 0.8;
+/// Share of variance from which on columns are said to be exchanged.
+const ALL_BUT: f64 = 0.97;
 
 /// Finds what is wrong.
 pub fn check(recording: &Recording, joints: &[Joint], out: &mut Vec<Finding>) {
@@ -36,6 +43,10 @@ pub fn check(recording: &Recording, joints: &[Joint], out: &mut Vec<Finding>) {
     for joint in joints {
         let (Some(command), Some(position)) = (of(recording, joint.command), of(recording, joint.position)) else { continue };
         let Some(place) = joint.position else { continue };
+        // Where only the data say which is the command, they cannot say that it is wrong.
+        if command.sure.min(position.sure) < NAMED {
+            continue;
+        }
         if excitation(command) == 0.0 || excitation(position) < 10.0 {
             continue;
         }
@@ -75,21 +86,26 @@ pub fn check(recording: &Recording, joints: &[Joint], out: &mut Vec<Finding>) {
         }
         let (lag, wide) = (found.lag * band.period, profile.uncertainty().map_or(f64::INFINITY, |half| half * band.period));
         let late = share(near(0.0, LATE_S, 1.0));
-        let is_early = 1.0 - late > WORSE * (1.0 - found.explained).max(1e-9);
+        let is_early = found.explained > ALL_BUT && 1.0 - late > WORSE * (1.0 - found.explained).max(1e-9);
         if lag < -EARLY.max(0.6 * recording.period) && lag + wide < 0.0 && is_early && !joint.is_led && !is_against {
-            let message = format!(
-                "{:?} is {:.0} ms ahead of {:?} (95 % interval ±{:.0} ms), and no joint is ahead of its command: the two columns are exchanged",
+            let ahead = format!(
+                "{:?} is {:.0} ms ahead of {:?} (95 % interval ±{:.0} ms), and no joint is ahead of its command",
                 names[0],
                 -1e3 * lag,
                 names[1],
                 1e3 * wide
             );
-            let todo = format!(
-                "[columns]\ncommand = {}\nposition = {}",
-                advice::source(recording, position, ""),
-                advice::source(recording, command, "")
-            );
-            out.push(new(FindingKind::SwappedColumns, message).todo(todo));
+            // What a sensor measures is the noisier of the two.
+            let noise = |signal: &Signal| noise::white(&signal.even).unwrap_or(0.0).max(resolution(&signal.even));
+            if noise(command) > NOISIER * noise(position) {
+                let (a, b) = (advice::source(recording, position, ""), advice::source(recording, command, ""));
+                let todo = format!("[columns]\ncommand = {a}\nposition = {b}");
+                out.push(new(FindingKind::SwappedColumns, format!("{ahead}, and less noisy: the two columns are exchanged")).todo(todo));
+            } else {
+                let todo = "ask the logger which of the two is older; a lag that is computed from them is wrong";
+                let finding = new(FindingKind::CommandLate, format!("{ahead}: the command was logged late, or the two are exchanged"));
+                out.push(finding.weighing(Weight::Note).sure(0.7).todo(todo));
+            }
         }
     }
 }

@@ -19,8 +19,10 @@ const LATE_S: f64 = 0.2;
 /// Blocks of the jackknife.
 const BLOCKS: usize = 8;
 /// Share of the torque that motion explains, from which on a lag is claimed; and by which factor the rest grows without the lag.
-const EXPLAINED: f64 = 0.6;
-const WORSE: f64 = 1.25;
+const EXPLAINED: f64 = 0.7;
+const WORSE: f64 = 2.0;
+/// Half of the interval is at most this share of the lag: hysteresis and play look like a lag that differs from stroke to stroke.
+const KNOWN: f64 = 0.35;
 /// A lag of a drive's electronics is some ms; from here on it turns friction into damping and inertia.
 const LAG_S: f64 = 0.010;
 /// Share from which on a sign is claimed.
@@ -55,7 +57,7 @@ fn one(recording: &Recording, joint: &Joint, place: usize, out: &mut Vec<Finding
     let (lag, wide) = (best.lag * work.period, wide * work.period);
     let rest = |share: f64| (1.0 - share).max(1e-9);
     let needed = rest(best.at_once) > WORSE * rest(best.explained);
-    if best.explained > EXPLAINED && needed && lag > LAG_S.max(0.8 * recording.period) && lag - wide > 0.3 * LAG_S.max(recording.period) {
+    if best.explained > EXPLAINED && needed && lag > LAG_S.max(0.8 * recording.period) && wide < KNOWN * lag && !work.is_at_the_end(best.lag) {
         let message = format!(
             "{:?} lags the motion of {position:?} by {:.0} ms (95 % interval ±{:.0} ms): a filter, or an older sample",
             names[0],
@@ -181,6 +183,11 @@ impl Regression {
         }
         let at_once = shares.get((-self.first) as usize).copied().unwrap_or(0.0);
         Some(Best { lag: lag + self.first as f64, explained: shares[best].clamp(0.0, 1.0), at_once })
+    }
+
+    fn is_at_the_end(&self, lag: f64) -> bool {
+        let last = self.first + self.blocks.first().map_or(0, |block| block.xy.len() as i64) - 1;
+        lag <= self.first as f64 || lag >= last as f64
     }
 
     fn uncertainty(&self) -> Option<f64> {

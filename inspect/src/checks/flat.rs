@@ -3,7 +3,7 @@
 use crate::advice;
 use crate::finding::{Finding, FindingKind};
 use crate::joints::Joint;
-use crate::numeric::{median, quantile, runs, span};
+use crate::numeric::{median, quantile, resolution, runs, span};
 use crate::quantity::Quantity;
 use crate::recording::{Recording, Signal};
 use backdrive_diagnosis::noise;
@@ -15,6 +15,8 @@ const LEAST_S: f64 = 0.08;
 const JUMP: f64 = 5.0;
 /// Share of this jump that the partner has to move meanwhile, where there is one.
 const PARTNER_MOVES: f64 = 0.2;
+/// Share of its range by which a partner has to move in the stretch.
+const MOVES: f64 = 0.005;
 /// Share of equal neighbours above which a signal stands still as a rule, and nothing is said of stretches.
 const OFTEN_EQUAL: f64 = 0.25;
 
@@ -69,7 +71,7 @@ fn frozen(recording: &Recording, signal: &Signal, joint: Option<&Joint>, out: &m
     let (usual, large) = (median(&moving), quantile(&moving, 0.95));
     let range = span(values);
     // Noise beyond the step: then no two neighbours are equal but by chance.
-    let is_fine = noise::white(values).is_some_and(|noise| noise > noise::step_of(values).unwrap_or(0.0));
+    let is_fine = noise::white(values).is_some_and(|noise| noise > resolution(values));
     let candidates = runs(values, LEAST_ROWS).into_iter().filter(|(from, to)| stream.time(*to) - stream.time(*from) >= LEAST_S);
     let mut found: Vec<(usize, usize)> = Vec::new();
     for (from, to) in candidates {
@@ -79,10 +81,12 @@ fn frozen(recording: &Recording, signal: &Signal, joint: Option<&Joint>, out: &m
         let chance = equal.max(1e-3).powi((to - from) as i32) * values.len() as f64;
         let is_noisy = is_fine && equal < OFTEN_EQUAL && chance < 1e-6 && values[from] != 0.0;
         let at_an_end = (values[from] - values.iter().copied().fold(f64::INFINITY, f64::min)).abs().min((values[from] - values.iter().copied().fold(f64::NEG_INFINITY, f64::max)).abs())
-            < 1e-3 * range;
+            < (1e-3 * range).max(3.0 * resolution(values));
         let jumped = after > JUMP * large && before > 0.1 * usual && after < large * (to - from) as f64 * 1.5;
-        let noise_stops = is_noisy && !at_an_end && signal.quantity.is_measured();
-        if noise_stops && !rests(recording, joint, signal, from, to) || (jumped && partner_moves(recording, joint, signal, from, to, after)) {
+        let noise_stops = is_noisy && !at_an_end && signal.quantity.is_measured() && is_noisy_around(values, from, to);
+        if (noise_stops && joint_moves(recording, joint, signal, from, to))
+            || (jumped && partner_moves(recording, joint, signal, from, to, after))
+        {
             found.push((from, to));
         }
     }
@@ -104,14 +108,23 @@ fn even_rows(recording: &Recording, signal: &Signal, from: usize, to: usize) -> 
     (at(from), at(to))
 }
 
-/// Whether the position of the joint stands still in this stretch as well: then a silent sensor is no wonder.
-fn rests(recording: &Recording, joint: Option<&Joint>, signal: &Signal, from: usize, to: usize) -> bool {
-    let Some(position) = joint.and_then(|joint| joint.position).map(|place| &recording.signals[place]) else { return false };
+/// Whether neighbours differ before and behind a stretch: where they do not, it rests there.
+fn is_noisy_around(values: &[f64], from: usize, to: usize) -> bool {
+    let length = 3 * (to - from);
+    let share = |part: &[f64]| part.windows(2).filter(|w| w[0] == w[1]).count() as f64 / part.len().max(1) as f64;
+    let (before, behind) = (&values[from.saturating_sub(length)..from], &values[to + 1..(to + 1 + length).min(values.len())]);
+    before.len().max(behind.len()) >= LEAST_ROWS && share(before) < OFTEN_EQUAL && share(behind) < OFTEN_EQUAL
+}
+
+/// Whether the joint is known to move in this stretch: by its command or its velocity where it is the position that stands, else by its position.
+fn joint_moves(recording: &Recording, joint: Option<&Joint>, signal: &Signal, from: usize, to: usize) -> bool {
+    let Some(joint) = joint else { return false };
     let (a, b) = even_rows(recording, signal, from, to);
-    if std::ptr::eq(position, signal) {
-        return false;
-    }
-    position.even.get(a..=b.min(position.even.len().saturating_sub(1))).is_some_and(|part| span(part) == 0.0)
+    [joint.command, joint.position, joint.velocity].into_iter().flatten().map(|place| &recording.signals[place]).any(|other| {
+        let part = other.even.get(a..=b.min(other.even.len().saturating_sub(1))).unwrap_or(&[]);
+        let noise = noise::white(&other.even).unwrap_or(0.0).max(resolution(&other.even));
+        !std::ptr::eq(other, signal) && span(part) > (5.0 * noise).max(MOVES * span(&other.even))
+    })
 }
 
 /// Whether what goes with a signal moved on while it stood: of a position its command, of a command its position.

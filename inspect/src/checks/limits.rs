@@ -14,9 +14,15 @@ use backdrive_plant::recording::units::Kind;
 const ENTERED: f64 = 0.4;
 /// Fewest samples that stand at a limit.
 const LEAST_AT_LIMIT: usize = 8;
+/// A command goes beyond a limit by this share of its range; droop and dead bands leave less.
+const BEYOND: f64 = 0.05;
 /// The least of a signal without a sign, as a share of its range: it comes down to 0.
 const TOUCHES: f64 = 0.02;
-/// Share of the time that a joint has to move in either direction, for a drive to need both signs.
+/// It does so this often, and rises to this share again: a motor that is off at the beginning does so once.
+const LEAST_TOUCHES: usize = 3;
+const RISES: f64 = 0.08;
+/// Share of the samples with motion, and their number, in either direction, for a drive to need both signs.
+const LEAST_MOVING: usize = 40;
 const EITHER_WAY: f64 = 0.05;
 /// Steps across the motion below which a position or a velocity is coarse, and a torque or a current.
 const COARSE: f64 = 25.0;
@@ -57,7 +63,7 @@ fn clipped(recording: &Recording, signal: &Signal, joint: Option<&Joint>, out: &
         let stands = values.windows(2).filter(|w| is_at(w[0]) && is_at(w[1])).count();
         // Rest at 0 is no limit, and one step of the sensor is how any motion ends.
         if count >= LEAST_AT_LIMIT && stands * 3 >= count && level != 0.0 && !entries.is_empty() && crate::numeric::mean(&entries) > (ENTERED * usual).max(1.5 * step) {
-            if joint.is_some_and(|joint| is_told_to_stand(recording, joint, &is_at)) {
+            if joint.is_some_and(|joint| !is_told_further(recording, joint, level)) {
                 continue;
             }
             found.push((level, count, signal.values.iter().position(|x| is_at(*x)).unwrap_or(0)));
@@ -80,18 +86,18 @@ fn clipped(recording: &Recording, signal: &Signal, joint: Option<&Joint>, out: &
     out.push(finding.todo("widen the sensor's or the drive's range and record again; until then leave these samples out"));
 }
 
-/// Whether the command of a joint stands still, as a rule, while its position stands at a level.
-fn is_told_to_stand(recording: &Recording, joint: &Joint, is_at: &dyn Fn(f64) -> bool) -> bool {
-    let (Some(command), Some(position)) = (joint.command, joint.position) else { return false };
+/// Whether the command of a joint goes on beyond a level at which its position stands; true where there is no command.
+fn is_told_further(recording: &Recording, joint: &Joint, level: f64) -> bool {
+    let (Some(command), Some(position)) = (joint.command, joint.position) else { return true };
     let (command, position) = (&recording.signals[command].even, &recording.signals[position]);
-    let factor = position.factor();
-    let least = 1e-3 * span(command);
-    let there = (1..command.len().min(position.even.len())).filter(|i| is_at(position.even[*i] / factor) && is_at(position.even[*i - 1] / factor));
-    let (all, still) = there.fold((0, 0), |(all, still), i| (all + 1, still + usize::from((command[i] - command[i - 1]).abs() < least)));
-    2 * still > all
+    let Some((low, high)) = extremes(command) else { return true };
+    let level = level * position.factor();
+    let least = BEYOND * (high - low);
+    let middle = median(&position.even);
+    if level > middle { high > level + least } else { low < level - least }
 }
 
-/// Share of samples in which a joint moves either way, the smaller of the two; 0 where its position does not say.
+/// Share of the samples with motion in which a joint moves either way, the smaller of the two; 0 where its position does not say.
 fn either_way(recording: &Recording, joint: &Joint) -> f64 {
     let Some(position) = joint.position.map(|place| &recording.signals[place].even) else { return 0.0 };
     let smooth = LowPass::butterworth(2, (0.1 * recording.rate()).min(5.0), recording.rate()).both_ways(position);
@@ -101,8 +107,26 @@ fn either_way(recording: &Recording, joint: &Joint) -> f64 {
     if rate.is_empty() || span(position) < 8.0 * noise || least <= 0.0 {
         return 0.0;
     }
-    let share = |sign: f64| rate.iter().filter(|v| sign * **v > least).count() as f64 / rate.len() as f64;
-    share(1.0).min(share(-1.0))
+    let count = |sign: f64| rate.iter().filter(|v| sign * **v > least).count();
+    let (up, down) = (count(1.0), count(-1.0));
+    if up + down < LEAST_MOVING {
+        return 0.0;
+    }
+    up.min(down) as f64 / (up + down) as f64
+}
+
+/// How often the size of a signal comes down to 0 and rises again.
+fn touches(values: &[f64], most: f64) -> usize {
+    let (mut count, mut is_down) = (0, false);
+    for size in values.iter().map(|x| x.abs()) {
+        if size <= TOUCHES * most {
+            is_down = true;
+        } else if is_down && size > RISES * most {
+            is_down = false;
+            count += 1;
+        }
+    }
+    count
 }
 
 fn rectified(recording: &Recording, joint: &Joint, place: usize, out: &mut Vec<Finding>) {
@@ -111,6 +135,9 @@ fn rectified(recording: &Recording, joint: &Joint, place: usize, out: &mut Vec<F
     let is_one_sided = low >= 0.0 || high <= 0.0;
     let (least, most) = (low.abs().min(high.abs()), low.abs().max(high.abs()));
     if !is_one_sided || least > TOUCHES * most || either_way(recording, joint) < EITHER_WAY {
+        return;
+    }
+    if touches(&signal.values, most) < LEAST_TOUCHES {
         return;
     }
     let message = format!(

@@ -8,6 +8,8 @@ use crate::joints::Joint;
 use crate::numeric::{extremes, median, neighbour_correlation, span};
 use crate::recording::Recording;
 
+/// What names and units say is this sure at least.
+const NAMED: f64 = 0.8;
 /// A joint moves where it does so this many times beyond noise and step, and by this share of what the other joints move.
 const MOVES: f64 = 30.0;
 const OF_OTHERS: f64 = 0.15;
@@ -28,6 +30,9 @@ pub fn check(recording: &Recording, joints: &[Joint], out: &mut Vec<Finding>) {
     for joint in joints {
         let Some(position) = of(recording, joint.position) else { continue };
         let moved = span(&position.even);
+        if position.sure < NAMED {
+            continue;
+        }
         if excitation(position) < MOVES || moved < OF_OTHERS * usual {
             continue;
         }
