@@ -51,7 +51,15 @@ pub fn settled(mut findings: Vec<Finding>) -> Vec<Finding> {
         .filter_map(|f| f.signals.first().cloned())
         .collect();
     findings.retain(|f| !(matches!(f.kind, FindingKind::EffortLag | FindingKind::NotTheDerivative) && f.signals.first().is_some_and(|s| dead.contains(s))));
+    // What is broken by itself says nothing beside others until it is put right.
+    let broken: Vec<String> = findings.iter().filter(|f| f.weight == Weight::Wrong && is_broken(f.kind)).flat_map(|f| f.signals.clone()).collect();
+    findings.retain(|f| !(is_pair(f.kind) && f.kind != FindingKind::Passive && touches(f, &broken)));
     findings
+}
+
+/// Whether a signal with such a finding is not what was measured.
+fn is_broken(kind: FindingKind) -> bool {
+    matches!(kind, FindingKind::Outliers | FindingKind::Frozen | FindingKind::Quantised | FindingKind::Clipped | FindingKind::Stuck | FindingKind::Repeated)
 }
 
 fn is_pair(kind: FindingKind) -> bool {

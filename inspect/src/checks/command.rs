@@ -4,7 +4,7 @@ use super::motion::{Band, excitation, of};
 use crate::advice;
 use crate::finding::{Finding, FindingKind, Weight};
 use crate::joints::Joint;
-use crate::numeric::{Follow, Profile, follow, resolution, width};
+use crate::numeric::{Follow, Profile, follow, width};
 use crate::recording::{Recording, Signal};
 use backdrive_diagnosis::low_pass::LowPass;
 use backdrive_diagnosis::noise;
@@ -85,6 +85,7 @@ pub fn check(recording: &Recording, joints: &[Joint], out: &mut Vec<Finding>) {
             out.push(new(FindingKind::WrongScale, message).weighing(weight).todo(todo));
         }
         let (lag, wide) = (found.lag * band.period, profile.uncertainty().map_or(f64::INFINITY, |half| half * band.period));
+        if std::env::var("DBG").is_ok() { eprintln!("DBG {:?} lag {lag:.4} wide {wide:.4} expl {:.4} late {:.4} slow {slow}", names, found.explained, share(near(0.0, LATE_S, 1.0))); }
         let late = share(near(0.0, LATE_S, 1.0));
         let is_early = found.explained > ALL_BUT && 1.0 - late > WORSE * (1.0 - found.explained).max(1e-9);
         if lag < -EARLY.max(0.6 * recording.period) && lag + wide < 0.0 && is_early && !joint.is_led && !is_against {
@@ -96,7 +97,7 @@ pub fn check(recording: &Recording, joints: &[Joint], out: &mut Vec<Finding>) {
                 1e3 * wide
             );
             // What a sensor measures is the noisier of the two.
-            let noise = |signal: &Signal| noise::white(&signal.even).unwrap_or(0.0).max(resolution(&signal.even));
+            let noise = |signal: &Signal| noise::white(&signal.even).unwrap_or(0.0).max(noise::step_of(&signal.even).unwrap_or(0.0) / 12f64.sqrt());
             if noise(command) > NOISIER * noise(position) {
                 let (a, b) = (advice::source(recording, position, ""), advice::source(recording, command, ""));
                 let todo = format!("[columns]\ncommand = {a}\nposition = {b}");

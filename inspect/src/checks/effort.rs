@@ -16,13 +16,15 @@ const TERMS: usize = 7;
 /// Lags that are tried, s.
 const EARLY_S: f64 = 0.08;
 const LATE_S: f64 = 0.2;
+/// Corner of the filter, Hz: dry friction turns within a few samples, and that is what tells a lag.
+const CORNER_HZ: f64 = 15.0;
 /// Blocks of the jackknife.
 const BLOCKS: usize = 8;
 /// Share of the torque that motion explains, from which on a lag is claimed; and by which factor the rest grows without the lag.
 const EXPLAINED: f64 = 0.7;
-const WORSE: f64 = 2.0;
+const WORSE: f64 = 1.35;
 /// Half of the interval is at most this share of the lag: hysteresis and play look like a lag that differs from stroke to stroke.
-const KNOWN: f64 = 0.35;
+const KNOWN: f64 = 0.45;
 /// A lag of a drive's electronics is some ms; from here on it turns friction into damping and inertia.
 const LAG_S: f64 = 0.010;
 /// Share from which on a sign is claimed.
@@ -55,6 +57,7 @@ fn one(recording: &Recording, joint: &Joint, place: usize, out: &mut Vec<Finding
     }
     let Some(wide) = work.uncertainty() else { return };
     let (lag, wide) = (best.lag * work.period, wide * work.period);
+    if std::env::var("DBG").is_ok() { eprintln!("DBG {:?} lag {lag:.4} wide {wide:.4} expl {:.4} once {:.4}", names, best.explained, best.at_once); }
     let rest = |share: f64| (1.0 - share).max(1e-9);
     let needed = rest(best.at_once) > WORSE * rest(best.explained);
     if best.explained > EXPLAINED && needed && lag > LAG_S.max(0.8 * recording.period) && wide < KNOWN * lag && !work.is_at_the_end(best.lag) {
@@ -101,7 +104,7 @@ struct Regression {
 
 impl Regression {
     fn new(recording: &Recording, joint: &Joint, place: usize) -> Option<Regression> {
-        let band = Band::of(recording);
+        let band = Band::up_to(recording, CORNER_HZ);
         let position = of(recording, joint.position).filter(|signal| excitation(signal) > 30.0)?;
         let drive = of(recording, Some(place))?;
         let (q, y) = (band.smooth(&position.even), band.smooth(&drive.even));

@@ -82,7 +82,9 @@ fn frozen(recording: &Recording, signal: &Signal, joint: Option<&Joint>, out: &m
         let is_noisy = is_fine && equal < OFTEN_EQUAL && chance < 1e-6 && values[from] != 0.0;
         let at_an_end = (values[from] - values.iter().copied().fold(f64::INFINITY, f64::min)).abs().min((values[from] - values.iter().copied().fold(f64::NEG_INFINITY, f64::max)).abs())
             < (1e-3 * range).max(3.0 * resolution(values));
-        let jumped = after > JUMP * large && before > 0.1 * usual && after < large * (to - from) as f64 * 1.5;
+        // Where rows are missing behind it, the jump is theirs.
+        let is_gap = stream.times.get(to + 1).is_some_and(|next| next - stream.times[to] > 1.5 * recording.period || *next <= stream.times[to]);
+        let jumped = !is_gap && after > JUMP * large && before > 0.1 * usual && after < large * (to - from) as f64 * 1.5;
         let noise_stops = is_noisy && !at_an_end && signal.quantity.is_measured() && is_noisy_around(values, from, to);
         if (noise_stops && joint_moves(recording, joint, signal, from, to))
             || (jumped && partner_moves(recording, joint, signal, from, to, after))

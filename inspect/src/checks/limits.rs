@@ -2,7 +2,7 @@
 
 use crate::finding::{Finding, FindingKind, Weight};
 use crate::joints::Joint;
-use crate::numeric::{extremes, median, span, width};
+use crate::numeric::{extremes, median, resolution, span, width};
 use crate::quantity::Quantity;
 use crate::recording::{Recording, Signal};
 use backdrive_diagnosis::audit::limits_reached;
@@ -16,6 +16,8 @@ const ENTERED: f64 = 0.4;
 const LEAST_AT_LIMIT: usize = 8;
 /// A command goes beyond a limit by this share of its range; droop and dead bands leave less.
 const BEYOND: f64 = 0.05;
+/// Of a joint with a command the limit is entered by this many steps of the sensor at least: stiction stops a joint that is slow already.
+const ENTRY_STEPS: f64 = 3.0;
 /// The least of a signal without a sign, as a share of its range: it comes down to 0.
 const TOUCHES: f64 = 0.02;
 /// It does so this often, and rises to this share again: a motor that is off at the beginning does so once.
@@ -63,7 +65,8 @@ fn clipped(recording: &Recording, signal: &Signal, joint: Option<&Joint>, out: &
         let stands = values.windows(2).filter(|w| is_at(w[0]) && is_at(w[1])).count();
         // Rest at 0 is no limit, and one step of the sensor is how any motion ends.
         if count >= LEAST_AT_LIMIT && stands * 3 >= count && level != 0.0 && !entries.is_empty() && crate::numeric::mean(&entries) > (ENTERED * usual).max(1.5 * step) {
-            if joint.is_some_and(|joint| !is_told_further(recording, joint, level)) {
+            let is_slow = crate::numeric::mean(&entries) < ENTRY_STEPS * resolution(&values);
+            if joint.is_some_and(|joint| joint.command.is_some() && (is_slow || !is_told_further(recording, joint, level))) {
                 continue;
             }
             found.push((level, count, signal.values.iter().position(|x| is_at(*x)).unwrap_or(0)));

@@ -13,6 +13,7 @@ mod repeated;
 mod sampling;
 mod sessions;
 mod spikes;
+mod units;
 mod velocity;
 
 pub use sessions::zeros;
@@ -31,6 +32,7 @@ pub fn all(recording: &Recording, joints: &[Joint]) -> Vec<Finding> {
     spikes::check(recording, &mut out);
     limits::check(recording, joints, &mut out);
     sampling::check(recording, &mut out);
+    units::check(recording, joints, &mut out);
     passive::check(recording, joints, &mut out);
     exchanged::check(recording, joints, &mut out);
     command::check(recording, joints, &mut out);

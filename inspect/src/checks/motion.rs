@@ -25,9 +25,14 @@ pub struct Band {
 impl Band {
     /// That of a recording.
     pub fn of(recording: &Recording) -> Band {
+        Band::up_to(recording, CORNER_HZ)
+    }
+
+    /// With another corner, Hz.
+    pub fn up_to(recording: &Recording, corner: f64) -> Band {
         let rate = recording.rate();
         let stride = ((rate / THINNED_HZ) as usize).max(1);
-        let filter = LowPass::butterworth(2, CORNER_HZ.min(OF_RATE * rate), rate);
+        let filter = LowPass::butterworth(2, corner.min(OF_RATE * rate), rate);
         Band { filter, stride, period: recording.period * stride as f64, full: recording.period }
     }
 

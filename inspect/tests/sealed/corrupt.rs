@@ -183,8 +183,9 @@ pub fn corrupt(random: &mut Random, clean: &Clean, name: &'static str) -> Option
                 }
             } else {
                 let shift = (late / period).round() as usize;
-                for row in 0..rows {
-                    columns[place].values[row] = x[row.saturating_sub(shift)];
+                for (other, column) in columns.iter_mut().enumerate() {
+                    let from = if other == place { 0 } else { shift };
+                    column.values = column.values[from..from + rows - shift].to_vec();
                 }
             }
             let kind = if role == Role::Velocity { Kind::VelocityLag } else { Kind::EffortLag };
