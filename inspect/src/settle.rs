@@ -51,6 +51,17 @@ pub fn settled(mut findings: Vec<Finding>) -> Vec<Finding> {
         .filter_map(|f| f.signals.first().cloned())
         .collect();
     findings.retain(|f| !(matches!(f.kind, FindingKind::EffortLag | FindingKind::NotTheDerivative) && f.signals.first().is_some_and(|s| dead.contains(s))));
+    // Rows behind a time that goes back belong to another stretch of time.
+    if findings.iter().any(|f| is(f, FindingKind::TimeGoesBack)) {
+        findings.retain(|f| !is_pair(f.kind));
+    }
+    // Behind a stretch that was written twice signals jump.
+    if findings.iter().any(|f| is(f, FindingKind::Repeated)) {
+        findings.retain(|f| f.kind != FindingKind::Frozen);
+    }
+    // A command in another unit than its position seems to stand still beside it.
+    let in_other: Vec<Option<String>> = findings.iter().filter(|f| is(f, FindingKind::WrongUnit)).map(|f| f.joint.clone()).collect();
+    findings.retain(|f| !(f.kind == FindingKind::Passive && in_other.contains(&f.joint)));
     // What is broken by itself says nothing beside others until it is put right.
     let broken: Vec<String> = findings.iter().filter(|f| f.weight == Weight::Wrong && is_broken(f.kind)).flat_map(|f| f.signals.clone()).collect();
     findings.retain(|f| !(is_pair(f.kind) && f.kind != FindingKind::Passive && touches(f, &broken)));

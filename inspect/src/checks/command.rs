@@ -4,7 +4,7 @@ use super::motion::{Band, excitation, of};
 use crate::advice;
 use crate::finding::{Finding, FindingKind, Weight};
 use crate::joints::Joint;
-use crate::numeric::{Follow, Profile, follow, width};
+use crate::numeric::{Follow, Profile, follow, quantile, width};
 use crate::recording::{Recording, Signal};
 use backdrive_diagnosis::low_pass::LowPass;
 use backdrive_diagnosis::noise;
@@ -23,7 +23,9 @@ const SLOW_HZ: f64 = 0.5;
 /// A slow motion off by more than this is a scale; droop and dead bands make less.
 const SCALE: f64 = 0.3;
 /// Share of the slow motion that a scale explains; dead bands and stiction leave more.
-const SLOW_EXPLAINED: f64 = 0.98;
+const SLOW_EXPLAINED: f64 = 0.995;
+/// How often slow motion has to come back through its middle.
+const LEAST_CROSSINGS: usize = 3;
 /// Degrees for radians, within what a servo's bandwidth leaves of fast motion.
 const NEAR: f64 = 0.3;
 /// A position is early by at least this, s, and by this many samples, to be taken for the command.
@@ -85,7 +87,6 @@ pub fn check(recording: &Recording, joints: &[Joint], out: &mut Vec<Finding>) {
             out.push(new(FindingKind::WrongScale, message).weighing(weight).todo(todo));
         }
         let (lag, wide) = (found.lag * band.period, profile.uncertainty().map_or(f64::INFINITY, |half| half * band.period));
-        if std::env::var("DBG").is_ok() { eprintln!("DBG {:?} lag {lag:.4} wide {wide:.4} expl {:.4} late {:.4} slow {slow}", names, found.explained, share(near(0.0, LATE_S, 1.0))); }
         let late = share(near(0.0, LATE_S, 1.0));
         let is_early = found.explained > ALL_BUT && 1.0 - late > WORSE * (1.0 - found.explained).max(1e-9);
         if lag < -EARLY.max(0.6 * recording.period) && lag + wide < 0.0 && is_early && !joint.is_led && !is_against {
@@ -117,7 +118,10 @@ fn slow_gain(recording: &Recording, u: &[f64], y: &[f64]) -> Option<f64> {
     let stride = ((recording.rate() / 20.0) as usize).max(1);
     let slow = |x: &[f64]| crate::numeric::thinned(&filter.both_ways(x), stride);
     let (a, b) = (slow(u), slow(y));
-    if width(&a) < 0.3 * width(u) {
+    // One transition fits any factor; several have to agree.
+    let middle = 0.5 * (quantile(&a, 0.01) + quantile(&a, 0.99));
+    let crossings = a.windows(2).filter(|w| (w[0] - middle) * (w[1] - middle) < 0.0).count();
+    if crossings < LEAST_CROSSINGS || width(&a) < 0.3 * width(u) {
         return None;
     }
     let lags = ((LATE_S * recording.rate()) as i64 / stride as i64).max(1);

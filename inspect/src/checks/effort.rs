@@ -24,7 +24,7 @@ const BLOCKS: usize = 8;
 const EXPLAINED: f64 = 0.7;
 const WORSE: f64 = 1.35;
 /// Half of the interval is at most this share of the lag: hysteresis and play look like a lag that differs from stroke to stroke.
-const KNOWN: f64 = 0.45;
+const KNOWN: f64 = 0.3;
 /// A lag of a drive's electronics is some ms; from here on it turns friction into damping and inertia.
 const LAG_S: f64 = 0.010;
 /// Share from which on a sign is claimed.
@@ -57,7 +57,6 @@ fn one(recording: &Recording, joint: &Joint, place: usize, out: &mut Vec<Finding
     }
     let Some(wide) = work.uncertainty() else { return };
     let (lag, wide) = (best.lag * work.period, wide * work.period);
-    if std::env::var("DBG").is_ok() { eprintln!("DBG {:?} lag {lag:.4} wide {wide:.4} expl {:.4} once {:.4}", names, best.explained, best.at_once); }
     let rest = |share: f64| (1.0 - share).max(1e-9);
     let needed = rest(best.at_once) > WORSE * rest(best.explained);
     if best.explained > EXPLAINED && needed && lag > LAG_S.max(0.8 * recording.period) && wide < KNOWN * lag && !work.is_at_the_end(best.lag) {

@@ -9,7 +9,7 @@ use crate::recording::{Recording, Signal};
 use backdrive_diagnosis::noise;
 
 /// A stretch is frozen from so many samples and so many seconds on.
-const LEAST_ROWS: usize = 6;
+const LEAST_ROWS: usize = 8;
 const LEAST_S: f64 = 0.08;
 /// A jump at its end of so many usual steps shows that the signal went on meanwhile.
 const JUMP: f64 = 5.0;

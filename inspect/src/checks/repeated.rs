@@ -5,11 +5,15 @@ use crate::finding::{Finding, FindingKind};
 use crate::numeric::span;
 use crate::quantity::Quantity;
 use crate::recording::{Recording, Signal};
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::hash::{DefaultHasher, Hash, Hasher};
 
 /// A repeated stretch has at least so many rows, all different from the row before.
 const LEAST_ROWS: usize = 8;
+/// Values that change in it, over all columns: one slow column may pass a place twice alike.
+const LEAST_CHANGES: usize = 22;
+/// Share of its range that something measured moves in it: at rest, coarse values repeat by themselves.
+const MOVES: f64 = 0.02;
 /// Beyond this share of the recording it is a motion that repeats itself, simulated without noise.
 const MOST: f64 = 0.4;
 
@@ -58,7 +62,11 @@ pub fn check(recording: &Recording, out: &mut Vec<Finding>) {
             }
         }
         let (length, from, to, offset) = best;
-        if length < LEAST_ROWS || total as f64 > MOST * rows as f64 {
+        let distinct: HashSet<u64> = (from..=to).map(hash).collect();
+        let part = |signal: &Signal| signal.values.get(from..=to).map_or(0.0, span);
+        let moves = columns.iter().any(|signal| signal.quantity.is_measured() && part(signal) > MOVES * span(&signal.values));
+        let changes: usize = columns.iter().filter_map(|signal| signal.values.get(from..=to)).map(|part| part.windows(2).filter(|w| w[0] != w[1]).count()).sum();
+        if length < LEAST_ROWS || distinct.len() < LEAST_ROWS || changes < LEAST_CHANGES || !moves || total as f64 > MOST * rows as f64 {
             continue;
         }
         let (word, a, b, c) = (stream.row_word(), stream.row(from), stream.row(to), stream.row(from - offset));

@@ -10,9 +10,9 @@ use std::collections::BTreeMap;
 
 /// Pieces of a recording over which its offset is looked at.
 const PIECES: usize = 10;
-/// A zero is shifted from so many deviations within recordings on, and from this share of the joint's range.
-const DEVIATIONS: f64 = 5.0;
-const OF_RANGE: f64 = 0.05;
+/// A zero is shifted where it is beyond the largest deviation within a recording by this factor, and beyond this share of the joint's range.
+const DEVIATIONS: f64 = 2.0;
+const OF_RANGE: f64 = 0.1;
 
 /// The offset of a position from its command in a recording.
 struct Offset<'a> {
@@ -35,7 +35,10 @@ pub fn zeros(all: &[(Recording, Vec<Joint>)], out: &mut Vec<Finding>) {
             let differences: Vec<f64> = position.even.iter().zip(&command.even).map(|(y, u)| y - u).collect();
             let size = (differences.len() / PIECES).max(1);
             let pieces: Vec<f64> = differences.chunks(size).map(median).collect();
-            let (middle, spread, range) = (median(&differences), robust_deviation(&pieces), span(&command.even));
+            let middle = median(&differences);
+            // What weight and friction make of it within the recording.
+            let spread = pieces.iter().map(|piece| (piece - middle).abs()).fold(0.0, f64::max);
+            let range = span(&command.even);
             by_joint.entry(format!("{} {}", joint.name, position.name)).or_default().push(Offset { recording, joint, place, middle, spread, range });
         }
     }
@@ -48,7 +51,7 @@ pub fn zeros(all: &[(Recording, Vec<Joint>)], out: &mut Vec<Finding>) {
         let range = offsets.iter().map(|offset| offset.range).fold(0.0, f64::max);
         for offset in offsets {
             let shift = offset.middle - usual;
-            if shift.abs() <= DEVIATIONS * within.max(between) || shift.abs() <= OF_RANGE * range || range == 0.0 {
+            if shift.abs() <= DEVIATIONS * within.max(2.5 * between) || shift.abs() <= OF_RANGE * range || range == 0.0 {
                 continue;
             }
             let name = offset.recording.signals[offset.place].name.as_str();

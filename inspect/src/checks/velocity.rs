@@ -36,6 +36,11 @@ pub fn check(recording: &Recording, joints: &[Joint], out: &mut Vec<Finding>) {
         let Some(found) = profile.best(None) else { continue };
         let names = [velocity.name.as_str(), position.name.as_str()];
         let new = |kind: FindingKind, message: String| Finding::new(kind, &recording.file, &names, message).at(&joint.name);
+        let turned = exchanged(recording, joint, &band, &names);
+        if let Some(turned) = turned.filter(|_| found.at_once < UNEXPLAINED) {
+            out.push(turned);
+            continue;
+        }
         if found.explained < EXPLAINED {
             if found.explained < UNEXPLAINED && excitation(velocity) > MOVES {
                 out.push(no_derivative(recording, joint, &band, &names));
@@ -98,11 +103,17 @@ fn no_derivative(recording: &Recording, joint: &Joint, band: &Band, names: &[&st
         let message = format!("{:?} is the size of the derivative of {:?}: it was logged without its sign", names[0], names[1]);
         return new(FindingKind::Rectified, message).todo("leave the velocity out of the set: it is computed from the position");
     }
-    if explained(&band.rate(&v.even), &band.smooth(&p.even)) > EXPLAINED {
-        let message = format!("{:?} is the derivative of {:?}: the two columns are exchanged", names[1], names[0]);
-        let table = advice::table_name(joint.title());
-        let (a, b) = (advice::source(recording, v, ""), advice::source(recording, p, ""));
-        return new(FindingKind::SwappedColumns, message).todo(format!("[joints.{table}]\nposition = {a}\nvelocity = {b}"));
-    }
     plain()
+}
+
+/// A position that is the derivative of its velocity: the two columns are exchanged.
+fn exchanged(recording: &Recording, joint: &Joint, band: &Band, names: &[&str; 2]) -> Option<Finding> {
+    let (position, velocity) = (&recording.signals[joint.position?], &recording.signals[joint.velocity?]);
+    let found = follow(&band.rate(&velocity.even), &band.smooth(&position.even), (-2, 2))?;
+    (found.explained > EXPLAINED && (found.gain - 1.0).abs() < FACTOR).then_some(())?;
+    let message = format!("{:?} is the derivative of {:?}: the two columns are exchanged", names[1], names[0]);
+    let table = advice::table_name(joint.title());
+    let (a, b) = (advice::source(recording, velocity, ""), advice::source(recording, position, ""));
+    let finding = Finding::new(FindingKind::SwappedColumns, &recording.file, names, message).at(&joint.name);
+    Some(finding.todo(format!("[joints.{table}]\nposition = {a}\nvelocity = {b}")))
 }

@@ -23,7 +23,9 @@ const PLATEAU: f64 = 0.08;
 const SHARE: f64 = 0.55;
 /// Fewest seconds behind, and stretches of them.
 const LEAST_S: f64 = 0.5;
-const STRETCHES: usize = 3;
+const STRETCHES: usize = 2;
+/// The command's own speed differs from the limit by this share of it: else the joint is late behind a ramp.
+const DIFFERS: f64 = 0.2;
 
 /// Finds it; `lag` in samples.
 pub fn find(u: &[f64], y: &[f64], lag: f64, period: f64) -> Option<RateLimit> {
@@ -46,6 +48,11 @@ pub fn find(u: &[f64], y: &[f64], lag: f64, period: f64) -> Option<RateLimit> {
     let fastest = speed.iter().fold(0.0f64, |m, v| m.max(v.abs()));
     let at: Vec<usize> = behind.iter().copied().filter(|i| speed[*i].abs() > (1.0 - PLATEAU) * limit).collect();
     let share = at.len() as f64 / behind.len() as f64;
+    let asked: Vec<f64> = derivative(u, period);
+    let own: Vec<f64> = at.iter().map(|i| (asked[i.saturating_sub(delay)].abs() / limit - 1.0).abs()).collect();
+    if median(&own) < DIFFERS {
+        return None;
+    }
     let mut stretches: Vec<[usize; 2]> = Vec::new();
     for i in &at {
         match stretches.last_mut() {
