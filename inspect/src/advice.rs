@@ -52,8 +52,14 @@ fn column_key(signal: &Signal, joint: &Joint) -> String {
     }
 }
 
-/// Rows of a file that count, from 0, the last one excluded: leaves out what stands before or behind.
-pub fn rows(file: &str, from: usize, to: usize) -> String {
+/// The pieces of a file before and behind rows that do not count: those from `from` up to `to`, which counts again. Rows of data are counted from 0.
+pub fn without(file: &str, from: usize, to: usize, rows: usize) -> String {
     let name = std::path::Path::new(file).file_name().map_or_else(|| file.to_string(), |name| name.to_string_lossy().into_owned());
-    format!("[files]\npiece = {{ of = {name:?}, rows = [{from}, {to}] }}")
+    // What is shorter says nothing.
+    let piece = |key: &str, from: usize, to: usize| (to > from + LEAST_ROWS).then(|| format!("\n{key} = {{ of = {name:?}, rows = [{from}, {to}] }}"));
+    let pieces: String = [piece("before", 0, from), piece("behind", to, rows)].into_iter().flatten().collect();
+    format!("[files]{pieces}")
 }
+
+/// Rows of the shortest piece that is named.
+const LEAST_ROWS: usize = 20;

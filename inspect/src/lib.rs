@@ -60,7 +60,7 @@ pub fn inspect(sources: &[Source], options: &Options) -> Result<Report, InspectE
 pub fn inspect_with_data(sources: &[Source], options: &Options) -> Result<(Report, Vec<Recording>), InspectError> {
     let mut recordings = read::recordings(sources, options)?;
     recordings.iter_mut().for_each(recognise::recognise);
-    let all: Vec<(Recording, Vec<Joint>)> = recordings
+    let mut all: Vec<(Recording, Vec<Joint>)> = recordings
         .into_iter()
         .map(|recording| {
             let joints = joints::joints(&recording);
@@ -75,13 +75,15 @@ pub fn inspect_with_data(sources: &[Source], options: &Options) -> Result<(Repor
         findings: Vec::new(),
         notes: Vec::new(),
     };
-    for (recording, joints) in &all {
+    for (recording, joints) in &mut all {
+        let joints = joints.as_slice();
         let mut findings = checks::all(recording, joints);
         for (response, limit) in response::responses(recording, joints) {
             findings.extend(limit.map(|limit| settle::limited(recording, &response, &limit)));
             report.responses.push(response);
         }
         report.findings.extend(settle::settled(findings));
+        let recording = &*recording;
         report.clocks.extend(recording.streams.iter().map(|stream| clock(recording, stream)));
         report.signals.extend(recording.signals.iter().map(|signal| known(recording, signal)));
         report.notes.extend(recording.notes.iter().map(|note| format!("{}: {note}", recording.file)));

@@ -70,7 +70,7 @@ pub fn settled(mut findings: Vec<Finding>) -> Vec<Finding> {
 
 /// Whether a signal with such a finding is not what was measured.
 fn is_broken(kind: FindingKind) -> bool {
-    matches!(kind, FindingKind::Outliers | FindingKind::Frozen | FindingKind::Quantised | FindingKind::Clipped | FindingKind::Stuck | FindingKind::Repeated)
+    matches!(kind, FindingKind::Frozen | FindingKind::Quantised | FindingKind::Clipped | FindingKind::Stuck | FindingKind::Repeated)
 }
 
 fn is_pair(kind: FindingKind) -> bool {

@@ -2,11 +2,15 @@
 
 use super::response;
 use crate::page_parts::ending;
-use backdrive_inspect::{Finding, FindingKind, Quantity, Recording, Report, Signal, Weight};
-use backdrive_report::{Cell, Figure, Page, Plot, Table, Tone, number, percent};
+use backdrive_inspect::{Finding, FindingKind, Quantity, Recording, Report, Response, Signal, Weight};
+use backdrive_report::{Cell, Figure, Page, Plot, Table, Tone, number};
 
 /// Most findings that have a picture; the table lists all.
 const MOST_PICTURES: usize = 12;
+/// Most pictures of one kind of finding: six joints alike need no six pictures.
+const MOST_OF_A_KIND: usize = 2;
+/// Most joints whose response is drawn.
+const MOST_JOINTS: usize = 4;
 /// Most signals in a picture.
 const MOST_SIGNALS: usize = 3;
 /// Seconds that are shown before and behind a place.
@@ -21,6 +25,10 @@ pub fn page(report: &Report, recordings: &[Recording]) -> Page {
     page.lead(if wrong > 0 { Tone::Bad } else { Tone::Good }, &format!("{}.", report.sentence()));
     if !report.findings.is_empty() {
         page.section("What was found");
+        let items: Vec<(String, Option<String>)> = report.wrong().filter(|f| f.todo.starts_with('[')).map(|f| (f.message.clone(), Some(f.todo.clone()))).collect();
+        if !items.is_empty() {
+            page.todo("Lines to paste into the set", &items);
+        }
         let mut table = Table::new(["", "recording", "joint", "finding", "sure", "what to do"]);
         for finding in &report.findings {
             let (word, tone) = if finding.weight == Weight::Wrong { ("wrong", Tone::Bad) } else { ("note", Tone::Neutral) };
@@ -29,7 +37,7 @@ pub fn page(report: &Report, recordings: &[Recording]) -> Page {
                 short(&finding.file).into(),
                 finding.joint.clone().unwrap_or_default().into(),
                 finding.message.clone().into(),
-                percent(finding.sure).into(),
+                format!("{:.0} %", 100.0 * finding.sure).into(),
                 finding.todo.clone().into(),
             ]);
         }
@@ -42,6 +50,10 @@ pub fn page(report: &Report, recordings: &[Recording]) -> Page {
             table.push(std::iter::once(short(&answer.file)).chain(response::cells(answer)).collect::<Vec<_>>());
         }
         page.table(table);
+        let drawn: Vec<Figure> = report.responses.iter().take(MOST_JOINTS).filter_map(|answer| followed(answer, recordings)).collect();
+        if !drawn.is_empty() {
+            page.figure(Figure::beside(drawn), "Command and position where the command moves most.");
+        }
         page.text("A dash stands where the motion does not show it. Droop, dead band and limit of speed are in the position's SI unit.");
     }
     pictures(&mut page, report, recordings);
@@ -56,7 +68,7 @@ pub fn page(report: &Report, recordings: &[Recording]) -> Page {
                 signal.name.clone(),
                 signal.quantity.text().to_string(),
                 signal.unit.clone().unwrap_or_default(),
-                percent(signal.sure),
+                format!("{:.0} %", 100.0 * signal.sure),
                 signal.why.clone(),
                 number(low),
                 number(high),
@@ -83,14 +95,28 @@ fn short(file: &str) -> String {
     std::path::Path::new(file).file_name().map_or_else(|| file.to_string(), |name| name.to_string_lossy().into_owned())
 }
 
+/// Command and position of a joint, in SI units where these are known.
+fn followed(answer: &Response, recordings: &[Recording]) -> Option<Figure> {
+    let recording = recordings.iter().find(|recording| recording.file == answer.file)?;
+    let find = |name: &str| recording.signals.iter().find(|signal| signal.name == name);
+    let (command, position) = (find(&answer.command)?, find(&answer.position)?);
+    let (from, to) = busiest(recording, command);
+    let at = |time: f64| (time / recording.period) as usize;
+    let rows = at(from)..at(to).min(command.even.len()).min(position.even.len());
+    let t: Vec<f64> = rows.clone().map(|row| row as f64 * recording.period).collect();
+    let (u, y) = (command.even.get(rows.clone())?, position.even.get(rows)?);
+    let plot = Plot::new(&response::title(answer)).x_axis("time", "s").y_axis("position", "");
+    Some(Figure::from(plot.line("command", &t, u).line("position", &t, y)))
+}
+
 fn pictures(page: &mut Page, report: &Report, recordings: &[Recording]) {
     let mut shown: Vec<(FindingKind, &str)> = Vec::new();
     let mut drawn = Vec::new();
     for finding in report.wrong() {
-        // One picture of a kind for each joint says it; six joints alike need no six pictures of a file each.
         let key = (finding.kind, finding.joint.as_deref().unwrap_or(""));
         let Some(recording) = recordings.iter().find(|recording| recording.file == finding.file) else { continue };
-        if shown.contains(&key) || drawn.len() >= MOST_PICTURES {
+        let alike = shown.iter().filter(|(kind, _)| *kind == finding.kind).count();
+        if shown.contains(&key) || alike >= MOST_OF_A_KIND || drawn.len() >= MOST_PICTURES {
             continue;
         }
         if let Some(figure) = picture(finding, recording) {

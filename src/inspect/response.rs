@@ -1,7 +1,7 @@
 //! The response of a joint in words and cells.
 
 use backdrive_inspect::{Bandwidth, Interval, Response};
-use backdrive_report::{number, percent};
+use backdrive_report::number;
 
 /// Headers of the table of joints.
 pub const HEADERS: [&str; 8] = ["joint", "lag, ms (95 %)", "-3 dB, Hz", "overshoot", "droop, mean (largest)", "dead band", "limit of speed", "clock, Hz (jitter, ms)"];
@@ -13,7 +13,7 @@ pub fn cells(response: &Response) -> Vec<String> {
         title(response),
         lag(response).unwrap_or_else(unknown),
         response.bandwidth.as_ref().map_or_else(unknown, bandwidth),
-        response.overshoot.map_or_else(unknown, percent),
+        response.overshoot.map_or_else(unknown, |share| format!("{:.0} %", 100.0 * share)),
         response.droop.map_or_else(unknown, |[mean, largest]| format!("{} ({})", number(mean), number(largest))),
         response.dead_band.map_or_else(unknown, |band| format!("{} ({} to {})", number(band.value), number(band.low), number(band.high))),
         response.rate_limit.map_or_else(unknown, |limit| format!("{} per s", number(limit))),

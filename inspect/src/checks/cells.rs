@@ -25,6 +25,6 @@ pub fn check(recording: &Recording, out: &mut Vec<Finding>) {
         let mut finding = Finding::new(FindingKind::Missing, &recording.file, &[&signal.name], message).at(&signal.joint);
         finding.rows = Some([row, stream.row(last)]);
         finding.time_s = Some([stream.time(first), stream.time(last)]);
-        out.push(finding.todo(advice::rows(&recording.file, last + 1, signal.values.len())));
+        out.push(finding.todo(advice::without(&recording.file, first, last + 1, signal.values.len())));
     }
 }

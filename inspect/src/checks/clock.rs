@@ -42,7 +42,7 @@ pub fn check(recording: &Recording, out: &mut Vec<Finding>) {
             finding.todo = match fault.kind {
                 ClockFaultKind::Uneven => "nothing: the recorded times are used as they are".to_string(),
                 ClockFaultKind::StandsStill => format!("leave out {} {}", stream.row_word(), stream.row(row + 1)),
-                _ => advice::rows(&recording.file, 0, row + 1),
+                _ => advice::without(&recording.file, row + 1, row + 1, stream.times.len()),
             };
             out.push(finding);
         }

@@ -100,7 +100,7 @@ fn frozen(recording: &Recording, signal: &Signal, joint: Option<&Joint>, out: &m
     let mut finding = Finding::new(FindingKind::Frozen, &recording.file, &[&signal.name], message).at(&signal.joint);
     finding.rows = Some([a, b]);
     finding.time_s = Some([stream.time(from), stream.time(to)]);
-    out.push(finding.todo(advice::rows(&recording.file, to + 1, values.len())));
+    out.push(finding.todo(advice::without(&recording.file, from, to + 1, values.len())));
 }
 
 /// Rows of a signal on the recording's even clock.

@@ -22,14 +22,14 @@ use crate::finding::Finding;
 use crate::joints::Joint;
 use crate::recording::Recording;
 
-/// All checks of one recording.
-pub fn all(recording: &Recording, joints: &[Joint]) -> Vec<Finding> {
+/// All checks of one recording. Outliers are taken out of its even samples.
+pub fn all(recording: &mut Recording, joints: &[Joint]) -> Vec<Finding> {
     let mut out = Vec::new();
     clock::check(recording, &mut out);
     cells::check(recording, &mut out);
+    spikes::check(recording, &mut out);
     repeated::check(recording, &mut out);
     flat::check(recording, joints, &mut out);
-    spikes::check(recording, &mut out);
     limits::check(recording, joints, &mut out);
     sampling::check(recording, &mut out);
     units::check(recording, joints, &mut out);

@@ -75,6 +75,6 @@ pub fn check(recording: &Recording, out: &mut Vec<Finding>) {
         finding.signals = columns.iter().map(|signal| signal.name.clone()).collect();
         finding.rows = Some([a, b]);
         finding.time_s = Some([stream.time(from), stream.time(to)]);
-        out.push(finding.todo(advice::rows(&recording.file, to + 1, rows)));
+        out.push(finding.todo(advice::without(&recording.file, from, to + 1, rows)));
     }
 }

@@ -18,6 +18,8 @@ const MOVES: f64 = 30.0;
 const FACTOR: f64 = 0.12;
 /// A factor this near to a unit's is the unit's.
 const NEAR: f64 = 0.04;
+/// Columns are exchanged where the rest is smaller by this factor the other way round.
+const BETTER: f64 = 0.3;
 /// A lag of a drive's own filter is up to some ms; from here on it spoils damping and friction (at 5 Hz, 12 ms turn 20 degrees).
 const LAG_S: f64 = 0.012;
 const LAG_SAMPLES: f64 = 1.2;
@@ -36,8 +38,7 @@ pub fn check(recording: &Recording, joints: &[Joint], out: &mut Vec<Finding>) {
         let Some(found) = profile.best(None) else { continue };
         let names = [velocity.name.as_str(), position.name.as_str()];
         let new = |kind: FindingKind, message: String| Finding::new(kind, &recording.file, &names, message).at(&joint.name);
-        let turned = exchanged(recording, joint, &band, &names);
-        if let Some(turned) = turned.filter(|_| found.at_once < UNEXPLAINED) {
+        if let Some(turned) = exchanged(recording, joint, &band, &names, found.explained) {
             out.push(turned);
             continue;
         }
@@ -107,10 +108,11 @@ fn no_derivative(recording: &Recording, joint: &Joint, band: &Band, names: &[&st
 }
 
 /// A position that is the derivative of its velocity: the two columns are exchanged.
-fn exchanged(recording: &Recording, joint: &Joint, band: &Band, names: &[&str; 2]) -> Option<Finding> {
+fn exchanged(recording: &Recording, joint: &Joint, band: &Band, names: &[&str; 2], straight: f64) -> Option<Finding> {
     let (position, velocity) = (&recording.signals[joint.position?], &recording.signals[joint.velocity?]);
     let found = follow(&band.rate(&velocity.even), &band.smooth(&position.even), (-2, 2))?;
-    (found.explained > EXPLAINED && (found.gain - 1.0).abs() < FACTOR).then_some(())?;
+    let is_better = 1.0 - found.explained < BETTER * (1.0 - straight);
+    (found.explained > EXPLAINED && is_better && (found.gain - 1.0).abs() < FACTOR).then_some(())?;
     let message = format!("{:?} is the derivative of {:?}: the two columns are exchanged", names[1], names[0]);
     let table = advice::table_name(joint.title());
     let (a, b) = (advice::source(recording, velocity, ""), advice::source(recording, position, ""));
