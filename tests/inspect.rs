@@ -103,7 +103,11 @@ fn errors_and_missing_values_name_file_column_and_row() {
     place.write("words.csv", "a,b\nx,y\nz,w\n");
     let words = place.backdrive(&["inspect", "words.csv"]);
     assert!(words.code == Some(3) && words.stderr.contains("no column holds times") && words.stderr.contains("--rate"), "{words:?}");
-    let text = joint(|_, y| y).lines().enumerate().map(|(i, line)| if i == 500 { format!("{},,,,\n", line.split(',').next().unwrap()) } else { format!("{line}\n") }).collect::<String>();
+    let text = joint(|_, y| y)
+        .lines()
+        .enumerate()
+        .map(|(i, line)| if i == 500 { format!("{},,,,\n", line.split(',').next().unwrap()) } else { format!("{line}\n") })
+        .collect::<String>();
     place.write("holes.csv", &text);
     let report = inspected(&place, &["holes.csv"], 1);
     assert!(kinds(&report).iter().all(|kind| kind == "missing"), "{report}");

@@ -12,7 +12,8 @@ pub fn source(recording: &Recording, signal: &Signal, more: &str) -> String {
         Some(field) => format!("topic = {:?}, field = {field:?}", stream.topic),
         None => format!("column = {:?}", heading(signal)),
     };
-    let unit = signal.stated.or(signal.hint).filter(|_| !more.contains("unit")).map_or(String::new(), |unit| format!(", unit = {:?}", unit.name));
+    let unit =
+        signal.stated.or(signal.hint).filter(|_| !more.contains("unit")).map_or(String::new(), |unit| format!(", unit = {:?}", unit.name));
     let more = if more.is_empty() { String::new() } else { format!(", {more}") };
     format!("{{ {place}{unit}{more} }}")
 }
@@ -56,7 +57,9 @@ fn column_key(signal: &Signal, joint: &Joint) -> String {
 pub fn without(file: &str, from: usize, to: usize, rows: usize) -> String {
     let name = std::path::Path::new(file).file_name().map_or_else(|| file.to_string(), |name| name.to_string_lossy().into_owned());
     // What is shorter says nothing.
-    let piece = |key: &str, from: usize, to: usize| (to > from + LEAST_ROWS).then(|| format!("\n{key} = {{ of = {name:?}, rows = [{from}, {to}] }}"));
+    let piece = |key: &str, from: usize, to: usize| {
+        (to > from + LEAST_ROWS).then(|| format!("\n{key} = {{ of = {name:?}, rows = [{from}, {to}] }}"))
+    };
     let pieces: String = [piece("before", 0, from), piece("behind", to, rows)].into_iter().flatten().collect();
     format!("[files]{pieces}")
 }

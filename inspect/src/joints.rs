@@ -83,5 +83,8 @@ pub fn joints(recording: &Recording) -> Vec<Joint> {
             joint.is_led = joint.command.is_some();
         }
     }
-    out.into_iter().map(|(_, _, joint)| joint).filter(|joint| joint.position.is_some() || joint.command.is_some() || joint.velocity.is_some()).collect()
+    out.into_iter()
+        .map(|(_, _, joint)| joint)
+        .filter(|joint| joint.position.is_some() || joint.command.is_some() || joint.velocity.is_some())
+        .collect()
 }

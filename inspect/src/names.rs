@@ -16,7 +16,8 @@ pub struct Named {
     pub hint: Option<Unit>,
 }
 
-const COMMAND: &str = " command commands commanded cmd target goal desired des setpoint sp ref reference action actions demand qref qdes qcmd targets ";
+const COMMAND: &str =
+    " command commands commanded cmd target goal desired des setpoint sp ref reference action actions demand qref qdes qcmd targets ";
 const POSITION: &str =
     " position positions pos posmot posse q angle angles theta phi state states encoder enc x displacement disp location qpos height ";
 const VELOCITY: &str = " velocity velocities vel velmot velse qd dq qdot speed speeds omega v xdot dx qvel ";
@@ -92,7 +93,8 @@ pub fn read(name: &str, before: &str) -> Named {
             hints.push(word);
         } else if let Some(found) = of(small) {
             // "current position" is no current; a counter's word beside another quantity is none.
-            let is_weak = |quantity: Option<Quantity>| matches!(quantity, None | Some(Quantity::Current | Quantity::Counter | Quantity::Time));
+            let is_weak =
+                |quantity: Option<Quantity>| matches!(quantity, None | Some(Quantity::Current | Quantity::Counter | Quantity::Time));
             if is_weak(quantity) {
                 quantity = Some(found);
             }

@@ -1,14 +1,16 @@
 //! Sources become recordings: files opened by the one reading layer of the bags, the times found, signals put on an even clock.
 
-use crate::numeric::{extremes, median};
 use crate::names;
+use crate::numeric::{extremes, median};
 use crate::quantity::Quantity;
 use crate::recording::{Recording, Signal, Stream};
 use crate::source::{InspectError, Options, Source};
 use crate::time::{Found, find};
 use backdrive_bags::{
-    ImportOptions, LerobotOptions, RawColumn, RawRecording, RawStream, Reader, TableFormat, is_lerobot, is_rosbag, raw_bag, raw_lerobot, raw_table, shell_word,
+    ImportOptions, LerobotOptions, RawColumn, RawRecording, RawStream, Reader, TableFormat, is_lerobot, is_rosbag, raw_bag, raw_lerobot,
+    raw_table, shell_word,
 };
+use backdrive_diagnosis::noise;
 use backdrive_plant::model::Hold;
 use backdrive_plant::recording::{resample, units};
 use std::path::{Path, PathBuf};
@@ -148,6 +150,8 @@ fn add(recording: &mut Recording, raw: RawStream, options: &Options) -> Result<(
             joint: named.joint,
             values: column.values,
             even: Vec::new(),
+            noise: 0.0,
+            step: 0.0,
             other: column.other,
         });
     }
@@ -175,28 +179,34 @@ fn even(recording: &mut Recording) {
     let single = recording.streams.len() == 1 && stride == 1;
     let grid: Vec<f64> = (0..count.div_ceil(stride)).map(|i| first + i as f64 * recording.period).collect();
     for signal in &mut recording.signals {
-        let (factor, is_finite) = (signal.factor(), |x: &f64| x.is_finite());
-        let times = &recording.streams[signal.stream].times;
-        let is_even = single && times.windows(2).all(|w| (w[1] - w[0] - period).abs() < EVEN * period);
-        if signal.values.len() < LEAST_SAMPLES || signal.values.iter().filter(|x| is_finite(x)).count() < LEAST_SAMPLES {
-            continue;
+        even_signal(signal, &recording.streams, single, period, &grid);
+        signal.noise = noise::white(&signal.even).filter(|noise| noise.is_finite()).unwrap_or(0.0);
+        signal.step = noise::step_of(&signal.even).unwrap_or(0.0);
+    }
+}
+
+fn even_signal(signal: &mut Signal, streams: &[Stream], single: bool, period: f64, grid: &[f64]) {
+    let (factor, is_finite) = (signal.factor(), |x: &f64| x.is_finite());
+    let times = &streams[signal.stream].times;
+    let is_even = single && times.windows(2).all(|w| (w[1] - w[0] - period).abs() < EVEN * period);
+    if signal.values.len() < LEAST_SAMPLES || signal.values.iter().filter(|x| is_finite(x)).count() < LEAST_SAMPLES {
+        return;
+    }
+    if is_even && signal.values.iter().all(|x| is_finite(x)) {
+        signal.even = signal.values.iter().map(|x| x * factor).collect();
+        return;
+    }
+    let (mut at, mut values, mut latest) = (Vec::new(), Vec::new(), f64::NEG_INFINITY);
+    for (time, value) in times.iter().zip(&signal.values) {
+        if *time > latest && value.is_finite() {
+            at.push(*time);
+            values.push(value * factor);
+            latest = *time;
         }
-        if is_even && signal.values.iter().all(|x| is_finite(x)) {
-            signal.even = signal.values.iter().map(|x| x * factor).collect();
-            continue;
-        }
-        let (mut at, mut values, mut latest) = (Vec::new(), Vec::new(), f64::NEG_INFINITY);
-        for (time, value) in times.iter().zip(&signal.values) {
-            if *time > latest && value.is_finite() {
-                at.push(*time);
-                values.push(value * factor);
-                latest = *time;
-            }
-        }
-        // A command is held until the next one; what a sensor measures goes on between its samples.
-        let hold = if signal.quantity == Quantity::Command && !single { Hold::Zero } else { Hold::Linear };
-        if at.len() >= LEAST_SAMPLES {
-            signal.even = resample(hold, &at, &values, &grid);
-        }
+    }
+    // A command is held until the next one; what a sensor measures goes on between its samples.
+    let hold = if signal.quantity == Quantity::Command && !single { Hold::Zero } else { Hold::Linear };
+    if at.len() >= LEAST_SAMPLES {
+        signal.even = resample(hold, &at, &values, grid);
     }
 }

@@ -61,6 +61,10 @@ pub struct Signal {
     pub values: Vec<f64>,
     /// In SI units as far as a unit is stated or hinted, on the recording's even clock. Empty where there is nothing to compare.
     pub even: Vec<f64>,
+    /// Standard deviation of the white noise of the even samples; 0 where there is none.
+    pub noise: f64,
+    /// Step of the even samples; 0 where they have none.
+    pub step: f64,
     /// What the column holds where that is no number.
     pub other: Option<String>,
 }

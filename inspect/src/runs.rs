@@ -13,7 +13,8 @@ pub fn parted(recording: Recording) -> Vec<Recording> {
         let changes: Vec<usize> = (1..values.len()).filter(|row| values[*row] != values[*row - 1]).collect();
         !changes.is_empty() && back.iter().all(|row| changes.contains(row)) && changes.len() <= 2 * back.len()
     };
-    let Some(by) = recording.signals.iter().position(|signal| signal.values.len() == stream.times.len() && numbers_runs(&signal.values)) else {
+    let Some(by) = recording.signals.iter().position(|signal| signal.values.len() == stream.times.len() && numbers_runs(&signal.values))
+    else {
         return vec![recording];
     };
     let mut cuts = vec![0];

@@ -15,7 +15,8 @@ pub fn limited(recording: &Recording, response: &Response, limit: &RateLimit) ->
         response.command,
         100.0 * limit.share
     );
-    let mut finding = Finding::new(FindingKind::RateLimit, &recording.file, &[&response.position, &response.command], message).at(&response.joint);
+    let mut finding =
+        Finding::new(FindingKind::RateLimit, &recording.file, &[&response.position, &response.command], message).at(&response.joint);
     finding.time_s = Some(times);
     finding.todo("command slower motion, or state the limit in the drive: a linear model does not hold there").sure(0.9)
 }
@@ -50,7 +51,9 @@ pub fn settled(mut findings: Vec<Finding>) -> Vec<Finding> {
         .filter(|f| is(f, FindingKind::Rectified) || is(f, FindingKind::Stuck) || is(f, FindingKind::Passive))
         .filter_map(|f| f.signals.first().cloned())
         .collect();
-    findings.retain(|f| !(matches!(f.kind, FindingKind::EffortLag | FindingKind::NotTheDerivative) && f.signals.first().is_some_and(|s| dead.contains(s))));
+    findings.retain(|f| {
+        !(matches!(f.kind, FindingKind::EffortLag | FindingKind::NotTheDerivative) && f.signals.first().is_some_and(|s| dead.contains(s)))
+    });
     // Rows behind a time that goes back belong to another stretch of time.
     if findings.iter().any(|f| is(f, FindingKind::TimeGoesBack)) {
         findings.retain(|f| !is_pair(f.kind));
@@ -63,7 +66,8 @@ pub fn settled(mut findings: Vec<Finding>) -> Vec<Finding> {
     let in_other: Vec<Option<String>> = findings.iter().filter(|f| is(f, FindingKind::WrongUnit)).map(|f| f.joint.clone()).collect();
     findings.retain(|f| !(f.kind == FindingKind::Passive && in_other.contains(&f.joint)));
     // What is broken by itself says nothing beside others until it is put right.
-    let broken: Vec<String> = findings.iter().filter(|f| f.weight == Weight::Wrong && is_broken(f.kind)).flat_map(|f| f.signals.clone()).collect();
+    let broken: Vec<String> =
+        findings.iter().filter(|f| f.weight == Weight::Wrong && is_broken(f.kind)).flat_map(|f| f.signals.clone()).collect();
     findings.retain(|f| !(is_pair(f.kind) && f.kind != FindingKind::Passive && touches(f, &broken)));
     findings
 }
@@ -92,7 +96,9 @@ fn is_pair(kind: FindingKind) -> bool {
 pub fn without_scaled(shifted: Vec<Finding>, findings: &[Finding]) -> Vec<Finding> {
     let is_other = |f: &Finding| is_pair(f.kind) || f.kind == FindingKind::JointsExchanged || f.kind == FindingKind::Stuck;
     let explains = |shift: &Finding| {
-        findings.iter().any(|f| f.weight == Weight::Wrong && f.file == shift.file && is_other(f) && shift.signals.iter().any(|s| f.signals.contains(s)))
+        findings.iter().any(|f| {
+            f.weight == Weight::Wrong && f.file == shift.file && is_other(f) && shift.signals.iter().any(|s| f.signals.contains(s))
+        })
     };
     shifted.into_iter().filter(|shift| !explains(shift)).collect()
 }

@@ -46,7 +46,9 @@ pub fn find(columns: &[RawColumn], options: &Options) -> Result<Found, String> {
     }
     let is_clock = |column: &RawColumn| {
         let steps: Vec<f64> = column.values.windows(2).map(|w| w[1] - w[0]).collect();
-        !steps.is_empty() && steps.iter().filter(|step| **step >= 0.0).count() as f64 >= FORWARD * steps.len() as f64 && median(&steps) > 0.0
+        !steps.is_empty()
+            && steps.iter().filter(|step| **step >= 0.0).count() as f64 >= FORWARD * steps.len() as f64
+            && median(&steps) > 0.0
     };
     let is_steady = |column: &RawColumn| {
         let steps: Vec<f64> = column.values.windows(2).map(|w| w[1] - w[0]).collect();
@@ -56,11 +58,10 @@ pub fn find(columns: &[RawColumn], options: &Options) -> Result<Found, String> {
         column.unit.is_some_and(|unit| unit.kind == Kind::Time) || names::read(&column.name, "").quantity == Some(Quantity::Time)
     };
     let asked = |column: &RawColumn| options.time.as_ref().is_some_and(|time| *time == column.name || units::split(time).0 == column.name);
-    let place = columns
-        .iter()
-        .position(asked)
-        .or_else(|| columns.iter().position(|column| named(column) && is_clock(column)))
-        .or_else(|| columns.iter().position(|column| is_steady(column) && names::read(&column.name, "").quantity != Some(Quantity::Counter)));
+    let place =
+        columns.iter().position(asked).or_else(|| columns.iter().position(|column| named(column) && is_clock(column))).or_else(|| {
+            columns.iter().position(|column| is_steady(column) && names::read(&column.name, "").quantity != Some(Quantity::Counter))
+        });
     let Some((place, column)) = place.and_then(|place| Some((place, columns.get(place)?))) else {
         let names: Vec<&str> = columns.iter().map(|column| column.name.as_str()).collect();
         return Err(format!("no column holds times; there is {}: say with --rate HZ how many rows a second has", names.join(", ")));

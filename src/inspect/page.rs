@@ -25,7 +25,8 @@ pub fn page(report: &Report, recordings: &[Recording]) -> Page {
     page.lead(if wrong > 0 { Tone::Bad } else { Tone::Good }, &format!("{}.", report.sentence()));
     if !report.findings.is_empty() {
         page.section("What was found");
-        let items: Vec<(String, Option<String>)> = report.wrong().filter(|f| f.todo.starts_with('[')).map(|f| (f.message.clone(), Some(f.todo.clone()))).collect();
+        let items: Vec<(String, Option<String>)> =
+            report.wrong().filter(|f| f.todo.starts_with('[')).map(|f| (f.message.clone(), Some(f.todo.clone()))).collect();
         if !items.is_empty() {
             page.todo("Lines to paste into the set", &items);
         }
@@ -81,7 +82,14 @@ pub fn page(report: &Report, recordings: &[Recording]) -> Page {
     let mut table = Table::new(["recording", "topic", "samples", "rate, Hz", "jitter, ms", "duration, s"]);
     for clock in &report.clocks {
         let samples = clock.samples.to_string();
-        table.push([short(&clock.file), clock.topic.clone(), samples, number(clock.rate_hz), number(clock.jitter_ms), number(clock.duration_s)]);
+        table.push([
+            short(&clock.file),
+            clock.topic.clone(),
+            samples,
+            number(clock.rate_hz),
+            number(clock.jitter_ms),
+            number(clock.duration_s),
+        ]);
     }
     page.table(table);
     for note in &report.notes {
@@ -134,14 +142,12 @@ fn pictures(page: &mut Page, report: &Report, recordings: &[Recording]) {
 
 /// The signals of a finding over the time that shows it, each over its own axis.
 fn picture(finding: &Finding, recording: &Recording) -> Option<Figure> {
-    let of_clock = matches!(
-        finding.kind,
-        FindingKind::Gap | FindingKind::TimeGoesBack | FindingKind::DuplicateTimes | FindingKind::Jitter
-    );
+    let of_clock = matches!(finding.kind, FindingKind::Gap | FindingKind::TimeGoesBack | FindingKind::DuplicateTimes | FindingKind::Jitter);
     if of_clock {
         return clock(finding, recording);
     }
-    let named: Vec<&Signal> = finding.signals.iter().filter_map(|name| recording.signals.iter().find(|signal| signal.name == *name)).collect();
+    let named: Vec<&Signal> =
+        finding.signals.iter().filter_map(|name| recording.signals.iter().find(|signal| signal.name == *name)).collect();
     let mut signals: Vec<&Signal> = named.into_iter().take(MOST_SIGNALS).collect();
     // What the joint does meanwhile.
     if let [only] = signals[..] {
@@ -191,7 +197,10 @@ fn busiest(recording: &Recording, signal: &Signal) -> (f64, f64) {
 
 /// The terms of the page.
 const TERMS: [(&str, &str); 7] = [
-    ("lag", "by how much a position is late behind its command in this motion; a response that is no pure delay has another lag at another speed"),
+    (
+        "lag",
+        "by how much a position is late behind its command in this motion; a response that is no pure delay has another lag at another speed",
+    ),
     ("-3 dB", "the frequency at which the response falls to 71 % of its size at low frequencies; >= where the motion goes no further"),
     ("droop", "steady error while the command is held: what weight and friction bend the servo by"),
     ("dead band", "steady position approached from above minus from below"),

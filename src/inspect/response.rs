@@ -4,7 +4,8 @@ use backdrive_inspect::{Bandwidth, Interval, Response};
 use backdrive_report::number;
 
 /// Headers of the table of joints.
-pub const HEADERS: [&str; 8] = ["joint", "lag, ms (95 %)", "-3 dB, Hz", "overshoot", "droop, mean (largest)", "dead band", "limit of speed", "clock, Hz (jitter, ms)"];
+pub const HEADERS: [&str; 8] =
+    ["joint", "lag, ms (95 %)", "-3 dB, Hz", "overshoot", "droop, mean (largest)", "dead band", "limit of speed", "clock, Hz (jitter, ms)"];
 
 /// One line of that table.
 pub fn cells(response: &Response) -> Vec<String> {
@@ -46,7 +47,11 @@ fn bandwidth(bandwidth: &Bandwidth) -> String {
 
 fn clock(response: &Response) -> String {
     let [position, command] = response.rates_hz;
-    let rates = if (position / command - 1.0).abs() > 0.02 { format!("{}, command {}", number(position), number(command)) } else { number(position) };
+    let rates = if (position / command - 1.0).abs() > 0.02 {
+        format!("{}, command {}", number(position), number(command))
+    } else {
+        number(position)
+    };
     let age = response.age_ms.map_or(String::new(), |[position, command]| format!(", age {} and {}", number(position), number(command)));
     format!("{rates} ({}{age})", number(response.jitter_ms))
 }

@@ -63,7 +63,8 @@ fn signals(out: &mut String, report: &Report, several: bool) {
         };
         let [low, high] = signal.range;
         let step = signal.step.map_or(String::new(), |step| format!(", step {}", number(step)));
-        let _ = writeln!(out, "signal    {}: {}{unit}{why}; {} to {}{step}", signal.name, signal.quantity.text(), number(low), number(high));
+        let _ =
+            writeln!(out, "signal    {}: {}{unit}{why}; {} to {}{step}", signal.name, signal.quantity.text(), number(low), number(high));
     }
     if listed.len() > MOST_SIGNALS {
         let _ = writeln!(out, "signal    and {} more: --json lists them", listed.len() - MOST_SIGNALS);
@@ -73,7 +74,9 @@ fn signals(out: &mut String, report: &Report, several: bool) {
 fn said(finding: &Finding, several: bool) -> String {
     let word = if finding.weight == Weight::Wrong { "wrong" } else { "note" };
     let file = if several { format!("{}: ", finding.file) } else { String::new() };
-    let at = finding.time_s.map_or(String::new(), |[from, to]| if from == to { format!(" (at {from:.2} s)") } else { format!(" ({from:.2} to {to:.2} s)") });
+    let at = finding
+        .time_s
+        .map_or(String::new(), |[from, to]| if from == to { format!(" (at {from:.2} s)") } else { format!(" ({from:.2} to {to:.2} s)") });
     let mut text = format!("{word:<9} {file}{}{at}; {:.0} % sure\n", finding.message, 100.0 * finding.sure);
     for (number, line) in finding.todo.lines().enumerate() {
         let _ = writeln!(text, "{:<9} {line}", if number == 0 { "do" } else { "" });

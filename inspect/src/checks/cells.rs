@@ -13,7 +13,8 @@ pub fn check(recording: &Recording, out: &mut Vec<Finding>) {
             let first = stream.lines.first().map(|line| format!("in line {line}:"));
             let is_words = first.is_none_or(|first| other.contains(&first));
             let weight = if is_words { Weight::Note } else { Weight::Wrong };
-            let finding = Finding::new(FindingKind::Missing, &recording.file, &[&signal.name], format!("column {:?} holds {other}", signal.name));
+            let finding =
+                Finding::new(FindingKind::Missing, &recording.file, &[&signal.name], format!("column {:?} holds {other}", signal.name));
             out.push(finding.weighing(weight).todo("leave such rows out, or leave the column out if it is not needed"));
             continue;
         }

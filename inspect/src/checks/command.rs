@@ -7,7 +7,6 @@ use crate::joints::Joint;
 use crate::numeric::{Follow, Profile, follow, quantile, width};
 use crate::recording::{Recording, Signal};
 use backdrive_diagnosis::low_pass::LowPass;
-use backdrive_diagnosis::noise;
 
 /// Lags that are tried: a command may be this late, and the position this early (columns exchanged), s.
 const LATE_S: f64 = 1.0;
@@ -57,7 +56,10 @@ pub fn check(recording: &Recording, joints: &[Joint], out: &mut Vec<Finding>) {
         let same = command.even.iter().zip(&position.even).filter(|(u, y)| u == y).count();
         if same as f64 > SAME * position.even.len() as f64 && !joint.is_led {
             let message = format!("{:?} and {:?} are the same in every row: the state was logged as the command", names[0], names[1]);
-            out.push(new(FindingKind::CommandIsPosition, message).todo("name the column of the target that was sent; nothing of the response is known"));
+            out.push(
+                new(FindingKind::CommandIsPosition, message)
+                    .todo("name the column of the target that was sent; nothing of the response is known"),
+            );
             continue;
         }
         let (u, y) = (band.smooth(&command.even), band.smooth(&position.even));
@@ -98,7 +100,7 @@ pub fn check(recording: &Recording, joints: &[Joint], out: &mut Vec<Finding>) {
                 1e3 * wide
             );
             // What a sensor measures is the noisier of the two.
-            let noise = |signal: &Signal| noise::white(&signal.even).unwrap_or(0.0).max(noise::step_of(&signal.even).unwrap_or(0.0) / 12f64.sqrt());
+            let noise = |signal: &Signal| signal.noise.max(signal.step / 12f64.sqrt());
             if noise(command) > NOISIER * noise(position) {
                 let (a, b) = (advice::source(recording, position, ""), advice::source(recording, command, ""));
                 let todo = format!("[columns]\ncommand = {a}\nposition = {b}");

@@ -59,7 +59,12 @@ fn one(recording: &Recording, joint: &Joint, place: usize, out: &mut Vec<Finding
     let (lag, wide) = (best.lag * work.period, wide * work.period);
     let rest = |share: f64| (1.0 - share).max(1e-9);
     let needed = rest(best.at_once) > WORSE * rest(best.explained);
-    if best.explained > EXPLAINED && needed && lag > LAG_S.max(0.8 * recording.period) && wide < KNOWN * lag && !work.is_at_the_end(best.lag) {
+    if best.explained > EXPLAINED
+        && needed
+        && lag > LAG_S.max(0.8 * recording.period)
+        && wide < KNOWN * lag
+        && !work.is_at_the_end(best.lag)
+    {
         let message = format!(
             "{:?} lags the motion of {position:?} by {:.0} ms (95 % interval ±{:.0} ms): a filter, or an older sample",
             names[0],

@@ -29,8 +29,10 @@ pub fn check(recording: &Recording, joints: &[Joint], out: &mut Vec<Finding>) {
         joints.iter().map(|joint| moving(joint.command).map(|signal| coarse(band.smooth(&signal.even)))).collect();
     let positions: Vec<Option<Vec<f64>>> =
         joints.iter().map(|joint| moving(joint.position).map(|signal| coarse(band.smooth(&signal.even)))).collect();
-    let rates: Vec<Option<Vec<f64>>> = joints.iter().map(|joint| moving(joint.position).map(|signal| coarse(band.rate(&signal.even)))).collect();
-    let told: Vec<Option<Vec<f64>>> = joints.iter().map(|joint| moving(joint.velocity).map(|signal| coarse(band.smooth(&signal.even)))).collect();
+    let rates: Vec<Option<Vec<f64>>> =
+        joints.iter().map(|joint| moving(joint.position).map(|signal| coarse(band.rate(&signal.even)))).collect();
+    let told: Vec<Option<Vec<f64>>> =
+        joints.iter().map(|joint| moving(joint.velocity).map(|signal| coarse(band.smooth(&signal.even)))).collect();
     pairs(recording, joints, (&commands, &positions, (-1, late)), Quantity::Position, out);
     if !out.iter().any(|finding| finding.kind == FindingKind::JointsExchanged) {
         pairs(recording, joints, (&rates, &told, (-2, 2)), Quantity::Velocity, out);

@@ -3,7 +3,7 @@
 use crate::advice;
 use crate::finding::{Finding, FindingKind};
 use crate::joints::Joint;
-use crate::numeric::{median, quantile, resolution, runs, span};
+use crate::numeric::{extremes, median, quantile, resolution, runs, span};
 use crate::quantity::Quantity;
 use crate::recording::{Recording, Signal};
 use backdrive_diagnosis::noise;
@@ -27,7 +27,8 @@ pub fn check(recording: &Recording, joints: &[Joint], out: &mut Vec<Finding>) {
     }
     for (place, signal) in recording.signals.iter().enumerate() {
         let joint = joints.iter().find(|joint| {
-            [joint.command, joint.position, joint.velocity, joint.effort, joint.current].contains(&Some(place)) && !(joint.is_led && joint.command == Some(place))
+            [joint.command, joint.position, joint.velocity, joint.effort, joint.current].contains(&Some(place))
+                && !(joint.is_led && joint.command == Some(place))
         });
         if signal.quantity.is_measured() || signal.quantity == Quantity::Command {
             frozen(recording, signal, joint, out);
@@ -55,7 +56,7 @@ fn stuck(recording: &Recording, joint: &Joint, out: &mut Vec<Finding>) {
 }
 
 fn is_moving(signal: &Signal) -> bool {
-    let noise = noise::white(&signal.even).unwrap_or(0.0).max(noise::step_of(&signal.even).unwrap_or(0.0));
+    let noise = signal.noise.max(signal.step);
     span(&signal.even) > 10.0 * noise && span(&signal.even) > 0.0
 }
 
@@ -69,9 +70,10 @@ fn frozen(recording: &Recording, signal: &Signal, joint: Option<&Joint>, out: &m
     }
     let equal = 1.0 - moving.len() as f64 / steps.len() as f64;
     let (usual, large) = (median(&moving), quantile(&moving, 0.95));
-    let range = span(values);
+    let Some((low, high)) = extremes(values) else { return };
+    let (range, fine) = (high - low, resolution(values));
     // Noise beyond the step: then no two neighbours are equal but by chance.
-    let is_fine = noise::white(values).is_some_and(|noise| noise > resolution(values));
+    let is_fine = noise::white(values).is_some_and(|noise| noise > fine);
     let candidates = runs(values, LEAST_ROWS).into_iter().filter(|(from, to)| stream.time(*to) - stream.time(*from) >= LEAST_S);
     let mut found: Vec<(usize, usize)> = Vec::new();
     for (from, to) in candidates {
@@ -80,10 +82,10 @@ fn frozen(recording: &Recording, signal: &Signal, joint: Option<&Joint>, out: &m
         // Noise does not stand still: with this share of equal neighbours so long a run does not happen once in a million recordings.
         let chance = equal.max(1e-3).powi((to - from) as i32) * values.len() as f64;
         let is_noisy = is_fine && equal < OFTEN_EQUAL && chance < 1e-6 && values[from] != 0.0;
-        let at_an_end = (values[from] - values.iter().copied().fold(f64::INFINITY, f64::min)).abs().min((values[from] - values.iter().copied().fold(f64::NEG_INFINITY, f64::max)).abs())
-            < (1e-3 * range).max(3.0 * resolution(values));
+        let at_an_end = (values[from] - low).abs().min((high - values[from]).abs()) < (1e-3 * range).max(3.0 * fine);
         // Where rows are missing behind it, the jump is theirs.
-        let is_gap = stream.times.get(to + 1).is_some_and(|next| next - stream.times[to] > 1.5 * recording.period || *next <= stream.times[to]);
+        let is_gap =
+            stream.times.get(to + 1).is_some_and(|next| next - stream.times[to] > 1.5 * recording.period || *next <= stream.times[to]);
         let jumped = !is_gap && after > JUMP * large && before > 0.1 * usual && after < large * (to - from) as f64 * 1.5;
         let noise_stops = is_noisy && !at_an_end && signal.quantity.is_measured() && is_noisy_around(values, from, to);
         if (noise_stops && joint_moves(recording, joint, signal, from, to))
@@ -124,7 +126,7 @@ fn joint_moves(recording: &Recording, joint: Option<&Joint>, signal: &Signal, fr
     let (a, b) = even_rows(recording, signal, from, to);
     [joint.command, joint.position, joint.velocity].into_iter().flatten().map(|place| &recording.signals[place]).any(|other| {
         let part = other.even.get(a..=b.min(other.even.len().saturating_sub(1))).unwrap_or(&[]);
-        let noise = noise::white(&other.even).unwrap_or(0.0).max(resolution(&other.even));
+        let noise = other.noise.max(resolution(&other.even));
         !std::ptr::eq(other, signal) && span(part) > (5.0 * noise).max(MOVES * span(&other.even))
     })
 }

@@ -64,7 +64,12 @@ fn clipped(recording: &Recording, signal: &Signal, joint: Option<&Joint>, out: &
         let entries: Vec<f64> = values.windows(2).filter(|w| !is_at(w[0]) && is_at(w[1])).map(|w| (w[1] - w[0]).abs()).collect();
         let stands = values.windows(2).filter(|w| is_at(w[0]) && is_at(w[1])).count();
         // Rest at 0 is no limit, and one step of the sensor is how any motion ends.
-        if count >= LEAST_AT_LIMIT && stands * 3 >= count && level != 0.0 && !entries.is_empty() && crate::numeric::mean(&entries) > (ENTERED * usual).max(1.5 * step) {
+        if count >= LEAST_AT_LIMIT
+            && stands * 3 >= count
+            && level != 0.0
+            && !entries.is_empty()
+            && crate::numeric::mean(&entries) > (ENTERED * usual).max(1.5 * step)
+        {
             let is_slow = crate::numeric::mean(&entries) < ENTRY_STEPS * resolution(&values);
             if joint.is_some_and(|joint| joint.command.is_some() && (is_slow || !is_told_further(recording, joint, level))) {
                 continue;
@@ -102,11 +107,12 @@ fn is_told_further(recording: &Recording, joint: &Joint, level: f64) -> bool {
 
 /// Share of the samples with motion in which a joint moves either way, the smaller of the two; 0 where its position does not say.
 fn either_way(recording: &Recording, joint: &Joint) -> f64 {
-    let Some(position) = joint.position.map(|place| &recording.signals[place].even) else { return 0.0 };
+    let Some(signal) = joint.position.map(|place| &recording.signals[place]) else { return 0.0 };
+    let position = &signal.even;
     let smooth = LowPass::butterworth(2, (0.1 * recording.rate()).min(5.0), recording.rate()).both_ways(position);
     let rate = derivative(&smooth, recording.period);
     let least = 0.05 * width(&rate);
-    let noise = noise::step_of(position).unwrap_or(0.0).max(noise::white(position).unwrap_or(0.0));
+    let noise = signal.step.max(signal.noise);
     if rate.is_empty() || span(position) < 8.0 * noise || least <= 0.0 {
         return 0.0;
     }
@@ -147,7 +153,8 @@ fn rectified(recording: &Recording, joint: &Joint, place: usize, out: &mut Vec<F
         "{:?} never changes its sign while the joint moves both ways, and comes down to {least}: it was logged without its sign (rectified)",
         signal.name
     );
-    let todo = "log the signed value; until then do not use it as a torque: leave it out of the set, the positions say what can be known".to_string();
+    let todo = "log the signed value; until then do not use it as a torque: leave it out of the set, the positions say what can be known"
+        .to_string();
     out.push(Finding::new(FindingKind::Rectified, &recording.file, &[&signal.name], message).at(&joint.name).todo(todo).sure(0.97));
 }
 

@@ -4,7 +4,6 @@ use crate::joints::Joint;
 use crate::numeric::{span, thinned};
 use crate::recording::{Recording, Signal};
 use backdrive_diagnosis::low_pass::{LowPass, derivative};
-use backdrive_diagnosis::noise;
 
 /// Highest corner of the filter, Hz: what joints of arms do is below it, what encoders and converters add is mostly above.
 const CORNER_HZ: f64 = 8.0;
@@ -60,7 +59,7 @@ pub fn of(recording: &Recording, place: Option<usize>) -> Option<&Signal> {
 /// How often its noise and its step a signal moves; 0 where it does not.
 pub fn excitation(signal: &Signal) -> f64 {
     let whole = span(&signal.even);
-    let noise = noise::white(&signal.even).unwrap_or(0.0).max(noise::step_of(&signal.even).unwrap_or(0.0)).max(1e-9 * whole);
+    let noise = signal.noise.max(signal.step).max(1e-9 * whole);
     if whole > 0.0 { whole / noise } else { 0.0 }
 }
 

@@ -36,14 +36,20 @@ pub fn check(recording: &Recording, joints: &[Joint], out: &mut Vec<Finding>) {
         if excitation(position) < MOVES || moved < OF_OTHERS * usual {
             continue;
         }
-        let new = |name: &str, message: String| Finding::new(FindingKind::Passive, &recording.file, &[name, &position.name], message).at(&joint.name);
-        if let Some(command) = joint.command.map(|place| &recording.signals[place]).filter(|command| span(&command.even) < NO_COMMAND * moved) {
+        let new = |name: &str, message: String| {
+            Finding::new(FindingKind::Passive, &recording.file, &[name, &position.name], message).at(&joint.name)
+        };
+        if let Some(command) =
+            joint.command.map(|place| &recording.signals[place]).filter(|command| span(&command.even) < NO_COMMAND * moved)
+        {
             let message = format!(
                 "{} moves by {moved:.3} while {:?} does not: the joint is driven by something else, or another column is its command",
                 title(joint),
                 command.name
             );
-            out.push(new(&command.name, message).todo("name the column of the command that was sent, or leave the command of this joint out"));
+            out.push(
+                new(&command.name, message).todo("name the column of the command that was sent, or leave the command of this joint out"),
+            );
         }
         for place in joint.drives() {
             let drive = &recording.signals[place];
@@ -51,10 +57,21 @@ pub fn check(recording: &Recording, joints: &[Joint], out: &mut Vec<Finding>) {
             let zero = advice::table_name(&joint.name);
             if is_still {
                 let value = drive.values.first().copied().unwrap_or(0.0);
-                let message = format!("{:?} is {value} throughout while {} moves: the joint has no motor, or its column is dead", drive.name, title(joint));
+                let message = format!(
+                    "{:?} is {value} throughout while {} moves: the joint has no motor, or its column is dead",
+                    drive.name,
+                    title(joint)
+                );
                 out.push(new(&drive.name, message).todo(format!("[joints.{zero}]\ntorque = 0   # if it has no motor")));
-            } else if is_signed(&drive.values) && neighbour_correlation(&drive.even) < WHITE && explained(recording, joint, place).is_some_and(|share| share < UNEXPLAINED) {
-                let message = format!("{:?} is noise alone while {} moves: the joint has no motor, or the sensor is not connected", drive.name, title(joint));
+            } else if is_signed(&drive.values)
+                && neighbour_correlation(&drive.even) < WHITE
+                && explained(recording, joint, place).is_some_and(|share| share < UNEXPLAINED)
+            {
+                let message = format!(
+                    "{:?} is noise alone while {} moves: the joint has no motor, or the sensor is not connected",
+                    drive.name,
+                    title(joint)
+                );
                 out.push(new(&drive.name, message).todo(format!("[joints.{zero}]\ntorque = 0   # if it has no motor")).sure(0.9));
             }
         }

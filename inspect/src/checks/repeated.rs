@@ -65,7 +65,11 @@ pub fn check(recording: &Recording, out: &mut Vec<Finding>) {
         let distinct: HashSet<u64> = (from..=to).map(hash).collect();
         let part = |signal: &Signal| signal.values.get(from..=to).map_or(0.0, span);
         let moves = columns.iter().any(|signal| signal.quantity.is_measured() && part(signal) > MOVES * span(&signal.values));
-        let changes: usize = columns.iter().filter_map(|signal| signal.values.get(from..=to)).map(|part| part.windows(2).filter(|w| w[0] != w[1]).count()).sum();
+        let changes: usize = columns
+            .iter()
+            .filter_map(|signal| signal.values.get(from..=to))
+            .map(|part| part.windows(2).filter(|w| w[0] != w[1]).count())
+            .sum();
         if length < LEAST_ROWS || distinct.len() < LEAST_ROWS || changes < LEAST_CHANGES || !moves || total as f64 > MOST * rows as f64 {
             continue;
         }

@@ -29,7 +29,9 @@ pub fn zeros(all: &[(Recording, Vec<Joint>)], out: &mut Vec<Finding>) {
     let mut by_joint: BTreeMap<String, Vec<Offset>> = BTreeMap::new();
     for (recording, joints) in all {
         for joint in joints.iter().filter(|joint| !joint.is_led) {
-            let (Some(command), Some(position), Some(place)) = (of(recording, joint.command), of(recording, joint.position), joint.position) else {
+            let (Some(command), Some(position), Some(place)) =
+                (of(recording, joint.command), of(recording, joint.position), joint.position)
+            else {
                 continue;
             };
             let differences: Vec<f64> = position.even.iter().zip(&command.even).map(|(y, u)| y - u).collect();
@@ -39,7 +41,14 @@ pub fn zeros(all: &[(Recording, Vec<Joint>)], out: &mut Vec<Finding>) {
             // What weight and friction make of it within the recording.
             let spread = pieces.iter().map(|piece| (piece - middle).abs()).fold(0.0, f64::max);
             let range = span(&command.even);
-            by_joint.entry(format!("{} {}", joint.name, position.name)).or_default().push(Offset { recording, joint, place, middle, spread, range });
+            by_joint.entry(format!("{} {}", joint.name, position.name)).or_default().push(Offset {
+                recording,
+                joint,
+                place,
+                middle,
+                spread,
+                range,
+            });
         }
     }
     for offsets in by_joint.values().filter(|offsets| offsets.len() > 1) {
@@ -55,7 +64,8 @@ pub fn zeros(all: &[(Recording, Vec<Joint>)], out: &mut Vec<Finding>) {
                 continue;
             }
             let name = offset.recording.signals[offset.place].name.as_str();
-            let message = format!("the zero of {name:?} is shifted by {shift:.4} beside the other recordings: the joint was homed elsewhere");
+            let message =
+                format!("the zero of {name:?} is shifted by {shift:.4} beside the other recordings: the joint was homed elsewhere");
             let entry = advice::entry(offset.recording, offset.joint, offset.place, &format!("offset = {:.4}", -shift));
             let finding = Finding::new(FindingKind::ZeroShifted, &offset.recording.file, &[name], message).at(&offset.joint.name);
             out.push(finding.todo(format!("in a set of its own for this file:\n{entry}")));

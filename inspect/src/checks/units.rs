@@ -29,7 +29,13 @@ pub fn check(recording: &Recording, joints: &[Joint], out: &mut Vec<Finding>) {
                 let todo = if is_stated { entry } else { format!("{entry}   # if it is mA; counts need their scale") };
                 let weight = if is_stated { Weight::Wrong } else { Weight::Note };
                 let sure = if is_stated { 0.97 } else { 0.6 };
-                out.push(Finding::new(FindingKind::WrongUnit, &recording.file, &[&signal.name], message).at(&joint.name).weighing(weight).todo(todo).sure(sure));
+                out.push(
+                    Finding::new(FindingKind::WrongUnit, &recording.file, &[&signal.name], message)
+                        .at(&joint.name)
+                        .weighing(weight)
+                        .todo(todo)
+                        .sure(sure),
+                );
             }
         }
         let Some(place) = joint.position.filter(|_| arm) else { continue };

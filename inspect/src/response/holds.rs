@@ -66,11 +66,7 @@ pub fn steady(recording: &Recording, joint: &Joint, u: &[f64], y: &[f64], lag: f
     }
     let largest = errors.iter().copied().max_by(|a, b| a.abs().total_cmp(&b.abs()));
     let droop = largest.filter(|_| errors.len() >= LEAST_HOLDS && !joint.is_led).map(|largest| [mean(&errors), largest]);
-    Steady {
-        overshoot: (overshoots.len() >= LEAST_STEPS).then(|| median(&overshoots)),
-        droop,
-        dead_band: dead_band(&above, &below),
-    }
+    Steady { overshoot: (overshoots.len() >= LEAST_STEPS).then(|| median(&overshoots)), droop, dead_band: dead_band(&above, &below) }
 }
 
 /// Difference of means with the interval of Welch's t.

@@ -97,7 +97,8 @@ fn of_joint(recording: &Recording, joint: &Joint) -> Option<(Response, Option<Ra
     if best.explained < EXPLAINED || best.gain <= 0.0 {
         return None;
     }
-    let in_ms = |lag: f64, half: f64| Interval { value: 1e3 * lag * period, low: 1e3 * (lag - half) * period, high: 1e3 * (lag + half) * period };
+    let in_ms =
+        |lag: f64, half: f64| Interval { value: 1e3 * lag * period, low: 1e3 * (lag - half) * period, high: 1e3 * (lag + half) * period };
     let lag_ms = profile.uncertainty().filter(|_| !profile.is_at_the_end(&best)).map(|half| in_ms(best.lag, half));
     let lag = (best.lag * period / recording.period).max(0.0);
     let steady = holds::steady(recording, joint, u, y, lag);

@@ -36,9 +36,8 @@ pub fn find(u: &[f64], y: &[f64], lag: f64, period: f64) -> Option<RateLimit> {
     let error: Vec<f64> = (0..y.len()).map(|i| (u[i.saturating_sub(delay)] - y[i]).abs()).collect();
     let usual = median(&error);
     // Direction: it moves towards the command.
-    let behind: Vec<usize> = (0..y.len())
-        .filter(|i| error[*i] > (BEHIND * range).max(3.0 * usual) && speed[*i] * (u[*i] - y[*i]) > 0.0)
-        .collect();
+    let behind: Vec<usize> =
+        (0..y.len()).filter(|i| error[*i] > (BEHIND * range).max(3.0 * usual) && speed[*i] * (u[*i] - y[*i]) > 0.0).collect();
     if (behind.len() as f64) * period < LEAST_S {
         return None;
     }

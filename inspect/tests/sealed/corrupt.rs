@@ -15,9 +15,33 @@ pub struct Corrupted {
 }
 
 pub const NAMES: [&str; 27] = [
-    "stuck", "clipped", "rectified", "rectified velocity", "quantised", "outliers", "gap", "missing", "time back", "duplicated", "frozen", "repeated",
-    "held", "interpolated", "filtered", "degrees", "milliampere", "degrees velocity", "sign", "sign velocity", "scale", "scale velocity", "swapped",
-    "velocity late", "torque late", "zero shifted", "exchanged",
+    "stuck",
+    "clipped",
+    "rectified",
+    "rectified velocity",
+    "quantised",
+    "outliers",
+    "gap",
+    "missing",
+    "time back",
+    "duplicated",
+    "frozen",
+    "repeated",
+    "held",
+    "interpolated",
+    "filtered",
+    "degrees",
+    "milliampere",
+    "degrees velocity",
+    "sign",
+    "sign velocity",
+    "scale",
+    "scale velocity",
+    "swapped",
+    "velocity late",
+    "torque late",
+    "zero shifted",
+    "exchanged",
 ];
 /// Further ones, which need a joint with a command.
 pub const MORE: [&str; 4] = ["passive command", "passive torque", "rate limit", "state as action"];
@@ -54,7 +78,8 @@ pub fn corrupt(random: &mut Random, clean: &Clean, name: &'static str) -> Option
     let mut columns = clean.columns.clone();
     let (rate, period) = (clean.rate, 1.0 / clean.rate);
     let rows = columns[0].values.len();
-    let places = |columns: &[Column], roles: &[Role]| -> Vec<usize> { (0..columns.len()).filter(|i| roles.contains(&columns[*i].role)).collect() };
+    let places =
+        |columns: &[Column], roles: &[Role]| -> Vec<usize> { (0..columns.len()).filter(|i| roles.contains(&columns[*i].role)).collect() };
     let pick = |random: &mut Random, columns: &[Column], roles: &[Role]| -> Option<usize> {
         let found = places(columns, roles);
         if found.is_empty() { None } else { Some(found[random.below(found.len())]) }
@@ -67,7 +92,10 @@ pub fn corrupt(random: &mut Random, clean: &Clean, name: &'static str) -> Option
             let place = pick(random, &columns, &[Role::Position, Role::Velocity])?;
             // Something else of the joint has to show that it moves.
             let joint = columns[place].joint;
-            let others = columns.iter().enumerate().filter(|(i, c)| *i != place && c.joint == joint && matches!(c.role, Role::Command | Role::Position | Role::Velocity));
+            let others = columns
+                .iter()
+                .enumerate()
+                .filter(|(i, c)| *i != place && c.joint == joint && matches!(c.role, Role::Command | Role::Position | Role::Velocity));
             (others.count() > 0).then_some(())?;
             let value = columns[place].values[random.below(rows)];
             columns[place].values.fill(value);
@@ -150,7 +178,8 @@ pub fn corrupt(random: &mut Random, clean: &Clean, name: &'static str) -> Option
         "frozen" => {
             let place = pick(random, &columns, &[Role::Position, Role::Velocity, Role::Drive])?;
             let length = (random.range(0.3, 1.5) * rate) as usize;
-            let position = of_joint(&columns, columns[place].joint, Role::Position).or_else(|| of_joint(&columns, columns[place].joint, Role::Leader))?;
+            let position = of_joint(&columns, columns[place].joint, Role::Position)
+                .or_else(|| of_joint(&columns, columns[place].joint, Role::Leader))?;
             let from = busy(random, &columns[position].values, length)?;
             let value = columns[place].values[from];
             columns[place].values[from..from + length].fill(value);
@@ -193,7 +222,9 @@ pub fn corrupt(random: &mut Random, clean: &Clean, name: &'static str) -> Option
         }
         "degrees" => {
             let place = pick(random, &columns, &[Role::Position])?;
-            (of_joint(&columns, columns[place].joint, Role::Command).is_some() || of_joint(&columns, columns[place].joint, Role::Velocity).is_some()).then_some(())?;
+            (of_joint(&columns, columns[place].joint, Role::Command).is_some()
+                || of_joint(&columns, columns[place].joint, Role::Velocity).is_some())
+            .then_some(())?;
             let factor = 180.0 / std::f64::consts::PI;
             columns[place].values.iter_mut().for_each(|x| *x *= factor);
             (accepted, named) = (vec![Kind::WrongUnit], vec![place]);
@@ -310,6 +341,7 @@ fn bare(heading: &str) -> String {
 /// A recording as two files.
 pub fn halves(columns: &[Column]) -> Vec<Vec<Column>> {
     let middle = columns[0].values.len() / 2;
-    let piece = |rows: std::ops::Range<usize>| columns.iter().map(|c| Column { values: c.values[rows.clone()].to_vec(), ..c.clone() }).collect();
+    let piece =
+        |rows: std::ops::Range<usize>| columns.iter().map(|c| Column { values: c.values[rows.clone()].to_vec(), ..c.clone() }).collect();
     vec![piece(0..middle), piece(middle..2 * middle)]
 }

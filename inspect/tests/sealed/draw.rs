@@ -75,7 +75,8 @@ fn wanted(random: &mut Random, rows: usize, period: f64, size: f64, fastest: f64
                     (target, left) = (random.range(-1.0, 1.0), random.range(0.8, 2.5));
                 }
                 // Ramps at a constant speed, or steps that a planner rounds off.
-                at += if kind == 2 { (target - at).clamp(-speed * period, speed * period) } else { (target - at) * (6.0 * period).min(1.0) };
+                at +=
+                    if kind == 2 { (target - at).clamp(-speed * period, speed * period) } else { (target - at) * (6.0 * period).min(1.0) };
                 at
             }
         };
@@ -185,7 +186,8 @@ pub fn clean(random: &mut Random) -> Clean {
             let force = torque(random, &x, period, is_lever);
             let spread = if is_lever { 2e-6 } else { 0.3 * encoder };
             let step = if is_lever { 5e-6 } else { encoder };
-            let (a, b, c) = if is_lever { ("x [m]", "velocity [m/s]", "force [N]") } else { ("angle [rad]", "speed [rad/s]", "current [A]") };
+            let (a, b, c) =
+                if is_lever { ("x [m]", "velocity [m/s]", "force [N]") } else { ("angle [rad]", "speed [rad/s]", "current [A]") };
             let measured = rounded(&noisy(random, &x, spread), step);
             add(a.to_string(), 0, Role::Position, measured);
             if random.chance(0.7) {

@@ -14,7 +14,10 @@ fn folder() -> std::path::PathBuf {
 type Used = (&'static str, &'static [(&'static str, &'static str, usize, Role)]);
 
 const FILES: &[Used] = &[
-    ("emps/emps_train.csv", &[("qref_m", "qref [m]", 0, Role::Command), ("q_m", "q [m]", 0, Role::Position), ("force_N", "force [N]", 0, Role::Drive)]),
+    (
+        "emps/emps_train.csv",
+        &[("qref_m", "qref [m]", 0, Role::Command), ("q_m", "q [m]", 0, Role::Position), ("force_N", "force [N]", 0, Role::Drive)],
+    ),
     ("tue_bilateral/m2_a_rigid.csv", TUE),
     ("tue_bilateral/m2_b_free_motion.csv", TUE),
     ("tue_bilateral/m2_c_spring.csv", TUE),
@@ -55,7 +58,12 @@ pub fn clean() -> Vec<Clean> {
         let mut columns = vec![Column { heading: "t".to_string(), joint: 0, role: Role::Time, values: times[rows.clone()].to_vec() }];
         for (name, heading, joint, role) in *used {
             let Some(column) = stream.columns.iter().find(|c| c.name == *name) else { continue };
-            columns.push(Column { heading: (*heading).to_string(), joint: *joint, role: *role, values: column.values[rows.clone()].to_vec() });
+            columns.push(Column {
+                heading: (*heading).to_string(),
+                joint: *joint,
+                role: *role,
+                values: column.values[rows.clone()].to_vec(),
+            });
         }
         out.push(Clean { kind: "real", rate, columns });
     }
