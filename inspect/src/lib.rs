@@ -103,7 +103,7 @@ fn clock(recording: &Recording, stream: &Stream) -> ClockReport {
         topic: stream.topic.clone(),
         samples: stream.times.len(),
         rate_hz: if usual > 0.0 { 1.0 / usual } else { 0.0 },
-        jitter_ms: 1e3 * numeric::deviation(&steps),
+        jitter_ms: numeric::jitter_ms(&steps),
         duration_s: stream.time(stream.times.len().saturating_sub(1)),
     }
 }

@@ -45,6 +45,12 @@ pub fn deviation(values: &[f64]) -> f64 {
     (values.iter().map(|x| (x - middle).powi(2)).sum::<f64>() / values.len().max(1) as f64).sqrt()
 }
 
+/// Standard deviation of the steps of a clock, s, in ms; what is below a nanosecond is rounding.
+pub fn jitter_ms(steps: &[f64]) -> f64 {
+    let jitter = 1e3 * deviation(steps);
+    if jitter < 1e-6 { 0.0 } else { jitter }
+}
+
 /// Standard deviation by the median of the distances from the median.
 pub fn robust_deviation(values: &[f64]) -> f64 {
     let middle = median(values);

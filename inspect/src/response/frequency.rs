@@ -1,6 +1,6 @@
 //! Bandwidth from averaged spectra of command and position (Welch).
 
-use super::Bandwidth;
+use super::types::Bandwidth;
 use crate::numeric::{median, thinned};
 use backdrive_stability::spectra::welch;
 

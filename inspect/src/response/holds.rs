@@ -1,6 +1,6 @@
 //! What stands still: steady error under load, dead band, overshoot of steps.
 
-use super::Interval;
+use super::types::Interval;
 use crate::joints::Joint;
 use crate::numeric::{deviation, mean, median, span, student};
 use crate::recording::Recording;
