@@ -103,7 +103,8 @@ pub fn read(name: &str, before: &str) -> Named {
         }
     }
     for word in self::words(before).iter().map(|word| word.to_lowercase()) {
-        is_command |= is_in(COMMAND, &word);
+        // CRTK calls the topics of commands servo_jp, servo_jf and so on.
+        is_command |= is_in(COMMAND, &word) || word == "servo";
         side = side.or(if is_in(LEADER, &word) { Some(Side::Leader) } else { is_in(FOLLOWER, &word).then_some(Side::Follower) });
         quantity = quantity.or(of(&word).filter(|found| *found != Quantity::Time));
     }
@@ -142,6 +143,7 @@ mod tests {
         assert_eq!((kuka.quantity, kuka.joint.as_str(), kuka.hint.map(|u| u.name)), (Some(Quantity::Velocity), "3", Some("deg/s")));
         assert_eq!(read("position[0]", "/leader/joint_states").side, Some(Side::Leader));
         assert_eq!(read("data[1]", "/forward_position_controller/commands").quantity, Some(Quantity::Command));
+        assert_eq!(read("position[0]", "/slave/servo_jp").quantity, Some(Quantity::Command));
         assert_eq!(said("target_qd_1").0, Some(Quantity::Unknown));
     }
 }

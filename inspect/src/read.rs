@@ -192,7 +192,7 @@ fn even_signal(signal: &mut Signal, streams: &[Stream], single: bool, period: f6
     if signal.values.len() < LEAST_SAMPLES || signal.values.iter().filter(|x| is_finite(x)).count() < LEAST_SAMPLES {
         return;
     }
-    if is_even && signal.values.iter().all(|x| is_finite(x)) {
+    if is_even && signal.values.iter().all(is_finite) {
         signal.even = signal.values.iter().map(|x| x * factor).collect();
         return;
     }

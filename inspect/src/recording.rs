@@ -99,11 +99,6 @@ impl Recording {
         1.0 / self.period
     }
 
-    /// Samples on the even clock.
-    pub fn len(&self) -> usize {
-        self.signals.iter().map(|signal| signal.even.len()).max().unwrap_or(0)
-    }
-
     /// The stream of a signal.
     pub fn stream(&self, signal: &Signal) -> &Stream {
         &self.streams[signal.stream]

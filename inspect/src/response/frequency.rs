@@ -21,7 +21,8 @@ pub fn bandwidth(u: &[f64], y: &[f64], period: f64) -> Option<Bandwidth> {
     let stride = ((0.25 / (HIGHEST_HZ * period)) as usize).max(1);
     let (u, y, period) = (thinned(u, stride), thinned(y, stride), period * stride as f64);
     let segment = ((SEGMENT_S / period) as usize).min(u.len() / SEGMENTS);
-    let spectra = welch(&[&u, &y], &[0..u.len()], segment, period, HIGHEST_HZ)?;
+    let whole = std::iter::once(0..u.len()).collect::<Vec<_>>();
+    let spectra = welch(&[&u, &y], &whole, segment, period, HIGHEST_HZ)?;
     let lines: Vec<(f64, f64)> = (0..spectra.hz.len())
         .filter(|line| spectra.coherence(*line, 0, 1) > COHERENT)
         .map(|line| {

@@ -45,7 +45,9 @@ fn of_joint(recording: &Recording, joint: &Joint) -> Option<(Response, Option<Ra
     }
     let in_ms =
         |lag: f64, half: f64| Interval { value: 1e3 * lag * period, low: 1e3 * (lag - half) * period, high: 1e3 * (lag + half) * period };
-    let lag_ms = profile.uncertainty().filter(|_| !profile.is_at_the_end(&best)).map(|half| in_ms(best.lag, half));
+    // An interval as wide as what was tried is no lag.
+    let is_known = |half: &f64| half * period < 0.5 * LATE_S && !profile.is_at_the_end(&best);
+    let lag_ms = profile.uncertainty().filter(is_known).map(|half| in_ms(best.lag, half));
     let lag = (best.lag * period / recording.period).max(0.0);
     let steady = holds::steady(recording, joint, u, y, lag);
     let limit = rate_limit::find(u, y, lag, recording.period);
