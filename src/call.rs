@@ -5,8 +5,8 @@ use crate::caller::{Caller, Calling, taken};
 use crate::cli::{self, Cli, Command};
 use crate::failure::{Failure, code};
 use crate::{
-    bag, bridge, compare, diagnose, doctor, export, fit, graph, init, model, prove, replay, run, secret, shell, simulate, stability,
-    test_bench, why,
+    bag, bridge, compare, diagnose, doctor, export, fit, graph, init, inspect, model, prove, replay, run, secret, shell, simulate,
+    stability, test_bench, why,
 };
 use clap::Parser;
 use std::sync::Arc;
@@ -69,6 +69,7 @@ pub(crate) fn dispatch(command: &Command) -> Result<u8, Failure> {
         Command::Stability(options) => stability::stability(options),
         Command::Why(options) => why::why(options),
         Command::Compare(options) => compare::compare(options),
+        Command::Inspect(options) => inspect::inspect(options),
         Command::Init(options) => init::init(options),
         Command::Diagnose(options) => diagnose::diagnose(options),
         Command::Fit(options) => fit::fit(options),

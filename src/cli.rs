@@ -11,6 +11,7 @@ mod export;
 mod fit;
 mod graph;
 mod init;
+mod inspect;
 mod model;
 mod network;
 mod node;
@@ -35,6 +36,7 @@ pub use export::{Export, Language, Target};
 pub use fit::Fit;
 pub use graph::Graph;
 pub use init::{Answer, Attached, Driven, Init, Motion, Start};
+pub use inspect::Inspect;
 pub use model::{Model, ModelFile};
 pub use network::{Network, Transport};
 pub use node::{Node, SealedMaster};
@@ -88,6 +90,9 @@ pub enum Command {
     /// Run the same hand through each law between master and slave, and through the canceller: edge, transparency, tracking, effort.
     #[command(after_help = compare::HELP)]
     Compare(Compare),
+    /// Ask whether recordings are right: what each signal is, what is wrong with it, how each joint answers its command. Needs no model.
+    #[command(after_help = inspect::HELP)]
+    Inspect(Inspect),
     /// Write a model and a set for recordings of your own: asks what is driven and what is measured, and checks what it wrote.
     #[command(after_help = init::HELP)]
     Init(Init),

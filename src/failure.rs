@@ -1,6 +1,7 @@
 //! Why a command fails, and the exit code that goes with it.
 
 use backdrive_bags::BagError;
+use backdrive_inspect::InspectError;
 use backdrive_launch::LaunchError;
 use backdrive_nodes::build::BuildError;
 use backdrive_plant::tomlfile::FileError;
@@ -100,6 +101,15 @@ impl Failure {
     /// A file of ours cannot be written.
     pub fn write(path: &std::path::Path, error: std::io::Error) -> Failure {
         Failure::machine(format!("{}: cannot be written: {error}", path.display()))
+    }
+}
+
+impl From<InspectError> for Failure {
+    fn from(error: InspectError) -> Failure {
+        match error {
+            InspectError::Bag(error) => Failure::bag(error),
+            InspectError::Recording { .. } => Failure::input(error),
+        }
     }
 }
 

@@ -21,6 +21,7 @@ pub mod failure;
 mod fit;
 mod graph;
 mod init;
+mod inspect;
 mod interrupt;
 mod model;
 mod network;

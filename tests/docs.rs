@@ -121,6 +121,11 @@ fn a_recording_of_ones_own_ends_in_what_the_page_promises() {
     assert!(near(size("out/rig", "positive"), 80.0) && near(size("out/rig", "negative"), 40.0), "{}", size("out/rig", "positive"));
 }
 
+#[test]
+fn an_inspection_says_what_its_page_says() {
+    follow(&Place::new(), "docs/inspect.md");
+}
+
 fn is_long() -> bool {
     std::env::var("BACKDRIVE_LONG").as_deref() == Ok("1")
 }

@@ -52,6 +52,7 @@ fn absent(verb: &[String]) -> Option<Vec<&'static str>> {
         ["run"] => vec!["absent.toml"],
         ["replay" | "stability" | "why"] | ["bag", "info"] => vec!["absent.mcap"],
         ["compare"] => vec!["absent.toml"],
+        ["inspect"] => vec!["absent.csv"],
         ["init"] => vec!["absent.csv"],
         ["diagnose"] => vec!["absent.csv", "--model", "absent.toml"],
         ["fit"] => vec!["absent.toml", "absent.csv"],

@@ -7,63 +7,101 @@ const UNEVEN: f64 = 0.05;
 /// Steps are told to be uneven where more than this share of them is.
 const UNEVEN_SHARE: f64 = 0.01;
 
+/// What is wrong with a clock.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ClockFaultKind {
+    /// A time stands in two rows.
+    StandsStill,
+    /// A time is before the one of the row above.
+    GoesBack,
+    /// A step is longer than one and a half usual ones.
+    Jumps,
+    /// Steps differ from the usual one by more than 5 %, and more than 1 in 100 do.
+    Uneven,
+}
+
+/// A fault of a clock, with where it is first; displayed as a sentence.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ClockFault {
+    /// What is wrong.
+    pub kind: ClockFaultKind,
+    /// The row, from 0, before the first such step.
+    pub row: usize,
+    /// The time of that row, s.
+    pub time: f64,
+    /// Steps of which it is true.
+    pub count: usize,
+    /// Of all steps.
+    pub steps: usize,
+    /// The smallest and the largest step of which it is true; of uneven ones, of all that are no jump. s; 0 of a clock that stands still.
+    pub range: [f64; 2],
+    /// The usual step, s.
+    pub usual: f64,
+    /// Samples that are missing in the jumps, about.
+    pub missing: f64,
+}
+
+impl std::fmt::Display for ClockFault {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let place = format!("first between rows {} and {}", self.row + 1, self.row + 2);
+        let (times, at, usual) = (count(self.count), self.time, self.usual);
+        let [least, most] = self.range;
+        match self.kind {
+            ClockFaultKind::StandsStill => {
+                write!(f, "the clock stands still {times}, {place}, at {at:?} s: leave out what was recorded twice")
+            }
+            ClockFaultKind::GoesBack => {
+                write!(f, "the clock goes back {times}, by up to {:.6} s, {place}, at {at:?} s: cut the recording there", -least)
+            }
+            ClockFaultKind::Jumps => write!(
+                f,
+                "the clock jumps {times}, by up to {most:.6} s where {usual:.6} s are usual, {place}, at {at:?} s: about {:.0} samples are missing",
+                self.missing
+            ),
+            ClockFaultKind::Uneven => write!(
+                f,
+                "the steps are uneven: {usual:.6} s as a rule, but {least:.6} to {most:.6} s, {} of {}, {place}",
+                self.count, self.steps
+            ),
+        }
+    }
+}
+
 /// A sentence for each thing that is wrong with times, s: that they stand still, go back, jump, or that their steps are uneven, with the row of the first (rows count
 /// from 1).
 ///
 /// Of a table the first two are no matter of a remark: its import refuses them. Fewer than three times say nothing about a usual step.
 pub fn clock_remarks(times: &[f64]) -> Vec<String> {
+    clock_faults(times).iter().map(ClockFault::to_string).collect()
+}
+
+/// As [`clock_remarks`], as values.
+pub fn clock_faults(times: &[f64]) -> Vec<ClockFault> {
     let steps: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
-    let mut remarks = Vec::new();
-    let place = |row: usize| format!("first between rows {} and {}, at {:?} s", row + 1, row + 2, times[row]);
-    let of = |is_one: &dyn Fn(f64) -> bool| -> Vec<usize> { (0..steps.len()).filter(|row| is_one(steps[*row])).collect() };
-    let (same, back) = (of(&|step| step == 0.0), of(&|step| step < 0.0));
-    if let Some(first) = same.first() {
-        remarks.push(format!("the clock stands still {}, {}: leave out what was recorded twice", count(same.len()), place(*first)));
-    }
-    if let Some(first) = back.first() {
-        let most = back.iter().map(|row| -steps[*row]).fold(0.0, f64::max);
-        remarks.push(format!(
-            "the clock goes back {}, by up to {most:.6} s, {}: cut the recording there",
-            count(back.len()),
-            place(*first)
-        ));
-    }
     let mut sorted: Vec<f64> = steps.iter().copied().filter(|step| *step > 0.0).collect();
-    if sorted.len() < 2 {
-        return remarks;
-    }
     sorted.sort_by(f64::total_cmp);
     // The lower of two in the middle: one gap among few rows is not taken for half of what is usual.
-    let usual = sorted[(sorted.len() - 1) / 2];
+    let usual = sorted.get(sorted.len().saturating_sub(1) / 2).copied().unwrap_or(0.0);
     let is_jump = |step: f64| step > MISSING * usual;
-    let jumps = of(&is_jump);
-    if let Some(first) = jumps.first() {
-        let longest = jumps.iter().map(|row| steps[*row]).fold(0.0, f64::max);
-        let lost: f64 = jumps.iter().map(|row| steps[*row] / usual - 1.0).sum();
-        remarks.push(format!(
-            "the clock jumps {}, by up to {longest:.6} s where {usual:.6} s are usual, {}: about {lost:.0} samples are missing",
-            count(jumps.len()),
-            place(*first)
-        ));
-    }
     let is_step = |step: f64| step > 0.0 && !is_jump(step);
-    let uneven = of(&|step| is_step(step) && (step - usual).abs() > UNEVEN * usual);
-    if let Some(first) = uneven.first().filter(|_| uneven.len() as f64 > UNEVEN_SHARE * steps.len() as f64) {
-        let within = steps
-            .iter()
-            .filter(|step| is_step(**step))
-            .fold((f64::INFINITY, 0.0_f64), |(least, most), step| (least.min(*step), most.max(*step)));
-        remarks.push(format!(
-            "the steps are uneven: {usual:.6} s as a rule, but {:.6} to {:.6} s, {} of {}, first between rows {} and {}",
-            within.0,
-            within.1,
-            uneven.len(),
-            steps.len(),
-            first + 1,
-            first + 2
-        ));
+    let is_uneven = |step: f64| is_step(step) && (step - usual).abs() > UNEVEN * usual;
+    let of = |kind: ClockFaultKind, is_one: &dyn Fn(f64) -> bool, within: &dyn Fn(f64) -> bool| {
+        let row = steps.iter().position(|step| is_one(*step))?;
+        let found = || steps.iter().copied().filter(|step| is_one(*step));
+        let range = steps.iter().filter(|step| within(**step)).fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], s| [a.min(*s), b.max(*s)]);
+        let missing = if kind == ClockFaultKind::Jumps { found().map(|step| step / usual - 1.0).sum() } else { 0.0 };
+        Some(ClockFault { kind, row, time: times[row], count: found().count(), steps: steps.len(), range, usual, missing })
+    };
+    let mut faults: Vec<ClockFault> = Vec::new();
+    faults.extend(of(ClockFaultKind::StandsStill, &|step| step == 0.0, &|step| step == 0.0));
+    faults.extend(of(ClockFaultKind::GoesBack, &|step| step < 0.0, &|step| step < 0.0));
+    if sorted.len() < 2 {
+        return faults;
     }
-    remarks
+    faults.extend(of(ClockFaultKind::Jumps, &is_jump, &is_jump));
+    let uneven = of(ClockFaultKind::Uneven, &is_uneven, &is_step);
+    faults.extend(uneven.filter(|fault| fault.count as f64 > UNEVEN_SHARE * steps.len() as f64));
+    faults
 }
 
 fn count(times: usize) -> String {

@@ -68,10 +68,13 @@ pub struct Alignment {
 
 /// What is known of one signal: when and what.
 #[derive(Default)]
-struct Series {
+pub(crate) struct Series {
     steps: Vec<u64>,
-    times: Vec<f64>,
-    values: Vec<f64>,
+    /// Stamp, or log time without one; s from the first message.
+    pub(crate) times: Vec<f64>,
+    /// Log time, s from the first message.
+    pub(crate) logged: Vec<f64>,
+    pub(crate) values: Vec<f64>,
     /// Some message had no step.
     stepless: bool,
 }
@@ -88,6 +91,43 @@ pub fn signals(reader: &Reader, wanted: &[Signal]) -> Result<Signals, BagError> 
 
 /// As [`signals`]; without `trim` over all steps that any signal has, and no further than where the first signal has more than `most` samples.
 pub(crate) fn gather(reader: &Reader, wanted: &[Signal], trim: bool, most: usize) -> Result<Signals, BagError> {
+    let Gathered { mut series, clock, sparse } = series_of(reader, wanted, most)?;
+    for (signal, series) in wanted.iter().zip(&mut series) {
+        if series.times.is_empty() {
+            return Err(BagError::Field {
+                topic: signal.topic.clone(),
+                field: signal.field.clone(),
+                what: "the topic has no message".to_owned(),
+            });
+        }
+        if (signal.scale, signal.offset) != (1.0, 0.0) {
+            series.values.iter_mut().for_each(|value| *value = signal.scale * *value + signal.offset);
+        }
+    }
+    if series.is_empty() {
+        return Err(BagError::Usage("no signal was asked for".to_owned()));
+    }
+    let mut found = if series.iter().all(|series| !series.stepless) {
+        by_step(&series, &sparse, trim, reader.header().map_or(0.0, |header| header.rate_hz), clock)
+    } else {
+        by_time(wanted, &series)
+    };
+    found.names = wanted.iter().map(|signal| signal.name.clone()).collect();
+    found.alignment.missing = found.columns.iter().map(|column| column.iter().filter(|value| value.is_nan()).count() as u64).collect();
+    Ok(found)
+}
+
+/// The messages' values of each wanted signal, in the order of the file, before anything is aligned.
+pub(crate) struct Gathered {
+    pub(crate) series: Vec<Series>,
+    /// Of an imported bag, the exact times of its rows.
+    pub(crate) clock: Option<Series>,
+    /// Whether a signal speaks now and then.
+    sparse: Vec<bool>,
+}
+
+/// Reads the wanted signals, no further than where one has more than `most` samples.
+pub(crate) fn series_of(reader: &Reader, wanted: &[Signal], most: usize) -> Result<Gathered, BagError> {
     let mut plans: HashMap<u16, Plan> = HashMap::new();
     let mut sparse = vec![false; wanted.len()];
     let imported = reader.header().is_some_and(|header| header.clock == Clock::Imported);
@@ -133,13 +173,16 @@ pub(crate) fn gather(reader: &Reader, wanted: &[Signal], trim: bool, most: usize
         // A stamp that nobody filled in is 0.
         let ns = stamp.filter(|stamp| *stamp != 0 || step.is_some()).unwrap_or(entry.log_time_ns as i64);
         // Seconds since 1970 would leave only 0.2 µs of a double; seconds since the first message are exact to the ns.
-        let time = ns.saturating_sub(*begin.get_or_insert(ns)) as f64 / 1e9;
+        let begin = *begin.get_or_insert(ns);
+        let time = ns.saturating_sub(begin) as f64 / 1e9;
+        let logged = (entry.log_time_ns as i64).saturating_sub(begin) as f64 / 1e9;
         for (place, path) in &plan.fields {
             let value = plan.schema.read(path, &entry.payload).map_err(|what| wrong(path, what))?;
             let series = &mut series[*place];
             series.stepless |= step.is_none();
             series.steps.push(step.unwrap_or(0));
             series.times.push(time);
+            series.logged.push(logged);
             series.values.push(value.unwrap_or(f64::NAN));
             full |= series.times.len() > most;
         }
@@ -148,29 +191,7 @@ pub(crate) fn gather(reader: &Reader, wanted: &[Signal], trim: bool, most: usize
         }
     }
     let clock = clock.and_then(|_| series.pop());
-    for (signal, series) in wanted.iter().zip(&mut series) {
-        if series.times.is_empty() {
-            return Err(BagError::Field {
-                topic: signal.topic.clone(),
-                field: signal.field.clone(),
-                what: "the topic has no message".to_owned(),
-            });
-        }
-        if (signal.scale, signal.offset) != (1.0, 0.0) {
-            series.values.iter_mut().for_each(|value| *value = signal.scale * *value + signal.offset);
-        }
-    }
-    if series.is_empty() {
-        return Err(BagError::Usage("no signal was asked for".to_owned()));
-    }
-    let mut found = if series.iter().all(|series| !series.stepless) {
-        by_step(&series, &sparse, trim, reader.header().map_or(0.0, |header| header.rate_hz), clock)
-    } else {
-        by_time(wanted, &series)
-    };
-    found.names = wanted.iter().map(|signal| signal.name.clone()).collect();
-    found.alignment.missing = found.columns.iter().map(|column| column.iter().filter(|value| value.is_nan()).count() as u64).collect();
-    Ok(found)
+    Ok(Gathered { series, clock, sparse })
 }
 
 struct Plan {

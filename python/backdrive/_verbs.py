@@ -206,6 +206,17 @@ def why(recording: Any, *, roles: Path | Mapping[str, Any] | None = None, progre
         return _reported(work, ["why", work.file(recording, "recording"), *_options({"roles": _roles(work, roles)})])
 
 
+def inspect(recordings: Any, *, rate: float | None = None, columns: Sequence[str] | None = None, time: str | None = None, progress: Progress = True) -> Report:
+    """Asks whether recordings are right: what each signal is, what is wrong with it, and how each joint answers its command. Needs no model.
+
+    recordings: one or several: paths (tables, bags, datasets, folders), frames, dictionaries of arrays, or a dictionary of these by name.
+    rate: rows per second of tables in which no column is the time, Hz. columns: headings of tables that have none. time: the column with the times.
+    """
+    with Work(progress) as work:
+        arguments = ["inspect", *work.files(recordings, "recording"), *_options({"rate": rate, "time": time})]
+        return _reported(work, arguments + _options({"columns": None if columns is None else ",".join(columns)}))
+
+
 def _roles(work: Work, roles: Any) -> str | None:
     if roles is None or _frames.is_path(roles):
         return roles

@@ -189,6 +189,17 @@ class Package(unittest.TestCase):
         for name in table:
             numpy.testing.assert_array_equal(frame[name], table[name].to_numpy())
 
+    def test_an_inspection_is_that_of_the_command_line(self):
+        t = numpy.arange(1500) * 0.02
+        frame = pandas.DataFrame({"t": t, "elbow.command": numpy.sin(1.3 * t), "elbow.position": -numpy.sin(1.3 * (t - 0.1))})
+        frame.to_csv(self.folder / "elbow.csv", index=False)
+        told = json.loads(self.program("inspect", "elbow.csv", "--json"))
+        report = backdrive.inspect({"elbow": frame}, progress=False)
+        self.assertEqual([f.kind for f in report.findings], ["wrong_sign"])
+        self.assertEqual([f["message"] for f in told["findings"]], [f.message for f in report.findings])
+        self.assertIn("scale = -1", report.findings[0].todo)
+        self.assertIn("<html", report.html)
+
     def test_errors_name_file_line_and_key(self):
         broken = NOMINAL.replace("motor = 0.02", "motor = -0.02")
         (self.folder / "broken.toml").write_text(broken)

@@ -7,5 +7,6 @@ mod statistics;
 mod write;
 
 pub use contract::{CommandedAt, Contract, PerJoint};
+pub(crate) use read::episode_tables;
 pub use read::{Episode, LerobotOptions, import_lerobot, is_lerobot};
 pub use write::{LerobotReport, export_lerobot};

@@ -63,6 +63,29 @@ struct Rows {
 /// # Errors
 /// It is no dataset of version 3, has not the episodes or the positions, a file is damaged, a value is missing, a bag exists or cannot be written.
 pub fn import_lerobot(folder: &Path, into: &Path, options: &LerobotOptions) -> Result<Vec<Episode>, BagError> {
+    let tables = episode_tables(folder, options)?;
+    std::fs::create_dir_all(into).map_err(|source| BagError::Create { path: into.to_owned(), source })?;
+    let bag_of = |name: &str| into.join(format!("{name}.mcap"));
+    for (name, _) in &tables {
+        check_target(&bag_of(name), options.overwrite)?;
+    }
+    let mut done: Vec<Episode> = Vec::with_capacity(tables.len());
+    for (name, table) in tables {
+        let import = ImportOptions { overwrite: options.overwrite, ..ImportOptions::default() };
+        let bag = bag_of(&name);
+        // All episodes or none: some of them would look like all.
+        let undo = |_: &BagError| done.iter().for_each(|episode| drop(std::fs::remove_file(&episode.bag)));
+        let report = write_bag(&folder.join(&name), &table, &bag, &import).inspect_err(undo)?;
+        done.push(Episode { name, bag, report });
+    }
+    Ok(done)
+}
+
+/// The episodes of a dataset as tables, `episode_000000` and so on, with the columns of [`import_lerobot`].
+///
+/// # Errors
+/// As of [`import_lerobot`], but for what is written.
+pub(crate) fn episode_tables(folder: &Path, options: &LerobotOptions) -> Result<Vec<(String, Table)>, BagError> {
     let info = Info::read(folder)?;
     let contract = &options.contract;
     let is_there = |role: &Role| contract.feature(*role).is_some_and(|feature| info.has(feature));
@@ -82,12 +105,7 @@ pub fn import_lerobot(folder: &Path, into: &Path, options: &LerobotOptions) -> R
         return Err(BagError::Usage(unknown));
     }
     let (episodes, types) = read_episodes(folder, (&features, &widths), options.episodes.as_deref(), options.most_bytes)?;
-    std::fs::create_dir_all(into).map_err(|source| BagError::Create { path: into.to_owned(), source })?;
-    let bag_of = |episode: u64| into.join(format!("episode_{episode:06}.mcap"));
-    for episode in episodes.keys() {
-        check_target(&bag_of(*episode), options.overwrite)?;
-    }
-    let mut done: Vec<Episode> = Vec::with_capacity(episodes.len());
+    let mut tables = Vec::with_capacity(episodes.len());
     for (episode, rows) in episodes {
         let name = format!("episode_{episode:06}");
         let mut table = Table { columns: vec![Column::new("t", times(&rows, info.fps), NumberType::Double)], ..Table::default() };
@@ -108,14 +126,9 @@ pub fn import_lerobot(folder: &Path, into: &Path, options: &LerobotOptions) -> R
             // Nobody knows what was sent at the first row.
             table.drop_first_row();
         }
-        let import = ImportOptions { overwrite: options.overwrite, ..ImportOptions::default() };
-        let bag = bag_of(episode);
-        // All episodes or none: some of them would look like all.
-        let undo = |_: &BagError| done.iter().for_each(|episode| drop(std::fs::remove_file(&episode.bag)));
-        let report = write_bag(&folder.join(&name), &table, &bag, &import).inspect_err(undo)?;
-        done.push(Episode { name, bag, report });
+        tables.push((name, table));
     }
-    Ok(done)
+    Ok(tables)
 }
 
 /// Rows by episode, and what the numbers of each feature are in the files.

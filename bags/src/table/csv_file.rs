@@ -11,6 +11,20 @@ use std::path::Path;
 /// Reads a CSV file, whose cells are separated by commas, semicolons, tabs or spaces. A column with a cell that is no number holds none, unless it is asked for: then that is an
 /// error, as is an empty cell or `nan` of a column that goes into the bag.
 pub(crate) fn read(path: &Path, options: &ImportOptions) -> Result<Table, BagError> {
+    read_cells(path, options, Missing::IsWrong)
+}
+
+/// What becomes of an empty cell, or one that holds `nan` or `inf`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Missing {
+    /// It is an error where the column is wanted.
+    IsWrong,
+    /// It stays as a value that is not finite.
+    Stays,
+}
+
+/// As [`read`], with what becomes of missing values.
+pub(crate) fn read_cells(path: &Path, options: &ImportOptions, missing: Missing) -> Result<Table, BagError> {
     let wrong = |(line, what): (u64, String)| BagError::Table { path: path.to_owned(), line, what };
     let file = backdrive_plant::input_file::open(path).map_err(BagError::io(path))?;
     let mut table = TextTable::new(std::io::BufReader::new(file)).map_err(BagError::io(path))?;
@@ -19,10 +33,10 @@ pub(crate) fn read(path: &Path, options: &ImportOptions) -> Result<Table, BagErr
     let heading = first.unwrap_or(1);
     let mut columns: Vec<Read> = match &options.headings {
         None if is_no_heading(record.iter()) => return Err(wrong((heading, NO_HEADING.to_owned()))),
-        None => record.iter().map(|heading| Read::new(heading, options)).collect(),
+        None => record.iter().map(|heading| Read::new(heading, options, missing)).collect(),
         Some(names) => {
             named(names, &record).map_err(|what| wrong((heading, what)))?;
-            names.iter().map(|name| Read::new(name, options)).collect()
+            names.iter().map(|name| Read::new(name, options, missing)).collect()
         }
     };
     let (mut lines, memory) = (Vec::new(), Memory::new(options.most_bytes));
@@ -65,11 +79,11 @@ struct Read {
 }
 
 impl Read {
-    fn new(heading: &str, options: &ImportOptions) -> Read {
+    fn new(heading: &str, options: &ImportOptions, missing: Missing) -> Read {
         let name = name_of(heading).to_owned();
         let is = |asked: &str| asked == name || asked == heading;
         let is_asked_for = is(&options.time) || options.columns.iter().any(|map| is(&map.column));
-        let is_wanted = is_asked_for || options.columns.is_empty();
+        let is_wanted = missing == Missing::IsWrong && (is_asked_for || options.columns.is_empty());
         Read { heading: heading.to_owned(), name, is_wanted, is_asked_for, values: Vec::new(), other: None }
     }
 

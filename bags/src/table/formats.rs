@@ -1,6 +1,8 @@
 //! The formats of tables, and how a file tells which one it is.
 
+use super::csv_file::Missing;
 use super::mapping::{ImportOptions, ImportReport};
+use super::types::Table;
 use super::{csv_file, from_bag, mat_in, mat_out, npz_in, parquet_in, parquet_out, to_bag};
 use crate::memory::Memory;
 use crate::{BagError, Reader};
@@ -103,12 +105,17 @@ impl TableFormat {
 /// As where a table is read as it is, an empty cell or `nan` is an error. Errors: the file cannot be read, a column is missing, a time is no number or
 /// goes back, a mapped cell is no number, `bag` exists or cannot be written.
 pub fn import_table(table: &Path, bag: &Path, options: &ImportOptions) -> Result<ImportReport, BagError> {
+    to_bag::write_bag(table, &read_table(table, options, Missing::IsWrong)?, bag, options)
+}
+
+/// Reads a table of any format, its columns called as the options say.
+pub(crate) fn read_table(table: &Path, options: &ImportOptions, missing: Missing) -> Result<Table, BagError> {
     let format = TableFormat::of_file(table)?;
     if let Some(variable) = options.variable.as_ref().filter(|_| format != TableFormat::Mat) {
         return Err(BagError::Usage(format!("{}: is no MATLAB file, so it has no structure {variable:?}", table.display())));
     }
     let mut read = match format {
-        TableFormat::Csv => csv_file::read(table, options)?,
+        TableFormat::Csv => csv_file::read_cells(table, options, missing)?,
         TableFormat::Numpy => npz_in::read(table, options)?,
         TableFormat::Parquet => parquet_in::read(table, Memory::new(options.most_bytes))?,
         TableFormat::Mat => mat_in::read(table, options)?,
@@ -121,7 +128,7 @@ pub fn import_table(table: &Path, bag: &Path, options: &ImportOptions) -> Result
         }
         read.columns.iter_mut().zip(names).for_each(|(column, name)| column.name.clone_from(name));
     }
-    to_bag::write_bag(table, &read, bag, options)
+    Ok(read)
 }
 
 /// As [`import_table`], of a file that is CSV whatever its ending says.

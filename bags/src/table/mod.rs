@@ -19,8 +19,11 @@ mod types;
 mod zip_members;
 
 pub use bag_columns::columns_of;
+pub(crate) use bag_columns::was_table;
+pub(crate) use csv_file::Missing;
+pub(crate) use formats::read_table;
 pub use formats::{TableFormat, export_csv, export_table, import_csv, import_table};
 pub(crate) use from_bag::table_of;
 pub use mapping::{ColumnMap, ImportOptions, ImportReport, Quantity, topic_of};
 pub(crate) use to_bag::write_bag;
-pub(crate) use types::{Cells, Column, Table};
+pub(crate) use types::{Cells, Column, Table, name_of, unit_of};
