@@ -113,7 +113,7 @@ pub enum Mark {
 
 /// A physics: everything that diagnosis knows of it before any device is looked at.
 pub struct Physics {
-    /// Name in verdicts: an element kind, the key of a signal, `inertia` or `series_compliance`.
+    /// Name in verdicts: an element kind, the key of a signal, `inertia`, `gravity` or `series_compliance`.
     pub name: &'static str,
     /// What it belongs to.
     pub family: Family,

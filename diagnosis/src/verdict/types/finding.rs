@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Finding {
     /// Its name: an element kind of model files, a key of an input or output (`delay`, `bandwidth`, `saturation`, `gain`, `back_emf`, `offset`),
-    /// `inertia`, or `series_compliance`.
+    /// `inertia`, `gravity`, or `series_compliance`.
     pub physics: String,
     /// Where it acts.
     #[serde(flatten, with = "PlaceInFile")]
