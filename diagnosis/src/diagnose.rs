@@ -4,7 +4,7 @@ use crate::audit::{Remark, Weight, audit};
 use crate::candidate::price;
 use crate::contenders::with_contenders;
 use crate::equation_error::{OnForces, inverse, search_on_forces};
-use crate::evaluator;
+use crate::evaluator::measured;
 use crate::hold;
 use crate::let_go::let_go;
 use crate::locate::{self, Location, locate};
@@ -78,7 +78,7 @@ pub fn diagnose(
 }
 
 /// Searches on forces where they are known along the motion, else by simulation. A device that forces drive, and one of which no law on forces explains much, is
-/// searched both ways: what is simulated down to the sensors' noise, or to far less than is left on forces, is the sharper answer.
+/// searched both ways: simulation knows laws that forces do not, and forces name what simulation cannot follow.
 fn searched(
     problem: Problem,
     settings: &Settings,
@@ -87,35 +87,38 @@ fn searched(
     remarks: &mut Vec<Remark>,
 ) -> Result<(Problem, Search), SearchError> {
     let direct = search_on_forces(&problem, settings, limit, report);
-    let is_direct = direct.is_some();
-    let on_forces = direct.or_else(|| search_on_forces(&inverse(&problem)?, settings, limit, report));
     let is_beyond = |search: &Search| search.forces.as_ref().is_some_and(|forces| forces.is_beyond);
-    let on_forces = match on_forces {
-        Some(found) if is_direct && !is_beyond(&found.1) => return Ok(found),
-        other => other,
+    let on_forces = match direct {
+        Some(found) if !is_beyond(&found.1) => return Ok(found),
+        Some(found) => Some(found),
+        None => inverse(&problem).and_then(|turned| search_on_forces(&turned, settings, limit, report)),
     };
-    let less = Settings { effort: settings.effort * tuning().equation_error.effort_beside, ..settings.clone() };
     let mut of_simulation = Vec::new();
-    let simulated = by_simulation(problem, if on_forces.is_some() { &less } else { settings }, limit, report, &mut of_simulation)?;
-    let is_explained = chosen(&simulated.1).levels.iter().all(|level| *level < tuning().noise.unexplained);
-    let is_sharper = |found: &(Problem, Search)| {
-        let unseen = |(problem, search): &(Problem, Search)| unseen_force(problem, search);
-        is_direct
-            && unseen(&simulated).zip(unseen(found)).is_some_and(|(simulated, found)| simulated < tuning().equation_error.sharper * found)
-    };
-    Ok(match on_forces.filter(|found| !is_explained && !is_sharper(found)) {
-        Some(found) => found,
+    let simulated = by_simulation(problem, settings, limit, report, &mut of_simulation)?;
+    match on_forces.filter(|found| !is_sharper(&simulated, found)) {
+        Some(found) => Ok(found),
         None => {
             remarks.extend(of_simulation);
-            simulated
+            Ok(simulated)
         }
-    })
+    }
 }
 
-/// Root mean square of what the chosen structure leaves of a measured force in held-out recordings, N or N m.
-fn unseen_force(problem: &Problem, search: &Search) -> Option<f64> {
-    let output = evaluator::measured(problem.held_out.first()?).next()?;
-    Some(search.noise_sd.get(output)? * chosen(search).unseen.as_ref()?.mean_square.sqrt())
+/// Whether a search by simulation has the better answer than one on forces: it explains all down to the sensors' noise, or leaves far less of the forces, or, of a
+/// device that forces drive, names a law at all.
+fn is_sharper(simulated: &(Problem, Search), on_forces: &(Problem, Search)) -> bool {
+    let best = chosen(&simulated.1);
+    if best.levels.iter().all(|level| *level < tuning().noise.unexplained) {
+        return true;
+    }
+    if on_forces.0.inverse.is_some() {
+        return !best.structure.added.is_empty();
+    }
+    let left = |(problem, search): &(Problem, Search)| {
+        let output = measured(problem.held_out.first()?).next()?;
+        Some(search.noise_sd.get(output)? * chosen(search).unseen.as_ref()?.mean_square.sqrt())
+    };
+    left(simulated).zip(left(on_forces)).is_some_and(|(simulated, found)| simulated < tuning().equation_error.sharper * found)
 }
 
 /// What a reader has to know of a search on forces.

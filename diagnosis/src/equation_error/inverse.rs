@@ -112,3 +112,70 @@ fn turned_record(model: &Model, output: usize, record: &Record) -> Option<Record
         ..record.clone()
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::equation_error::search_on_forces;
+    use crate::search::Settings;
+    use crate::verdict::chosen;
+    use backdrive_plant::recording::Recording;
+
+    const DRIVEN: &str = "name = 'lever'\nmotion = 'rotation'\n[bodies]\nlever = 0.02\n\
+        [[elements]]\nname = 'viscous'\nkind = 'damper'\nbetween = ['lever', 'ground']\ndamping = 0.05\n\
+        [[inputs]]\nname = 'torque'\nkind = 'force'\non = 'lever'\nhold = 'linear'\ngain = 0.5\n\
+        [[outputs]]\nname = 'angle'\nkind = 'position'\nof = 'lever'\n";
+
+    /// A lever with friction of 0.1 N m and gravity of 0.3 N m, moved by a controller; the torque is logged in units of 0.5 N m.
+    fn record(model: &Model, name: &str, phase: f64) -> Record {
+        let t: Vec<f64> = (0..6000).map(|k| f64::from(k) / 500.0).collect();
+        let waves = [(0.9, 0.31, phase), (0.3, 0.83, 1.0 + phase), (0.05, 2.1, 2.0)];
+        let derivative = |t: f64, order: i32| {
+            let one = |(amplitude, hz, phase): &(f64, f64, f64)| {
+                let w = std::f64::consts::TAU * hz;
+                amplitude * w.powi(order) * (w * t + phase + f64::from(order) * std::f64::consts::FRAC_PI_2).sin()
+            };
+            waves.iter().map(one).sum::<f64>()
+        };
+        let torque = |t: &f64| {
+            let [q, v, a] = [0, 1, 2].map(|order| derivative(*t, order));
+            (0.02 * a + 0.05 * v + 0.1 * v.signum() + 0.3 * q.sin() + 0.004 * (40.0 * t).sin()) / 0.5
+        };
+        let signals = vec![
+            ("angle".to_string(), t.iter().map(|t| derivative(*t, 0)).collect()),
+            ("torque".to_string(), t.iter().map(torque).collect()),
+        ];
+        Record::new(&Recording::new(name, t.clone(), signals).unwrap(), model, Vec::new()).unwrap()
+    }
+
+    #[test]
+    fn what_a_torque_drives_is_named_on_forces_and_written_into_its_own_file() {
+        let model = Model::from_toml(DRIVEN, "lever.toml").unwrap();
+        let records = [0.0, 0.7].map(|phase| record(&model, "r.csv", phase)).to_vec();
+        let held_out = vec![record(&model, "h.csv", 2.0)];
+        let problem = Problem::new(DRIVEN.to_string(), "lever.toml".into(), model.clone(), records, held_out, Initial::Free).unwrap();
+        let turned = inverse(&problem).unwrap();
+        let settings = Settings::default();
+        let (_, search) = search_on_forces(&turned, &settings, settings.limit(None), &|_| ()).unwrap();
+        let best = chosen(&search);
+        let mut names: Vec<&str> = best.structure.added.iter().map(|h| h.physics.name).collect();
+        names.sort_unstable();
+        assert_eq!(names, ["coulomb", "gravity"]);
+        for (hypothesis, values) in best.structure.added.iter().zip(best.structure.added_of(&best.fit.values)) {
+            let size = if hypothesis.physics.name == "coulomb" { 0.1 } else { 0.3 };
+            assert!((values[0].abs() / size - 1.0).abs() < 0.05, "{} {values:?}", hypothesis.id);
+        }
+    }
+
+    #[test]
+    fn a_motion_ahead_of_its_recording_is_a_force_that_acts_late() {
+        let model = Model::from_toml(DRIVEN, "lever.toml").unwrap();
+        let records = vec![record(&model, "r.csv", 0.0)];
+        let problem = Problem::new(DRIVEN.to_string(), "lever.toml".into(), model, records, Vec::new(), Initial::Free).unwrap();
+        let turned = inverse(&problem).unwrap().inverse.unwrap();
+        let set = |late: f64| vec![Edit::Set { path: "inputs.angle.delay".to_string(), value: Value::Number(late), comment: None }];
+        let expected = Edit::Set { path: "inputs.torque.delay".to_string(), value: Value::Number(0.004), comment: None };
+        assert_eq!(turned.in_file(set(-0.004)), [expected]);
+        assert!(turned.in_file(set(0.004)).is_empty());
+    }
+}

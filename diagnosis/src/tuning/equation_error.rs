@@ -47,10 +47,8 @@ group! {
         much_left: f64 = 0.3, "-", Judgement("a tenth of the variance: friction of real joints that is left out takes more");
         /// The same in the noise of the force's sensor, above which the search goes on by simulation, with the laws that are only simulated.
         beyond: f64 = 10.0, "noise standard deviations", Judgement("what a machine does beside its laws is as fast as its sensor's noise in part; a memory that no column has is slow");
-        /// Share of what is left on forces below which what is left by simulation decides.
-        sharper: f64 = 0.7, "-", Judgement("the force that is simulated is not low-passed: half the error is then the same law's");
-        /// Share of the effort of a search by simulation beside one on forces.
-        effort_beside: f64 = 0.5, "-", Cost("it has to find what explains all down to the noise, or nothing");
+        /// Share of what a search on forces leaves of them below which what a search by simulation leaves decides.
+        sharper: f64 = 0.7, "-", Judgement("half the power: what stands in the columns is then not what is missing");
         /// Structures that are simulated and whose numbers are refined.
         simulated: usize = 8, "structures", Cost("those that left-out stretches hardly tell apart are fewer");
     }

@@ -43,14 +43,13 @@ const CORNER: f64 = 100.0;
 /// See [`RATE`].
 const KEPT: usize = 5;
 /// Laws of dry friction, and the parameter that is its size.
-const DRY: [(&str, &str); 8] = [
+const DRY: [(&str, &str); 7] = [
     ("coulomb", "force"),
     ("dahl", "coulomb"),
     ("lugre", "coulomb"),
     ("maxwell_slip", "force"),
     ("stribeck", "coulomb"),
     ("friction_deficit", "coulomb"),
-    ("asymmetric_coulomb", "positive"),
     ("preisach_lugre", "coulomb"),
 ];
 /// Where the figures stand that nobody published.
@@ -223,11 +222,14 @@ fn told(report: &mut Report, context: &Context, ask: &Ask, verdict: &Verdict, kn
     Ok(())
 }
 
-/// Size of the dry friction that a verdict names, of several laws together; a hysteretic spring without stiffness slides at its offsets.
+/// Size of the dry friction that a verdict names, of several laws together: the mean of both directions where they differ; a hysteretic spring without
+/// stiffness slides at its offsets.
 fn friction(verdict: &Verdict) -> Option<f64> {
     let side = |key: &str| total(verdict, "hysteretic_spring", key);
     let sliding = || Some(0.5 * (side("offset_positive")? - side("offset_negative")?));
-    let all: Vec<f64> = DRY.iter().filter_map(|(physics, key)| total(verdict, physics, key)).chain(sliding()).collect();
+    let way = |key: &str| total(verdict, "asymmetric_coulomb", key);
+    let lopsided = || Some(0.5 * (way("positive")? + way("negative")?));
+    let all: Vec<f64> = DRY.iter().filter_map(|(physics, key)| total(verdict, physics, key)).chain(sliding()).chain(lopsided()).collect();
     if all.is_empty() { None } else { Some(all.iter().sum()) }
 }
 
