@@ -19,3 +19,8 @@ pub fn todo(page: &mut Page, steps: &[Step]) {
     let items: Vec<(String, Option<String>)> = steps.iter().map(|step| (step.sentence.clone(), step.pasted())).collect();
     page.todo("What to do now", &items);
 }
+
+/// Lines for a file, each with its reason.
+pub fn lines_to_paste(page: &mut Page, lines: &[(String, Option<String>)]) {
+    page.todo("Lines to paste into the set", lines);
+}

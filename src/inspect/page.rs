@@ -2,6 +2,7 @@
 
 use super::response;
 use crate::page_parts::ending;
+use crate::page_parts::lines_to_paste;
 use backdrive_inspect::{Finding, FindingKind, Quantity, Recording, Report, Response, Signal, Weight};
 use backdrive_report::{Cell, Figure, Page, Plot, Table, Tone, number};
 
@@ -28,7 +29,7 @@ pub fn page(report: &Report, recordings: &[Recording]) -> Page {
         let items: Vec<(String, Option<String>)> =
             report.wrong().filter(|f| f.todo.starts_with('[')).map(|f| (f.message.clone(), Some(f.todo.clone()))).collect();
         if !items.is_empty() {
-            page.todo("Lines to paste into the set", &items);
+            lines_to_paste(&mut page, &items);
         }
         let mut table = Table::new(["", "recording", "joint", "finding", "sure", "what to do"]);
         for finding in &report.findings {

@@ -4,39 +4,11 @@
 //! drift: each law adds to them where it acts.
 
 use super::band::has_memory;
-use crate::problem::{Problem, Record, spread};
+use crate::problem::{Inverse, Problem, Record, spread};
 use backdrive_plant::model::{Hold, Input, InputKind, Model, Output, OutputKind};
 use backdrive_plant::set::Initial;
 use backdrive_plant::stepper::segments;
-use backdrive_plant::write::{Edit, Value};
 use std::sync::Arc;
-
-/// What a problem that was turned round is of.
-#[derive(Debug, Clone)]
-pub struct Inverse {
-    /// The problem as it was recorded.
-    pub recorded: Arc<Problem>,
-    /// The output that is now the motion.
-    pub motion: String,
-    /// The input that is now compared; the first where several forces act on the body.
-    pub force: String,
-}
-
-impl Inverse {
-    /// Edits of the model that was turned round, as those of the model as its file has it. A motion that is ahead of its recording is a force that acts late; the
-    /// other way round no model of a device that is driven by forces can have it.
-    pub fn in_file(&self, edits: Vec<Edit>) -> Vec<Edit> {
-        let delay = format!("inputs.{}.delay", self.motion);
-        let one = |edit: Edit| match edit {
-            Edit::Set { path, value: Value::Number(late), comment } if path == delay => {
-                let path = format!("inputs.{}.delay", self.force);
-                (late < 0.0).then_some(Edit::Set { path, value: Value::Number(-late), comment })
-            }
-            other => Some(other),
-        };
-        edits.into_iter().filter_map(one).collect()
-    }
-}
 
 /// The problem turned round; `None` unless it is one body without memory, driven by recorded forces alone, with its position recorded in every file.
 pub(crate) fn inverse(problem: &Problem) -> Option<Problem> {
@@ -120,6 +92,7 @@ mod tests {
     use crate::search::Settings;
     use crate::verdict::chosen;
     use backdrive_plant::recording::Recording;
+    use backdrive_plant::write::{Edit, Value};
 
     const DRIVEN: &str = "name = 'lever'\nmotion = 'rotation'\n[bodies]\nlever = 0.02\n\
         [[elements]]\nname = 'viscous'\nkind = 'damper'\nbetween = ['lever', 'ground']\ndamping = 0.05\n\

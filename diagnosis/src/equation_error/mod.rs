@@ -14,7 +14,6 @@ mod search;
 
 use band::{corners, is_known};
 pub use belief::{Belief, Figures};
-pub use inverse::Inverse;
 pub(crate) use inverse::inverse;
 pub use on_forces::OnForces;
 pub(crate) use search::search_on_forces;

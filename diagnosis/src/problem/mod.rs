@@ -2,6 +2,7 @@
 
 mod error;
 mod files;
+mod inverse;
 mod lag;
 mod logged;
 mod outliers;
@@ -11,13 +12,13 @@ mod substeps;
 
 pub use error::ProblemError;
 pub use files::MOST_OF_A_BAG;
+pub use inverse::Inverse;
 pub use logged::Logged;
 pub use outliers::Outliers;
 pub use record::Record;
 pub(crate) use record::spread;
 pub use stated::Stated;
 
-use crate::equation_error::Inverse;
 use crate::hypothesis::Place;
 use crate::noise;
 use crate::tuning::tuning;
