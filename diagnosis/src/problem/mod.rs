@@ -2,7 +2,6 @@
 
 mod error;
 mod files;
-mod inverse;
 mod lag;
 mod logged;
 mod outliers;
@@ -12,7 +11,6 @@ mod substeps;
 
 pub use error::ProblemError;
 pub use files::MOST_OF_A_BAG;
-pub use inverse::Inverse;
 pub use logged::Logged;
 pub use outliers::Outliers;
 pub use record::Record;
@@ -27,10 +25,12 @@ use backdrive_plant::model::Model;
 use backdrive_plant::set::{Initial, RecordingSet};
 use backdrive_plant::stepper::{Options, Plant, ahead};
 use backdrive_plant::tomlfile::read_text;
+use backdrive_plant::write::{Edit, Value};
 use files::{names, record, unknown_of};
 use lag::lag_of;
 use stated::stated_numbers;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// A nominal model and the recordings that are to be held against it.
 #[derive(Debug, Clone)]
@@ -162,6 +162,33 @@ impl Problem {
         let names = still.iter().map(|output| self.model.outputs[*output].name.clone()).collect();
         let without = |records: Vec<Record>| -> Vec<Record> { records.into_iter().map(|record| record.without_outputs(&still)).collect() };
         (Problem { fit: without(self.fit), held_out: without(self.held_out), ..self }, names)
+    }
+}
+
+/// What a problem that was turned round is of.
+#[derive(Debug, Clone)]
+pub struct Inverse {
+    /// The problem as it was recorded.
+    pub recorded: Arc<Problem>,
+    /// The output that is now the motion.
+    pub motion: String,
+    /// The input that is now compared; the first where several forces act on the body.
+    pub force: String,
+}
+
+impl Inverse {
+    /// Edits of the model that was turned round, as those of the model as its file has it. A motion that is ahead of its recording is a force that acts late; the
+    /// other way round no model of a device that is driven by forces can have it.
+    pub fn in_file(&self, edits: Vec<Edit>) -> Vec<Edit> {
+        let delay = format!("inputs.{}.delay", self.motion);
+        let one = |edit: Edit| match edit {
+            Edit::Set { path, value: Value::Number(late), comment } if path == delay => {
+                let path = format!("inputs.{}.delay", self.force);
+                (late < 0.0).then_some(Edit::Set { path, value: Value::Number(-late), comment })
+            }
+            other => Some(other),
+        };
+        edits.into_iter().filter_map(one).collect()
     }
 }
 
