@@ -77,8 +77,8 @@ pub fn diagnose(
     Ok(Diagnosis { problem, remarks, search, location, verdict, files, per_record })
 }
 
-/// Searches on forces where they are known along the motion, else by simulation. A device that forces drive, and one of which no law on forces explains much, is
-/// searched both ways: simulation knows laws that forces do not, and forces name what simulation cannot follow.
+/// Searches on forces where they are known along the motion, else by simulation. Where the laws on forces leave much, the set is simulated as well; of a device that
+/// forces drive, forces are asked where simulation names no law.
 fn searched(
     problem: Problem,
     settings: &Settings,
@@ -86,16 +86,23 @@ fn searched(
     report: &(dyn Fn(&str) + Sync),
     remarks: &mut Vec<Remark>,
 ) -> Result<(Problem, Search), SearchError> {
-    let direct = search_on_forces(&problem, settings, limit, report);
     let is_beyond = |search: &Search| search.forces.as_ref().is_some_and(|forces| forces.is_beyond);
-    let on_forces = match direct {
+    let direct = match search_on_forces(&problem, settings, limit, report) {
         Some(found) if !is_beyond(&found.1) => return Ok(found),
-        Some(found) => Some(found),
-        None => inverse(&problem).and_then(|turned| search_on_forces(&turned, settings, limit, report)),
+        direct => direct,
     };
+    let turned = inverse(&problem);
     let mut of_simulation = Vec::new();
     let simulated = by_simulation(problem, settings, limit, report, &mut of_simulation)?;
-    match on_forces.filter(|found| !is_sharper(&simulated, found)) {
+    let best = chosen(&simulated.1);
+    let is_explained = best.levels.iter().all(|level| *level < tuning().noise.unexplained);
+    let on_forces = match direct {
+        Some(found) => Some(found).filter(|found| !is_explained && !leaves_less(&simulated, found)),
+        None => {
+            turned.filter(|_| !is_explained && best.structure.added.is_empty()).and_then(|t| search_on_forces(&t, settings, limit, report))
+        }
+    };
+    match on_forces {
         Some(found) => Ok(found),
         None => {
             remarks.extend(of_simulation);
@@ -104,16 +111,8 @@ fn searched(
     }
 }
 
-/// Whether a search by simulation has the better answer than one on forces: it explains all down to the sensors' noise, or leaves far less of the forces, or, of a
-/// device that forces drive, names a law at all.
-fn is_sharper(simulated: &(Problem, Search), on_forces: &(Problem, Search)) -> bool {
-    let best = chosen(&simulated.1);
-    if best.levels.iter().all(|level| *level < tuning().noise.unexplained) {
-        return true;
-    }
-    if on_forces.0.inverse.is_some() {
-        return !best.structure.added.is_empty();
-    }
+/// Whether a search by simulation leaves far less of the measured force in held-out recordings than one on forces.
+fn leaves_less(simulated: &(Problem, Search), on_forces: &(Problem, Search)) -> bool {
     let left = |(problem, search): &(Problem, Search)| {
         let output = measured(problem.held_out.first()?).next()?;
         Some(search.noise_sd.get(output)? * chosen(search).unseen.as_ref()?.mean_square.sqrt())

@@ -44,6 +44,9 @@ pub fn find(columns: &[RawColumn], options: &Options) -> Result<Found, String> {
             false => Err(format!("--rate {rate}: expected rows per second, above 0")),
         };
     }
+    if columns.iter().all(|column| column.values.len() < 2) {
+        return Err("holds no two rows of numbers: record again, or give the file that has them".to_string());
+    }
     let is_clock = |column: &RawColumn| {
         let steps: Vec<f64> = column.values.windows(2).map(|w| w[1] - w[0]).collect();
         !steps.is_empty()

@@ -16,7 +16,7 @@ const TERMS: usize = 7;
 /// Lags that are tried, s.
 const EARLY_S: f64 = 0.08;
 const LATE_S: f64 = 0.2;
-/// Corner of the filter, Hz: dry friction turns within a few samples, and that is what tells a lag.
+/// Corner of the filter, Hz: dry friction changes sign within a few samples, and that shows a lag.
 const CORNER_HZ: f64 = 15.0;
 /// Blocks of the jackknife.
 const BLOCKS: usize = 8;

@@ -8,10 +8,10 @@ use crate::quantity::Quantity;
 use crate::recording::{Recording, Signal};
 use backdrive_diagnosis::noise;
 
-/// A stretch is frozen from so many samples and so many seconds on.
+/// Least length of a frozen stretch, in samples and in seconds.
 const LEAST_ROWS: usize = 8;
 const LEAST_S: f64 = 0.08;
-/// A jump at its end of so many usual steps shows that the signal went on meanwhile.
+/// Least jump at its end, in usual steps, that shows that the signal went on meanwhile.
 const JUMP: f64 = 5.0;
 /// Share of this jump that the partner has to move meanwhile, where there is one.
 const PARTNER_MOVES: f64 = 0.2;
