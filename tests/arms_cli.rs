@@ -113,7 +113,7 @@ fn wrong_input_is_told_with_joint_file_and_key() {
     };
     failed(&["diagnose", ".", "--out", "out"], 3, &["a.csv", "[joints.elbow] current", "i2", "tau2"]);
     failed(&["diagnose", ".", "--out", "out", "--grip", "hand.toml"], 2, &["--grip hand.toml", "without a hand"]);
-    failed(&["diagnose", ".", "--out", "out", "--without", "gravity"], 2, &["gravity_direction", "payload"]);
+    failed(&["diagnose", ".", "--out", "out", "--without", "gravitation"], 2, &["gravity_direction", "payload"]);
     let unknown = "model = 'arm.toml'\nfit = ['a.csv']\n[unknown.hand]\nbandwidth_hz = 5.0\n";
     place.write("unknown.toml", unknown);
     failed(&["diagnose", "unknown.toml", "--out", "out"], 3, &["unknown.hand", "every joint"]);
