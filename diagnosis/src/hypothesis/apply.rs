@@ -1,7 +1,7 @@
 //! Hypotheses as edits, and edits made to a model in memory as [`backdrive_plant::write::patch`] makes them to its file.
 
 use super::types::{ElementForm, Form, Hypothesis, HypothesisError, Source};
-use backdrive_plant::elements::{Law, kind_named};
+use backdrive_plant::elements::{Kind, Law, kind_named};
 use backdrive_plant::model::{Body, Element, Model, OutputKind, Place};
 use backdrive_plant::write::{Edit, ElementSpec, Value};
 
@@ -78,6 +78,7 @@ fn edits(hypothesis: &Hypothesis, model: &Model, values: &[f64]) -> Result<Vec<E
             }
             Ok(vec![Edit::PutBody { name: body.clone(), inertia: own + added, comment: None }])
         }
+        Form::Hung { on, body, element, kind } => hung(hypothesis, [on, body], element, kind, values).map_err(wrong),
         Form::Series { joint, body, spring, damper } => series(model, joint, body, [spring, damper], values).map_err(wrong),
     }
 }
@@ -131,6 +132,23 @@ fn put(form: &ElementForm, model: &Model, values: &[f64]) -> Result<Vec<Edit>, P
         });
     }
     Ok(edits)
+}
+
+/// A free body, and the element that it hangs on.
+fn hung(hypothesis: &Hypothesis, [on, body]: [&String; 2], name: &str, kind: &'static Kind, values: &[f64]) -> Result<Vec<Edit>, String> {
+    let Some((inertia, values)) = values.split_last() else { return Err("an inertia is needed".to_string()) };
+    let of = |key: &str| hypothesis.parameters.iter().zip(values).find(|(p, _)| p.key == key).map(|(_, value)| *value);
+    let numbers: Vec<Vec<f64>> = kind.parameters.iter().map(|p| vec![of(p.key).or(p.default).unwrap_or(0.0)]).collect();
+    for (p, list) in kind.parameters.iter().zip(&numbers) {
+        for x in list {
+            backdrive_plant::tomlfile::check_range(*x, p.range).map_err(|e| format!("{} {e}", p.key))?;
+        }
+    }
+    if !(inertia.is_finite() && *inertia > 0.0) {
+        return Err(format!("the inertia of {body} must be above 0, is {inertia}"));
+    }
+    let element = ElementSpec { name: name.to_string(), between: [on.clone(), body.clone()], law: (kind.build)(&numbers)? };
+    Ok(vec![Edit::PutBody { name: body.clone(), inertia: *inertia, comment: None }, Edit::PutElement { element, comment: None }])
 }
 
 /// What was between the ends of the joint is now between the first of them and the new body; spring and damper lead from there to the second.

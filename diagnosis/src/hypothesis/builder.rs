@@ -279,6 +279,41 @@ pub(crate) fn series(
     finish(id, physics, place, Vec::new(), parameters, starts, Form::Series { joint, body, spring, damper })
 }
 
+/// A free body hung on another by an element of the physics' kind: `freedoms` are those of the keys, and of the body's inertia.
+pub(crate) fn hung(
+    sites: &Sites,
+    physics: &'static Physics,
+    on: &str,
+    keys: &[(&'static str, Freedom)],
+    inertia: Freedom,
+    starts: Vec<Vec<f64>>,
+) -> Option<Hypothesis> {
+    let (model, kind) = (sites.model, kind_named(physics.name)?);
+    let taken = |name: &str| name == "ground" || model.bodies.iter().any(|b| b.name == name);
+    let body = unique(&format!("behind_{on}"), taken);
+    let element = free_name(model, &format!("{}_{on}_{body}", physics.name));
+    let parameter = |key: &str, unit: &str, path: String, freedom: Freedom| Parameter {
+        key: key.to_string(),
+        unit: unit_for(model.motion, unit),
+        path,
+        index: None,
+        range: freedom.range,
+        neutral: freedom.neutral,
+        log: freedom.log,
+        in_samples: false,
+    };
+    let mut parameters = Vec::new();
+    for (key, freedom) in keys {
+        let unit = kind.parameters.iter().find(|p| p.key == *key)?.unit;
+        parameters.push(parameter(key, unit, format!("elements.{element}.{key}"), *freedom));
+    }
+    parameters.push(parameter("inertia", "kg", format!("bodies.{body}"), inertia));
+    let place = Place::Between(on.to_string(), body.clone());
+    let id = id(physics.name, &place, "");
+    let form = Form::Hung { on: on.to_string(), body, element, kind };
+    Some(finish(id, physics, place, Vec::new(), parameters, starts, form))
+}
+
 impl Hypothesis {
     /// Says which number of the model does the same.
     pub(crate) fn same_as(mut self, path: Option<String>) -> Hypothesis {

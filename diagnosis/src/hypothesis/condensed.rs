@@ -4,6 +4,7 @@
 
 use super::types::{Form, Hypothesis};
 use crate::physics::physics_named;
+use crate::problem::Stated;
 use crate::tuning::tuning;
 use backdrive_plant::model::{InputKind, Model};
 
@@ -72,3 +73,31 @@ fn springs(model: &Model, ends: [Option<usize>; 2], stated: &dyn Fn(&str) -> Opt
     let path = |name: &str| format!("elements.{name}.stiffness");
     there.filter_map(|e| Some((path(&e.name), stated(&path(&e.name)).filter(|k| *k > 0.0)?))).collect()
 }
+
+impl Hypothesis {
+    /// Whether fits of it start from sizes all over its range: not where it is another resolved more finely.
+    pub(crate) fn is_scanned(&self) -> bool {
+        self.physics.facts.scanned && !self.id.contains(':')
+    }
+
+    /// The starts that are scanned: all of a body that the model lacks, for nothing is known of it; else the first.
+    pub(crate) fn scanned_from(&self) -> impl Iterator<Item = &Vec<f64>> {
+        let count = if matches!(self.form, Form::Hung { .. }) { usize::MAX } else { 1 };
+        self.starts.iter().take(count)
+    }
+
+    /// Stated values beside a start of this hypothesis: the body that it hangs on has its inertia of what was stated for both.
+    pub(crate) fn given_back(&self, paths: &[Stated], stated: &[f64], values: &[f64]) -> Vec<f64> {
+        let mut given = stated.to_vec();
+        if let (Form::Hung { on, .. }, Some(inertia)) = (&self.form, values.last())
+            && let Some(at) = paths.iter().position(|s| s.path == format!("bodies.{on}"))
+            && let Some(own) = given.get_mut(at)
+        {
+            *own = (*own - inertia).max(LEAST_LEFT * *own);
+        }
+        given
+    }
+}
+
+/// Share of an inertia that is left to a body at least when another takes of it.
+const LEAST_LEFT: f64 = 0.1;

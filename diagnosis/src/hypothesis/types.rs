@@ -156,6 +156,8 @@ pub struct Facts {
     pub contains: &'static [&'static str],
     /// Numbers of its law that are known beforehand, and yet are claimed with it.
     pub fixed: usize,
+    /// Whether the misfit has so many valleys over its size that fits start from sizes all over its range.
+    pub scanned: bool,
     /// Its forces along a motion as sums of a few, for each choice of its nonlinear numbers; none where it is only simulated.
     pub(crate) spans: fn(&Hypothesis, &Seen) -> Vec<Span>,
 }
@@ -224,6 +226,7 @@ impl Facts {
         plausible: &[],
         contains: &[],
         fixed: 0,
+        scanned: false,
         spans: |h, _| match (h.physics.facts.proportional, h.parameters.len(), h.starts.first()) {
             (true, 1, Some(start)) => vec![Span::proportional(start.clone())],
             _ => Vec::new(),
@@ -343,6 +346,8 @@ pub(super) enum Form {
     Inertia { body: String },
     /// Adds a body behind the elements of a joint, and a spring and a damper from it to the joint's other end.
     Series { joint: [String; 2], body: String, spring: String, damper: String },
+    /// Hangs a free body on another by an element of this kind, whose parameters but the last are those of the kind in the hypothesis' order; the last is the body's inertia.
+    Hung { on: String, body: String, element: String, kind: &'static Kind },
 }
 
 #[derive(Debug, Clone)]

@@ -1,7 +1,9 @@
 //! A joint with play: it stands in the place of the joint's spring and damper.
 
-use crate::hypothesis::builder::{ElementBuilder, even, first_value};
+use crate::hypothesis::builder::{ElementBuilder, any, even, first_value, hung, log};
+use crate::hypothesis::sites::{Reach, Site, Sites};
 use crate::hypothesis::{Against, Facts, Family, Hypothesis, Mark, Parameter, Physics, State};
+use backdrive_plant::model::InputKind;
 
 /// The word that sets a play with round edges apart.
 const ROUND: &str = "round";
@@ -17,6 +19,7 @@ pub(super) const PHYSICS: Physics = Physics {
     facts: Facts {
         memory: true,
         holds: true,
+        scanned: true,
         refine: |coarse, values, finer| (coarse.physics == finer.physics).then(|| blunted(values, finer)).flatten(),
         // With no gap it is a spring and a damper.
         contains: &["spring"],
@@ -30,11 +33,18 @@ pub(super) const PHYSICS: Physics = Physics {
             let new = ElementBuilder::new(sites, &PHYSICS, site)?.replacing(index).removing(damper.map(|(i, _)| i));
             let (k, b) = (first_value(&spring.law).max(0.0), damper.map_or(0.0, |(_, d)| first_value(&d.law).max(0.0)));
             let (x, typical) = (site.displacement, site.force / site.displacement);
+            // The joint of a model without play hardly opens; a play is at most as wide as its ends move.
+            let moves = site.ends.iter().filter(|end| end.is_some()).map(|end| sites.scales.motion([*end, None])[0].peak);
+            let widest = moves.fold(f64::INFINITY, f64::min).max(4.0 * site.displacement_peak);
+            // Sides that lose nothing bounce, and where they meet next hangs on everything: a start has a damping ratio of a few per cent at least.
+            let masses = site.ends.iter().flatten().map(|body| sites.model.bodies[*body].inertia).filter(|m| *m > 0.0);
+            let b = b.max(LOSS * (k * masses.fold(f64::INFINITY, f64::min)).sqrt());
+            let b = if b.is_finite() { b } else { 0.0 };
             let new = new
-                .number("gap", even(0.0, 4.0 * site.displacement_peak, 0.0))
+                .number("gap", even(0.0, widest, 0.0))
                 .number("stiffness", even(0.0, 1000.0 * k.max(typical), k))
                 .number("damping", even(0.0, 1000.0 * b.max(site.force / site.speed), b));
-            let new = if round { new.tag(ROUND).number("rounding", even(0.0, 4.0 * site.displacement_peak, 0.0)) } else { new };
+            let new = if round { new.tag(ROUND).number("rounding", even(0.0, widest, 0.0)) } else { new };
             // The spring as refitted has the joint's deflection at the forces that act: of that a gap takes a share, and the shaft is as much stiffer.
             let shared = |share: f64| vec![2.0 * share * site.displacement_peak, k / (1.0 - share), b];
             let mut starts = vec![vec![0.2 * x, k, b], shared(0.5), vec![0.02 * x, k, b], shared(0.8), vec![x, k, b]];
@@ -43,9 +53,42 @@ pub(super) const PHYSICS: Physics = Physics {
             }
             Some(new.starts(starts))
         };
-        [false, true].into_iter().flat_map(|round| sites.near().filter_map(move |site| one(site, round))).collect()
+        let joints = [false, true].into_iter().flat_map(|round| sites.near().filter_map(move |site| one(site, round)));
+        joints.chain(sites.pairs.iter().filter_map(|site| behind(sites, site))).collect()
     },
 };
+
+/// A load that the model does not have, behind a play: of a body that nothing but ground holds and no input moves.
+fn behind(sites: &Sites, site: &Site) -> Option<Hypothesis> {
+    let (Some(body), true) = (site.ends[0], site.reach == Reach::Ground) else { return None };
+    let model = sites.model;
+    let joined = model.elements.iter().any(|e| e.between.contains(&Some(body)) && e.between.iter().flatten().count() == 2);
+    let moved = model.inputs.iter().any(|i| i.kind == InputKind::Motion && i.on == body);
+    let own = model.bodies[body].inertia;
+    if joined || moved || own <= 0.0 {
+        return None;
+    }
+    let (moves, force) = (site.displacement_peak, site.force);
+    // As stiff as lets its sides give way by a hundredth of the motion, or by far less.
+    let soft = force / moves;
+    let keys =
+        [("gap", even(0.0, moves, 0.0)), ("stiffness", log(soft, 1e7 * soft)), ("damping", any(0.0, 1000.0 * (100.0 * soft * own).sqrt()))];
+    let start = |share: f64, stiff: f64| {
+        let k = stiff * soft;
+        vec![0.05 * moves, k, LOSS * (k * share * own).sqrt(), share * own]
+    };
+    hung(
+        sites,
+        &PHYSICS,
+        &site.between[0],
+        &keys,
+        log(1e-2 * own, 100.0 * own),
+        vec![start(0.5, 1e3), start(0.5, 10.0), start(0.5, 100.0), start(0.5, 1e4)],
+    )
+}
+
+/// Twice the damping ratio of the sides that a fit starts from, at least.
+const LOSS: f64 = 0.1;
 
 /// Rounding that a fit starts from, in a gap.
 const BLUNT: f64 = 0.2;

@@ -4,8 +4,8 @@ use super::journal::Outcome;
 use super::settings::Settings;
 use super::state::State;
 use super::steps::{
-    Anew, Elsewhere, Exchanges, Finer, Given, GivenBack, Laws, More, MorePairs, Pairs, Plain, Race, Relatives, Richer, Ripples, Singles,
-    Split, Step,
+    Anew, Elsewhere, Exchanges, Finer, Given, GivenBack, Laws, More, MorePairs, Pairs, Plain, Race, Relatives, Richer, Ripples, Scans,
+    Singles, Split, Step,
 };
 use crate::candidate::key_of;
 use crate::race::{Course, distinct};
@@ -20,6 +20,7 @@ fn steps(is_quiet: bool, effects: usize) -> Vec<&'static dyn Step> {
         &Plain,
         &GivenBack,
         &Split::ALONE,
+        &Scans,
         &Laws,
         &Singles::NEXT,
         &Plain,
@@ -45,7 +46,7 @@ fn steps(is_quiet: bool, effects: usize) -> Vec<&'static dyn Step> {
         &Elsewhere,
     ]);
     for _ in 2..effects {
-        steps.extend([&More as &dyn Step, &Split::BESIDE, &Anew, &Exchanges]);
+        steps.extend([&More as &dyn Step, &Split::BESIDE, &Scans, &Anew, &Exchanges]);
     }
     steps.extend([&Elsewhere as &dyn Step, &Relatives]);
     steps
@@ -119,6 +120,7 @@ fn take(step: &dyn Step, state: &mut State) -> Outcome {
         Race::Coupled => course,
         Race::Free => Course { along: None, ..course },
         Race::Finer => Course { along: None, coarse: state.fine, ..course },
+        Race::Finest => Course { along: None, coarse: tuning().search.scan_substeps, ..course },
     };
     let proposed = seeds.len();
     let raced = course.race(seeds);

@@ -33,6 +33,18 @@ group! {
         share_of_elsewhere: f64 = 0.05, "of the work", Cost("some steps at each of some places");
         /// Share in which joints are split and brought near, and the same for fitting them on.
         share_of_splits: f64 = 0.1, "of the work", Cost("as share_of_relatives");
+        /// Share in which sizes of play are scanned and fitted, and the same for fitting them on.
+        share_of_scans: f64 = 0.15, "of the work", Cost("as share_of_relatives");
+        /// Sizes that are tried, from the largest down.
+        scan_points: usize = 36, "sizes", Cost("a simulation each");
+        /// Factor from one of them to the next.
+        scan_ratio: f64 = 0.85, "-", Judgement("the valley of a play is about as wide as a third of it");
+        /// Factor on the strength of the coupling there.
+        scan_coupling: f64 = 10.0, "-", Judgement("sides that meet a little later must not lead elsewhere");
+        /// Substeps per sample of fits there, at most.
+        scan_substeps: usize = 16, "substeps", Cost("sides met to a tenth of a sample time");
+        /// Sizes that are fitted.
+        scanned: usize = 4, "structures", Cost("some steps each");
         /// Share of a step that tries other effects, while the best leaves more than noise.
         share_of_effects: f64 = 0.25, "of the work", Cost("laws of many parameters must not starve all other steps");
         /// Structures that also start beside the stated parameters as given.

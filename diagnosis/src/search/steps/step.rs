@@ -13,6 +13,8 @@ pub(crate) enum Race {
     Free,
     /// Not coupled, with as many substeps as the residual of the best asks for.
     Finer,
+    /// Not coupled, with as many substeps as it takes to see where bodies meet.
+    Finest,
 }
 
 /// On which terms the structures of a step are fitted.
