@@ -128,9 +128,11 @@ impl From<BuildError> for Failure {
 impl From<LaunchError> for Failure {
     fn from(error: LaunchError) -> Failure {
         let code = match &error {
-            LaunchError::RunDir { .. } | LaunchError::SharedMemory { .. } | LaunchError::Runtime { .. } | LaunchError::Network { .. } => {
-                code::MACHINE
-            }
+            LaunchError::RunDir { .. }
+            | LaunchError::SharedMemory { .. }
+            | LaunchError::Runtime { .. }
+            | LaunchError::Network { .. }
+            | LaunchError::DomainTaken { .. } => code::MACHINE,
             LaunchError::NoNodes | LaunchError::NoSecret | LaunchError::Spawn { .. } => code::BAD_INPUT,
             LaunchError::NodeFailed { code, .. } => *code,
             LaunchError::NotReady { .. } | LaunchError::DiedAtStart { .. } => code::NODE,

@@ -136,16 +136,58 @@ fn a_force_command_that_its_graph_does_not_make_is_named_with_factor_and_time() 
     }
 }
 
-/// The push of the base once more at the end of a recording that is longer than what is looked at at once.
-#[test]
-fn a_contradiction_behind_the_first_forty_thousand_steps_is_named_with_its_time() {
-    let place = Place::new();
+/// The push of the base once more at the end of a recording that is longer than what is looked at at once: the push is from 60 s to 62.2 s.
+fn long_base(place: &Place) -> Bag {
     let again = "{ t = 1.95, x = 0.0 }, { t = 60.0, x = 0.0 }, { t = 60.2, x = 0.007 }, { t = 62.0, x = 0.007 }, { t = 62.2, x = 0.0 }";
     let text = short_graph().replace("{ t = 1.95, x = 0.0 }", again).replace("duration_s = 2.0", "duration_s = 64.0");
     place.write("long.toml", &text.replace("rate_hz = 500", "rate_hz = 1000").replace("lambda = 0.3", "lambda = 0.1"));
     let done = place.backdrive(&["run", "long.toml", "--transport", "inproc", "--bag", "long.mcap"]);
     assert_eq!(done.code, Some(0), "{done:?}");
-    let bag = Bag::load(&place.path("long.mcap"));
+    Bag::load(&place.path("long.mcap"))
+}
+
+#[test]
+fn a_device_that_does_something_else_late_in_a_recording_is_told_by_every_verb() {
+    let place = Place::new();
+    let bag = long_base(&place);
+    let path = place.path("changed.mcap");
+    let kept_back = |bag: &Bag| {
+        bag.save(&path);
+        let reader = backdrive_bags::Reader::open(&path).unwrap();
+        let graph = backdrive_nodes::graph::Graph::load(&place.path("long.toml"), &backdrive_nodes::graph::Overrides::default()).unwrap();
+        backdrive_stability::bag_gate::held_back(&reader, &graph, false).unwrap().0
+    };
+    assert_eq!(kept_back(&bag), None);
+    let measured = [
+        ("/master/measured_js", Numbers::Position),
+        ("/master/measured_js", Numbers::Effort),
+        ("/slave/measured_js", Numbers::Position),
+        ("/slave/measured_js", Numbers::Effort),
+    ];
+    for (topic, numbers) in measured {
+        for (from, factor) in [(41_000, 1.5), (61_000, -1.0)] {
+            let mut bag = bag.clone();
+            bag.numbers(topic, numbers, |index, x| if index >= from { factor * x } else { x });
+            assert!(kept_back(&bag).is_some(), "{topic} {numbers:?} times {factor} from {from} on");
+        }
+    }
+    // Without contact: the rows in contact are all as they were.
+    let mut moved = bag.clone();
+    moved.numbers("/slave/measured_js", Numbers::Position, |index, x| if (20_000..50_000).contains(&index) { x + 0.002 } else { x });
+    moved.save(&path);
+    for verb in ["stability", "replay", "why"] {
+        let done = place.backdrive(&[verb, "changed.mcap"]);
+        assert_eq!(done.code, Some(7), "{verb}: {done:?}");
+        if verb == "stability" {
+            assert!(done.stdout.contains("the slave's model misses"), "{done:?}");
+        }
+    }
+}
+
+#[test]
+fn a_contradiction_behind_the_first_forty_thousand_steps_is_named_with_its_time() {
+    let place = Place::new();
+    let bag = long_base(&place);
     // What keeps a green answer back of every verb.
     let said = |bag: &Bag| -> (bool, Vec<String>) {
         let path = place.path("changed.mcap");

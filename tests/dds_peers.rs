@@ -333,6 +333,20 @@ fn two_runs_in_one_domain_do_not_feel_each_other() {
 }
 
 #[test]
+fn of_two_runs_that_begin_at_the_same_instant_exactly_one_goes_on() {
+    let Some(hosts) = Hosts::joined() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    for _ in 0..3 {
+        let both = ["a.mcap", "b.mcap"].map(|bag| contact(&hosts, 0, folder.path(), bag, &["--duration", "4", "--overwrite"]));
+        let ends = both.map(ended);
+        let refused = |(code, told, _): &&(Option<i32>, String, Value)| *code == Some(5) && told.contains("speaks here too");
+        assert_eq!(ends.iter().filter(refused).count(), 1, "{ends:?}");
+        let (code, told, result) = ends.iter().find(|end| !refused(end)).unwrap();
+        assert!(matches!(code, Some(0 | 1 | 7)) && result["refused"].as_u64() == Some(0), "{code:?} {told}{result}");
+    }
+}
+
+#[test]
 fn who_speaks_first_on_a_topic_has_nothing_of_it() {
     let Some(hosts) = Hosts::joined() else { return };
     let folder = tempfile::tempdir().unwrap();

@@ -135,6 +135,16 @@ fn json_bag() -> Vec<u8> {
     bytes
 }
 
+/// Types of messages in protobuf: name, descriptors, and a message of each.
+fn protobuf_types() -> Vec<(String, Vec<u8>, Vec<u8>)> {
+    let reader = Reader::open(Path::new(&file("tests/cases/protobuf/joints.mcap"))).unwrap();
+    let first = |channel: u16| {
+        let mut entries = reader.messages().unwrap().map(Result::unwrap);
+        entries.find(|entry| entry.topic.channel == channel).unwrap().payload
+    };
+    reader.topics().iter().map(|topic| (topic.type_name.clone(), topic.schema.clone(), first(topic.channel))).collect()
+}
+
 /// A definition of a message with everything that a definition can hold.
 const DEFINITION: &str = "std_msgs/Header header\nuint8 KIND=3\nstring[] name\nfloat64[] position\nfloat32[3] fixed\nbool[<=4] few\nOwn[] own\n\
                           ================================================================================\nMSG: std_msgs/Header\n\
@@ -189,9 +199,24 @@ fn targets(place: &Place) -> Vec<Target> {
                [files.\"a.csv\"]\nrows = [1, 20]\n[joints.elbow]\nposition = \"q\"\ntorque = \"tau\"\n";
     let roles = "axes = [\"x\"]\n[signals]\nx_m = \"/m.position[0]\"\nF_f = { topic = \"/f\", field = \"effort[0]\", scale = 1.0, offset = 0.0 }\n\
                  x_c = \"/c.position[0]\"\nF_s = { topic = \"/s\", field = \"effort[0]\", hold = \"zero\" }\n[gains]\nmu = 1.0\nlambda = 0.3\n[resample]\nrate_hz = 1000\n";
+    let protobuf = protobuf_types();
+    let names: Vec<String> = protobuf.iter().map(|(name, ..)| name.clone()).collect();
+    let schemas: Vec<Schema> = protobuf.iter().map(|(name, schema, _)| Schema::protobuf(name, schema).unwrap()).collect();
     vec![
         target("mcap", "bag.mcap", vec![read(&bag), read(&place.path("episode.mcap"))], false, read_bag),
         target("cdr definition", "own.msg", vec![DEFINITION.into()], true, |path| Schema::parse("pkg/msg/Mine", &text_of(path)).is_ok()),
+        target("protobuf schema", "types.bin", protobuf.iter().map(|(_, schema, _)| schema.clone()).collect(), false, move |path| {
+            names.iter().any(|name| Schema::protobuf(name, &read(path)).is_ok())
+        }),
+        target("protobuf message", "payload", protobuf.iter().map(|(.., payload)| payload.clone()).collect(), false, move |path| {
+            let payload = read(path);
+            let read = |schema: &Schema| {
+                let numbers = schema.numbers(&payload)?;
+                schema.joint_names(&payload)?;
+                numbers.iter().try_for_each(|path| schema.read(&schema.find(path)?, &payload).map(|_| ()))
+            };
+            schemas.iter().map(read).filter(Result::is_ok).count() > 0
+        }),
         target("cdr message", "payload", vec![(0..255).cycle().take(400).collect()], false, |path| {
             let schema = Schema::parse("pkg/msg/Mine", DEFINITION).unwrap();
             let payload = read(path);

@@ -231,12 +231,73 @@ fn json_in_an_mcap_file_is_read() {
     assert!(!done.stdout.contains("q in rad"), "{done:?}");
 }
 
+/// Written by the Python packages mcap-protobuf-support and foxglove-schemas-protobuf: 400 foxglove.JointStates at 500 Hz, `elbow` as `swing(1.0, t)` and
+/// `wrist` at rest, and 100 messages of a type with nested, repeated, mapped, optional and enumerated fields.
 #[test]
-fn protobuf_in_an_mcap_file_is_refused_in_one_line_by_all() {
+fn protobuf_in_an_mcap_file_is_read() {
+    let place = Place::new();
+    std::fs::create_dir_all(place.path("mine")).unwrap();
+    std::fs::copy(file("tests/cases/protobuf/joints.mcap"), place.path("mine/joints.mcap")).unwrap();
+    let told = place.backdrive(&["bag", "info", "mine/joints.mcap"]);
+    assert!(told.code == Some(0) && !told.stdout.contains("NOT READ"), "{told:?}");
+    let table = |topic: &str| {
+        let done = place.backdrive(&["bag", "export", "mine/joints.mcap", "--topic", topic, "--out", "o.csv", "--overwrite"]);
+        assert_eq!(done.code, Some(0), "{done:?}");
+        let text = std::fs::read_to_string(place.path("o.csv")).unwrap();
+        let headings: Vec<String> = text.lines().next().unwrap().split(',').map(str::to_owned).collect();
+        let rows: Vec<BTreeMap<String, f64>> = text
+            .lines()
+            .skip(1)
+            .map(|line| headings.iter().cloned().zip(line.split(',').map(|cell| cell.parse().unwrap_or(f64::NAN))).collect())
+            .collect();
+        rows
+    };
+    let rows = table("/joints");
+    assert_eq!(rows.len(), 400);
+    for (k, row) in rows.iter().enumerate() {
+        let (q, tau) = swing(1.0, k as f64 * 0.002);
+        // By the messages' own times, which are 3 ms before those of the recorder.
+        assert!((row["t"] - k as f64 * 0.002).abs() < 1e-9, "{row:?}");
+        assert!((row["/joints.joints[0].position"] - q).abs() < 1e-9 && (row["/joints.joints[0].effort"] - tau).abs() < 1e-9, "{row:?}");
+        assert_eq!((row["/joints.joints[1].position"], row["/joints.joints[1].effort"]), (0.0, 0.25));
+    }
+    let rows = table("/rig/log");
+    // Rows are those in which every signal has a value: `temperature` is sent from the message at 0.4 s on.
+    let row = &rows[10];
+    let meant = [
+        ("wrench.force", 120.0),
+        ("wrench.torque", 0.0),
+        ("currents[1]", 240.0),
+        ("counts[0]", -240.0),
+        ("counts[1]", 7.0),
+        ("gains.k.p", 4.0),
+    ];
+    for (field, value) in meant.into_iter().chain([("mode", 2.0), ("temperature", 21.5), ("ok", 1.0), ("tick", 2f64.powi(40) + 240.0)]) {
+        assert_eq!(row[&format!("/rig/log.{field}")], value, "{field}");
+    }
+    assert!((row["/rig/log.ratio"] - f64::from(0.1_f32)).abs() < 1e-12, "{row:?}");
+    assert!(rows.len() == 50 && !row.keys().any(|name| name.contains("stamp") || name.contains("picture")), "{row:?}");
+    let wrong = place.backdrive(&["bag", "export", "mine/joints.mcap", "--topic", "/other", "--out", "p.csv"]);
+    assert_eq!(wrong.code, Some(3), "{wrong:?}");
+    let done = init(&place, &["--drive", "/joints.joints[0].effort", "--position", "/joints.joints[0].position"]);
+    is_right(&place, &done);
+    // In a set a joint is found by its name as well.
+    let set = std::fs::read_to_string(place.path("mine/set.toml")).unwrap();
+    place.write("mine/set.toml", &set.replace("joints[0]", "joints[elbow]"));
+    let found = place.backdrive(&["diagnose", "mine", "--effort", "0.1", "--out", "found", "--no-report", "--json"]);
+    assert!(set.contains("joints[0]") && matches!(found.code, Some(0 | 1 | 7)), "{set}{found:?}");
+    let inspected = place.backdrive(&["inspect", "mine/joints.mcap", "--json"]);
+    let signals = inspected.json()["signals"].to_string();
+    assert!(matches!(inspected.code, Some(0 | 1)) && signals.contains("joints[0].position"), "{inspected:?}");
+}
+
+#[test]
+fn protobuf_without_its_descriptors_is_refused_in_one_line_by_all() {
     let place = Place::new();
     std::fs::create_dir_all(place.path("mine")).unwrap();
     foreign(&place, "mine/pb.mcap", "protobuf", "protobuf", |_| vec![9, 0, 0, 0, 0, 0, 0, 240, 63]);
-    let says = ["topic /joint_states is not read: its messages are protobuf", "write its numbers as CSV"];
+    let says =
+        ["topic /joint_states is not read: its messages are protobuf", "its schema is no FileDescriptorSet", "write its numbers as CSV"];
     let told = place.backdrive(&["bag", "info", "mine/pb.mcap"]);
     assert!(told.stdout.contains("NOT READ") && says.iter().all(|words| told.stdout.contains(words)), "{told:?}");
     assert!(place.backdrive(&["bag", "info", "mine/pb.mcap", "--json"]).json()["topics"][0]["unread"].as_str().unwrap().contains(says[0]));

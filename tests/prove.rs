@@ -139,4 +139,14 @@ fn what_cannot_be_proven_is_told_in_one_line() {
     assert_eq!(ended.code, Some(3), "{ended:?}");
     assert!(ended.stderr.contains("no-task.toml") && ended.stderr.contains("--contact"), "{}", ended.stderr);
     assert!(!place.path("third").exists());
+    // A pipe that nobody writes, and a device that never ends, are no files, whichever of them it is.
+    let pipe = place.path("pipe");
+    assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+    for option in ["--model", "--grip", "--second-order", "--session", "--contact", "--regrip"] {
+        for path in [pipe.to_str().unwrap(), "/dev/zero"] {
+            let ended = prove_with(&place, &[(option, path)], &["--out", "fourth"]);
+            assert!(ended.code == Some(3) && ended.stderr.contains("expected a regular file"), "{option} {path}: {ended:?}");
+        }
+    }
+    assert!(!place.path("fourth").exists());
 }

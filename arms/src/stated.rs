@@ -35,7 +35,7 @@ impl Unused {
     pub fn place(&self, file: &Path) -> String {
         let quoted = [format!("\"{}\"", self.name), format!("'{}'", self.name)];
         let is_name = |line: &str| line.trim_start().starts_with("name") && quoted.iter().any(|name| line.contains(name.as_str()));
-        let line = std::fs::read_to_string(file).ok().and_then(|text| text.lines().position(is_name));
+        let line = backdrive_plant::input_file::read_to_string(file).ok().and_then(|text| text.lines().position(is_name));
         let line = line.map_or(String::new(), |line| format!(":{}", line + 1));
         let file = file.file_name().map_or(String::new(), |name| name.to_string_lossy().into_owned());
         format!("{file}{line}: element \"{}\"", self.name)

@@ -1,16 +1,27 @@
-//! Reads a number out of any ROS 2 message by the path of its field, guided by the schema in the bag.
+//! Reads a number out of any message of ROS 2, JSON or protobuf by the path of its field, guided by the schema in the bag.
 
 use crate::cdr_bytes::Cdr;
 pub(crate) use crate::cdr_bytes::{Count, Type};
-use crate::json_message;
+use crate::field_path::Entry;
+pub use crate::field_path::FieldPath;
+use crate::json_message::{self, JsonMessage};
+use crate::protobuf_message::ProtobufType;
 use std::collections::HashMap;
 
-/// A ROS 2 message definition with everything that it refers to.
+/// What a topic's messages hold: of ROS 2 the definition with everything that it refers to.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Schema {
     pub(crate) types: Vec<Vec<Field>>,
-    /// Messages are JSON, which says itself what it holds: then there are no types.
-    is_json: bool,
+    form: Form,
+}
+
+/// How messages are encoded.
+#[derive(Debug, Clone, PartialEq)]
+enum Form {
+    Cdr,
+    /// It says itself what it holds: there are no types.
+    Json,
+    Protobuf(ProtobufType),
 }
 
 #[derive(Debug, Clone, PartialEq)]
@@ -18,42 +29,6 @@ pub(crate) struct Field {
     pub(crate) name: String,
     pub(crate) of: Type,
     pub(crate) count: Count,
-}
-
-/// Where a number stands in a message: `effort[0]`, `effort[elbow]` (by the message's names of its joints), `wrench.force.x`, `header.stamp` (a time, in s).
-#[derive(Debug, Clone, PartialEq)]
-pub struct FieldPath {
-    text: String,
-    /// Place of the field in its type, and which entry of it if it is a list.
-    steps: Vec<(usize, Option<Entry>)>,
-    is_time: bool,
-}
-
-/// Which entry of a list.
-#[derive(Debug, Clone, PartialEq)]
-enum Entry {
-    At(usize),
-    /// The one that stands where the message's list `name` has this name.
-    Named(String),
-}
-
-impl FieldPath {
-    /// In a message of JSON only the first entry of a path matters here: whether it is by place or by name.
-    fn of_json(path: &str) -> FieldPath {
-        let first = path.split_once('[').filter(|(list, _)| !list.contains('.')).and_then(|(_, rest)| rest.split_once(']'));
-        let entry = first.map(|(entry, _)| entry.parse().map_or_else(|_| Entry::Named(entry.to_owned()), Entry::At));
-        FieldPath { text: path.to_owned(), steps: vec![(0, entry)], is_time: false }
-    }
-
-    /// Whether it takes an entry of a list of the message by its place.
-    pub fn is_by_place(&self) -> bool {
-        matches!(self.steps.first(), Some((_, Some(Entry::At(_)))))
-    }
-
-    /// Whether it takes an entry by the name of a joint, which a message need not have.
-    pub fn is_by_name(&self) -> bool {
-        matches!(self.steps.first(), Some((_, Some(Entry::Named(_)))))
-    }
 }
 
 /// Nesting beyond this is a definition that contains itself.
@@ -65,7 +40,32 @@ const MOST_NUMBERS: usize = 256;
 impl Schema {
     /// That of messages in JSON.
     pub fn json() -> Schema {
-        Schema { types: Vec::new(), is_json: true }
+        Schema { types: Vec::new(), form: Form::Json }
+    }
+
+    /// That of messages in protobuf: `descriptors` is a FileDescriptorSet that defines `type_name`, such as `foxglove.JointStates`.
+    ///
+    /// Errors: a sentence, it is none or does not define it.
+    pub fn protobuf(type_name: &str, descriptors: &[u8]) -> Result<Schema, String> {
+        ProtobufType::parse(type_name, descriptors).map(|of| Schema { types: Vec::new(), form: Form::Protobuf(of) })
+    }
+
+    /// The message where it is JSON or protobuf; `None` where it is CDR.
+    fn without_types(&self, payload: &[u8]) -> Result<Option<JsonMessage>, String> {
+        match &self.form {
+            Form::Cdr => Ok(None),
+            Form::Json => json_message::parse(payload).map(Some),
+            Form::Protobuf(of) => of.read(payload).map(Some),
+        }
+    }
+
+    /// Where a message says when it was made; `None` where it cannot.
+    pub fn stamp(&self) -> Option<FieldPath> {
+        let path = match &self.form {
+            Form::Protobuf(of) => of.stamp()?,
+            _ => "header.stamp",
+        };
+        self.find(path).ok()
     }
 
     /// Reads a ros2msg schema: the definition of `type_name`, then its dependencies behind lines of `=`.
@@ -86,15 +86,17 @@ impl Schema {
         }
         let places: HashMap<&str, usize> = sections.iter().enumerate().rev().map(|(index, (name, _))| (name.as_str(), index)).collect();
         let types = sections.iter().map(|(name, lines)| fields(name, lines, &places)).collect::<Result<_, _>>()?;
-        Ok(Schema { types, is_json: false })
+        Ok(Schema { types, form: Form::Cdr })
     }
 
     /// Finds a field by its path.
     ///
     /// Errors: a sentence that says what there is instead.
     pub fn find(&self, path: &str) -> Result<FieldPath, String> {
-        if self.is_json {
-            return json_message::check(path).map(|()| FieldPath::of_json(path));
+        match &self.form {
+            Form::Cdr => {}
+            Form::Json => return json_message::check(path).map(|()| FieldPath::of_json(path)),
+            Form::Protobuf(of) => return of.check(path).map(|()| FieldPath::of_json(path)),
         }
         let (mut at, mut steps) = (0, Vec::new());
         let (mut inside, mut has_names) = (false, self.name_list().is_some());
@@ -145,8 +147,8 @@ impl Schema {
 
     /// Paths of all numbers in a message like this one, at most 256: lists have the length that they have in it.
     pub fn numbers(&self, payload: &[u8]) -> Result<Vec<String>, String> {
-        if self.is_json {
-            return Ok(json_message::parse(payload)?.numbers(MOST_NUMBERS));
+        if let Some(message) = self.without_types(payload)? {
+            return Ok(message.numbers(MOST_NUMBERS));
         }
         let mut found = Vec::new();
         let mut cdr = Cdr::new(payload)?;
@@ -158,8 +160,8 @@ impl Schema {
     ///
     /// Integers beyond 2⁵³ are rounded. A time is in s. Errors: a sentence, the message ends early.
     pub fn read(&self, path: &FieldPath, payload: &[u8]) -> Result<Option<f64>, String> {
-        if self.is_json {
-            return json_message::parse(payload)?.number(&path.text);
+        if let Some(message) = self.without_types(payload)? {
+            return message.number(&path.text);
         }
         self.read_with(path, payload, |cdr, of| match of {
             Type::Message(_) => Ok(cdr.time_ns()? as f64 * 1e-9),
@@ -170,16 +172,16 @@ impl Schema {
     /// Reads a time in ns: as a number of s since 1970 it would have a grain of 0.2 µs.
     ///
     /// `None` as of [`Schema::read`], and for a field that is no time.
-    pub(crate) fn read_time_ns(&self, path: &FieldPath, payload: &[u8]) -> Result<Option<i64>, String> {
-        if self.is_json {
-            return Ok(json_message::parse(payload)?.time_ns(&path.text));
+    pub fn read_time_ns(&self, path: &FieldPath, payload: &[u8]) -> Result<Option<i64>, String> {
+        if let Some(message) = self.without_types(payload)? {
+            return Ok(message.time_ns(&path.text));
         }
         if path.is_time { self.read_with(path, payload, |cdr, _| cdr.time_ns()) } else { Ok(None) }
     }
 
     /// Where the messages have a list of the names of their joints, as a JointState has.
     pub(crate) fn name_list(&self) -> Option<usize> {
-        if self.is_json {
+        if self.form != Form::Cdr {
             return Some(0); // any message may have one
         }
         self.types.first()?.iter().position(|field| field.name == "name" && field.of == Type::Text && field.count != Count::One)
@@ -189,8 +191,8 @@ impl Schema {
     ///
     /// Errors: a sentence, the message ends early.
     pub fn joint_names(&self, payload: &[u8]) -> Result<Vec<String>, String> {
-        if self.is_json {
-            return Ok(json_message::parse(payload)?.joint_names());
+        if let Some(message) = self.without_types(payload)? {
+            return Ok(message.joint_names());
         }
         let Some((place, fields)) = self.name_list().zip(self.types.first()) else { return Ok(Vec::new()) };
         let mut cdr = Cdr::new(payload)?;
@@ -313,12 +315,6 @@ impl Schema {
                 Ok(())
             }
         }
-    }
-}
-
-impl std::fmt::Display for FieldPath {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(&self.text)
     }
 }
 

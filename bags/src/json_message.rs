@@ -1,4 +1,5 @@
-//! Numbers out of a message in JSON, by the path of their field: `position[0]`, `position[elbow]`, `wrench.force.x`.
+//! Numbers out of a message in JSON, or in what is the same, by the path of their field: `position[0]`, `position[elbow]`, `joints[elbow].position`,
+//! `wrench.force.x`.
 
 use serde_json::Value;
 
@@ -55,6 +56,11 @@ pub(crate) fn check(path: &str) -> Result<(), String> {
 }
 
 impl JsonMessage {
+    /// A message that was no text.
+    pub(crate) fn of(value: Value) -> JsonMessage {
+        JsonMessage(value)
+    }
+
     /// Paths of its numbers, at most so many.
     pub(crate) fn numbers(&self, most: usize) -> Vec<String> {
         let mut found = Vec::new();
@@ -69,7 +75,7 @@ impl JsonMessage {
     pub(crate) fn number(&self, path: &str) -> Result<Option<f64>, String> {
         Ok(match self.at(path) {
             Some(value @ Value::Object(_)) => time_ns(value).map(|ns| ns as f64 * 1e-9),
-            Some(Value::String(_)) => return Err(format!("{path:?} is text in this message of json")),
+            Some(Value::String(_)) => return Err(format!("{path:?} is text in this message of json or protobuf")),
             value => value.and_then(number),
         })
     }
@@ -79,10 +85,13 @@ impl JsonMessage {
         time_ns(self.at(path)?)
     }
 
-    /// The names of the joints, as a JointState has them; none where there is no such list.
+    /// The names of the joints, as a JointState of ROS has them, or JointStates of Foxglove; none where there is no such list.
     pub(crate) fn joint_names(&self) -> Vec<String> {
-        let names = self.0.get("name").and_then(Value::as_array);
-        names.map(|names| names.iter().filter_map(|name| name.as_str().map(str::to_owned)).collect()).unwrap_or_default()
+        let list = |key: &str| self.0.get(key).and_then(Value::as_array);
+        let names = list("name").map(|names| names.iter().filter_map(Value::as_str).collect());
+        let of_joints = || list("joints").map(|joints| joints.iter().filter_map(name_of).collect());
+        let names: Vec<&str> = names.or_else(of_joints).unwrap_or_default();
+        names.into_iter().map(str::to_owned).collect()
     }
 
     fn at(&self, path: &str) -> Option<&Value> {
@@ -91,7 +100,9 @@ impl JsonMessage {
             (value, rest) = match (value, rest.strip_prefix('[')) {
                 (Value::Array(entries), Some(inner)) => {
                     let (entry, behind) = inner.split_once(']')?;
-                    let place = entry.parse().ok().or_else(|| self.joint_names().iter().position(|name| name == entry))?;
+                    let own = || entries.iter().position(|value| name_of(value) == Some(entry));
+                    let joint = || self.joint_names().iter().position(|name| name == entry);
+                    let place = entry.parse().ok().or_else(own).or_else(joint)?;
                     (entries.get(place)?, behind)
                 }
                 (Value::Object(fields), None) => {
@@ -111,6 +122,11 @@ impl JsonMessage {
     }
 }
 
+/// The name that an entry of a list has itself.
+fn name_of(entry: &Value) -> Option<&str> {
+    entry.get("name").and_then(Value::as_str)
+}
+
 fn number(value: &Value) -> Option<f64> {
     match value {
         Value::Bool(is) => Some(f64::from(u8::from(*is))),
@@ -118,11 +134,11 @@ fn number(value: &Value) -> Option<f64> {
     }
 }
 
-/// `{ sec, nanosec }` of ROS 2, `{ secs, nsecs }` of ROS 1, `{ sec, nsec }` of Foxglove.
+/// `{ sec, nanosec }` of ROS 2, `{ secs, nsecs }` of ROS 1, `{ sec, nsec }` of Foxglove, `{ seconds, nanos }` of protobuf.
 fn time_ns(value: &Value) -> Option<i64> {
-    let whole = |keys: [&str; 2]| keys.iter().find_map(|key| value.get(key)).and_then(Value::as_i64);
-    let nanoseconds = whole(["nanosec", "nsec"]).or_else(|| whole(["nsecs", "nanosecs"]))?;
-    Some(whole(["sec", "secs"])?.saturating_mul(1_000_000_000).saturating_add(nanoseconds))
+    let whole = |keys: &[&str]| keys.iter().find_map(|key| value.get(key)).and_then(Value::as_i64);
+    let nanoseconds = whole(&["nanosec", "nsec", "nsecs", "nanosecs", "nanos"])?;
+    Some(whole(&["sec", "secs", "seconds"])?.saturating_mul(1_000_000_000).saturating_add(nanoseconds))
 }
 
 fn list(value: &Value, path: String, most: usize, found: &mut Vec<String>, nested: usize) {

@@ -24,6 +24,13 @@ pub(crate) fn recover_command(bag: &Path) -> String {
     format!("backdrive bag recover {} --bag {}", word(bag), word(&free))
 }
 
+/// A sentence for a bag that was not closed, with the command that saves what there is; `None` for one that was.
+pub(crate) fn end_missing(bag: &Path, was_closed: bool) -> Option<String> {
+    let sentence =
+        || format!("the file was not closed, so its end is missing; `{}` makes a clean copy of what there is", recover_command(bag));
+    (!was_closed).then(sentence)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -140,7 +140,7 @@ pub(crate) fn series_of(reader: &Reader, wanted: &[Signal], most: usize) -> Resu
                 let schema = topic.parse_schema()?;
                 // Where the bag tells the axes, they are the same in every message.
                 let may_change = topic.axes.is_empty() && schema.name_list().is_some();
-                let stamp = schema.find("header.stamp").ok();
+                let stamp = schema.stamp();
                 vacant.insert(Plan { stamp, schema, fields: Vec::new(), joints: may_change.then(Vec::new) })
             }
         };

@@ -80,6 +80,16 @@ pub enum LaunchError {
         /// What the network says.
         reason: String,
     },
+    /// Another run on this machine speaks for a node in the same ROS domain.
+    #[error(
+        "ROS domain {domain}: another run on this machine speaks here too, as node `{node}`; end that first, or choose another ROS domain with --domain"
+    )]
+    DomainTaken {
+        /// The domain.
+        domain: u16,
+        /// Name of the node.
+        node: String,
+    },
     /// The hosts of a run have nothing to know each other by.
     #[error(
         "hosts know each other by a shared secret: make one with `backdrive secret run.secret`, copy it to each host, and add --secret run.secret"

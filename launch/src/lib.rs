@@ -5,7 +5,7 @@
 //! - `rundir`: the directory of a run; `sweep`: removing what dead runs have left
 //! - `child`: one process, heard and ended; `slot`: the place of a node in a run, over all its lives
 //! - `supervise`: starting and ending a run; `watch`: what happens between
-//! - `session`: who a run is on the network; `secret`: what its hosts share
+//! - `domain_claim`: which run of a machine speaks in a ROS domain; `session`: who a run is on the network; `secret`: what its hosts share
 //! - `hosts`: a run on several hosts starts together; `place`: where its nodes meet
 //! - `status`, `screen`: what a person sees meanwhile
 //! - `report`: what is known afterwards
@@ -18,6 +18,7 @@
 #![cfg_attr(not(test), warn(clippy::print_stdout, clippy::print_stderr))]
 
 mod child;
+mod domain_claim;
 mod error;
 mod hosts;
 pub mod join;

@@ -1,5 +1,6 @@
 //! Starting and ending a run.
 
+use crate::domain_claim::DomainClaim;
 use crate::error::LaunchError;
 use crate::options::SuperviseOptions;
 use crate::place::Place;
@@ -58,6 +59,8 @@ pub async fn supervise_plan(mut plan: Plan, mut options: SuperviseOptions) -> Re
     // Before anything is made, so that a signal never leaves something behind.
     let signals = Signals::watch()?;
     let screen = Screen::new(options.display, options.status_every);
+    // Before anything is made, and held until the run has ended.
+    let _claim = DomainClaim::take(&plan)?;
     let swept = options.home.sweep(options.sweep_limit);
     if options.display != Display::Quiet {
         for run in &swept.removed {

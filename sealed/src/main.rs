@@ -149,8 +149,15 @@ fn wrong(error: impl std::fmt::Display) -> Failure {
     Failure(error.to_string(), 3)
 }
 
+/// Reads a regular file: a named pipe waits for a writer that may never come, and a device has no end.
 fn read(path: &Path) -> Result<String, Failure> {
-    fs::read_to_string(path).map_err(|error| Failure(format!("{}: cannot be read: {error}", path.display()), 3))
+    let no_file = "it is no regular file; copy what it holds into a file first";
+    let text = match fs::metadata(path) {
+        Ok(about) if !about.is_file() => Err(no_file.to_string()),
+        Ok(_) => fs::read_to_string(path).map_err(|error| error.to_string()),
+        Err(error) => Err(error.to_string()),
+    };
+    text.map_err(|why| Failure(format!("{}: cannot be read: {why}", path.display()), 3))
 }
 
 fn draw_truth(options: &Options) -> Result<(), Failure> {

@@ -45,6 +45,20 @@ fn play(axes: usize, mut step: impl FnMut(&[f64], &[f64]) -> Vec<Reading>) -> Ve
 }
 
 #[test]
+fn a_pipe_or_a_device_as_a_file_ends_at_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let pipe = folder.path().join("pipe");
+    assert!(Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+    for path in [pipe.to_str().unwrap(), "/dev/zero"] {
+        let (made, drawn) = draw_file(folder.path(), path);
+        let told = String::from_utf8(drawn.stderr).unwrap();
+        assert!(drawn.status.code() == Some(3) && told.contains("is no regular file") && !made.exists(), "{path}: {told}");
+        let run = device_process(Path::new(path), MODEL, &[]).stdin(Stdio::null()).output().unwrap();
+        assert_eq!(run.status.code(), Some(3), "{path}: {run:?}");
+    }
+}
+
+#[test]
 fn the_process_is_the_device() {
     let folder = tempfile::tempdir().unwrap();
     for (model, axes) in [(MODEL, 1), ("plant/models/two-axis.toml", 2)] {

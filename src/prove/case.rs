@@ -204,7 +204,7 @@ fn floors(error: Option<f64>, verdict: &Verdict) -> Option<f64> {
 
 /// The truth, which must be what was sealed.
 fn open_truth(hidden: &Hidden, digest: &str) -> Result<Truth, Failure> {
-    let bytes = std::fs::read(&hidden.truth).map_err(|e| Failure::input(format!("{}: {e}", hidden.truth.display())))?;
+    let bytes = backdrive_plant::input_file::read(&hidden.truth).map_err(|e| Failure::input(format!("{}: {e}", hidden.truth.display())))?;
     if hash(&bytes) != digest {
         return Err(Failure::input(format!("{}: is not what was sealed", hidden.truth.display())));
     }

@@ -32,7 +32,7 @@ pub(super) fn ours(folder: &Path, name: &str, arguments: &[&dyn AsRef<std::ffi::
 
 /// Reads a text file.
 pub(super) fn read(path: &Path) -> Result<String, Failure> {
-    std::fs::read_to_string(path).map_err(|e| Failure::input(format!("{}: cannot be read: {e}", path.display())))
+    backdrive_plant::input_file::read_to_string(path).map_err(|e| Failure::input(format!("{}: cannot be read: {e}", path.display())))
 }
 
 /// Writes a text file.

@@ -76,7 +76,8 @@ pub struct Opened {
 impl Opened {
     /// The device that `truth` makes of the files that `hidden` names.
     pub fn new(hidden: &Hidden, truth: &Truth) -> Result<Opened, String> {
-        let read = |path: &Path| std::fs::read_to_string(path).map_err(|e| format!("{}: cannot be read: {e}", path.display()));
+        let read =
+            |path: &Path| backdrive_plant::input_file::read_to_string(path).map_err(|e| format!("{}: cannot be read: {e}", path.display()));
         let name = |path: &Path| path.display().to_string();
         let free = Network::from_toml(&read(&hidden.model)?, &name(&hidden.model)).map_err(|e| e.to_string())?;
         let held = match &hidden.grip {

@@ -22,7 +22,8 @@ pub fn hand_over(recorded: &Path, session: &Path, shows_hand: bool, hand_hz: f64
             without(&from, &to, &|topic| hidden.iter().any(|h| h == topic), &|header| tell_less(header, shows_hand))
                 .map_err(Failure::input)?;
         } else {
-            let bytes = std::fs::read(&from).map_err(|e| Failure::input(format!("{}: cannot be read: {e}", from.display())))?;
+            let bytes =
+                backdrive_plant::input_file::read(&from).map_err(|e| Failure::input(format!("{}: cannot be read: {e}", from.display())))?;
             output::file(&to, bytes)?;
         }
     }

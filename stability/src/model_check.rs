@@ -194,6 +194,7 @@ fn compare(what: Compared, counts: impl Fn(usize) -> bool, recorded: &[f64], pre
         effect_rms,
         floor_rms: what.floor,
         silent: 0,
+        span_s: None,
         agrees,
     })
 }

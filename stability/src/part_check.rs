@@ -5,11 +5,12 @@ use serde::Serialize;
 /// How well a device's model tells what was recorded of the device.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PartCheck {
-    /// `master`, `slave`, or `force path`: the way from F_s to the reflected part of F_f, with its gain and delay.
+    /// In contact: `master`, `slave`, or `force path`: the way from F_s to the reflected part of F_f, with its gain and delay. All along the recording:
+    /// `master's motor`, `master's motion`, `handle's motion`, `slave's motion`, `slave's force`.
     pub part: &'static str,
     /// Number of the axis.
     pub axis: usize,
-    /// What is compared: the master's position, the force on the slave, or the reflected force.
+    /// What is compared: a position, the force on the slave, or the force that is applied or reflected to the master.
     pub quantity: &'static str,
     /// Root mean square of recorded less predicted, in contact; m, rad, N or N m.
     pub error_rms: f64,
@@ -20,6 +21,9 @@ pub struct PartCheck {
     /// Steps in which the device's sensor gave no number, where those are more than a few lost messages.
     #[serde(skip_serializing_if = "is_none")]
     pub silent: usize,
+    /// Times between which the device does not do what its model does, s from the begin of the recording; `None` where it is all of what was compared.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub span_s: Option<[f64; 2]>,
     /// Whether the model tells the device: the error is within three floors, or below [`AGREES_WITHIN`] of the effect.
     pub agrees: bool,
 }
@@ -33,6 +37,13 @@ pub const AGREES_WITHIN: f64 = 0.02;
 
 impl std::fmt::Display for PartCheck {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        self.said(f)?;
+        self.span_s.map_or(Ok(()), |[from, to]| write!(f, ", from {from:.3} s to {to:.3} s"))
+    }
+}
+
+impl PartCheck {
+    fn said(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         if self.silent > 0 {
             return write!(f, "the {} of {} was recorded as no number in {} steps", self.quantity, self.part, self.silent);
         }
@@ -43,7 +54,9 @@ impl std::fmt::Display for PartCheck {
                 write!(f, "{share:.1} % of the force applied to the master is not what its model makes of the force command")
             }
             "handle's motion" => write!(f, "the master's model misses {share:.1} % of the motion of what the hand holds"),
+            "master's motion" => write!(f, "the master's model misses {share:.1} % of its motion"),
             "slave's motion" => write!(f, "the slave's model misses {share:.1} % of its motion"),
+            "slave's force" => write!(f, "the slave's model misses {share:.1} % of its force"),
             "slave" => write!(f, "the slave's model misses {share:.1} % of the contact force"),
             _ => write!(f, "{share:.1} % of the reflected force is not lambda times the contact force as late as the graph says"),
         }

@@ -44,25 +44,36 @@ impl TopicRef {
         if self.encoding == "cdr" && self.schema_encoding == "ros2msg" {
             return Some(format!("topic {} is not read: {error}", self.name));
         }
+        let why = match &error {
+            BagError::Field { what, .. } if self.is_protobuf() => what.clone(),
+            _ => "cdr with ros2msg, protobuf with its descriptors, and json are read".to_owned(),
+        };
         let (topic, encoding) = (&self.name, if self.encoding.is_empty() { "of no stated encoding" } else { &self.encoding });
         let schema = if self.schema_encoding.is_empty() { "no schema".to_owned() } else { format!("a schema of {}", self.schema_encoding) };
         Some(format!(
-            "topic {topic} is not read: its messages are {encoding} with {schema}, and cdr with ros2msg and json are read; write its numbers as CSV or \
+            "topic {topic} is not read: its messages are {encoding} with {schema}, and {why}; write its numbers as CSV or \
              .npz (Python: mcap.reader.make_reader with a decoder factory of that encoding) and import that"
         ))
     }
 
+    fn is_protobuf(&self) -> bool {
+        self.encoding == "protobuf" && self.schema_encoding == "protobuf"
+    }
+
     /// Its schema, for reading fields by name.
     ///
-    /// Errors: it is neither a ros2msg CDR topic nor JSON, or the schema cannot be parsed.
+    /// Errors: it is neither a ros2msg CDR topic nor protobuf nor JSON, or the schema cannot be parsed.
     pub fn parse_schema(&self) -> Result<Schema, BagError> {
         let wrong = |what: String| BagError::Field { topic: self.name.clone(), field: String::new(), what };
         if self.encoding == "json" {
             return Ok(Schema::json());
         }
+        if self.is_protobuf() {
+            return Schema::protobuf(&self.type_name, &self.schema).map_err(wrong);
+        }
         if self.encoding != "cdr" || self.schema_encoding != "ros2msg" {
             return Err(wrong(format!(
-                "messages are {:?} with a {:?} schema; fields can be read of \"cdr\" with \"ros2msg\" and of \"json\"",
+                "messages are {:?} with a {:?} schema; fields can be read of \"cdr\" with \"ros2msg\", of \"protobuf\" and of \"json\"",
                 self.encoding, self.schema_encoding
             )));
         }

@@ -52,7 +52,7 @@ pub fn columns_of(reader: &Reader, topics: Option<&[String]>) -> Result<Vec<Sign
         for field in ["mu", "lambda"].iter().filter(|_| gains[topic.index]) {
             wanted.push(Signal { hold: Hold::Zero, ..Signal::new(&format!("{}.{field}", topic.name), &topic.name, field) });
         }
-        for field in foreign[topic.index].iter().flat_map(Foreign::fields).filter(|field| !field.starts_with("header.")) {
+        for field in foreign[topic.index].iter().flat_map(Foreign::fields) {
             wanted.push(Signal::new(&format!("{}.{field}", topic.name), &topic.name, &field));
         }
     }
@@ -105,14 +105,25 @@ impl Foreign {
 
     /// Its fields; entries of lists by the names of the joints, where their places change.
     fn fields(&self) -> Vec<String> {
-        let list =
-            |field: &String| field.split_once('[').filter(|(list, _)| self.changes && !list.contains('.')).map(|(list, _)| list.to_owned());
+        // What stands before and behind a place in a list of joints, such as `joints[` and `].position`.
+        let around = |field: &String| {
+            let (list, rest) = field.split_once('[').filter(|(list, _)| self.changes && !list.contains('.'))?;
+            Some((list.to_owned(), rest.split_once(']')?.1.to_owned()))
+        };
+        // When a message was made is no signal.
+        let stamp = self.schema.as_ref().and_then(Schema::stamp).map(|path| format!("{path}."));
+        let is_stamp =
+            |field: &String| field.starts_with("header.") || stamp.as_ref().is_some_and(|stamp| field.starts_with(stamp.as_str()));
         let mut fields: Vec<String> = Vec::new();
-        for field in &self.numbers {
-            match list(field) {
+        let mut known: BTreeSet<(String, String)> = BTreeSet::new();
+        for field in self.numbers.iter().filter(|field| !is_stamp(field)) {
+            match around(field) {
                 None => fields.push(field.clone()),
-                Some(list) if fields.iter().any(|known| known.starts_with(&format!("{list}["))) => {}
-                Some(list) => fields.extend(self.joints.iter().map(|joint| format!("{list}[{joint}]"))),
+                Some((list, behind)) => {
+                    if known.insert((list.clone(), behind.clone())) {
+                        fields.extend(self.joints.iter().map(|joint| format!("{list}[{joint}]{behind}")));
+                    }
+                }
             }
         }
         fields

@@ -5,6 +5,7 @@
 
 use super::alone::{Alone, PutOut};
 use super::compared::{AsIf, Compared, Sensor, compare};
+use super::devices::{InWindow, Output, whole};
 use super::recorded::Quantity;
 use super::windows::{Window, in_windows};
 use crate::part_check::PartCheck;
@@ -45,15 +46,15 @@ const COMPUTED: &[(NodeKind, &str, Quantity, bool)] = &[
 const DEVICES: &[(NodeKind, &str, Quantity, &str)] = &[
     (NodeKind::Master, "measured", Quantity::Effort, "master's motor"),
     (NodeKind::Master, "user", Quantity::Position, "handle's motion"),
+    (NodeKind::Master, "measured", Quantity::Position, "master's motion"),
     (NodeKind::Slave, "measured", Quantity::Position, "slave's motion"),
+    (NodeKind::Slave, "measured", Quantity::Effort, "slave's force"),
 ];
 
 /// In real time the samples of a step do not always come in it: a difference below this share is no contradiction.
 const SMALL_IN_REALTIME: f64 = 0.1;
 /// There, nor is one that nothing simple explains below this share.
 const UNEXPLAINED_IN_REALTIME: f64 = 0.5;
-/// Share of the steps in which a device's sensor may be silent in lockstep; as much as may be lost of a topic.
-const MOST_SILENT: f64 = 0.01;
 /// In lockstep nothing is left to chance.
 const SMALL_IN_LOCKSTEP: f64 = 0.01;
 
@@ -79,12 +80,8 @@ pub fn against(reader: &Reader, graph: &Graph) -> Result<Against, BagError> {
     for mut of in of_nodes {
         looked_at.append(&mut of.looked_at);
         found.contradictions.extend(of.contradictions.iter().map(Contradiction::sentence));
-        found.parts.append(&mut of.parts);
+        found.parts.extend(whole(&of.parts));
         found.notes.append(&mut of.notes);
-    }
-    if !found.parts.is_empty() && reader.counts().iter().any(|count| *count > WINDOW + WINDOW / 2) {
-        let seconds = WINDOW as f64 * graph.period_s();
-        found.notes.push(format!("the devices were held against their models in the first {seconds:.0} s of the recording alone"));
     }
     found.notes.extend(not_looked_at(reader, graph, &looked_at));
     Ok(found)
@@ -98,8 +95,8 @@ fn told(graph: &Graph, index: usize) -> Vec<Told> {
     computed.chain(devices).collect()
 }
 
-/// Runs nodes by themselves along the whole recording, window by window; devices along its first window. `recorded_gains`: with the gains that were in force
-/// instead of those that the graph plans.
+/// Runs nodes by themselves along the whole recording, window by window. `recorded_gains`: with the gains that were in force instead of those that the graph
+/// plans.
 fn look_at(reader: &Reader, graph: &Graph, nodes: &[usize], recorded_gains: bool) -> Result<Vec<Found>, BagError> {
     let mut found: Vec<Found> = nodes.iter().map(|_| Found::default()).collect();
     let mut running: Vec<Option<Alone>> = nodes.iter().map(|_| None).collect();
@@ -119,9 +116,6 @@ fn look_at(reader: &Reader, graph: &Graph, nodes: &[usize], recorded_gains: bool
             of.has_gains |= !gains.is_empty();
             let put = alone.run(&window.recorded, window.origin, &gains);
             Look { graph, index, window }.at(&told, &put, of);
-            if told.iter().all(|(.., part)| part.is_some()) {
-                *running = None;
-            }
         }
         begun = true;
     })?;
@@ -148,7 +142,8 @@ struct Look<'a> {
 #[derive(Default)]
 struct Found {
     contradictions: Vec<Contradiction>,
-    parts: Vec<PartCheck>,
+    /// Outputs of devices, in every window.
+    parts: Vec<InWindow>,
     notes: Vec<String>,
     looked_at: Vec<String>,
     /// Topics without a sample in some window.
@@ -224,11 +219,18 @@ impl Look<'_> {
             if !found.looked_at.contains(&topic) {
                 found.looked_at.push(topic.clone());
             }
+            if !lockstep && *part == Some("slave's force") && is_unsteady(graph, index) {
+                continue;
+            }
             for axis in 0..node.axes {
                 let predicted: Vec<f64> = predicted.samples.iter().map(|sample| quantity.of(sample, axis)).collect();
                 let column = track.column(*quantity, axis);
                 match part {
-                    Some(part) => found.parts.extend(device(part, axis, *quantity, column, &predicted, small)),
+                    Some(part) => {
+                        let output = Output { part, axis, quantity: *quantity, small, lockstep };
+                        let span_s = [first_row, first_row + window.recorded.rows].map(|row| row as f64 * graph.period_s());
+                        found.parts.extend(InWindow::of(output, column, &predicted, span_s));
+                    }
                     None => {
                         let sensor = Sensor { exact: *exact && !lockstep, small, ..Sensor::default() };
                         let place = Place { topic: &topic, node, axis, quantity: *quantity, period_s: graph.period_s(), first_row };
@@ -249,6 +251,12 @@ fn is_ours(node: &Node) -> bool {
             Settings::Master(files) | Settings::Slave(files) => files.model.is_some(),
             _ => true,
         }
+}
+
+/// Whether a way to a node loses or scatters what it carries: in real time that is never the same twice, and a stiff wall makes much of it.
+fn is_unsteady(graph: &Graph, index: usize) -> bool {
+    let ways = graph.connections.iter().filter(|way| way.to.0 == index);
+    ways.filter_map(|way| way.impairment).any(|impairment| impairment.jitter_s > 0.0 || impairment.loss > 0.0)
 }
 
 /// Gains that a node had in force, as it told them.
@@ -342,27 +350,6 @@ impl Place<'_> {
             to_s: at(last),
         }
     }
-}
-
-/// A device beside its model.
-fn device(part: &'static str, axis: usize, quantity: Quantity, recorded: &[f64], predicted: &[f64], small: f64) -> Option<PartCheck> {
-    let rows: Vec<usize> =
-        (0..recorded.len().min(predicted.len())).filter(|r| recorded[*r].is_finite() && predicted[*r].is_finite()).collect();
-    if rows.len() < 64 {
-        return None;
-    }
-    let rms = |value: &dyn Fn(usize) -> f64| (rows.iter().map(|row| value(*row).powi(2)).sum::<f64>() / rows.len() as f64).sqrt();
-    let (error_rms, effect_rms) = (rms(&|row| recorded[row] - predicted[row]), rms(&|row| predicted[row]));
-    let quantity = match quantity {
-        Quantity::Position => "position",
-        Quantity::Effort => "applied force",
-    };
-    // In lockstep there is a value in every step: a sensor that is silent for longer than a few lost messages is not known to do what the model does.
-    let silent = recorded.iter().zip(predicted).filter(|(r, p)| !r.is_finite() && p.is_finite()).count();
-    let speaks = small > SMALL_IN_LOCKSTEP || silent as f64 <= MOST_SILENT * (silent + rows.len()) as f64;
-    let silent = if speaks { 0 } else { silent };
-    let agrees = speaks && error_rms <= 2.0 * small * effect_rms.max(rms(&|row| recorded[row]));
-    Some(PartCheck { part, axis, quantity, error_rms, effect_rms, floor_rms: 0.0, silent, agrees })
 }
 
 /// Topics of samples in the bag that no answer is drawn from.

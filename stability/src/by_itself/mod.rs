@@ -6,6 +6,7 @@
 pub mod against;
 pub mod alone;
 pub mod compared;
+mod devices;
 pub mod recorded;
 mod ways;
 mod windows;

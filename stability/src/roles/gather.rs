@@ -12,8 +12,8 @@ use std::path::Path;
 /// How the wanted fields of a topic are read.
 struct Plan {
     schema: Schema,
-    /// Seconds and ns of the header's stamp, where there is one.
-    stamp: Option<[FieldPath; 2]>,
+    /// Where its messages say when they were made, if they do.
+    stamp: Option<FieldPath>,
     fields: Vec<(usize, FieldPath)>,
     /// The joints of the first message, where a field is one of them by its place.
     joints: Option<Vec<String>>,
@@ -61,16 +61,9 @@ pub(super) fn gather(path: &Path, roles: &Roles, wanted: &[(SignalRole, &Located
             plan.check_joints(&entry.payload).map_err(&damaged)?;
             let read = |field: &FieldPath| plan.schema.read(field, &entry.payload).map_err(&damaged);
             let logged = entry.log_time_ns as i64;
-            let stamp = match &plan.stamp {
-                // A stamp that nobody filled in is 0.
-                Some([sec, nanosec]) => match (read(sec)?, read(nanosec)?) {
-                    (Some(s), Some(ns)) if s != 0.0 || ns != 0.0 => {
-                        Some((s as i64).saturating_mul(1_000_000_000).saturating_add(ns as i64))
-                    }
-                    _ => None,
-                },
-                None => None,
-            };
+            let stamp = plan.stamp.as_ref().map(|path| plan.schema.read_time_ns(path, &entry.payload)).transpose().map_err(&damaged)?;
+            // A stamp that nobody filled in is 0.
+            let stamp = stamp.flatten().filter(|ns| *ns != 0);
             for (place, field) in &plan.fields {
                 // A message without the joint that is named says nothing of it.
                 let value = match read(field)? {
@@ -120,8 +113,7 @@ fn plan(
             std::collections::hash_map::Entry::Occupied(plan) => plan.into_mut(),
             std::collections::hash_map::Entry::Vacant(vacant) => {
                 let schema = topic.parse_schema().map_err(|e| roles.at(located, e.to_string()))?;
-                let stamp = schema.find("header.stamp.sec").ok().zip(schema.find("header.stamp.nanosec").ok());
-                vacant.insert(Plan { stamp: stamp.map(|(s, ns)| [s, ns]), schema, fields: Vec::new(), joints: None })
+                vacant.insert(Plan { stamp: schema.stamp(), schema, fields: Vec::new(), joints: None })
             }
         };
         let field = plan.schema.find(&located.signal.field);

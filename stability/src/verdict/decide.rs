@@ -91,7 +91,12 @@ impl Answer {
 
     /// Whether the models that are not exchanged do what was recorded.
     fn models_agree(&self, swapped: Swapped) -> bool {
-        let counts = |c: &&PartCheck| !(c.part == "master" && swapped.master || c.part == "slave" && swapped.slave);
+        let exchanged = |part: &str| match part {
+            "master" | "master's motion" => swapped.master,
+            "slave" | "slave's force" => swapped.slave,
+            _ => false,
+        };
+        let counts = |c: &&PartCheck| !exchanged(c.part);
         self.checks.iter().filter(counts).all(|c| c.agrees) && self.loop_check.is_none_or(|c| c.agrees)
     }
 
