@@ -116,7 +116,10 @@ fn next(options: &cli::Fit, files: &[PathBuf], fitted: &Fitted) -> Vec<Step> {
                 [again.build().filter(|c| c.is("fit"))],
             ));
         }
-        Some(out) if agree => steps.push(Step::new("Look at what the refitted model predicts of a recording.", [simulated(out, files, Path::new("fitted-predicted.csv"))])),
+        Some(out) if agree => steps.push(Step::new(
+            "Look at what the refitted model predicts of a recording.",
+            [simulated(out, files, Path::new("fitted-predicted.csv"))],
+        )),
         Some(_) => {}
     }
     let asked = Offered::verb("diagnose");
