@@ -6,10 +6,11 @@ use crate::diagnose_text::text;
 use crate::explain::explained;
 use crate::failure::{Failure, code};
 use crate::interrupt;
-use crate::offered::lines;
+use crate::offered::Step;
 use crate::output;
 use crate::progress;
 use crate::recordings::{self, Opened};
+use answer::{Answer, to_do};
 use backdrive_diagnosis::diagnose::{self, Diagnosis};
 use backdrive_diagnosis::physics::physics_named;
 use backdrive_diagnosis::search::Settings;
@@ -18,6 +19,7 @@ use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
+pub mod answer;
 mod arm;
 mod arm_options;
 
@@ -49,19 +51,19 @@ pub fn diagnose(options: &cli::Diagnose) -> Result<u8, Failure> {
         effort: options.effort.unwrap_or(usual.effort),
         patience: options.patience.map_or(usual.patience, Duration::from_secs_f64),
     };
-    let Diagnosed { found, written, next } = diagnose_into(opened, &settings, &options.out, report, &stop)?;
+    let Diagnosed { found, written, steps } = diagnose_into(opened, &settings, &options.out, report, &stop)?;
     let seconds = began.elapsed().as_secs_f64();
     let path = options.out.join("time.txt");
     output::file(&path, format!("{seconds:.2}\n"))?;
     if options.json {
-        output::json(&found.verdict)?;
+        output::json(&Answer { verdict: &found.verdict, next: &steps })?;
     } else {
         output::line(text(&found))?;
         if options.explain {
             output::line(format_args!("\n{}\n", explained(&found.search)))?;
         }
         output::line(format_args!("wrote     {}: {} ({seconds:.1} s)", shown(&options.out), written.join(", ")))?;
-        next.iter().try_for_each(output::line)?;
+        to_do(&steps)?;
     }
     if stop.load(Ordering::SeqCst) {
         return Err(Failure { code: code::INTERRUPTED, message: "stopped; what was found until then is written".to_string() });
@@ -75,8 +77,8 @@ pub struct Diagnosed {
     pub found: Diagnosis,
     /// Names of the files in the folder that was given, and the path of a report that went elsewhere.
     pub written: Vec<String>,
-    /// What to do next with the commands that do it, as lines of a terminal.
-    pub next: Vec<String>,
+    /// What to do next with the commands that do it.
+    pub steps: Vec<Step>,
 }
 
 /// Diagnoses what was opened and writes verdict, model and next experiment into a folder, which is made if it is not there, and where wanted the
@@ -121,8 +123,7 @@ pub fn diagnose_into(
         output::file(report, page(&shown).html())?;
         written.push(if report == out.join(REPORT) { REPORT.to_string() } else { report.display().to_string() });
     }
-    let next = lines("to do", 10, &steps.into_iter().filter(|step| !step.commands.is_empty()).collect::<Vec<_>>());
-    Ok(Diagnosed { found, written, next })
+    Ok(Diagnosed { found, written, steps })
 }
 
 /// Physics to leave out that a device of one axis may have.

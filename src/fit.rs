@@ -2,8 +2,11 @@
 
 use crate::cli;
 use crate::columns::columns;
+use crate::diagnose::answer::to_do;
+use crate::diagnose_page::next::simulated;
 use crate::failure::{Failure, code};
 use crate::interrupt;
+use crate::offered::{Offered, Step};
 use crate::output;
 use crate::progress;
 use crate::recordings::{self, file_name};
@@ -20,6 +23,7 @@ use backdrive_plant::model::Model;
 use backdrive_report::{number, percent};
 use serde_json::json;
 use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 use std::time::Duration;
 
@@ -65,6 +69,7 @@ pub fn fit(options: &cli::Fit) -> Result<u8, Failure> {
     if let Some(out) = &options.out {
         output::file(out, &fitted.model)?;
     }
+    let steps = next(options, &opened.files, &fitted);
     let disagree = !fitted.per_record.disagreements().is_empty();
     if options.json {
         let all = json!({
@@ -77,10 +82,12 @@ pub fn fit(options: &cli::Fit) -> Result<u8, Failure> {
             "agree": fitted.per_record.agree(),
             "kept": fitted.kept,
             "compared": fitted.per_record.compared(),
+            "next": steps,
         });
         output::json(&all)?;
     } else {
         output::line(text(&problem, &fitted))?;
+        to_do(&steps)?;
     }
     if let Some(out) = &options.out {
         let kept = match fitted.kept.len() {
@@ -94,6 +101,42 @@ pub fn fit(options: &cli::Fit) -> Result<u8, Failure> {
         return Err(Failure { code: code::INTERRUPTED, message: "stopped; the parameters are those reached until then".to_string() });
     }
     Ok(if disagree { code::NEGATIVE } else { 0 })
+}
+
+/// What to do with the numbers, the most useful first.
+fn next(options: &cli::Fit, files: &[PathBuf], fitted: &Fitted) -> Vec<Step> {
+    let mut steps = Vec::new();
+    let agree = fitted.per_record.disagreements().is_empty();
+    match &options.out {
+        None => {
+            let stem = options.model.file_stem().map_or_else(|| "model".to_string(), |stem| stem.to_string_lossy().into_owned());
+            let again = Offered::again().without("--json", false).option_writes("--out", Path::new(&format!("{stem}.fitted.toml")));
+            steps.push(Step::new(
+                "Write the model with these numbers: the same command with a file.",
+                [again.build().filter(|c| c.is("fit"))],
+            ));
+        }
+        Some(out) if agree => steps.push(Step::new(
+            "Look at what the refitted model predicts of a recording.",
+            [simulated(out, files, Path::new("fitted-predicted.csv"))],
+        )),
+        Some(_) => {}
+    }
+    let asked = Offered::verb("diagnose");
+    let asked = options.set.iter().fold(asked, |asked, path| asked.reads(path)).option_reads("--model", &options.model);
+    let asked = match &options.grip {
+        Some(none) if none.as_os_str() == "none" => asked.option("--grip", "none"),
+        Some(grip) => asked.option_reads("--grip", grip),
+        None => asked,
+    };
+    let asked = options.ignore_signal.iter().fold(asked, |asked, signal| asked.word("--ignore-signal").word(signal));
+    let text = match agree {
+        true => "Find out whether the device has physics that its model leaves out.",
+        false => "The records disagree, so that no numbers make this structure the device: find out which physics its model leaves out.",
+    };
+    let asked = asked.option_writes("--out", Path::new("diagnosis")).build();
+    steps.insert(if agree { steps.len() } else { 0 }, Step::new(text, [asked]));
+    steps
 }
 
 /// How often parameters that the recordings do not determine are taken out and the rest is fitted again, at most.

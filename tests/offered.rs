@@ -177,6 +177,22 @@ fn what_is_offered_for_recordings_of_ones_own_works_as_it_stands() {
     assert!(matches!(ended.code, Some(0 | 1 | 7)), "{ended:?}");
     offers.hear(&place, &ended, Some("my motor/first/report.html"));
     assert!(offers.0.iter().all(|c| !c.contains("--effort") || c.contains("--effort 0.2")), "{:?}", offers.0);
+    // In JSON the same steps as on the terminal.
+    let ended = place.backdrive(&["diagnose", "my motor", "--effort", "0.1", "--out", "my motor/first", "--json"]);
+    let told = ended.json();
+    assert!(told["verdict"].is_string() && told["next"].as_array().is_some_and(|steps| !steps.is_empty()), "{ended:?}");
+    offers.hear(&place, &ended, None);
+    // Numbers without a file, with one, and as JSON.
+    let fit = ["fit", "my motor/model.toml", "my motor", "--effort", "0.1"];
+    for more in [&[][..], &["--out", "my motor/fitted.toml"], &["--json"]] {
+        let mut of_fit = Offers::default();
+        let ended = place.backdrive(&[&fit[..], more].concat());
+        assert!(matches!(ended.code, Some(0 | 1)), "{ended:?}");
+        of_fit.hear(&place, &ended, None);
+        let offered = |verb: &str| of_fit.0.iter().any(|command| command.starts_with(&format!("backdrive {verb}")));
+        assert!(offered("diagnose 'my motor'") && offered(if more.contains(&"--out") { "simulate" } else { "fit" }), "{more:?}: {ended:?}");
+        offers.0.extend(of_fit.0);
+    }
     offers.run(&place);
 }
 

@@ -1,8 +1,9 @@
 //! `backdrive diagnose` of a model with a robot: logs of position and torque of every joint.
 
+use super::answer::{self, Answer};
 use super::arm_options;
 use crate::cli;
-use crate::diagnose_page::arm::{Shown, page};
+use crate::diagnose_page::arm::{Shown, page, to_do};
 use crate::failure::{Failure, code};
 use crate::interrupt;
 use crate::output;
@@ -68,14 +69,16 @@ pub fn diagnose(options: &cli::Diagnose, set: &RecordingSet, model: &Path, repor
     }
     let seconds = began.elapsed().as_secs_f64();
     write("time.txt", &format!("{seconds:.2}\n"))?;
+    let steps = to_do(&found.verdict, &options.out);
     if options.json {
-        output::json(&found.verdict)?;
+        output::json(&Answer { verdict: &found.verdict, next: &steps })?;
     } else {
         output::line(text(&problem, &found))?;
         if options.explain {
             output::line(format_args!("\n{}\n", explained(&found.tried)))?;
         }
         output::line(format_args!("wrote     {}: {} ({seconds:.1} s)", options.out.display(), written.join(", ")))?;
+        answer::to_do(&steps)?;
     }
     if stop.load(Ordering::SeqCst) {
         return Err(Failure { code: code::INTERRUPTED, message: "stopped; what was found until then is written".to_string() });

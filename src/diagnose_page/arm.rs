@@ -103,7 +103,7 @@ fn summary(verdict: &Verdict, held: bool) -> String {
 }
 
 /// What to do now, most useful first, with commands to copy.
-fn to_do(verdict: &Verdict, out: &Path) -> Vec<Step> {
+pub fn to_do(verdict: &Verdict, out: &Path) -> Vec<Step> {
     let mut steps = Vec::new();
     let model = out.join(MODEL_FILE);
     let (name, export) = (model.display(), Offered::verb("export").reads(&model).option("--to", "urdf"));

@@ -23,7 +23,7 @@ pub fn next(found: &Diagnosis, out: &Path, files: &[PathBuf]) -> Vec<Step> {
     let (before, after) = (held.nrmse_before.unwrap_or(f64::NAN), held.nrmse_after.unwrap_or(f64::NAN));
     let worth = format!("its error is {} of what was measured, that of the model as given {}", percent(after), percent(before));
     let place = if is_master { "a canceller" } else { "a feed-forward or a simulation" };
-    let use_it = if is_master { vec![contact(&model)] } else { vec![simulated(&model, files)] };
+    let use_it = if is_master { vec![contact(&model)] } else { vec![simulated(&model, files, Path::new("predicted.csv"))] };
     let mut steps = Vec::new();
     match found.verdict.word {
         Word::Missing | Word::Parameters => {
@@ -66,12 +66,12 @@ fn contact(model: &Path) -> Option<Offered> {
     run.option("--high-pass", 1).option_writes("--bag", Path::new("with-diagnosed.mcap")).build()
 }
 
-/// The model's prediction of a recording.
-fn simulated(model: &Path, files: &[PathBuf]) -> Option<Offered> {
+/// The model's prediction of a recording, into a table of this name or one like it.
+pub fn simulated(model: &Path, files: &[PathBuf], table: &Path) -> Option<Offered> {
     // A set names the columns; the model beside it is the first of the files.
     let recording = files.iter().rev().find(|file| file.extension().is_some_and(|e| e != "toml"))?;
     let set = recording.parent().map(|folder| folder.join("set.toml")).filter(|set| set.exists());
-    let simulate = Offered::verb("simulate").reads(model).reads(recording).option_writes("--out", Path::new("predicted.csv"));
+    let simulate = Offered::verb("simulate").reads(model).reads(recording).option_writes("--out", table);
     match set {
         Some(set) => simulate.option_reads("--columns", &set).build(),
         None => simulate.build(),
