@@ -87,3 +87,16 @@ fn a_constant_that_was_left_out_hides_nothing() {
     near(number(&found, "dahl", "coulomb"), 500.0, 0.05);
     assert!(found.verdict.held_out.nrmse_after.unwrap() < 0.02);
 }
+
+#[test]
+fn play_behind_a_spring_is_found() {
+    if std::env::var("BACKDRIVE_LONG").as_deref() != Ok("1") {
+        skipped::skipped("a search of a minute; BACKDRIVE_LONG=1 runs it");
+        return;
+    }
+    let Some(folder) = case("41-play-missed-by-the-search") else { return };
+    let found = diagnosed(&folder);
+    near(number(&found, "backlash", "gap"), 0.0349, 0.15);
+    let held = &found.verdict.held_out;
+    assert!(held.nrmse_after.unwrap() < 0.5 && held.nrmse_before.unwrap() > 1.0, "{held:?}");
+}
