@@ -22,8 +22,6 @@ mod arm;
 mod arm_options;
 mod servo;
 
-pub(crate) use servo::estimate as servo_estimate;
-
 /// Name of the report, where no other is asked for.
 pub const REPORT: &str = "report.html";
 

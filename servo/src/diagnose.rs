@@ -6,6 +6,7 @@ use crate::inputs::{Use, looked_at};
 use crate::physics::named;
 use crate::problem::{Joint, Problem};
 use crate::record::Record;
+use crate::run::free_runs;
 use crate::search::{Candidate, Claim, Found as Searched, scored, search_all};
 use crate::shared::shared;
 use crate::simulate::simulate;
@@ -61,6 +62,9 @@ pub struct Found {
 /// A joint that hardly moves in a record, rad or m: its nrmse there says nothing.
 const MOVES: f64 = 1e-3;
 
+/// What a rival that does nearly the same keeps beside the claim, however well the claim predicts: laws that simplify the same drive differ in what was left out of both.
+const DOUBT: f64 = 0.15;
+
 /// Diagnoses every joint.
 ///
 /// # Errors
@@ -97,6 +101,7 @@ pub fn diagnose(problem: &Problem, without: &[String]) -> Result<Found, ServoErr
         .collect();
     let found = search_all(&records, without);
     let answers: Vec<Answer> = used.iter().zip(found).map(|(index, found)| answer(*index, &problem.joints[*index], found)).collect();
+    let answers = from_commands_alone(problem, answers)?;
     let mut model = problem.model.clone();
     for answer in &answers {
         let joint = &problem.joints[answer.joint];
@@ -135,8 +140,26 @@ fn answer(index: usize, joint: &Joint, found: Searched) -> Answer {
     Answer { joint: index, found, judged, is_held_out }
 }
 
+/// Held-out recordings run again with all joints where their own free runs bring them, not where they were recorded.
+fn from_commands_alone(problem: &Problem, mut answers: Vec<Answer>) -> Result<Vec<Answer>, ServoError> {
+    let numbers = |of: &dyn Fn(&Searched) -> Numbers| -> Vec<Option<Numbers>> {
+        (0..problem.joints.len()).map(|j| answers.iter().find(|a| a.joint == j).map(|a| of(&a.found))).collect()
+    };
+    let best = numbers(&|found| found.best.fit.numbers);
+    let count = problem.joints.first().map_or(0, |j| j.held_out.len());
+    for index in 0..count {
+        let positions = free_runs(problem, &best, true, index)?;
+        for answer in &mut answers {
+            if let Some(judged) = answer.judged.get_mut(index) {
+                judged.diagnosed.clone_from(&positions[answer.joint]);
+            }
+        }
+    }
+    Ok(answers)
+}
+
 /// What the position sensor resolves: its step, or its noise.
-fn floor(records: &[&Record]) -> f64 {
+pub(crate) fn floor(records: &[&Record]) -> f64 {
     let of = |r: &Record| {
         let mut steps: Vec<f64> = r.position.windows(2).map(|w| (w[1] - w[0]).abs()).filter(|d| *d > 1e-12).collect();
         steps.sort_by(f64::total_cmp);
@@ -277,7 +300,7 @@ fn of_number(candidate: &Candidate, n: Number) -> Estimate {
     out
 }
 
-fn numbers_of(candidate: &Candidate) -> BTreeMap<String, Estimate> {
+pub(crate) fn numbers_of(candidate: &Candidate) -> BTreeMap<String, Estimate> {
     candidate.fit.free.iter().map(|n| (n.facts().key.to_string(), of_number(candidate, *n))).collect()
 }
 
@@ -333,7 +356,7 @@ fn finding(joint: &Joint, found: &Searched, claim: &Claim, gain: Option<&Estimat
         .iter()
         .map(|(name, gain)| {
             let own = gain.map_or(0.5, |g| sure(g.in_errors()));
-            (*name, ((1.0 - own) / own.max(1e-9)).min(1.0))
+            (*name, ((1.0 - own) / own.max(1e-9)).clamp(DOUBT, 1.0))
         })
         .collect();
     let all = 1.0 + rivals.iter().map(|r| r.1).sum::<f64>();

@@ -25,7 +25,7 @@ pub struct Problem<'a> {
 }
 
 /// Steps of a fit without a fold, after the one by the derivatives of the whole.
-const LEFT_OUT: usize = 2;
+const LEFT_OUT: usize = 1;
 
 /// Stretches that a record is cut into, for comparisons.
 pub const BLOCKS: usize = 4;

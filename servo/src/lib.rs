@@ -11,6 +11,8 @@ pub mod inputs;
 pub mod physics;
 pub mod problem;
 pub mod record;
+pub mod refit;
+pub mod run;
 pub mod said;
 pub mod search;
 pub mod shared;

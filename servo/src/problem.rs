@@ -44,14 +44,19 @@ pub fn is_servo(set: &RecordingSet) -> bool {
         return set.joints.iter().any(|j| j.has_command) && set.joints.iter().all(|j| !j.has_torque);
     }
     let Some(first) = set.fit.iter().chain(&set.held_out).next() else { return false };
-    let path = set.path_of(first);
-    if is_bag(&path) {
-        return false;
-    }
-    let Ok(headings) = read_headings(&path) else { return false };
+    let Ok(headings) = names_in(&set.path_of(first)) else { return false };
     let plain: Vec<&str> = headings.iter().map(|h| split(h).0).collect();
     let ends = |ends: &[&str]| plain.iter().any(|h| ends.iter().any(|e| h.ends_with(e)));
     !pairs(&plain).is_empty() && !ends(&[".torque", ".effort", "_torque", "_effort", ".tau"])
+}
+
+/// Headings of a table, or of what was a table before it became a bag.
+fn names_in(path: &Path) -> Result<Vec<String>, ServoError> {
+    if !is_bag(path) {
+        return Ok(read_headings(path)?);
+    }
+    let reader = Reader::open(path)?;
+    Ok(reader.topics().iter().filter_map(|t| t.name.strip_prefix("/recording/").map(str::to_string)).collect())
 }
 
 /// Joints with a command and a position by their headings: name, heading of the command, heading of the position.
@@ -156,7 +161,7 @@ fn joints_of(set: &mut RecordingSet) -> Result<Vec<JointColumns>, ServoError> {
         return Ok(set.joints.clone());
     }
     let first = set.fit.iter().chain(&set.held_out).next().cloned().unwrap_or_default();
-    let headings = read_headings(&set.path_of(&first))?;
+    let headings = names_in(&set.path_of(&first))?;
     let plain: Vec<&str> = headings.iter().map(|h| split(h).0).collect();
     let mut columns = Columns::new();
     let joints =

@@ -225,7 +225,7 @@ impl Searcher<'_> {
             kept.retain(|name| *name != "gravity");
         }
         let candidate = self.candidate(kept, &start);
-        if total(&candidate) < (1.0 - LEAST) * total(best) { candidate } else { best.clone() }
+        if self.is_no_worse(best, &candidate) { candidate } else { best.clone() }
     }
 
     /// What is not worth it taken off, and how sure the rest is.
@@ -238,11 +238,7 @@ impl Searcher<'_> {
     /// A structure fitted to all, and without each fold.
     fn candidate(&self, added: Vec<&'static str>, start: &Numbers) -> Candidate {
         let free = free_of(&added);
-        let fit = self.problem.fit(&free, start, FULL, None);
-        let folds = self.problem.leave_out(&fit);
-        let by_fold: Vec<Vec<[f64; BLOCKS]>> = folds.par_iter().map(|n| self.problem.blocks(n)).collect();
-        let unseen = (0..self.problem.records.len()).map(|r| std::array::from_fn(|b| by_fold[self.problem.folds[r][b]][r][b])).collect();
-        Candidate { added, fit, folds, unseen }
+        candidate_of(&self.problem, added, &free, start)
     }
 
     /// How much better one predicts than another. Errors below what the sensor resolves are none.
@@ -277,7 +273,13 @@ impl Searcher<'_> {
         let losses: f64 = differences.iter().map(|d| (-d).max(0.0)).sum();
         let most = differences.iter().fold(0.0f64, |m, d| m.max(*d));
         let rest = gains - most - losses;
-        lowers > MUCH && losses < FEW * gains && rest > 0.2 * LEAST * total(base) * self.problem.records.len() as f64
+        let is_no_worse = self.gain(base, better).is_none_or(|g| g.mean > 0.0);
+        is_no_worse && lowers > MUCH && losses < FEW * gains && rest > 0.2 * LEAST * total(base) * self.problem.records.len() as f64
+    }
+
+    /// Whether one in the place of another lowers the mean loss on unseen recordings, and is no worse in most of them.
+    fn is_no_worse(&self, base: &Candidate, better: &Candidate) -> bool {
+        total(better) < (1.0 - LEAST) * total(base) && self.gain(base, better).is_none_or(|g| g.mean > 0.0)
     }
 
     /// What a round may do, in two stages: add a physics, or two that need each other; put one in the place of a rival.
@@ -348,7 +350,7 @@ impl Searcher<'_> {
             self.tried.push(Tried { adds: names, drops: change.drops.map(|p| p.name), gain, lowers, taken: false });
             // One in the place of another has to be better only; a second number of two has to be worth it as well.
             let enough = match change.drops {
-                Some(_) => lowers > LEAST,
+                Some(_) => self.is_no_worse(best, &candidate),
                 None => self.is_better(best, &candidate) && lowers > LEAST * change.adds.len() as f64,
             };
             // Of those that do as much the one that stands first in the list, the commoner law, is taken.
@@ -411,6 +413,15 @@ impl Searcher<'_> {
         let rivals = named(name).iter().flat_map(|p| p.rivals).filter_map(of).collect();
         Claim { name, without: self.gain(without, best), rivals }
     }
+}
+
+/// Numbers fitted to all records and without each fold, with their errors on what a fit has not seen.
+pub(crate) fn candidate_of(problem: &Problem, added: Vec<&'static str>, free: &[Number], start: &Numbers) -> Candidate {
+    let fit = problem.fit(free, start, FULL, None);
+    let folds = problem.leave_out(&fit);
+    let by_fold: Vec<Vec<[f64; BLOCKS]>> = folds.par_iter().map(|n| problem.blocks(n)).collect();
+    let unseen = (0..problem.records.len()).map(|r| std::array::from_fn(|b| by_fold[problem.folds[r][b]][r][b])).collect();
+    Candidate { added, fit, folds, unseen }
 }
 
 /// The numbers that a first look at a move fits: its own, and those that most often give way to it.

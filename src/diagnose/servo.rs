@@ -2,15 +2,16 @@
 
 use crate::cli;
 use crate::diagnose_page::servo::page;
+use crate::estimate_text::estimate;
 use crate::failure::{Failure, code};
 use crate::output;
 use crate::progress;
 use crate::recordings;
 use crate::set_checks;
-use backdrive_diagnosis::verdict::{Estimate, Finding, MODEL_FILE, Parameter, VERDICT_FILE, Word};
+use backdrive_diagnosis::verdict::{Finding, MODEL_FILE, Parameter, VERDICT_FILE, Word};
 use backdrive_diagnosis::words as said;
 use backdrive_plant::set::RecordingSet;
-use backdrive_report::{number, si};
+use backdrive_report::number;
 use backdrive_servo::diagnose::{Found, diagnose as diagnosed};
 use backdrive_servo::problem::{Problem, is_servo};
 use backdrive_servo::said::words;
@@ -135,18 +136,8 @@ fn text(problem: &Problem, found: &Found) -> String {
     out.trim_end().to_string()
 }
 
-/// A number with its interval.
-pub fn estimate(estimate: &Estimate) -> String {
-    let Estimate { value, unit, ci95, .. } = estimate;
-    let with_unit = |x: f64| if matches!(unit.as_str(), "rad" | "s" | "N m") { si(x, unit) } else { format!("{} {unit}", number(x)) };
-    match ci95 {
-        [Some(low), Some(high)] => format!("{} (95 %: {} to {})", with_unit(*value), with_unit(*low), with_unit(*high)),
-        _ => with_unit(*value),
-    }
-}
-
 /// A finding with its numbers.
-pub fn finding_text(finding: &Finding) -> String {
+fn finding_text(finding: &Finding) -> String {
     let numbers: Vec<String> = finding
         .parameters
         .iter()

@@ -1,7 +1,7 @@
 //! The report of `backdrive diagnose` on joints that position servos drive.
 
 use super::phrases::{capital, tone};
-use crate::diagnose::servo_estimate;
+use crate::estimate_text::estimate;
 use crate::offered::{Offered, Step};
 use crate::page_parts::{ending, todo};
 use crate::recordings::file_name;
@@ -58,7 +58,7 @@ pub fn page(problem: &Problem, found: &Found, name: &str, out: &Path) -> Page {
                 .parameters
                 .iter()
                 .filter_map(|(name, p)| match p {
-                    Parameter::One(one) => Some(format!("{} {}", name.replace('_', " "), servo_estimate(one))),
+                    Parameter::One(one) => Some(format!("{} {}", name.replace('_', " "), estimate(one))),
                     Parameter::List(_) => None,
                 })
                 .collect();
@@ -110,7 +110,7 @@ pub fn page(problem: &Problem, found: &Found, name: &str, out: &Path) -> Page {
     let rows: Vec<Vec<String>> = servo
         .joints
         .iter()
-        .flat_map(|j| j.numbers.iter().map(|(key, e)| vec![j.joint.clone(), key.replace('_', " "), servo_estimate(e)]))
+        .flat_map(|j| j.numbers.iter().map(|(key, e)| vec![j.joint.clone(), key.replace('_', " "), estimate(e)]))
         .collect();
     page.table(table(["joint", "number", "value and 95 % interval"], rows));
     ending(&mut page, &TERMS);
