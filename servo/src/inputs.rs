@@ -138,7 +138,7 @@ fn best_lag(record: &Record, signal: &[f64]) -> (f64, f64) {
     // Some 2000 samples say as much.
     let stride = (n / 2000).max(1);
     let most = (LAGS * n as f64) as i64;
-    let mut best = (0.0, 0.0f64);
+    let (mut best, mut near) = ((0.0, 0.0f64), (0.0, 0.0f64));
     let mut lag = -most;
     while lag <= most {
         let (mut count, mut sx, mut sy, mut sxx, mut syy, mut sxy) = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
@@ -159,12 +159,19 @@ fn best_lag(record: &Record, signal: &[f64]) -> (f64, f64) {
         let (vx, vy, c) = (sxx - sx * sx / count, syy - sy * sy / count, sxy - sx * sy / count);
         // A lag at which little is left to compare explains nothing.
         let share = if vx > 0.0 && vy > 0.0 && c > 0.0 { c * c / (vx * vy) } else { 0.0 };
+        let time = lag as f64 * step;
         if share > best.1 + 1e-9 {
-            best = (lag as f64 * step, share);
+            best = (time, share);
         }
-        lag += 1.max(most / 500);
+        if (-0.1..=LATEST).contains(&time) && share > near.1 + 1e-9 {
+            near = (time, share);
+        }
+        // Every lag that a servo may have is looked at.
+        let is_near = ((lag as f64) * step + 0.2).abs() < LATEST + 0.5;
+        lag += if is_near { 1 } else { 1.max(most / 500) };
     }
-    best
+    // A motion that repeats itself explains as much some periods later.
+    if near.1 > 0.8 * best.1 { near } else { best }
 }
 
 fn running_sum(record: &Record) -> Vec<f64> {

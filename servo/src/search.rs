@@ -18,6 +18,8 @@ const LEAST: f64 = 0.02;
 /// What shows in few recordings has to lower it by this share, and others may lose this share of what those gain.
 const MUCH: f64 = 0.05;
 const FEW: f64 = 0.25;
+/// Errors up to so many times what the position sensor resolves are its own.
+const NOISE: f64 = 1.4;
 /// Physics that are also tried two at a time: neither alone need show.
 const PAIRS: [[&str; 2]; 5] = [
     ["speed_limit", "acceleration_limit"],
@@ -260,7 +262,9 @@ impl Searcher<'_> {
     /// Whether one predicts unseen recordings better than another beyond chance: in most stretches, or by much in some recordings and by little worse in none.
     fn is_better(&self, base: &Candidate, better: &Candidate) -> bool {
         let lowers = 1.0 - total(better) / total(base);
-        if !lowers.is_finite() || lowers < LEAST {
+        // Below what the sensor resolves there is nothing to explain.
+        let is_noise = total(base).sqrt() * self.problem.scale < NOISE * self.floor;
+        if !lowers.is_finite() || lowers < LEAST || is_noise {
             return false;
         }
         if self.gain(base, better).is_some_and(|g| g.is_sure()) {

@@ -86,6 +86,18 @@ fn a_joint_that_rests_under_a_load_does_not_creep() {
     assert!(simulated.iter().all(|q| *q == 0.0), "{:?}", simulated.last());
 }
 
+#[test]
+fn a_motion_that_repeats_itself_is_not_taken_for_a_late_one() {
+    let mut joint = joint(&base());
+    for record in joint.fit.iter_mut().chain(&mut joint.held_out) {
+        record.t = (0..4000).map(|i| 0.02 * f64::from(i)).collect();
+        record.command = record.t.iter().map(|t| 0.3 * (1.7 * t).sin()).collect();
+        record.position = vec![0.0; 4000];
+        record.position = simulate(&base(), record, 40);
+    }
+    assert_eq!(backdrive_servo::inputs::looked_at(&joint).unwrap(), backdrive_servo::inputs::Use::Good);
+}
+
 fn refused(change: impl Fn(&mut Record)) -> String {
     let mut joint = joint(&base());
     joint.fit.iter_mut().chain(&mut joint.held_out).for_each(change);
