@@ -22,6 +22,7 @@ use std::time::{Duration, Instant};
 pub mod answer;
 mod arm;
 mod arm_options;
+mod servo;
 
 /// Name of the report, where no other is asked for.
 pub const REPORT: &str = "report.html";
@@ -31,6 +32,9 @@ pub fn diagnose(options: &cli::Diagnose) -> Result<u8, Failure> {
     let began = Instant::now();
     let beside = options.out.join(REPORT);
     let report = (!options.no_report).then_some(options.html.as_deref().unwrap_or(&beside));
+    if let Some((set, model)) = servo::asked(options)? {
+        return servo::diagnose(options, &set, model.as_deref(), report, began).map(exit_code);
+    }
     if let Some((set, model)) = arm::asked(options)? {
         return arm::diagnose(options, &set, &model, report, began).map(exit_code);
     }

@@ -10,6 +10,7 @@ use crate::offered::{Offered, Step};
 use crate::output;
 use crate::progress;
 use crate::recordings::{self, file_name};
+use crate::servo_runs;
 use backdrive_diagnosis::compare::{Quality, predictions, qualities};
 use backdrive_diagnosis::intervals::Uncertainty;
 use backdrive_diagnosis::parameters::{Pair, Row, correlated, refitted_text, rows};
@@ -44,7 +45,11 @@ struct Fitted {
 
 /// Fits, writes, and says how sure the numbers are.
 pub fn fit(options: &cli::Fit) -> Result<u8, Failure> {
-    if Model::load(&options.model)?.arm.is_some() {
+    let model = Model::load(&options.model)?;
+    if !model.servos.is_empty() {
+        return servo_runs::fit(options);
+    }
+    if model.arm.is_some() {
         let model = options.model.display();
         return Err(Failure::input(format!(
             "{model}: [robot]: fit takes models of one axis; the numbers of an arm are refitted by `backdrive diagnose`"

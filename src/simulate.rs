@@ -5,6 +5,7 @@ use crate::failure::Failure;
 use crate::output;
 use crate::output::may_replace;
 use crate::progress::busy;
+use crate::servo_runs;
 use backdrive_bags::{Reader, recording, topic_of};
 use backdrive_plant::excitation::{Excitation, load_experiments};
 use backdrive_plant::model::{Fragment, Hold, Model, OutputKind};
@@ -18,6 +19,9 @@ use std::path::{Component, Path, PathBuf};
 /// Simulates, writes the predictions, and says how far they are from what was recorded.
 pub fn simulate(options: &cli::Simulate) -> Result<u8, Failure> {
     let model = held_model(&options.model, options.grip.as_deref())?;
+    if !model.servos.is_empty() {
+        return servo_runs::simulate(options, &model);
+    }
     let mut results = Vec::new();
     let drives = busy(&format!("reading {}", options.drive), || drives(options, &model))?;
     drives.iter().try_for_each(|drive| may_replace(&drive.out, options.overwrite))?;

@@ -126,6 +126,11 @@ fn an_inspection_says_what_its_page_says() {
     follow(&Place::new(), "docs/inspect.md");
 }
 
+#[test]
+fn servo_joints_are_diagnosed_as_their_page_says() {
+    follow(&Place::new(), "docs/servo.md");
+}
+
 fn is_long() -> bool {
     std::env::var("BACKDRIVE_LONG").as_deref() == Ok("1")
 }

@@ -40,7 +40,16 @@ pub fn joints_of(set: &mut RecordingSet, coordinates: &[Coordinate], first: &str
         let of = |name: &&str| set.joints.iter().find(|j| j.name == **name).cloned();
         return names
             .iter()
-            .map(|n| of(n).ok_or_else(|| fault(format!("says nothing of joint \"{n}\": add [joints.{n}] with position and torque"))))
+            .map(|n| {
+                let joint =
+                    of(n).ok_or_else(|| fault(format!("says nothing of joint \"{n}\": add [joints.{n}] with position and torque")))?;
+                match joint.has_torque || joint.is_passive {
+                    true => Ok(joint),
+                    false => {
+                        Err(fault(format!("[joints.{n}] has no torque, and other joints have: name the torque of all of them, or of none")))
+                    }
+                }
+            })
             .collect();
     }
     if is_bag(&set.path_of(first)) {

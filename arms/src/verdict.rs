@@ -112,6 +112,7 @@ pub fn verdict(parts: Parts) -> Result<Verdict, ArmError> {
         detectable: None,
         searched: cut_short.then_some(Searched { steps: 0, exhausted: false, cut_short }),
         arm: Some(Box::new(arm)),
+        servo: None,
         findings,
     })
 }

@@ -20,6 +20,7 @@ pub mod parse;
 pub mod preisach;
 pub mod recording;
 pub mod robot;
+pub mod servo;
 pub mod set;
 pub mod stepper;
 pub mod tomlfile;

@@ -4,6 +4,7 @@
 
 use crate::elements::Law;
 use crate::robot::Arm;
+use crate::servo::ServoJoint;
 
 /// Whether the axes are linear or rotational. The units follow: m, N, kg or rad, N m, kg m².
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -41,6 +42,8 @@ pub struct Model {
     pub axes: Vec<Axis>,
     /// The robot whose joints are bodies of the network; `None` for a device without one.
     pub arm: Option<Box<Arm>>,
+    /// Joints that a position servo drives, by name: they are simulated from recorded commands and are no bodies of the network.
+    pub servos: Vec<ServoJoint>,
 }
 
 impl Model {

@@ -3,6 +3,7 @@
 use super::values::positive;
 use backdrive_arms::physics::ALL as OF_ARMS;
 use backdrive_diagnosis::physics::{PHYSICS, physics_named};
+use backdrive_servo::physics::ALL as OF_SERVOS;
 use clap::Args;
 use std::path::PathBuf;
 
@@ -13,6 +14,7 @@ pub const HELP: &str = "Examples:
   backdrive diagnose session.csv held-out.csv --model model.toml --out out/diagnosis --effort 3 --explain
   backdrive diagnose set/ --without coulomb --out out/diagnosis
   backdrive diagnose studies/dfki_double_pendulum/set-arm.toml --out out/arm      (a model with [robot]: logs of every joint, docs/arms.md)
+  backdrive diagnose episodes/ --model arm.toml --out out/servo      (commands and positions without torque, docs/servo.md)
 
 Writes verdict.json, model.diagnosed.toml, report.html and time.txt. Ctrl-C ends the search and writes what was found until then.
 
@@ -70,10 +72,12 @@ fn physics(name: &str) -> Result<String, String> {
         return Ok(known.name.to_string());
     }
     let of_arms = || OF_ARMS.iter().map(|p| p.facts().name);
-    if of_arms().any(|known| known == name) {
+    let of_servos = || OF_SERVOS.iter().map(|p| p.name);
+    if of_arms().chain(of_servos()).any(|known| known == name) {
         return Ok(name.to_string());
     }
     let known = PHYSICS.iter().map(|p| p.name).collect::<Vec<_>>();
-    let more: Vec<&str> = of_arms().filter(|n| !known.contains(n)).collect();
-    Err(format!("no such physics; there are {}; of arms also {}", known.join(", "), more.join(", ")))
+    let more = |names: Vec<&'static str>| names.into_iter().filter(|n| !known.contains(n)).collect::<Vec<_>>().join(", ");
+    let (arms, servos) = (more(of_arms().collect()), more(of_servos().collect()));
+    Err(format!("no such physics; there are {}; of arms also {arms}; of position servos also {servos}", known.join(", ")))
 }

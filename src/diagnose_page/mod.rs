@@ -7,6 +7,7 @@ mod force;
 mod held_out;
 pub mod next;
 mod phrases;
+pub mod servo;
 mod tables;
 
 use crate::diagnose_text::{alternatives, confidence, errors, parameters, shows};

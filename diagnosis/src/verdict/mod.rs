@@ -113,6 +113,7 @@ pub fn verdict(
         searched: Some(Searched { steps: search.work, exhausted: search.exhausted, cut_short: search.cut }),
         findings: decision.findings,
         arm: None,
+        servo: None,
     };
     Ok((verdict, Files { model, rivals, experiment }))
 }

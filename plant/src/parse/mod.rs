@@ -4,6 +4,7 @@ mod network;
 mod paths;
 mod points;
 mod robot;
+mod servo;
 mod signals;
 
 pub use network::{HAND, PORT};
@@ -95,6 +96,7 @@ fn read(mut top: Table, folder: Option<&Path>) -> Result<ModelFile, FileError> {
         table.finish()?;
         model.axes.push(axis);
     }
+    servo::read_servos(&mut top, &mut model)?;
     top.finish()?;
     Ok(ModelFile::Device(model))
 }

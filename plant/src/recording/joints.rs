@@ -15,6 +15,10 @@ pub struct JointColumns {
     pub torque_constant: Option<f64>,
     /// Whether the set says `torque = 0`: the joint has no motor, and no column holds its torque.
     pub is_passive: bool,
+    /// Whether the position that its servo was told was logged.
+    pub has_command: bool,
+    /// Whether its torque was logged, or a current with a torque constant. Only a joint with a command may be without.
+    pub has_torque: bool,
 }
 
 impl JointColumns {
@@ -33,9 +37,37 @@ impl JointColumns {
         format!("{}.torque", self.name)
     }
 
+    /// Name of the signal of the position that its servo was told, rad or m.
+    pub fn command(&self) -> String {
+        format!("{}.command", self.name)
+    }
+
+    /// A joint of a position servo whose torque nobody logged, with a column of each of these headings as it stands.
+    pub fn of_servo(name: &str, command: &str, position: &str, columns: &mut Columns) -> JointColumns {
+        let joint = JointColumns {
+            name: name.to_string(),
+            has_velocity: false,
+            torque_constant: None,
+            is_passive: false,
+            has_command: true,
+            has_torque: false,
+        };
+        for (signal, heading) in [(joint.command(), command), (joint.position(), position)] {
+            columns.push((signal, ColumnRule::of(Source::Column(heading.to_string()))));
+        }
+        joint
+    }
+
     /// Reads a column of each of these headings as it stands; without a heading for it, no velocity.
     pub fn of_headings(name: &str, position: &str, velocity: Option<&str>, torque: &str, columns: &mut Columns) -> JointColumns {
-        let joint = JointColumns { name: name.to_string(), has_velocity: velocity.is_some(), torque_constant: None, is_passive: false };
+        let joint = JointColumns {
+            name: name.to_string(),
+            has_velocity: velocity.is_some(),
+            torque_constant: None,
+            is_passive: false,
+            has_command: false,
+            has_torque: true,
+        };
         let mut add = |signal: String, heading: &str| columns.push((signal, ColumnRule::of(Source::Column(heading.to_string()))));
         add(joint.position(), position);
         add(joint.torque(), torque);
@@ -58,14 +90,15 @@ fn is_zero(table: &mut Table, key: &str) -> Result<bool, FileError> {
     }
 }
 
-/// Reads `[joints.NAME]` tables: `position`, `torque` (0 for a joint without a motor) or `current` with `torque_constant`, and perhaps `velocity`; each a heading or a table as in
-/// `[columns]`. The rules are added to `columns`.
+/// Reads `[joints.NAME]` tables: `position`, `torque` (0 for a joint without a motor) or `current` with `torque_constant`, or the `command` of a position servo, and perhaps
+/// `velocity`; each a heading or a table as in `[columns]`. The rules are added to `columns`.
 pub(crate) fn read_joints(mut table: Table, columns: &mut Columns) -> Result<Vec<JointColumns>, FileError> {
     let mut joints = Vec::new();
     for name in table.keys() {
         let mut below = table.table(&name)?.ok_or_else(|| table.missing(&name))?;
         let position = read_one(&mut below, "position")?.ok_or_else(|| below.missing("position"))?;
         let velocity = read_one(&mut below, "velocity")?;
+        let command = read_one(&mut below, "command")?;
         let is_passive = is_zero(&mut below, "torque")?;
         let torque = if is_passive { None } else { read_one(&mut below, "torque")? };
         let current = read_one(&mut below, "current")?;
@@ -80,18 +113,36 @@ pub(crate) fn read_joints(mut table: Table, columns: &mut Columns) -> Result<Vec
                 Some(ColumnRule { scale: Some(current.scale.unwrap_or(1.0) * constant), offset: current.offset * constant, ..current })
             }
             (None, Some(_), Some(_)) => return Err(below.error_at("torque_constant", "must not be 0")),
+            // A servo's current without a constant has no scale, often no sign: it is no torque.
+            (None, Some(_), None) if command.is_some() => None,
             (None, Some(_), None) => return Err(below.missing("torque_constant")),
             (Some(_), Some(_), _) => return Err(below.error("has both a torque and a current; keep one")),
             (Some(_), None, Some(_)) => {
                 return Err(below.error_at("torque_constant", "goes with a current, and this joint has a torque; say scale at the torque"));
             }
-            (None, None, _) => return Err(below.missing("torque")),
+            (None, None, Some(_)) => {
+                return Err(below.error_at("torque_constant", "goes with a current, and this joint has none; leave it out"));
+            }
+            (None, None, None) if command.is_some() => None,
+            (None, None, None) => {
+                return Err(below
+                    .error("has neither a torque nor a command; add torque = \"HEADING\", or for a position servo command = \"HEADING\""));
+            }
         };
         below.finish()?;
-        let joint = JointColumns { name, has_velocity: velocity.is_some(), torque_constant: constant, is_passive };
+        let joint = JointColumns {
+            name,
+            has_velocity: velocity.is_some(),
+            torque_constant: constant,
+            is_passive,
+            has_command: command.is_some(),
+            has_torque: torque.is_some(),
+        };
         columns.push((joint.position(), position));
-        if let Some(torque) = torque {
-            columns.push((joint.torque(), torque));
+        for (signal, rule) in [(joint.torque(), torque), (joint.command(), command)] {
+            if let Some(rule) = rule {
+                columns.push((signal, rule));
+            }
         }
         if let Some(velocity) = velocity {
             columns.push((joint.velocity(), velocity));

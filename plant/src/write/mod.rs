@@ -8,6 +8,7 @@ pub use text::{key, number, string};
 
 use crate::model::{Fragment, Hold, InputKind, Model, Motion, OutputKind, Place};
 use crate::robot::{Arm, Point};
+use crate::servo::FACTS;
 use std::fmt::Write;
 use text::{list, parameter_text, strings};
 
@@ -81,6 +82,13 @@ fn write_model(model: &Model, is_fragment: bool) -> String {
     for axis in &model.axes {
         line("\n[[axes]]".to_string());
         line(axis_keys(model, axis));
+    }
+    for servo in &model.servos {
+        line(format!("\n[servo.{}]", key(&servo.joint)));
+        // What does nothing is left out.
+        for facts in FACTS.iter().filter(|facts| servo.numbers[facts.number] != facts.nothing) {
+            line(format!("{} = {}", facts.key, number(servo.numbers[facts.number])));
+        }
     }
     out
 }

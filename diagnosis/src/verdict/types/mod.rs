@@ -4,11 +4,13 @@ mod arm;
 mod finding;
 mod next_experiment;
 mod place;
+mod servo;
 mod shown;
 
 pub use arm::{ArmJoint, ArmPart, BaseParameter};
 pub use finding::{Alternative, Detectable, Estimate, Estimates, Finding, Interval, Moved, Parameter};
 pub use next_experiment::{NextExperiment, Planned, PlannedPayload, Refused, Sensor};
+pub use servo::{ServoAnswer, ServoErrors, ServoPart, SharedCause};
 pub use shown::Where;
 
 use crate::audit::{self, Weight};
@@ -74,6 +76,9 @@ pub struct Verdict {
     /// What only a diagnosis of an arm says; not in other files.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub arm: Option<Box<ArmPart>>,
+    /// What only a diagnosis from commands and positions says; not in other files.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub servo: Option<Box<ServoPart>>,
 }
 
 /// How far a search went. It computes the same on every machine, unless it is cut short.

@@ -1,0 +1,37 @@
+//! What a diagnosis of servo joints says in words.
+
+use crate::physics::named;
+use backdrive_diagnosis::verdict::{Finding, ServoPart, Word};
+
+/// A physics in words.
+pub fn words(physics: &str) -> String {
+    named(physics).map_or_else(|| backdrive_diagnosis::words::physics(physics), |p| p.words.to_string())
+}
+
+/// The joint of a finding.
+pub fn joint_of(finding: &Finding) -> &str {
+    use backdrive_diagnosis::hypothesis::Place;
+    match &finding.place {
+        Place::Between(joint, _) => joint,
+        Place::Signal(signal) => signal.rsplit_once('.').map_or(signal, |(joint, _)| joint),
+    }
+}
+
+/// The verdict in one sentence.
+pub(crate) fn sentence(word: Word, findings: &[Finding], servo: &ServoPart) -> String {
+    let of = |joint: &str| {
+        let all: Vec<String> = findings.iter().filter(|f| joint_of(f) == joint && f.confidence >= 0.5).map(|f| words(&f.physics)).collect();
+        (!all.is_empty()).then(|| format!("{joint}: {}", all.join(", ")))
+    };
+    let joints: Vec<String> = servo.joints.iter().filter_map(|j| of(&j.joint)).collect();
+    match word {
+        Word::NothingMissing => "delay, second order and offset explain how every joint answers its commands".to_string(),
+        Word::Unexplained => {
+            "delay, second order and offset do not explain how the joints answer, and no known physics explains more".to_string()
+        }
+        _ if joints.is_empty() => {
+            "something beyond delay, second order and offset shows, and which physics it is these recordings do not tell".to_string()
+        }
+        _ => format!("beside delay, second order and offset, {}", joints.join("; ")),
+    }
+}

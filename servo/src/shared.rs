@@ -1,0 +1,80 @@
+//! What the recordings of a servo joint do not tell apart, and the motion that would.
+
+use crate::search::Found;
+use backdrive_diagnosis::verdict::SharedCause;
+use backdrive_plant::servo::Number;
+
+/// A rival this many standard errors behind is told apart.
+const APART: f64 = 2.5;
+
+/// Causes that share what was seen.
+pub fn shared(found: &Found) -> Vec<SharedCause> {
+    let mut out = vec![cause(
+        &["damper", "derivative_gain", "back_emf"],
+        "damping is the sum of viscous friction, the servo's derivative part and the motor's back-EMF: positions alone do not divide it",
+        "move the joint by hand with the torque off: only viscous friction is left there",
+    )];
+    let delay = found.best.fit.numbers[Number::Delay];
+    let spread = found.best.folds.iter().map(|n| (n[Number::Delay] - delay).abs()).fold(0.0, f64::max);
+    if delay > 3.0 * spread.max(1e-3) {
+        out.push(cause(
+            &["delay", "series_compliance"],
+            "what is told as delay holds transport, the age of the position when it is logged, and all that is quicker than the recording, a soft gear among it",
+            "chirp up to the fastest that the joint follows: a delay turns the phase in proportion to the frequency and leaves the amplitude, a soft gear has a peak",
+        ));
+    }
+    for claim in &found.claims {
+        for (rival, _) in claim.rivals.iter().filter(|(_, gain)| gain.is_none_or(|g| g.in_errors() < APART)) {
+            let (sentence, motion) = told(claim.name, rival);
+            out.push(cause(&[claim.name, rival], sentence, motion));
+        }
+    }
+    out
+}
+
+fn cause(causes: &[&str], sentence: &str, motion: &str) -> SharedCause {
+    SharedCause {
+        causes: causes.iter().map(|c| (*c).to_string()).collect(),
+        sentence: sentence.to_string(),
+        separated_by: motion.to_string(),
+    }
+}
+
+/// What two physics share, and what separates them.
+fn told(one: &str, other: &str) -> (&'static str, &'static str) {
+    let is = |a: &str, b: &str| (one, other) == (a, b) || (one, other) == (b, a);
+    if is("coulomb", "dead_band") {
+        return (
+            "dry friction and a dead band leave the same band of angles in which the joint stays",
+            "approach one angle under two loads, or at two speeds: friction keeps its band at any speed, a dead band lets a moving joint come nearer",
+        );
+    }
+    if is("coulomb", "backlash") || is("dead_band", "backlash") {
+        return (
+            "play, dry friction and a dead band all delay the joint after a reversal by a fixed angle",
+            "reverse under a steady load: it closes the play, and leaves friction as it is",
+        );
+    }
+    if is("coulomb", "load_friction") {
+        return (
+            "friction that grows with the load and friction that does not are one where the load hardly changes",
+            "repeat one motion with a known payload",
+        );
+    }
+    if is("gravity", "payload") || is("gravity", "gain") || is("payload", "gain") {
+        return (
+            "droop under a weight and a wrong scale of the position both grow with the angle",
+            "hold the same angle of this joint in two poses of the joints before it, so that its weight pulls both ways",
+        );
+    }
+    if is("saturation", "speed_limit") || is("saturation", "acceleration_limit") || is("speed_limit", "acceleration_limit") {
+        return (
+            "limits of torque, speed and acceleration all flatten large steps",
+            "steps of 0.1, 0.3 and 1 rad: a limit of speed gives ramps of one slope, one of acceleration ramps whose slope grows with the step, one of torque depends on the load",
+        );
+    }
+    if is("coulomb", "stribeck") {
+        return ("friction that is larger at rest shows at slow reversals only", "ramps at four speeds from a hundredth of the fastest on");
+    }
+    ("both predict the recordings that were left out alike", "larger and smaller motions at several speeds")
+}
