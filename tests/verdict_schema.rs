@@ -121,7 +121,10 @@ fn a_verdict_that_is_written_now_is_valid() {
     let done = place.backdrive(&["diagnose", ".", "--out", "out", "--patience", "4", "--no-report", "--json"]);
     assert!(matches!(done.code, Some(0 | 1 | 7)), "{done:?}");
     assert_valid(&validator(), &read(place.path("out/verdict.json")), "verdict.json");
-    let verdict = done.json();
+    let mut verdict = done.json();
+    // Commands to paste hang on the folder they were asked from, and are no part of the file.
+    let next = verdict.as_object_mut().and_then(|verdict| verdict.remove("next")).unwrap_or_default();
+    assert!(next.as_array().is_some_and(|next| next.iter().all(|step| step["do"].is_string() && step["commands"].is_array())), "{next:#}");
     assert_eq!(verdict, serde_json::from_str::<Value>(&read(place.path("out/verdict.json"))).unwrap());
     // What the command line once added afterwards is in it.
     assert!(verdict["audit"].as_array().is_some_and(|audit| !audit.is_empty()), "{verdict:#}");
