@@ -38,12 +38,12 @@ pub(super) const PHYSICS: Physics = Physics {
             let widest = moves.fold(f64::INFINITY, f64::min).max(4.0 * site.displacement_peak);
             // Sides that lose nothing bounce, and where they meet next hangs on everything: a start has a damping ratio of a few per cent at least.
             let masses = site.ends.iter().flatten().map(|body| sites.model.bodies[*body].inertia).filter(|m| *m > 0.0);
-            let b = b.max(LOSS * (k * masses.fold(f64::INFINITY, f64::min)).sqrt());
-            let b = if b.is_finite() { b } else { 0.0 };
+            let (own, b) = (b, b.max(LOSS * (k * masses.fold(f64::INFINITY, f64::min)).sqrt()));
+            let b = if b.is_finite() { b } else { own };
             let new = new
                 .number("gap", even(0.0, widest, 0.0))
                 .number("stiffness", even(0.0, 1000.0 * k.max(typical), k))
-                .number("damping", even(0.0, 1000.0 * b.max(site.force / site.speed), b));
+                .number("damping", even(0.0, 1000.0 * b.max(site.force / site.speed), own));
             let new = if round { new.tag(ROUND).number("rounding", even(0.0, widest, 0.0)) } else { new };
             // The spring as refitted has the joint's deflection at the forces that act: of that a gap takes a share, and the shaft is as much stiffer.
             let shared = |share: f64| vec![2.0 * share * site.displacement_peak, k / (1.0 - share), b];
@@ -72,7 +72,7 @@ fn behind(sites: &Sites, site: &Site) -> Option<Hypothesis> {
     // As stiff as lets its sides give way by a hundredth of the motion, or by far less.
     let soft = force / moves;
     let keys =
-        [("gap", even(0.0, moves, 0.0)), ("stiffness", log(soft, 1e7 * soft)), ("damping", any(0.0, 1000.0 * (100.0 * soft * own).sqrt()))];
+        [("gap", any(0.0, moves)), ("stiffness", log(soft, 1e7 * soft)), ("damping", any(0.0, 1000.0 * (100.0 * soft * own).sqrt()))];
     let start = |share: f64, stiff: f64| {
         let k = stiff * soft;
         vec![0.05 * moves, k, LOSS * (k * share * own).sqrt(), share * own]
