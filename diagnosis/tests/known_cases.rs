@@ -90,8 +90,8 @@ fn a_constant_that_was_left_out_hides_nothing() {
 
 #[test]
 fn play_behind_a_spring_is_found() {
-    if std::env::var("BACKDRIVE_LONG").as_deref() != Ok("1") {
-        skipped::skipped("a search of a minute; BACKDRIVE_LONG=1 runs it");
+    if std::env::var("BACKDRIVE_FULL").as_deref() != Ok("1") {
+        skipped::skipped("a search of two minutes; BACKDRIVE_FULL=1 runs it");
         return;
     }
     let Some(folder) = case("41-play-missed-by-the-search") else { return };
