@@ -1,4 +1,4 @@
-//! A joint with play: it stands in the place of the joint's spring and damper.
+//! A joint with play: it stands in the place of the joint's spring and damper, or holds a load that the model does not have.
 
 use crate::hypothesis::builder::{ElementBuilder, any, even, first_value, hung, log};
 use crate::hypothesis::sites::{Reach, Site, Sites};
