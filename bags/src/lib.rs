@@ -28,6 +28,7 @@ mod header;
 mod index;
 mod info;
 mod json_message;
+mod lengths;
 mod lerobot;
 mod memory;
 mod merge;

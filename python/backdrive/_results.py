@@ -135,7 +135,9 @@ class Fit(Result):
     kept: list[str]
 
     def __init__(self, text: str, notes: list[str], code: int, model: Model) -> None:
-        super().__init__(text, notes, code)
+        # The commands that the command line offers next name files, and here there were none: `model` is in hand.
+        said = {name: value for name, value in json.loads(text).items() if name != "next"}
+        super().__init__(json.dumps(said, ensure_ascii=False), notes, code)
         self.refitted: Model = model
 
     @property

@@ -2,6 +2,7 @@
 
 use crate::BagError;
 use crate::framing::Frame;
+use crate::lengths::within;
 use mcap::records::{Record, op};
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use std::io::Read;
@@ -105,6 +106,10 @@ fn chunk_head(body: &[u8], cut: bool) -> Option<(Vec<u8>, &[u8])> {
 /// Parses the body of a record that is whole.
 pub(crate) fn parse<'a>(path: &Path, frame: &Frame, body: &'a [u8]) -> Result<Record<'a>, BagError> {
     let damaged = |what: String| BagError::Damaged { path: path.to_owned(), offset: frame.offset, what };
+    if !within(frame.opcode, body) {
+        let len = body.len();
+        return Err(damaged(format!("record of type 0x{:02x}, {len} bytes: a length in it goes beyond its end", frame.opcode)));
+    }
     // mcap 0.26 slices an attachment without looking at its length first.
     if frame.opcode == op::ATTACHMENT && attachment_header_len(body).is_none_or(|len| len + 4 > body.len()) {
         return Err(damaged(format!("an attachment record of {} bytes is too short for its own header", body.len())));
