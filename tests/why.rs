@@ -1,5 +1,6 @@
 //! `backdrive why` on bags of loops that shake for a reason.
 
+use backdrive_bags::{Entry, Reader, Recorder, RecorderOptions};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -89,6 +90,41 @@ fn what_the_canceller_does_not_know_is_named() {
         (Some("saturation"), Some("run_away")),
         "{said}"
     );
+}
+
+/// The messages of one run with the header of another: the bag of a loop whose graph does not know something.
+fn under_the_graph_of(known: &Path, recorded: &Path, to: &Path) {
+    let header = Reader::open(known).unwrap().header().unwrap().clone();
+    let reader = Reader::open(recorded).unwrap();
+    let mut recorder = Recorder::create(to, &header, &RecorderOptions::lockstep()).unwrap();
+    for entry in reader.messages().unwrap() {
+        let entry: Entry = entry.unwrap();
+        let Some(message) = entry.message(recorded).unwrap() else { continue };
+        recorder.push(header.topic(&entry.topic.name).unwrap(), message, 0).unwrap();
+    }
+    assert_eq!(recorder.finish().unwrap().lost(), 0);
+}
+
+#[test]
+fn play_in_the_slave_is_the_slave_s_and_no_remedy_is_promised_by_a_loop_that_does_not_shake() {
+    let folder = tempfile::tempdir().unwrap();
+    let place = |name: &str| folder.path().join(name);
+    // 1.3 mm of play between the drive and the tip.
+    let slave = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("plant/models/slave.toml")).unwrap();
+    let slave = slave.replace("tip     = 0.5 ", "tip = 0.35\nmotor = 0.15 ").replace("[\"command\", \"tip\"]", "[\"command\", \"motor\"]");
+    let play = "[[elements]]\nname = \"gear\"\nkind = \"backlash\"\nbetween = [\"motor\", \"tip\"]\ngap = 0.0013\nstiffness = 2.0e5\ndamping = 40.0\n\n[[inputs]]";
+    std::fs::write(place("slave-with-play.toml"), slave.replacen("[[inputs]]", play, 1)).unwrap();
+    let with_play = place("slave-with-play.toml").display().to_string();
+
+    let gain = ["--canceller", "none", "--lambda", "1.5"];
+    std::fs::rename(recorded(folder.path(), &gain), place("known.mcap")).unwrap();
+    let faulty = recorded(folder.path(), &[&gain[..], &["--slave", &with_play]].concat());
+    under_the_graph_of(&place("known.mcap"), &faulty, &place("hidden.mcap"));
+    let (said, code) = asked(&place("hidden.mcap"), &[]);
+    assert_eq!((code, &said["happening"]["happens"], &said["reproduced"]), (Some(1), &"limit_cycle".into(), &false.into()), "{said}");
+    let first = &said["causes"][0];
+    assert_eq!((&first["kind"], &first["place"], &first["seen"]), (&"unknown".into(), &"slave".into(), &true.into()), "{said}");
+    assert_eq!(said["remedies"].as_array().map(Vec::len), Some(0), "{said}");
 }
 
 /// Loops with something hidden, by the example that draws them. Of one round of kinds all but a few are named; the whole set is in docs/figures.md.

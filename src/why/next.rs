@@ -42,7 +42,11 @@ pub fn next(found: &Answer, asked: &Asked) -> Vec<Step> {
             let run = Offered::verb("run").reads(asked.recording).flag("--dither").option_writes("--bag", &bag).flag("--overwrite").build();
             [run, Offered::verb("stability").reads_later(&bag).build()]
         });
-        let text = "None of the remedies that were tried stops it in the re-simulation. Record the loop with a dither and measure its stability limit.";
+        let text = if found.remedies.is_empty() && !found.reproduced {
+            "The loop does not shake when it is run again with the models in the bag, so no remedy could be tried. Put right what differs, or record the loop with a dither and measure its stability limit."
+        } else {
+            "None of the remedies that were tried stops it in the re-simulation. Record the loop with a dither and measure its stability limit."
+        };
         steps.push(Step::new(text, dithered.into_iter().flatten()));
     }
     if let Happening::NotJudged { why } = found.happening {

@@ -36,7 +36,7 @@ pub fn text(answer: &Answer, steps: &[Step]) -> String {
     if answer.happening.is_trouble() && answer.causes.is_empty() {
         line("cause", NO_CAUSE);
     }
-    for text in answer.differs.iter().filter(|d| !answer.causes.iter().any(|c| c.evidence == **d)) {
+    for text in answer.differs.iter().filter(|d| !answer.causes.iter().any(|c| c.evidence.contains(d.as_str()))) {
         line("differs", text);
     }
     if let Some(again) = &answer.again {

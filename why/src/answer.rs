@@ -221,6 +221,7 @@ fn again(question: &Question, answer: &mut Answer, hear: &(dyn Fn(&str) + Sync),
     answer.again_signals = run.signals;
     answer.again = Some(run.outcome.to_string());
     answer.reproduced = reproduces(&answer.happening, &run.outcome, run.frequency_hz);
+    let mut shakes_again = answer.reproduced || !run.outcome.is_stable();
     // A limit hides what happens beneath: then the causes are looked for without it.
     let (mut loop_of_causes, mut always, mut happening) = (was.clone(), Vec::new(), answer.happening);
     if let Happening::Saturation { .. } = happening {
@@ -230,6 +231,7 @@ fn again(question: &Question, answer: &mut Answer, hear: &(dyn Fn(&str) + Sync),
         let beneath = Happening::of_run(&run);
         if beneath.is_trouble() {
             (loop_of_causes, always, happening) = (unlimited, vec![Change::NoLimits], beneath);
+            shakes_again = true;
         }
         answer.beneath = Some(beneath);
     }
@@ -248,8 +250,13 @@ fn again(question: &Question, answer: &mut Answer, hear: &(dyn Fn(&str) + Sync),
         always: &always,
         edge: answer.edge,
         reproduced: answer.reproduced,
+        shakes_again,
     };
     answer.causes = causes(&asked, cancel)?;
+    // Of a loop that does not shake when it is run again nothing says what stops the one that did.
+    if !shakes_again {
+        return Ok(());
+    }
     hear("what would stop it");
     answer.remedies = remedies(&was, session, &hand, *gain, answer.edge, &answer.causes, cancel)?;
     Ok(())

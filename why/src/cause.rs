@@ -61,6 +61,8 @@ pub struct Asked<'a> {
     pub edge: Option<f64>,
     /// Whether the loop as it was does what was recorded.
     pub reproduced: bool,
+    /// Whether the loop as it was shakes at all when it is run again. Where it does not, nothing can be learned from leaving a thing out of it.
+    pub shakes_again: bool,
     /// Changes that every run has besides: motors without limits, where a limit hides what happens beneath.
     pub always: &'a [Change],
 }
@@ -70,6 +72,15 @@ const SEEN: f64 = 6.0;
 
 /// How much further the edge lies without a thing counts up to this factor.
 const FURTHER: f64 = 4.0;
+
+/// Weight of a thing without which the loop does as before.
+const NO_EVIDENCE: f64 = 0.05;
+
+/// A thing that takes along this share of the amplitude explains the shaking, though what is left of it goes on.
+const MOST_OF_IT: f64 = 0.5;
+
+/// Weight of the gain where something else explains the shaking.
+const GAIN_BESIDE: f64 = 0.4;
 
 /// Every cause, the likeliest first.
 ///
@@ -85,7 +96,12 @@ pub fn causes(asked: &Asked, cancel: &AtomicBool) -> Result<Vec<Cause>, Resimula
             let run = suspect.without.run(asked.hand, asked.gain, &RunOptions::default(), cancel)?;
             let edge = if run.outcome.is_stable() { suspect.without.edge(asked.hand, gain, cancel)?.critical_gain } else { None };
             let holds = run.outcome.is_stable();
-            let further = if holds { edge.map_or(FURTHER, |e| (e / gain).clamp(1.0, FURTHER)) } else { 0.05 };
+            let further = match holds {
+                // What is stable with and without a thing says nothing of it.
+                _ if !asked.shakes_again => NO_EVIDENCE,
+                true => edge.map_or(FURTHER, |e| (e / gain).clamp(1.0, FURTHER)),
+                false => taken_along(asked.happening, &run.outcome).filter(|share| *share >= MOST_OF_IT).unwrap_or(NO_EVIDENCE),
+            };
             let weight = further * if suspect.seen { SEEN } else { 1.0 };
             let cause = Cause {
                 kind: suspect.kind,
@@ -101,7 +117,46 @@ pub fn causes(asked: &Asked, cancel: &AtomicBool) -> Result<Vec<Cause>, Resimula
             Ok((cause, weight))
         })
         .collect::<Result<_, ResimulateError>>()?;
-    Ok(weighed(asked, judged))
+    Ok(weighed(asked, judged.into_iter().chain(unknown(asked)).collect()))
+}
+
+/// Share of the amplitude that goes with a thing; `None` where the one or the other is no limit cycle.
+fn taken_along(happening: &Happening, without: &Outcome) -> Option<f64> {
+    match (happening, without) {
+        (Happening::LimitCycle { amplitude_m: was, .. }, Outcome::LimitCycle { amplitude_m: left, .. }) => Some(1.0 - left / was),
+        _ => None,
+    }
+}
+
+/// Nodes that do something else than the graph says, of which no model is known, where the loop without them does not do what was recorded; each node once.
+fn unknown(asked: &Asked) -> Vec<(Cause, f64)> {
+    if asked.reproduced {
+        return Vec::new();
+    }
+    let cause = |place: String, evidence: String, seen: bool| Cause {
+        kind: CauseKind::Unknown,
+        place,
+        evidence,
+        without: "not known, for nothing in the bag models it".to_string(),
+        holds_without: false,
+        edge_without: None,
+        seen,
+        confidence: 0.0,
+        repairs: Vec::new(),
+    };
+    let mut all: Vec<(Cause, f64)> = Vec::new();
+    for difference in asked.differences.iter().filter(|d| d.kind != NodeKind::Master && !is_modelled(d)) {
+        let (_, place, evidence) = named(difference, asked.graph);
+        match all.iter_mut().find(|(cause, _)| cause.place == place) {
+            Some((cause, _)) => cause.evidence = format!("{}; {evidence}", cause.evidence),
+            None => all.push((cause(place, evidence, true), SEEN)),
+        }
+    }
+    if all.is_empty() && asked.differences.is_empty() && !asked.shakes_again {
+        let evidence = "the graph's loop does not shake when it is run again, and every node does what the graph says".to_string();
+        all.push((cause(String::new(), evidence, false), 1.0));
+    }
+    all
 }
 
 /// Shares of the weights, with the gain itself as what is left where nothing else explains it.
@@ -110,6 +165,7 @@ fn weighed(asked: &Asked, mut judged: Vec<(Cause, f64)>) -> Vec<Cause> {
         return Vec::new();
     }
     let lowered = asked.edge.filter(|edge| *edge < asked.gain.product());
+    let explained = judged.iter().any(|(_, weight)| *weight >= MOST_OF_IT);
     let gain = Cause {
         kind: CauseKind::GainTooHigh,
         place: String::new(),
@@ -124,7 +180,13 @@ fn weighed(asked: &Asked, mut judged: Vec<(Cause, f64)>) -> Vec<Cause> {
         confidence: 0.0,
         repairs: Vec::new(),
     };
-    judged.push((gain, if lowered.is_some() { 1.0 } else { 0.2 }));
+    let weight = match lowered {
+        _ if !asked.shakes_again => NO_EVIDENCE,
+        Some(_) if explained => GAIN_BESIDE,
+        Some(_) => 1.0,
+        None => 0.2,
+    };
+    judged.push((gain, weight));
     let sum: f64 = judged.iter().map(|(_, w)| w).sum();
     let trust = if asked.reproduced { 1.0 } else { 0.6 };
     let mut causes: Vec<Cause> = judged.into_iter().map(|(c, w)| Cause { confidence: trust * w / sum.max(1e-9), ..c }).collect();
