@@ -64,7 +64,10 @@ pub fn fit(options: &cli::Fit) -> Result<u8, Failure> {
     for note in &opened.notes {
         output::note(format_args!("note: {note}"));
     }
-    let problem = opened.problem;
+    let (problem, contradicted) = opened.problem.without_contradicted_outputs();
+    for remark in contradicted {
+        output::note(format_args!("note: {remark}"));
+    }
     let patience = Duration::from_secs_f64(options.patience);
     let without: Vec<String> = PHYSICS.iter().map(|p| p.name.to_string()).collect();
     // With every physics withheld a search is the refit of the nominal model alone.

@@ -52,6 +52,8 @@ pub fn open(paths: &[PathBuf], model: Option<&Path>, grip: Option<&Path>, ignore
         }
     };
     let problem = problem.map_err(|e| told_failure(&e, model, &set))?;
+    let problem =
+        problem.without_named_outputs(|name| ignored.iter().chain(&set.ignore).any(|other| other == name)).map_err(Failure::input)?;
     set_checks::repeated_samples(&problem)?;
     notes.extend(set_checks::left_out(&set, &problem.model, ignored, grip.is_some())?);
     if !set.mixed_rates {

@@ -8,9 +8,10 @@ use crate::excitation::RATE;
 use crate::experiment::{Plan, REPEATS, plan, same_load};
 use crate::fit::Fit;
 use crate::judge::{AGAINST, Judged, each, gains, judge};
+use crate::physics::{At, Physics};
 use crate::problem::Problem;
 use crate::regression::Data;
-use crate::search::{MOST, Search, added, search};
+use crate::search::{LOAD_CHANGES, MOST, Search, added, rare, search};
 use crate::verdict::{Parts, place, verdict};
 use crate::written::{Reading, model_of};
 use backdrive_diagnosis::audit::Weight;
@@ -127,9 +128,9 @@ pub fn diagnose(problem: &Problem, settings: &Settings) -> Result<Found, ArmErro
     if cut_short {
         notes.push("the search was interrupted: what else is missing was not looked for to the end".to_string());
     }
-    if added(&found.best.structure).len() >= settings.effects {
+    if rare(&found.best.structure) >= settings.effects {
         notes.push(format!(
-            "the search ended at {} physics, as many as were allowed (--effects): what remains may be others",
+            "the search ended at {} physics beside those that every joint has, as many as were allowed (--effects): what remains may be others",
             settings.effects
         ));
     }
@@ -183,7 +184,10 @@ fn load_remarks(data: &Data, found: &Search) -> Vec<Remark> {
         weight: Weight::Caution,
     }
     };
-    same_load(data, found).into_iter().map(remark).collect()
+    let untold = same_load(data, found);
+    let rubs = |j: usize| found.best.structure.terms.iter().any(|t| t.physics == Physics::Coulomb && t.at == At::Joint(j));
+    let unchanged = |j: &usize| untold.contains(j) || rubs(*j) && !data.unsigned[*j] && data.load_spread(*j) < LOAD_CHANGES;
+    (0..data.problem.joints.len()).filter(unchanged).map(remark).collect()
 }
 
 fn next(plan: &Plan, problem: &Problem) -> NextExperiment {

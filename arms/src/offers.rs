@@ -43,7 +43,15 @@ pub(crate) fn is_possible(data: &Data, fit: &Fit) -> bool {
             (Physics::Backlash, Some(gap)) => value / gap,
             _ => 1.0,
         };
-        !is_sharp && (0.5..2.0).contains(&unit) && (!term.physics.facts().positive || value > least)
+        let is_added = term.given.is_none();
+        // A joint whose friction is more than its load cannot be driven back, and moves by no load at all.
+        let locks = is_added && term.physics == Physics::LoadFriction && value >= 1.0;
+        // Viscous friction that drives in one direction.
+        let drives = is_added && term.physics == Physics::AsymmetricDamper && {
+            let level = fit.structure.terms.iter().zip(&fit.places).find(|(t, _)| t.physics == Physics::Damper && t.at == term.at);
+            value.abs() > level.map_or(0.0, |(_, place)| fit.values[place.start]) + 2.0 * error
+        };
+        !is_sharp && !locks && !drives && (0.5..2.0).contains(&unit) && (!term.physics.facts().positive || value > least)
     })
 }
 

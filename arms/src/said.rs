@@ -39,8 +39,8 @@ fn hertz(f: f64) -> String {
 
 /// The verdict in a sentence.
 pub(crate) fn sentence(word: Word, findings: &[Finding], arm: &ArmPart, held: bool, unsigned: &[&str]) -> String {
-    // What a simulation speaks against is not asserted beside others.
-    let against = |f: &&Finding| f.closed_loop.is_some_and(|ratio| ratio > AGAINST);
+    // What a simulation or held-out torque speaks against is not asserted beside others.
+    let against = |f: &&Finding| f.confidence <= 0.5 || f.closed_loop.is_some_and(|ratio| ratio > AGAINST);
     let asserted: Vec<&Finding> = match findings.iter().all(|f| against(&f)) {
         true => findings.iter().collect(),
         false => findings.iter().filter(|f| !against(f)).collect(),
@@ -66,7 +66,7 @@ pub(crate) fn sentence(word: Word, findings: &[Finding], arm: &ArmPart, held: bo
                     let other = format!("{} {}", words(&a.physics), backdrive_diagnosis::words::place(&a.place));
                     format!("leaves out {named}, or in place of the first {other}, which these logs do not tell apart")
                 }
-                None => format!("may leave out {named}, which these logs and a simulation in closed loop do not agree on"),
+                None => format!("may leave out {named}, which held-out torque or a simulation in closed loop does not bear out"),
             };
             format!("The model {open}; {tail} ({} without).{besides}", before.join(", "))
         }

@@ -10,7 +10,7 @@ use crate::regression::Data;
 use backdrive_diagnosis::predictive::{Gain, gain};
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Physics that are added at most.
+/// Physics that are added at most, those not counted that every joint has.
 pub const MOST: usize = 8;
 /// Candidates that are fitted in full in each round, those that promise most.
 const FITTED: usize = 10;
@@ -24,6 +24,9 @@ const WORTH: f64 = 10.0;
 pub const LEAST_SHARE: f64 = 0.03;
 /// The least share of the rms torque of a joint, that where it shows most, that a physics has to be.
 pub const LEAST_TORQUE: f64 = 0.01;
+
+/// The load at a joint has to spread by this share of its median for friction that grows with it to be tried.
+pub const LOAD_CHANGES: f64 = 0.5;
 
 /// A candidate that was fitted in full.
 #[derive(Debug, Clone)]
@@ -143,7 +146,9 @@ fn may_be(data: &Data, term: &Term) -> bool {
         term.physics,
         Physics::Gain | Physics::Coupling | Physics::Delay | Physics::Compliance | Physics::Backlash | Physics::LoadFriction
     );
-    let may = |j: usize| !(data.unsigned[j] || of_a_motor && data.is_passive(j));
+    // What grows with a load that does not change is what does not grow with it.
+    let no_load = |j: usize| term.physics == Physics::LoadFriction && data.load_spread(j) < LOAD_CHANGES;
+    let may = |j: usize| !(data.unsigned[j] || of_a_motor && data.is_passive(j) || no_load(j));
     match term.at {
         At::Joint(j) => may(j),
         At::Pair(j, k) => may(j) && may(k),
@@ -206,11 +211,19 @@ pub fn largest_share(data: &Data, base: &Fit, better: &Fit) -> f64 {
         .fold(f64::NEG_INFINITY, f64::max)
 }
 
+/// Physics that every joint has more or less of: they take no other's place.
+const COMMON: [Physics; 4] = [Physics::Coulomb, Physics::Damper, Physics::Bias, Physics::Inertia];
+
+/// Terms that a search has added and that not every joint has.
+pub fn rare(structure: &Structure) -> usize {
+    added(structure).into_iter().filter(|index| !COMMON.contains(&structure.terms[*index].physics)).count()
+}
+
 /// Adds what is worth it.
 fn grow(data: &Data, pool: &[Term], most: usize, best: &mut Fit, weights: &Weights, tried: &mut Vec<Tried>, stop: &AtomicBool) {
     // Adding and exchanging can take turns: what was there once ends it.
     let mut seen: Vec<Vec<(Physics, crate::physics::At)>> = Vec::new();
-    while added(&best.structure).len() < most {
+    while rare(&best.structure) < most {
         let mut now: Vec<_> = best.structure.terms.iter().map(|t| (t.physics, t.at)).collect();
         now.sort();
         if seen.iter().filter(|s| **s == now).count() > 1 {

@@ -188,6 +188,11 @@ fn findings(data: &Data, search: &Search, judged: &[Option<Judged>]) -> Vec<Find
         if closed_loop.is_some_and(|ratio| ratio > AGAINST) {
             sure = sure.min(0.5);
         }
+        let numbers = numbers(data, best, *index);
+        let is_doubted = !falls(data, search, term) || may_be_nothing(&numbers);
+        if is_doubted {
+            sure = sure.min(0.5);
+        }
         let facts = term.physics.facts();
         let kin: f64 =
             rivals.iter().zip(&weights).filter(|(r, _)| r.term.physics.facts().family == facts.family).map(|(_, w)| w / total).sum();
@@ -196,7 +201,7 @@ fn findings(data: &Data, search: &Search, judged: &[Option<Judged>]) -> Vec<Find
         let finding = Finding {
             physics: facts.name.to_string(),
             place: place(data, term),
-            parameters: numbers(data, best, *index),
+            parameters: numbers,
             replaces,
             confidence,
             family: Some(facts.family),
@@ -205,10 +210,46 @@ fn findings(data: &Data, search: &Search, judged: &[Option<Judged>]) -> Vec<Find
             closed_loop,
         };
         let against = closed_loop.is_some_and(|ratio| ratio > AGAINST);
-        out.push((if against { f64::NEG_INFINITY } else { found.map_or(0.0, |g| g.mean) }, finding));
+        out.push((if against || is_doubted { f64::NEG_INFINITY } else { found.map_or(0.0, |g| g.mean) }, finding));
     }
     out.sort_by(|a, b| b.0.total_cmp(&a.0));
     out.into_iter().map(|(_, f)| f).collect()
+}
+
+/// At the joints of a term what of the torque of held-out logs has to be left at most, as a share of its rms, for anything to be believed there.
+const EXPLAINS: f64 = 0.9;
+
+/// Whether the torque of held-out logs that is left where a term acts falls with what was found, to below what leaving the joint alone would leave; true where no
+/// log is held out.
+fn falls(data: &Data, search: &Search, term: &Term) -> bool {
+    if data.fit_count == data.motions.len() {
+        return true;
+    }
+    let at: Vec<usize> = match term.at {
+        At::Joint(j) => vec![j],
+        // What the second joint does shows at the first.
+        At::Pair(j, _) => vec![j],
+        At::Base => (0..data.problem.joints.len()).collect(),
+    };
+    at.iter().any(|j| {
+        let left = |fit: &Fit| data.mean_square(&fit.residual, *j, true).sqrt();
+        let (before, after) = (left(&search.refit), left(&search.best));
+        after < before && (data.is_passive(*j) || after < EXPLAINS * data.scale(*j, true))
+    })
+}
+
+/// Whether the interval of a size holds 0.
+fn may_be_nothing(numbers: &BTreeMap<String, Parameter>) -> bool {
+    const SIZES: [&str; 8] = ["force", "coulomb", "stiffness", "inertia", "coefficient", "damping", "gap", "amplitude"];
+    let holds_zero = |one: &Estimate| matches!(one.ci95, [Some(low), Some(high)] if low <= 0.0 && high >= 0.0);
+    // One of several sizes that is nothing leaves the others.
+    let sizes: Vec<&Estimate> = numbers
+        .iter()
+        .filter(|(key, _)| SIZES.contains(&key.as_str()))
+        .filter_map(|(_, number)| if let Parameter::One(one) = number { Some(one) } else { None })
+        .filter(|one| one.value != 0.0)
+        .collect();
+    !sizes.is_empty() && sizes.iter().all(|one| holds_zero(one))
 }
 
 /// Elements of plain dry friction that a richer law takes the place of.

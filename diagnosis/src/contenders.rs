@@ -7,7 +7,7 @@ use crate::candidate::{Candidate, advantage_over, candidate, key_of, sort};
 use crate::compare::unseen;
 use crate::evaluator::Evaluator;
 use crate::fit::Fit;
-use crate::hypothesis::{Hypothesis, Scales, inherited, starts_beside};
+use crate::hypothesis::{Hypothesis, Run, Scales, inherited, starts_beside};
 use crate::physics;
 use crate::problem::Problem;
 use crate::search::Search;
@@ -70,7 +70,7 @@ fn contenders<'a>(problem: &'a Problem, search: &Search, without: &[String], bud
     let nominal = &search.nominal;
     let Some(model) = nominal.structure.model(problem, &nominal.fit.values) else { return Vec::new() };
     let records = nominal.structure.with_unknown(problem, &problem.fit, &nominal.fit.values);
-    let runs: Vec<(Vec<Vec<f64>>, f64)> = records.iter().map(|r| (r.inputs.clone(), r.period)).collect();
+    let runs: Vec<Run> = records.iter().map(Run::from).collect();
     let Ok(scales) = Scales::of(&model, &runs) else { return Vec::new() };
     let withheld: Vec<&str> = without.iter().map(String::as_str).collect();
     let hypotheses = physics::without(physics::all(&model, &scales), &withheld);

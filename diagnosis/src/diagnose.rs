@@ -65,6 +65,10 @@ pub fn diagnose(
         let text = "stands still throughout while others move: it is left out of every fit and of the verdict".to_string();
         remarks.push(Remark { weight: Weight::Caution, records: Vec::new(), signal, about: "constant", text });
     }
+    let (problem, contradicted) = problem.without_contradicted_outputs();
+    // What is measured beside its own position says more than beside a model.
+    remarks.retain(|r| !(matches!(r.about, "sign" | "unit") && contradicted.iter().any(|c| c.signal == r.signal)));
+    remarks.extend(contradicted);
     let (problem, search) = searched(problem, settings, limit, report, &mut remarks)?;
     remarks.extend(search.forces.as_ref().map(of_band));
     remarks.extend(timing(&problem, &search));

@@ -2,6 +2,7 @@
 
 use crate::problem::{Problem, Record};
 use crate::tuning::tuning;
+use backdrive_plant::set::Initial;
 
 /// Two stretches under the same excitation, and how far an output is apart in them.
 #[derive(Debug, Clone, PartialEq)]
@@ -22,10 +23,18 @@ pub struct Repeat {
 pub fn repeats(problem: &Problem) -> Vec<Repeat> {
     let mut all = Vec::new();
     for (i, a) in problem.fit.iter().enumerate() {
-        for (j, b) in problem.fit[..i].iter().enumerate() {
+        // What begins anywhere does something else under the same excitation.
+        let before = if problem.initial == Initial::Free { &[] } else { &problem.fit[..i] };
+        for (j, b) in before.iter().enumerate() {
             all.extend(recordings(a, b).into_iter().map(|(output, apart)| Repeat { record: i, of: j, output, apart, period: None }));
         }
-        all.extend(periods(a).into_iter().map(|(output, apart, period)| Repeat { record: i, of: i, output, apart, period: Some(period) }));
+        all.extend(periods(a, &problem.lag).into_iter().map(|(output, apart, period)| Repeat {
+            record: i,
+            of: i,
+            output,
+            apart,
+            period: Some(period),
+        }));
     }
     all
 }
@@ -45,7 +54,8 @@ pub fn floors(problem: &Problem, noise_sd: &[f64]) -> Vec<f64> {
 fn recordings(a: &Record, b: &Record) -> Vec<(usize, f64)> {
     let on = |samples: &[f64]| at_times_of(a, b, samples);
     let (long, short) = (a.period * a.len as f64, b.period * b.len as f64);
-    if (long / short - 1.0).abs() > 0.01 || a.inputs.is_empty() {
+    let moves = a.inputs.iter().any(|input| input.iter().any(|x| *x != input[0]));
+    if (long / short - 1.0).abs() > 0.01 || !moves {
         return Vec::new();
     }
     let same = |(x, y): (&Vec<f64>, &Vec<f64>)| is_repeated(x, &on(y));
@@ -57,12 +67,19 @@ fn recordings(a: &Record, b: &Record) -> Vec<(usize, f64)> {
 }
 
 /// Periods of a recording whose inputs repeat themselves: how far each output is apart from one to the next, and their length, s. The first one, in which the
-/// device comes to its rhythm, does not count.
-fn periods(record: &Record) -> Vec<(usize, f64, f64)> {
+/// device comes to its rhythm, does not count. Of a position that nothing holds, which may be elsewhere in each period, the displacement over `lag` samples is compared.
+fn periods(record: &Record, lag: &[usize]) -> Vec<(usize, f64, f64)> {
     let Some(length) = period_of(record) else { return Vec::new() };
     let of = |(o, samples): (usize, &Option<Vec<f64>>)| {
         let later = samples.as_deref()?.get(length..)?;
-        (later.len() > length).then(|| (o, deviation(&later[length..], later), length as f64 * record.period))
+        let lag = lag.get(o).copied().unwrap_or(0);
+        let displaced: Vec<f64> = match lag {
+            0 => later.to_vec(),
+            lag => later.iter().skip(lag).zip(later).map(|(now, then)| now - then).collect(),
+        };
+        // Both ends of a displacement have the noise of a sample.
+        let ends = if lag > 0 { std::f64::consts::SQRT_2 } else { 1.0 };
+        (displaced.len() > length).then(|| (o, deviation(&displaced[length..], &displaced) / ends, length as f64 * record.period))
     };
     record.outputs.iter().enumerate().filter_map(of).collect()
 }
@@ -142,9 +159,11 @@ mod tests {
     fn periods_of_a_periodic_excitation_are_compared_after_the_first() {
         let drift =
             record(4000, 1e-3, |t| (std::f64::consts::TAU * t / 0.5).sin(), |t| t.mul_add(0.01, (std::f64::consts::TAU * t / 0.5).cos()));
-        let found = periods(&drift);
+        let found = periods(&drift, &[0]);
         assert!((found[0].2 - 0.5).abs() < 2e-3, "{found:?}");
         assert!((found[0].1 - 0.005 / 2.0f64.sqrt()).abs() < 1e-4, "{found:?}");
-        assert!(periods(&record(4000, 1e-3, |t| (t * t).sin(), f64::sin)).is_empty());
+        // A drift of what nothing holds is no lack of repetition.
+        assert!(periods(&drift, &[20])[0].1 < 1e-3);
+        assert!(periods(&record(4000, 1e-3, |t| (t * t).sin(), f64::sin), &[0]).is_empty());
     }
 }

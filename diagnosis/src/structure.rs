@@ -68,6 +68,8 @@ pub struct FreeParameter {
     pub records: Option<Vec<usize>>,
     /// What it would be without data, and how sure that is, in the fit's own unit: holds what the recordings say nothing of.
     pub prior: Option<(f64, f64)>,
+    /// What a fit starts from where no other fit has a value.
+    pub start: f64,
 }
 
 impl FreeParameter {
@@ -165,6 +167,7 @@ impl Structure {
                     () => 1e-5 * width,
                 };
                 free.push(FreeParameter {
+                    start: 0.0,
                     role: Role::Added(h, p),
                     range: parameter.range,
                     log: parameter.log,
@@ -197,6 +200,7 @@ impl Structure {
                     step,
                     coarse: false,
                     records: Some(std::iter::once(r).chain(later).collect()),
+                    start: 0.0,
                     prior: None,
                 });
             }
@@ -218,7 +222,7 @@ impl Structure {
             Role::Condition(path, _) => own(&number.role).or_else(|| problem.model.values_at(path).ok().and_then(|v| v.first().copied())),
             Role::Position(..) | Role::Velocity(..) | Role::Knot(..) => own(&number.role),
         };
-        self.free.iter().map(|n| value(n).unwrap_or(0.0).clamp(n.range.0, n.range.1)).collect()
+        self.free.iter().map(|n| value(n).unwrap_or(n.start).clamp(n.range.0, n.range.1)).collect()
     }
 
     /// The parameters among `values` that belong to single records.
@@ -293,24 +297,40 @@ impl Structure {
         for (number, value) in self.free.iter().zip(values).filter(|(n, _)| n.records.is_some() && n.is_of(index)) {
             match &number.role {
                 Role::Condition(path, _) => own.model.to_mut().set_values_at(path, &[*value]).ok()?,
-                Role::Position(body, _) => own.starts.push((*body, *value, 0.0)),
-                Role::Velocity(body, _) => match own.starts.iter_mut().find(|s| s.0 == *body) {
-                    Some(start) => start.2 = *value,
-                    None => own.starts.push((*body, 0.0, *value)),
-                },
-                Role::Stated(_) | Role::Added(..) | Role::Knot(..) => {}
+                Role::Position(..) | Role::Velocity(..) | Role::Stated(_) | Role::Added(..) | Role::Knot(..) => {}
             }
         }
+        own.starts = self.starts(values, index);
         let curve =
             |(u, unknown): (usize, &Unknown)| (unknown.input, unknown.curve(&self.weights(values, u, index).collect::<Vec<_>>(), record));
         own.curves = problem.unknown.iter().enumerate().map(curve).collect();
         Some(own)
     }
 
-    /// Records with the curves that values give the inputs which nobody measured.
+    /// How bodies begin in a record whose start is free, by these values.
+    fn starts(&self, values: &[f64], record: usize) -> Vec<Start> {
+        let mut starts: Vec<Start> = Vec::new();
+        for (number, value) in self.free.iter().zip(values).filter(|(n, _)| n.records.is_some() && n.is_of(record)) {
+            match number.role {
+                Role::Position(body, _) => starts.push((body, *value, 0.0)),
+                Role::Velocity(body, _) => match starts.iter_mut().find(|s| s.0 == body) {
+                    Some(start) => start.2 = *value,
+                    None => starts.push((body, 0.0, *value)),
+                },
+                Role::Condition(..) | Role::Stated(_) | Role::Added(..) | Role::Knot(..) => {}
+            }
+        }
+        starts
+    }
+
+    /// Records with the starts that values give them, and the curves of inputs which nobody measured.
     pub fn with_unknown(&self, problem: &Problem, records: &[Record], values: &[f64]) -> Vec<Record> {
         let mut seen = records.to_vec();
         for (r, record) in seen.iter_mut().enumerate() {
+            let starts = self.starts(values, r);
+            if !starts.is_empty() {
+                record.begins = starts;
+            }
             for (index, unknown) in problem.unknown.iter().enumerate() {
                 let weights: Vec<f64> = self.weights(values, index, r).collect();
                 let samples = unknown.curve(&weights, record);
@@ -347,7 +367,7 @@ fn stated_number(index: usize, stated: &Stated) -> FreeParameter {
     let centre = if log { stated.given.ln() } else { stated.given };
     let spread = if log { tuning().fit.prior } else { 2.0 * stated.given.abs() };
     let step = if log { tuning().fit.difference } else { tuning().fit.difference * stated.given.abs() };
-    FreeParameter { role: Role::Stated(index), range, log, step, coarse: false, records: None, prior: Some((centre, spread)) }
+    FreeParameter { role: Role::Stated(index), range, log, step, coarse: false, records: None, prior: Some((centre, spread)), start: 0.0 }
 }
 
 /// The weights of the unknown inputs in a record.
@@ -361,6 +381,7 @@ fn knots<'a>(problem: &'a Problem, record: &'a Record, r: usize) -> impl Iterato
             step: tuning().fit.difference * size,
             coarse: false,
             records: Some(vec![r]),
+            start: 0.0,
             prior: Some((0.0, 0.01 * tuning().fit.unknown_range * size)),
         })
     })
@@ -382,7 +403,9 @@ fn start_numbers(problem: &Problem, record: &Record, r: usize) -> Vec<FreeParame
     let size = if size > 0.0 { size } else { 1.0 };
     let free = (0..model.bodies.len()).filter(|b| !model.inputs.iter().any(|i| i.kind == InputKind::Motion && i.on == *b));
     free.flat_map(|body| {
-        let number = |role, width: f64| FreeParameter {
+        let [position, velocity] = measured_start(model, record, body).map_or([0.0; 2], |start| start);
+        let number = |role, width: f64, start: f64| FreeParameter {
+            start,
             role,
             range: (-width, width),
             log: false,
@@ -392,9 +415,24 @@ fn start_numbers(problem: &Problem, record: &Record, r: usize) -> Vec<FreeParame
             prior: Some((0.0, tuning().fit.start_prior * width)),
         };
         let speed = size / (tuning().fit.start_range * record.period);
-        [number(Role::Position(body, r), tuning().fit.start_range * size), number(Role::Velocity(body, r), speed)]
+        [number(Role::Position(body, r), tuning().fit.start_range * size, position), number(Role::Velocity(body, r), speed, velocity)]
     })
     .collect()
+}
+
+/// Position and velocity with which a body begins, by a parabola through the first samples of its position; `None` where that was not recorded.
+fn measured_start(model: &Model, record: &Record, body: usize) -> Option<[f64; 2]> {
+    use backdrive_plant::model::OutputKind;
+    let (output, samples) = model.outputs.iter().zip(&record.outputs).find_map(|(output, samples)| match output.kind {
+        OutputKind::Position(own) if own == body && output.gain != 0.0 => Some((output, samples.as_deref()?)),
+        _ => None,
+    })?;
+    let first = samples.get(..tuning().fit.start_samples.min(samples.len()))?;
+    let time = |i: usize| i as f64 * record.period;
+    let regressor = nalgebra::DMatrix::from_fn(first.len(), 3, |i, power| time(i).powi(power as i32));
+    let measured = nalgebra::DVector::from_iterator(first.len(), first.iter().map(|y| (y - output.offset) / output.gain));
+    let found = regressor.svd(true, true).solve(&measured, 0.0).ok()?;
+    Some([found[0], found[1]]).filter(|start| start.iter().all(|x| x.is_finite()))
 }
 
 fn set(model: &mut Model, path: &str, index: usize, value: f64) -> Option<()> {

@@ -3,10 +3,13 @@
 #[path = "../../tests/common/skipped.rs"]
 mod skipped;
 
+use backdrive_diagnosis::audit;
+use backdrive_diagnosis::compare::mean_squares;
 use backdrive_diagnosis::diagnose::{Diagnosis, diagnose};
 use backdrive_diagnosis::hypothesis::Family;
 use backdrive_diagnosis::problem::Problem;
 use backdrive_diagnosis::search::Settings;
+use backdrive_diagnosis::structure::Structure;
 use backdrive_diagnosis::verdict::Parameter;
 use std::path::{Path, PathBuf};
 
@@ -99,4 +102,49 @@ fn play_behind_a_spring_is_found() {
     near(number(&found, "backlash", "gap"), 0.0349, 0.15);
     let held = &found.verdict.held_out;
     assert!(held.nrmse_after.unwrap() < 0.5 && held.nrmse_before.unwrap() > 1.0, "{held:?}");
+}
+
+#[test]
+fn a_speed_that_contradicts_its_position_is_told_and_left_out() {
+    let Some(folder) = case("03-speed-column-against-position") else { return };
+    for (set, gain) in [("set.toml", "3.33 times"), ("set-sign.toml", "-1 times")] {
+        let found = diagnose(Problem::open(&folder.join(set), None).unwrap(), &Settings::default(), None, &|_| ()).unwrap();
+        let told = found.remarks.iter().find(|r| r.about == "velocity").unwrap();
+        assert!(told.signal == "speed" && told.text.contains(gain), "{told}");
+        near(number(&found, "coulomb", "force"), 4.0e-3, 0.02);
+        assert!(!found.remarks.iter().any(|r| r.about == "repeats" && r.text.contains("no model can do better")), "{:?}", found.remarks);
+    }
+}
+
+#[test]
+fn a_speed_off_by_a_factor_and_a_lag_ends_the_question() {
+    let Some(folder) = case("04-speed-column-scaled-real") else { return };
+    let problem = Problem::open(&folder.join("set.toml"), None).unwrap();
+    let told = audit::usable(&problem).unwrap_err();
+    // SciPy, zero-phase Butterworth at 8 Hz on even times: the velocity is 3.25 and 3.27 times the derivative, 42 ms late, in the two files.
+    assert!(told.contains("Velocity is 3.2") && told.contains("lags the derivative of CurrentPosition by 42 ms"), "{told}");
+    let alone = problem.without_named_outputs(|name| name == "Velocity").unwrap();
+    audit::usable(&alone).unwrap();
+}
+
+#[test]
+fn free_swings_are_no_repeats_and_tell_their_friction() {
+    let Some(folder) = case("38-free-swings-said-to-repeat") else { return };
+    let found = diagnosed(&folder);
+    near(number(&found, "coulomb", "force"), 1.0e-3, 0.05);
+    assert!(found.verdict.held_out.nrmse_after.unwrap() < 6e-4);
+    assert!(!found.remarks.iter().any(|r| r.about == "repeats"), "{:?}", found.remarks);
+}
+
+#[test]
+fn the_start_of_a_held_out_swing_stands_in_its_first_samples() {
+    let Some(folder) = case("37-start-of-held-out-swing-not-found") else { return };
+    let problem = Problem::open(&folder.join("set.toml"), None).unwrap();
+    let structure = Structure::new(&problem, &problem.fit, Vec::new());
+    // The true numbers, by the case's generator.
+    let known = |path: &str| if path == "elements.dry.force" { 1.0e-3 } else { f64::NAN };
+    let stated: Vec<f64> = problem.stated.iter().map(|s| if known(&s.path).is_nan() { s.given } else { known(&s.path) }).collect();
+    let values = structure.values(&problem, &stated, &[], &[]);
+    let left = mean_squares(&problem, &problem.held_out, &structure, &values).unwrap();
+    assert!(left[0].sqrt() < 1.2 * 3e-4, "{left:?}");
 }

@@ -1,8 +1,9 @@
 //! What each signal probably is, from its name and from the data, with how surely.
 
-use crate::numeric::{follow, span, thinned};
+use crate::numeric::{span, thinned};
 use crate::quantity::Quantity;
 use crate::recording::{Recording, Signal};
+use backdrive_diagnosis::follow::follow;
 use backdrive_diagnosis::low_pass::derivative;
 
 /// Share of variance from which on data alone say what a signal is.

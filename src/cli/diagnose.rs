@@ -36,14 +36,15 @@ pub struct Diagnose {
     /// The grip that holds the nominal model, where it holds no hand itself; `none` for no hand.
     #[arg(long, value_name = "FILE|none")]
     pub grip: Option<PathBuf>,
-    /// A recorded input that may have no place in the model, such as a hand that was at rest; may be given several times. In set.toml:
-    /// ignore = ["NAME"].
+    /// A recorded signal that is not used: an input that has no place in the model, such as a hand that was at rest, or an output that is not
+    /// compared; may be given several times. In set.toml: ignore = ["NAME"].
     #[arg(long, value_name = "NAME")]
     pub ignore_signal: Vec<String>,
     /// A physics that is not to be considered, and with it all that contain it as a special case; may be given several times.
     #[arg(long, value_name = "KIND", value_parser = physics)]
     pub without: Vec<String>,
-    /// How many physics may be missing at once, at most; more take more time. Without this 3, of an arm 8.
+    /// How many physics may be missing at once, at most; more take more time. Without this 3, of an arm 8
+    /// beside constant, dry and viscous friction and armature.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=8))]
     pub effects: Option<u8>,
     /// How much to search, as a multiple of the default (1), which takes up to about 20 s on two cores. The verdict depends on this alone, and is the same

@@ -6,11 +6,13 @@ mod remark;
 mod set;
 mod signals;
 mod units;
+mod velocities;
 
 pub use rates::rates;
 pub(crate) use remark::file_name;
 pub use remark::{Remark, Weight};
 pub use signals::limits_reached;
+pub use velocities::{Contradiction, contradictions};
 
 use crate::problem::{Problem, Record};
 use backdrive_plant::model::InputKind;
@@ -69,6 +71,10 @@ pub fn usable(problem: &Problem) -> Result<(), String> {
     }
     if let Some(text) = rates::unit_of_time(problem) {
         return Err(text);
+    }
+    if let Some(wrong) = contradictions(problem).into_iter().find(|wrong| wrong.is_both) {
+        let signal = &model.outputs[wrong.output].name;
+        return Err(format!("{}: {signal} {}", wrong.file, wrong.text));
     }
     match units::remarks(problem).into_iter().find(|r| r.weight == Weight::Unusable) {
         Some(remark) => Err(format!("{first}: {remark}")),

@@ -26,7 +26,7 @@ pub struct Remark {
     /// The signal; empty where it is about the clock.
     pub signal: String,
     /// What was looked at: `clock`, `gaps`, `short`, `missing`, `constant`, `outliers`, `encoder`, `filtered`, `saturated`, `sign`, `unit`, `loop`,
-    /// `repeats`, `noise`, `timing`, `hold`, `thinned`.
+    /// `repeats`, `noise`, `timing`, `hold`, `thinned`, `velocity`.
     pub about: &'static str,
     /// One clause; of several recordings that of the first.
     pub text: String,

@@ -1,7 +1,7 @@
 //! Every law that can be looked at on forces along a motion, as columns beside those of the nominal model's own numbers.
 
 use super::gram::{Gram, Sum};
-use crate::hypothesis::{Family, ForceSpan, Hypothesis, Scales, Seen, apply_edits};
+use crate::hypothesis::{Family, ForceSpan, Hypothesis, Run, Scales, Seen, apply_edits};
 use crate::physics;
 use crate::problem::{Problem, Record};
 use crate::simulate::predict;
@@ -66,7 +66,7 @@ struct Stated {
 
 /// How far the model moves and pushes on the recordings.
 fn scales(problem: &Problem) -> Option<Scales> {
-    let runs: Vec<(Vec<Vec<f64>>, f64)> = problem.fit.iter().map(|r| (r.inputs.clone(), r.period)).collect();
+    let runs: Vec<Run> = problem.fit.iter().map(Run::from).collect();
     let largest = |output: usize| {
         let samples = problem.fit.iter().filter_map(|r| r.outputs.get(output)?.as_deref()).flatten();
         samples.fold(0.0f64, |most, y| most.max(y.abs()))

@@ -82,7 +82,7 @@ impl<'a> Planner<'a> {
         let lengths = problem.fit.iter().map(|r| (r.len as f64 * r.period, r.period));
         let longest = lengths.max_by(|a, b| a.0.total_cmp(&b.0));
         let Some((longest, period)) = longest.filter(|_| ranges.iter().any(Option::is_some)) else {
-            return Err(Reason("no input moves in any recording, so nothing says what the device stands".to_string()));
+            return Err(Reason("no input moves in any recording, so no excitation can be planned".to_string()));
         };
         let end = |share: f64| budget.spent() + (share * budget.left() as f64) as Steps;
         let ends = (end(tuning().experiment.shares[0]), end(tuning().experiment.shares[1]));

@@ -5,7 +5,7 @@ use super::*;
 use crate::candidate::{Candidate, candidate};
 use crate::evaluator::Evaluator;
 use crate::fit::Fit;
-use crate::hypothesis::{Hypothesis, Scales};
+use crate::hypothesis::{Hypothesis, Run, Scales};
 use crate::intervals::Uncertainty;
 use crate::physics;
 use crate::problem::{Problem, Record};
@@ -83,7 +83,7 @@ fn problem(nominal: &str, truth: &str, column: Vec<f64>, noise: f64) -> Problem 
 }
 
 fn hypotheses(problem: &Problem) -> Vec<Hypothesis> {
-    let runs: Vec<(Vec<Vec<f64>>, f64)> = problem.fit.iter().map(|r| (r.inputs.clone(), r.period)).collect();
+    let runs: Vec<Run> = problem.fit.iter().map(Run::from).collect();
     physics::all(&problem.model, &Scales::of(&problem.model, &runs).unwrap())
 }
 

@@ -11,7 +11,7 @@ mod starts;
 mod types;
 
 pub use apply::apply_edits;
-pub use scales::{Scales, Span};
+pub use scales::{Run, Scales, Span};
 pub(crate) use sites::is_seen;
 pub(crate) use starts::{inherited, refined, starts_beside};
 pub use types::{Against, Facts, Family, Hypothesis, HypothesisError, Mark, Parameter, Physics, Place, State};

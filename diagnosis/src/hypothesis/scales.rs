@@ -1,5 +1,6 @@
 //! How far, how fast and how hard things move: what parameters are measured against.
 
+use crate::problem::Record;
 use crate::tuning::tuning;
 use backdrive_plant::model::{InputKind, Model, OutputKind};
 use backdrive_plant::stepper::{CompileError, Options, Plant, Segment, ahead, segments};
@@ -48,21 +49,38 @@ impl Sum {
     }
 }
 
+/// What drives a model, for its scales.
+#[derive(Debug, Clone, Default)]
+pub struct Run {
+    /// Samples of each input, in the model's order.
+    pub inputs: Vec<Vec<f64>>,
+    /// Sample time, s.
+    pub period: f64,
+    /// Bodies that do not start at rest at 0: body, position in m or rad, velocity in m/s or rad/s.
+    pub begins: Vec<(usize, f64, f64)>,
+}
+
+impl From<&Record> for Run {
+    fn from(record: &Record) -> Run {
+        Run { inputs: record.inputs.clone(), period: record.period, begins: record.begins.clone() }
+    }
+}
+
 impl Scales {
-    /// Scales of a model on runs: the samples of each input in the model's order, and the sample time, s.
+    /// Scales of a model on runs.
     ///
     /// Where the model runs away, what came before counts.
     ///
     /// # Errors
     /// When the model cannot be simulated.
-    pub fn of(model: &Model, runs: &[(Vec<Vec<f64>>, f64)]) -> Result<Scales, CompileError> {
+    pub fn of(model: &Model, runs: &[Run]) -> Result<Scales, CompileError> {
         let (n, elements) = (model.bodies.len(), model.elements.len());
         let mut motion = vec![[Sum::default(); 3]; (n + 1) * (n + 1)];
         let mut forces = vec![Sum::default(); elements];
         let mut inputs = vec![Sum::default(); model.inputs.len()];
         let mut outputs = vec![Sum::default(); model.outputs.len()];
         let (mut count, mut shortest, mut longest) = (0, f64::INFINITY, 0.0_f64);
-        for (columns, period) in runs {
+        for Run { inputs: columns, period, begins } in runs {
             if let Some(missing) = model.inputs.get(columns.len()) {
                 return Err(CompileError::MissingInput(missing.name.clone()));
             }
@@ -75,6 +93,7 @@ impl Scales {
             let driven: Vec<Vec<Segment>> =
                 model.inputs.iter().zip(columns).map(|(i, c)| segments(i.hold, &c[..samples], *period)).collect();
             plant.start_at(&columns.iter().map(|c| c.first().copied().unwrap_or(0.0)).collect::<Vec<_>>());
+            begins.iter().for_each(|(body, position, velocity)| plant.set_motion(*body, *position, *velocity));
             let mut now = vec![Segment::default(); columns.len()];
             let mut read = vec![0.0; model.outputs.len()];
             for k in 0..samples {

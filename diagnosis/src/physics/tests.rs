@@ -1,7 +1,7 @@
 //! All hypotheses on all devices: what they do to a model and to its file, and whether it still moves.
 
 use super::*;
-use crate::hypothesis::{Against, Family, HypothesisError, Parameter, refined, starts_beside};
+use crate::hypothesis::{Against, Family, HypothesisError, Parameter, Run, refined, starts_beside};
 use backdrive_plant::elements::KINDS;
 use backdrive_plant::model::{InputKind, OutputKind};
 use backdrive_plant::stepper::{Options, simulate};
@@ -51,9 +51,13 @@ fn run(model: &Model) -> (Vec<Vec<f64>>, f64) {
     (inputs.map(|(i, input)| sine(if input.kind == InputKind::Force { force } else { 2e-3 }, 9.0 + i as f64)).collect(), period)
 }
 
+fn driven((inputs, period): &(Vec<Vec<f64>>, f64)) -> Run {
+    Run { inputs: inputs.clone(), period: *period, begins: Vec::new() }
+}
+
 fn hypotheses(model: &Model) -> (Vec<Hypothesis>, (Vec<Vec<f64>>, f64)) {
     let run = run(model);
-    let scales = Scales::of(model, std::slice::from_ref(&run)).expect("the device moves");
+    let scales = Scales::of(model, &[driven(&run)]).expect("the device moves");
     (all(model, &scales), run)
 }
 
@@ -243,7 +247,7 @@ fn play_takes_a_share_of_the_deflection_that_the_joint_has() {
         [[outputs]]\nname = 'y'\nkind = 'position'\nof = 'a'\n";
     let model = Model::from_toml(text, "a").expect("a model");
     let runs = [run(&model)];
-    let scales = Scales::of(&model, &runs).expect("the device moves");
+    let scales = Scales::of(&model, &runs.clone().map(|run| driven(&run))).expect("the device moves");
     let peak = scales.motion([Some(0), Some(1)])[0].peak;
     let hypotheses = all(&model, &scales);
     let backlash = hypotheses.iter().find(|h| h.id == "backlash@a-b").expect("proposed");

@@ -17,6 +17,7 @@ pub use record::Record;
 pub(crate) use record::spread;
 pub use stated::Stated;
 
+use crate::audit::{Remark, contradictions};
 use crate::hypothesis::Place;
 use crate::noise;
 use crate::tuning::tuning;
@@ -160,8 +161,37 @@ impl Problem {
             return (self, Vec::new());
         }
         let names = still.iter().map(|output| self.model.outputs[*output].name.clone()).collect();
-        let without = |records: Vec<Record>| -> Vec<Record> { records.into_iter().map(|record| record.without_outputs(&still)).collect() };
-        (Problem { fit: without(self.fit), held_out: without(self.held_out), ..self }, names)
+        (self.without_outputs(&still), names)
+    }
+
+    /// The same without the velocities that contradict the positions of their bodies, and what is to be said of each: the position is a measurement of the same.
+    pub fn without_contradicted_outputs(self) -> (Problem, Vec<Remark>) {
+        let wrong = contradictions(&self);
+        let remarks = wrong.iter().map(|contradiction| contradiction.remark(&self)).collect();
+        let places: Vec<usize> = wrong.iter().map(|contradiction| contradiction.output).collect();
+        (self.without_outputs(&places), remarks)
+    }
+
+    /// The same without the outputs of these names.
+    ///
+    /// # Errors
+    /// One sentence where none would be left.
+    pub fn without_named_outputs(self, is_ignored: impl Fn(&str) -> bool) -> Result<Problem, String> {
+        let measured = |output: &usize| self.fit.iter().any(|r| r.outputs.get(*output).is_some_and(Option::is_some));
+        let (ignored, left): (Vec<usize>, Vec<usize>) =
+            (0..self.model.outputs.len()).filter(measured).partition(|output| is_ignored(&self.model.outputs[*output].name));
+        if ignored.is_empty() {
+            return Ok(self);
+        }
+        if left.is_empty() {
+            return Err("every output that was recorded is ignored: nothing is left to compare the model with".to_string());
+        }
+        Ok(self.without_outputs(&ignored))
+    }
+
+    fn without_outputs(self, places: &[usize]) -> Problem {
+        let without = |records: Vec<Record>| -> Vec<Record> { records.into_iter().map(|record| record.without_outputs(places)).collect() };
+        Problem { fit: without(self.fit), held_out: without(self.held_out), ..self }
     }
 }
 

@@ -9,7 +9,7 @@ use crate::error_budget::of_driving_motion;
 use crate::evaluator::Evaluator;
 use crate::excerpts::Excerpts;
 use crate::fit::Fit;
-use crate::hypothesis::Scales;
+use crate::hypothesis::{Run, Scales};
 use crate::noise;
 use crate::problem::{Problem, Record};
 use crate::screen::worst_records;
@@ -204,7 +204,7 @@ fn at_middle<'a>(evaluator: &Evaluator<'a>) -> Evaluator<'a> {
 
 /// How far a model moves on the recordings.
 fn scales(problem: &Problem, model: &Model, seen: &[Record]) -> Result<Scales, SearchError> {
-    let runs: Vec<(Vec<Vec<f64>>, f64)> = seen.iter().map(|r| (r.inputs.clone(), r.period)).collect();
+    let runs: Vec<Run> = seen.iter().map(Run::from).collect();
     let largest = |output: usize| {
         let samples = problem.fit.iter().filter_map(|r| r.outputs.get(output)?.as_deref()).flatten();
         samples.fold(0.0_f64, |most, y| most.max(y.abs()))

@@ -1,11 +1,12 @@
 //! A position beside its command: unit, sign, scale, which of the two is which.
 
-use super::motion::{Band, excitation, of};
+use super::motion::{band_of, excitation, of};
 use crate::advice;
 use crate::finding::{Finding, FindingKind, Weight};
 use crate::joints::Joint;
-use crate::numeric::{Follow, Profile, follow, quantile, width};
+use crate::numeric::{quantile, width};
 use crate::recording::{Recording, Signal};
+use backdrive_diagnosis::follow::{Follow, Profile, follow};
 use backdrive_diagnosis::low_pass::LowPass;
 
 /// Lags that are tried: a command may be this late, and the position this early (columns exchanged), s.
@@ -40,7 +41,7 @@ const ALL_BUT: f64 = 0.97;
 
 /// Finds what is wrong.
 pub fn check(recording: &Recording, joints: &[Joint], out: &mut Vec<Finding>) {
-    let band = Band::of(recording);
+    let band = band_of(recording);
     for joint in joints {
         let (Some(command), Some(position)) = (of(recording, joint.command), of(recording, joint.position)) else { continue };
         let Some(place) = joint.position else { continue };

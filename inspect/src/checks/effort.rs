@@ -2,12 +2,14 @@
 //!
 //! The torque is regressed on what any joint asks for: inertia, viscous and dry friction, weight and a spring. The lag is where that explains most.
 
-use super::motion::{Band, excitation, of};
+use super::motion::{excitation, of};
 use crate::advice;
 use crate::finding::{Finding, FindingKind};
 use crate::joints::Joint;
-use crate::numeric::{deviation, extremes, student};
+use crate::numeric::{deviation, extremes};
 use crate::recording::Recording;
+use backdrive_diagnosis::follow::student;
+use backdrive_diagnosis::kinematics::Band;
 use backdrive_diagnosis::low_pass::derivative;
 use nalgebra::{SMatrix, SVector};
 
@@ -108,7 +110,7 @@ struct Regression {
 
 impl Regression {
     fn new(recording: &Recording, joint: &Joint, place: usize) -> Option<Regression> {
-        let band = Band::up_to(recording, CORNER_HZ);
+        let band = Band::up_to(CORNER_HZ, recording.period, recording.rate());
         let position = of(recording, joint.position).filter(|signal| excitation(signal) > 30.0)?;
         let drive = of(recording, Some(place))?;
         let (q, y) = (band.smooth(&position.even), band.smooth(&drive.even));

@@ -1,12 +1,13 @@
 //! Columns of two joints that are exchanged.
 
-use super::motion::{Band, excitation, of};
+use super::motion::{band_of, excitation, of};
 use crate::advice;
 use crate::finding::{Finding, FindingKind};
 use crate::joints::Joint;
-use crate::numeric::{follow, thinned};
+use crate::numeric::thinned;
 use crate::quantity::Quantity;
 use crate::recording::Recording;
+use backdrive_diagnosis::follow::follow;
 
 /// Rate at which joints are compared, Hz, and lags that are tried, s.
 const COARSE_HZ: f64 = 25.0;
@@ -20,7 +21,7 @@ pub fn check(recording: &Recording, joints: &[Joint], out: &mut Vec<Finding>) {
     if joints.len() < 2 {
         return;
     }
-    let band = Band::of(recording);
+    let band = band_of(recording);
     let stride = ((1.0 / (COARSE_HZ * band.period)) as usize).max(1);
     let coarse = |values: Vec<f64>| thinned(&values, stride);
     let late = (LATE_S / (band.period * stride as f64)) as i64;

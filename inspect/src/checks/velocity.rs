@@ -1,48 +1,41 @@
 //! A velocity beside the derivative of its position.
 
-use super::motion::{Band, excitation, of};
+use super::motion::{band_of, excitation, of};
 use crate::advice;
 use crate::finding::{Finding, FindingKind, Weight};
 use crate::joints::Joint;
-use crate::numeric::{Profile, follow};
 use crate::recording::Recording;
+use backdrive_diagnosis::follow::follow;
+use backdrive_diagnosis::kinematics::{Band, EXPLAINED, Kinematics};
 
-/// Lags that are tried, s.
-const LAGS_S: f64 = 0.25;
-/// From this share of the variance on a velocity is that of the position.
-const EXPLAINED: f64 = 0.8;
 /// Below this one it is not, where both move far beyond their noise.
 const UNEXPLAINED: f64 = 0.4;
 const MOVES: f64 = 30.0;
-/// A factor off by more than this is a unit or a scale; filters and noise make less.
-const FACTOR: f64 = 0.12;
 /// A factor this near to a unit's is the unit's.
 const NEAR: f64 = 0.04;
+/// A lag from here on is worth a note where its interval holds 0, s.
+const UNSURE_S: f64 = 0.012;
+/// Of exchanged columns the factor is this near to 1.
+const EXCHANGED: f64 = 0.12;
 /// Columns are exchanged where the rest is smaller by this factor the other way round.
 const BETTER: f64 = 0.3;
-/// A lag of a drive's own filter is up to some ms; from here on it spoils damping and friction (at 5 Hz, 12 ms turn 20 degrees).
-const LAG_S: f64 = 0.012;
-const LAG_SAMPLES: f64 = 1.2;
-
 /// Finds what is wrong.
 pub fn check(recording: &Recording, joints: &[Joint], out: &mut Vec<Finding>) {
-    let band = Band::of(recording);
+    let band = band_of(recording);
     for joint in joints {
         let (Some(position), Some(velocity)) = (of(recording, joint.position), of(recording, joint.velocity)) else { continue };
         let Some(place) = joint.velocity else { continue };
         if excitation(position) < MOVES || excitation(velocity) < 5.0 {
             continue;
         }
-        let (rate, told) = (band.rate(&position.even), band.smooth(&velocity.even));
-        let profile = Profile::new(&rate, &told, (-band.samples(LAGS_S), band.samples(LAGS_S)), None);
-        let Some(found) = profile.best(None) else { continue };
+        let Some(found) = Kinematics::of(&position.even, &velocity.even, &band) else { continue };
         let names = [velocity.name.as_str(), position.name.as_str()];
         let new = |kind: FindingKind, message: String| Finding::new(kind, &recording.file, &names, message).at(&joint.name);
         if let Some(turned) = exchanged(recording, joint, &band, &names, found.explained) {
             out.push(turned);
             continue;
         }
-        if found.explained < EXPLAINED {
+        if !found.is_explained() {
             if found.explained < UNEXPLAINED && excitation(velocity) > MOVES {
                 out.push(no_derivative(recording, joint, &band, &names));
             }
@@ -59,14 +52,13 @@ pub fn check(recording: &Recording, joints: &[Joint], out: &mut Vec<Finding>) {
             let unit = if size > 1.0 { "unit = \"deg/s\"" } else { "unit = \"deg\"" };
             let message = format!("{:?} is {size:.4} times the derivative of {:?}: {which:?} is in degrees", names[0], names[1]);
             out.push(new(FindingKind::WrongUnit, message).todo(advice::entry(recording, joint, at, unit)));
-        } else if (size - 1.0).abs() > FACTOR {
+        } else if found.is_scaled() {
             let message = format!("{:?} is {size:.4} times the derivative of {:?}", names[0], names[1]);
             let todo = advice::entry(recording, joint, place, &format!("scale = {:.4}", 1.0 / size));
             out.push(new(FindingKind::WrongScale, message).todo(todo));
         }
-        let lag = found.lag * band.period;
-        let wide = profile.uncertainty().map_or(f64::INFINITY, |half| half * band.period);
-        if lag.abs() > LAG_S.max(LAG_SAMPLES * recording.period) && lag.abs() - wide > 0.5 * recording.period {
+        let (lag, wide) = (found.lag_s, found.half_s);
+        if found.is_shifted() {
             let (word, what) = if lag > 0.0 { ("lags", "a filter or an older sample") } else { ("leads", "the position is the older one") };
             let message = format!(
                 "{:?} {word} the derivative of {:?} by {:.0} ms (95 % interval ±{:.0} ms): {what}",
@@ -80,7 +72,7 @@ pub fn check(recording: &Recording, joints: &[Joint], out: &mut Vec<Finding>) {
                 -lag / recording.period
             );
             out.push(new(FindingKind::VelocityLag, message).todo(todo));
-        } else if lag.abs() > LAG_S.max(recording.period) {
+        } else if lag.abs() > UNSURE_S.max(recording.period) {
             let message = format!("{:?} is {:.0} ms beside the derivative of {:?}", names[0], 1e3 * lag, names[1]);
             out.push(new(FindingKind::VelocityLag, message).weighing(Weight::Note).todo("nothing; the interval holds 0").sure(0.5));
         }
@@ -112,7 +104,7 @@ fn exchanged(recording: &Recording, joint: &Joint, band: &Band, names: &[&str; 2
     let (position, velocity) = (&recording.signals[joint.position?], &recording.signals[joint.velocity?]);
     let found = follow(&band.rate(&velocity.even), &band.smooth(&position.even), (-2, 2))?;
     let is_better = 1.0 - found.explained < BETTER * (1.0 - straight);
-    (found.explained > EXPLAINED && is_better && (found.gain - 1.0).abs() < FACTOR).then_some(())?;
+    (found.explained > EXPLAINED && is_better && (found.gain - 1.0).abs() < EXCHANGED).then_some(())?;
     let message = format!("{:?} is the derivative of {:?}: the two columns are exchanged", names[1], names[0]);
     let table = advice::table_name(joint.title());
     let (a, b) = (advice::source(recording, velocity, ""), advice::source(recording, position, ""));

@@ -2,8 +2,9 @@
 
 use super::types::Interval;
 use crate::joints::Joint;
-use crate::numeric::{deviation, mean, median, span, student};
+use crate::numeric::{deviation, mean, median, span};
 use crate::recording::Recording;
+use backdrive_diagnosis::follow::student;
 use backdrive_diagnosis::noise;
 
 /// A command is held where it stays within this share of its range, for at least so many seconds and lags.

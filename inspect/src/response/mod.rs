@@ -6,8 +6,9 @@ mod rate_limit;
 mod types;
 
 use crate::joints::Joint;
-use crate::numeric::{Profile, span, thinned};
+use crate::numeric::{span, thinned};
 use crate::recording::Recording;
+use backdrive_diagnosis::follow::Profile;
 use backdrive_diagnosis::low_pass::derivative;
 
 pub use rate_limit::RateLimit;

@@ -213,7 +213,7 @@ pub struct RecordErrors {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Remark {
     /// What was looked at: `clock`, `gaps`, `short`, `missing`, `constant`, `outliers`, `encoder`, `filtered`, `saturated`, `sign`, `unit`, `loop`,
-    /// `repeats`, `noise`, `timing`, `hold`, `thinned`.
+    /// `repeats`, `noise`, `timing`, `hold`, `thinned`, `velocity`.
     pub what: String,
     /// Recordings, signal, or both.
     #[serde(rename = "where")]

@@ -1,0 +1,83 @@
+//! Velocities beside the derivatives of the positions of the same bodies: where they contradict each other, one of the two columns is wrong.
+
+use super::remark::{Remark, Weight, file_name};
+use crate::kinematics::{Band, Kinematics};
+use crate::problem::{Problem, Record};
+use backdrive_plant::model::OutputKind;
+use backdrive_plant::write::round_significant;
+
+/// From so many times its noise on a position moves far enough to be differentiated.
+const MOVES: f64 = 30.0;
+
+/// A velocity that is not what its position says.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Contradiction {
+    /// The velocity, by its place among the outputs.
+    pub output: usize,
+    /// What was seen and what to do, as a clause.
+    pub text: String,
+    /// Whether neither a factor nor a lag alone puts it right, so that nothing says which of the two columns can be believed.
+    pub is_both: bool,
+    /// The file where it was seen first.
+    pub file: String,
+}
+
+/// Every velocity that contradicts the position of its body in all recordings that tell.
+pub fn contradictions(problem: &Problem) -> Vec<Contradiction> {
+    let outputs = &problem.model.outputs;
+    let position_of = |body: usize| outputs.iter().position(|o| matches!(o.kind, OutputKind::Position(own) if own == body));
+    let of = |(velocity, output): (usize, &backdrive_plant::model::Output)| {
+        let OutputKind::Velocity(body) = output.kind else { return None };
+        let position = position_of(body)?;
+        let seen: Vec<(&Record, Kinematics)> =
+            problem.fit.iter().chain(&problem.held_out).filter_map(|r| Some((r, seen(r, position, velocity, problem)?))).collect();
+        let first = seen.first()?;
+        let (turned, scaled, shifted) =
+            (seen.iter().all(|(_, k)| k.gain < 0.0), seen.iter().all(|(_, k)| k.is_scaled()), seen.iter().all(|(_, k)| k.is_shifted()));
+        if !turned && !scaled && !shifted {
+            return None;
+        }
+        let (name, of) = (&output.name, &outputs[position].name);
+        let middle = |value: &dyn Fn(&Kinematics) -> f64| seen.iter().map(|(_, k)| value(k)).sum::<f64>() / seen.len() as f64;
+        let gain = middle(&|k| k.gain);
+        let mut parts = Vec::new();
+        if turned || scaled {
+            parts.push(format!("is {} times the derivative of {of}", round_significant(gain, 3)));
+        }
+        if shifted {
+            let lag = middle(&|k| k.lag_s);
+            let word = if lag > 0.0 { "lags" } else { "leads" };
+            parts.push(format!("{word} the derivative of {of} by {:.0} ms", 1e3 * lag.abs()));
+        }
+        let is_both = scaled && shifted;
+        let todo = match is_both || shifted {
+            false => format!(
+                "{name} is left out, and computed from {of} where it is needed; where {of} is right, say scale = {} times what it is for {name} under [columns] of set.toml",
+                round_significant(1.0 / gain, 3)
+            ),
+            true if is_both => format!(
+                "one of the two is not what its name says: find out which, and leave that column out with --ignore-signal {name} or --ignore-signal {of}"
+            ),
+            true => format!("{name} is left out, and computed from {of} where it is needed"),
+        };
+        let text = format!("{}: {todo}", parts.join(", and "));
+        Some(Contradiction { output: velocity, text, is_both, file: file_name(&first.0.name).to_string() })
+    };
+    outputs.iter().enumerate().filter_map(of).collect()
+}
+
+impl Contradiction {
+    /// As a remark of the audit.
+    pub fn remark(&self, problem: &Problem) -> Remark {
+        let signal = problem.model.outputs.get(self.output).map_or(String::new(), |o| o.name.clone());
+        Remark { weight: Weight::Caution, records: Vec::new(), signal, about: "velocity", text: self.text.clone() }
+    }
+}
+
+/// How a velocity follows its position in a recording; `None` where too little moves to tell, and where the one is not the other's derivative at all.
+fn seen(record: &Record, position: usize, velocity: usize, problem: &Problem) -> Option<Kinematics> {
+    let (x, v) = (record.outputs.get(position)?.as_deref()?, record.outputs.get(velocity)?.as_deref()?);
+    let far = |output: usize| record.spread[output] > MOVES * problem.noise_sd[output];
+    let moves = far(position) && record.spread[velocity] > problem.noise_sd[velocity];
+    Kinematics::of(x, v, &Band::of(record.period, 1.0 / record.period)).filter(|k| moves && k.is_explained())
+}
