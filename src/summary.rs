@@ -40,7 +40,11 @@ pub struct Summary {
 /// The graph that a bag holds, with the command line's changes.
 pub fn graph_of(reader: &Reader, changes: &Overrides) -> Result<Graph, Failure> {
     let path = reader.path();
-    let header = reader.header().ok_or_else(|| Failure::input(format!("{}: is not a bag of a run: it holds no graph", path.display())))?;
+    let no_graph = || match reader.without_messages() {
+        Some(cut) => Failure::input(format!("{}: {cut}", path.display())),
+        None => Failure::input(format!("{}: is not a bag of a run: it holds no graph", path.display())),
+    };
+    let header = reader.header().ok_or_else(no_graph)?;
     if header.graph_toml.is_empty() {
         return Err(Failure::input(format!("{}: holds recordings, but no graph to run", path.display())));
     }

@@ -3,8 +3,11 @@
 //! The commands are collected from what the verbs print and write, and each is run as it stands, in its order, in the same folder. Of commands that
 //! search for minutes (`diagnose` with more effort) the effort is brought down before they are run: what they name is looked at all the same.
 
+#[path = "../arms/tests/common/mod.rs"]
+mod arms;
 mod system;
 
+use arms::{AS_STATED, Beside, set};
 use serde_json::Value;
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -194,6 +197,46 @@ fn what_is_offered_for_recordings_of_ones_own_works_as_it_stands() {
         offers.0.extend(of_fit.0);
     }
     offers.run(&place);
+}
+
+#[test]
+fn what_is_offered_for_an_arm_works_as_it_stands() {
+    let place = place();
+    std::fs::create_dir(place.path("my arm")).unwrap();
+    set(&place.path("my arm"), &Beside { dry: [0.2, 0.3], ..AS_STATED }, "", |_| {});
+    let mut offers = Offers::default();
+    let ended = place.backdrive(&["diagnose", "my arm", "--out", "out"]);
+    assert_eq!(ended.code, Some(1), "{ended:?}");
+    offers.hear(&place, &ended, Some("out/report.html"));
+    assert!(offers.0.iter().any(|command| command.contains("out/model.diagnosed.toml")), "{:?}", offers.0);
+    assert!(offers.run(&place) >= 1, "{:?}", offers.0);
+    // In JSON the same, under names that are free now.
+    let mut offers = Offers::default();
+    let ended = place.backdrive(&["diagnose", "my arm", "--out", "other", "--json"]);
+    assert!(ended.json()["next"].as_array().is_some_and(|steps| !steps.is_empty()), "{ended:?}");
+    offers.hear(&place, &ended, None);
+    assert!(offers.run(&place) >= 1, "{:?}", offers.0);
+}
+
+#[test]
+fn a_bag_that_breaks_off_before_its_first_message_is_recovered_or_recorded_again() {
+    let place = place();
+    let whole = place.backdrive(&["run", "launch/contact.toml", "--transport", "inproc", "--duration", "0.2", "--bag", "whole.mcap"]);
+    assert!(matches!(whole.code, Some(0 | 7)), "{whole:?}");
+    std::fs::write(place.path("cut.mcap"), &std::fs::read(place.path("whole.mcap")).unwrap()[..100]).unwrap();
+    let diagnose = ["diagnose", "cut.mcap", "--model", "plant/models/impulse-engine.toml", "--out", "out"];
+    for asked in [
+        &diagnose[..],
+        &["init", ".", "--recording", "cut.mcap", "--yes"],
+        &["stability", "cut.mcap"],
+        &["why", "cut.mcap"],
+        &["replay", "cut.mcap"],
+        &["inspect", "cut.mcap"],
+        &["bag", "export", "cut.mcap", "--out", "cut.csv"],
+    ] {
+        let ended = place.backdrive(asked);
+        assert!(ended.code == Some(3) && ended.stderr.contains("`backdrive bag recover cut.mcap --bag cut-saved.mcap`"), "{ended:?}");
+    }
 }
 
 /// A command that is put together by hand is one that nobody checked.

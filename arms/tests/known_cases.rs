@@ -36,10 +36,12 @@ fn number<'f>(finding: &'f Finding, key: &str) -> &'f Estimate {
 
 fn sizes(found: &Found) -> impl Iterator<Item = (&Finding, &Estimate)> {
     let sure = found.verdict.findings.iter().filter(|f| f.confidence > 0.5);
-    sure.flat_map(|f| f.parameters.iter().filter_map(move |(key, p)| match p {
-        Parameter::One(one) if key != "phase" && key != "rest" => Some((f, one)),
-        _ => None,
-    }))
+    sure.flat_map(|f| {
+        f.parameters.iter().filter_map(move |(key, p)| match p {
+            Parameter::One(one) if key != "phase" && key != "rest" => Some((f, one)),
+            _ => None,
+        })
+    })
 }
 
 #[test]

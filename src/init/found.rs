@@ -104,6 +104,9 @@ pub fn recordings(options: &Init) -> Result<Recordings, Failure> {
         all.push(match is_bag(path) {
             true => {
                 let reader = Reader::open(path).map_err(Failure::input)?;
+                if let Some(cut) = reader.without_messages() {
+                    return Err(Failure::input(format!("{}: {cut}", path.display())));
+                }
                 unread.extend(reader.topics().iter().filter_map(|topic| topic.unread()));
                 columns_of(&reader, None).map_err(Failure::input)?.into_iter().map(|signal| Column::of_topic(&reader, signal)).collect()
             }

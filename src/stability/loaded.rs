@@ -46,7 +46,8 @@ impl Loaded {
         }
         let reader = Reader::open(path).map_err(Failure::input)?;
         let hint = |f: Failure| Failure { message: format!("{}; a bag that we did not record needs --roles FILE", f.message), ..f };
-        let recorded = graph_of(&reader, &Overrides::default()).map_err(hint)?;
+        let is_cut = reader.without_messages().is_some();
+        let recorded = graph_of(&reader, &Overrides::default()).map_err(|f| if is_cut { f } else { hint(f) })?;
         let asked = graph_of(&reader, &changes)?;
         let mut session = Session::from_bag(&reader, &recorded).map_err(Failure::input)?;
         if !reader.ended_cleanly() {

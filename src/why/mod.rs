@@ -81,7 +81,8 @@ pub fn why(options: &cli::Why) -> Result<u8, Failure> {
 fn of_our_bag(path: &Path, cancel: &Arc<AtomicBool>) -> Result<(Answer, Session, Option<Graph>), Failure> {
     let hint = |f: Failure| Failure { message: format!("{}; a recording that we did not make needs --roles FILE", f.message), ..f };
     let reader = Reader::open(path).map_err(Failure::input)?;
-    let graph = graph_of(&reader, &Overrides::default()).map_err(hint)?;
+    let is_cut = reader.without_messages().is_some();
+    let graph = graph_of(&reader, &Overrides::default()).map_err(|f| if is_cut { f } else { hint(f) })?;
     let read = || -> Result<(Session, Recorded), Failure> {
         let session = Session::from_bag(&reader, &graph).map_err(Failure::input)?;
         Ok((session, Recorded::read(&reader).map_err(Failure::input)?))

@@ -14,6 +14,7 @@ use crate::BagError;
 use crate::completeness::{COMPLETENESS, Completeness};
 use crate::framing::Frames;
 use crate::header::{BagHeader, RUN};
+use crate::offer::end_missing;
 use crate::span::Spans;
 use crate::steps::Said;
 use attachments::Attachments;
@@ -179,6 +180,12 @@ impl Reader {
     /// Whether the writer closed the file.
     pub fn ended_cleanly(&self) -> bool {
         self.closed
+    }
+
+    /// A sentence for a file that breaks off before its first message, with the command that saves what there is; `None` for any other.
+    pub fn without_messages(&self) -> Option<String> {
+        let is_empty = || self.messages().is_ok_and(|mut all| all.next().is_none());
+        if self.closed || !is_empty() { None } else { end_missing(&self.path, self.closed) }
     }
 
     /// Profile of the file, such as `ros2`.
