@@ -11,6 +11,7 @@ use crate::output;
 use crate::progress;
 use crate::recordings::{self, file_name};
 use crate::servo_runs;
+use backdrive_diagnosis::audit::without_contradicted;
 use backdrive_diagnosis::compare::{Quality, predictions, qualities};
 use backdrive_diagnosis::intervals::Uncertainty;
 use backdrive_diagnosis::parameters::{Pair, Row, correlated, refitted_text, rows};
@@ -64,7 +65,7 @@ pub fn fit(options: &cli::Fit) -> Result<u8, Failure> {
     for note in &opened.notes {
         output::note(format_args!("note: {note}"));
     }
-    let (problem, contradicted) = opened.problem.without_contradicted_outputs();
+    let (problem, contradicted) = without_contradicted(opened.problem);
     for remark in contradicted {
         output::note(format_args!("note: {remark}"));
     }

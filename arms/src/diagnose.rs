@@ -8,6 +8,7 @@ use crate::excitation::RATE;
 use crate::experiment::{Plan, REPEATS, plan, same_load};
 use crate::fit::Fit;
 use crate::judge::{AGAINST, Judged, each, gains, judge};
+use crate::offers::load_spread;
 use crate::physics::{At, Physics};
 use crate::problem::Problem;
 use crate::regression::Data;
@@ -186,7 +187,7 @@ fn load_remarks(data: &Data, found: &Search) -> Vec<Remark> {
     };
     let untold = same_load(data, found);
     let rubs = |j: usize| found.best.structure.terms.iter().any(|t| t.physics == Physics::Coulomb && t.at == At::Joint(j));
-    let unchanged = |j: &usize| untold.contains(j) || rubs(*j) && !data.unsigned[*j] && data.load_spread(*j) < LOAD_CHANGES;
+    let unchanged = |j: &usize| untold.contains(j) || rubs(*j) && !data.unsigned[*j] && load_spread(data, *j) < LOAD_CHANGES;
     (0..data.problem.joints.len()).filter(unchanged).map(remark).collect()
 }
 

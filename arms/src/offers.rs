@@ -55,6 +55,14 @@ pub(crate) fn is_possible(data: &Data, fit: &Fit) -> bool {
     })
 }
 
+/// How far the load at a joint spreads over the fitted logs, from a tenth of it to nine tenths, as a share of its median.
+pub(crate) fn load_spread(data: &Data, joint: usize) -> f64 {
+    let mut all: Vec<f64> = data.load[..data.fit_count].iter().flat_map(|load| load[joint].iter().map(|x| x.abs())).collect();
+    all.sort_by(f64::total_cmp);
+    let at = |share: f64| all.get((share * all.len().saturating_sub(1) as f64) as usize).copied().unwrap_or(0.0);
+    (at(0.9) - at(0.1)) / at(0.5).max(f64::MIN_POSITIVE)
+}
+
 pub(crate) fn with(structure: &Structure, term: &Term) -> Structure {
     let mut out = structure.clone();
     out.terms.push(term.clone());

@@ -240,14 +240,6 @@ impl<'a> Data<'a> {
         columns
     }
 
-    /// How far the load at a joint spreads over the fitted logs, from a tenth of it to nine tenths, as a share of its median.
-    pub fn load_spread(&self, joint: usize) -> f64 {
-        let mut all: Vec<f64> = self.load[..self.fit_count].iter().flat_map(|load| load[joint].iter().map(|x| x.abs())).collect();
-        all.sort_by(f64::total_cmp);
-        let at = |share: f64| all.get((share * all.len().saturating_sub(1) as f64) as usize).copied().unwrap_or(0.0);
-        (at(0.9) - at(0.1)) / at(0.5).max(f64::MIN_POSITIVE)
-    }
-
     /// What columns of a motion are made of.
     pub(crate) fn sight<'s>(&'s self, m: usize, slip: &'s [f64]) -> Sight<'s> {
         Sight {

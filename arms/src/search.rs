@@ -4,7 +4,7 @@ use crate::consistent::consistent;
 use crate::error::ArmError;
 use crate::fit::{Fit, Structure, TOLERANCES, Weights};
 use crate::left::{Left, left};
-use crate::offers::{is_possible, ranked, shaped, slipped, tolerated, torque_share, with, without, without_term};
+use crate::offers::{is_possible, load_spread, ranked, shaped, slipped, tolerated, torque_share, with, without, without_term};
 use crate::physics::{Physics, Term, candidates};
 use crate::regression::Data;
 use backdrive_diagnosis::predictive::{Gain, gain};
@@ -147,7 +147,7 @@ fn may_be(data: &Data, term: &Term) -> bool {
         Physics::Gain | Physics::Coupling | Physics::Delay | Physics::Compliance | Physics::Backlash | Physics::LoadFriction
     );
     // What grows with a load that does not change is what does not grow with it.
-    let no_load = |j: usize| term.physics == Physics::LoadFriction && data.load_spread(j) < LOAD_CHANGES;
+    let no_load = |j: usize| term.physics == Physics::LoadFriction && load_spread(data, j) < LOAD_CHANGES;
     let may = |j: usize| !(data.unsigned[j] || of_a_motor && data.is_passive(j) || no_load(j));
     match term.at {
         At::Joint(j) => may(j),

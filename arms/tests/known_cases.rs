@@ -62,8 +62,8 @@ fn short_logs_give_the_published_friction_and_nothing_whose_interval_holds_nothi
 
 #[test]
 fn friction_that_grows_with_a_load_takes_a_load_that_changes() {
-    if std::env::var("BACKDRIVE_LONG").as_deref() != Ok("1") {
-        skipped::skipped("friction_that_grows_with_a_load_takes_a_load_that_changes: a minute; BACKDRIVE_LONG=1 runs it".to_string());
+    if std::env::var("BACKDRIVE_FULL").as_deref() != Ok("1") {
+        skipped::skipped("friction_that_grows_with_a_load_takes_a_load_that_changes: a minute; BACKDRIVE_FULL=1 runs it".to_string());
         return;
     }
     let Some(found) = diagnosed("27-load-friction-versus-dry", "set.toml") else { return };

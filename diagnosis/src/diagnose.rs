@@ -1,6 +1,6 @@
 //! A diagnosis from its problem to its verdict: the audit, the search, the force located, what is claimed, and each record by itself.
 
-use crate::audit::{Remark, Weight, audit};
+use crate::audit::{Remark, Weight, audit, without_contradicted};
 use crate::candidate::price;
 use crate::contenders::with_contenders;
 use crate::equation_error::{OnForces, inverse, search_on_forces};
@@ -65,7 +65,7 @@ pub fn diagnose(
         let text = "stands still throughout while others move: it is left out of every fit and of the verdict".to_string();
         remarks.push(Remark { weight: Weight::Caution, records: Vec::new(), signal, about: "constant", text });
     }
-    let (problem, contradicted) = problem.without_contradicted_outputs();
+    let (problem, contradicted) = without_contradicted(problem);
     // What is measured beside its own position says more than beside a model.
     remarks.retain(|r| !(matches!(r.about, "sign" | "unit") && contradicted.iter().any(|c| c.signal == r.signal)));
     remarks.extend(contradicted);

@@ -12,7 +12,7 @@ pub use rates::rates;
 pub(crate) use remark::file_name;
 pub use remark::{Remark, Weight};
 pub use signals::limits_reached;
-pub use velocities::{Contradiction, contradictions};
+pub use velocities::without_contradicted;
 
 use crate::problem::{Problem, Record};
 use backdrive_plant::model::InputKind;
@@ -72,7 +72,7 @@ pub fn usable(problem: &Problem) -> Result<(), String> {
     if let Some(text) = rates::unit_of_time(problem) {
         return Err(text);
     }
-    if let Some(wrong) = contradictions(problem).into_iter().find(|wrong| wrong.is_both) {
+    if let Some(wrong) = velocities::contradictions(problem).into_iter().find(|wrong| wrong.is_both) {
         let signal = &model.outputs[wrong.output].name;
         return Err(format!("{}: {signal} {}", wrong.file, wrong.text));
     }

@@ -11,7 +11,7 @@ const MOVES: f64 = 30.0;
 
 /// A velocity that is not what its position says.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Contradiction {
+pub(super) struct Contradiction {
     /// The velocity, by its place among the outputs.
     pub output: usize,
     /// What was seen and what to do, as a clause.
@@ -23,7 +23,7 @@ pub struct Contradiction {
 }
 
 /// Every velocity that contradicts the position of its body in all recordings that tell.
-pub fn contradictions(problem: &Problem) -> Vec<Contradiction> {
+pub(super) fn contradictions(problem: &Problem) -> Vec<Contradiction> {
     let outputs = &problem.model.outputs;
     let position_of = |body: usize| outputs.iter().position(|o| matches!(o.kind, OutputKind::Position(own) if own == body));
     let of = |(velocity, output): (usize, &backdrive_plant::model::Output)| {
@@ -68,10 +68,18 @@ pub fn contradictions(problem: &Problem) -> Vec<Contradiction> {
 
 impl Contradiction {
     /// As a remark of the audit.
-    pub fn remark(&self, problem: &Problem) -> Remark {
+    fn remark(&self, problem: &Problem) -> Remark {
         let signal = problem.model.outputs.get(self.output).map_or(String::new(), |o| o.name.clone());
         Remark { weight: Weight::Caution, records: Vec::new(), signal, about: "velocity", text: self.text.clone() }
     }
+}
+
+/// A problem without the velocities that contradict the positions of their bodies, and what is to be said of each: the position is a measurement of the same.
+pub fn without_contradicted(problem: Problem) -> (Problem, Vec<Remark>) {
+    let wrong = contradictions(&problem);
+    let remarks = wrong.iter().map(|contradiction| contradiction.remark(&problem)).collect();
+    let places: Vec<usize> = wrong.iter().map(|contradiction| contradiction.output).collect();
+    (problem.without_outputs(&places), remarks)
 }
 
 /// How a velocity follows its position in a recording; `None` where too little moves to tell, and where the one is not the other's derivative at all.

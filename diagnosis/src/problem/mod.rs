@@ -17,7 +17,6 @@ pub use record::Record;
 pub(crate) use record::spread;
 pub use stated::Stated;
 
-use crate::audit::{Remark, contradictions};
 use crate::hypothesis::Place;
 use crate::noise;
 use crate::tuning::tuning;
@@ -164,14 +163,6 @@ impl Problem {
         (self.without_outputs(&still), names)
     }
 
-    /// The same without the velocities that contradict the positions of their bodies, and what is to be said of each: the position is a measurement of the same.
-    pub fn without_contradicted_outputs(self) -> (Problem, Vec<Remark>) {
-        let wrong = contradictions(&self);
-        let remarks = wrong.iter().map(|contradiction| contradiction.remark(&self)).collect();
-        let places: Vec<usize> = wrong.iter().map(|contradiction| contradiction.output).collect();
-        (self.without_outputs(&places), remarks)
-    }
-
     /// The same without the outputs of these names.
     ///
     /// # Errors
@@ -189,7 +180,8 @@ impl Problem {
         Ok(self.without_outputs(&ignored))
     }
 
-    fn without_outputs(self, places: &[usize]) -> Problem {
+    /// The same without some outputs, by their places in the model.
+    pub fn without_outputs(self, places: &[usize]) -> Problem {
         let without = |records: Vec<Record>| -> Vec<Record> { records.into_iter().map(|record| record.without_outputs(places)).collect() };
         Problem { fit: without(self.fit), held_out: without(self.held_out), ..self }
     }
