@@ -142,10 +142,10 @@ struct Shown {
     is_long: bool,
 }
 
-/// The commands between backquotes in the list of the README, in their order, without those of items that end in `<!-- not run: why -->`.
-fn readme() -> Vec<Shown> {
-    let text = std::fs::read_to_string(file("README.md")).unwrap();
-    let list = text.split("## Thirteen things").nth(1).unwrap().split("In Python,").next().unwrap();
+/// The commands between backquotes in the guide's list, in their order, without those of items that end in `<!-- not run: why -->`.
+fn thirteen() -> Vec<Shown> {
+    let text = std::fs::read_to_string(file("docs/guide.md")).unwrap();
+    let list = text.split("## Thirteen things").nth(1).unwrap().split("\n## ").next().unwrap();
     let mut items: Vec<String> = Vec::new();
     for line in list.lines() {
         match line.split_once(". **").filter(|(number, _)| number.parse::<u8>().is_ok()) {
@@ -198,8 +198,16 @@ fn run_in_order(shown: Vec<Shown>) -> Vec<(String, i32)> {
 }
 
 #[test]
-fn every_command_of_the_readme_works_in_its_order_in_one_folder() {
-    let codes = run_in_order(readme());
+fn the_readme_s_two_doors_work_as_they_stand() {
+    let lines = std::fs::read_to_string(file("README.md")).unwrap().lines().count();
+    assert!(lines <= 120, "{lines} lines: a stranger reads it in a minute");
+    assert_eq!(blocks("README.md").len(), 2);
+    follow(&Place::new(), "README.md");
+}
+
+#[test]
+fn every_command_of_the_guide_s_list_works_in_its_order_in_one_folder() {
+    let codes = run_in_order(thirteen());
     assert!(codes.len() >= 7, "{codes:?}");
     let code = |begin: &str| codes.iter().find(|(command, _)| command.starts_with(begin)).unwrap_or_else(|| panic!("{begin}: {codes:?}")).1;
     // The question why is about the run that shakes, not about an earlier one.

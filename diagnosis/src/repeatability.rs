@@ -66,8 +66,8 @@ fn recordings(a: &Record, b: &Record) -> Vec<(usize, f64)> {
     both.filter_map(|(o, (x, y))| Some((o, deviation(x.as_deref()?, &on(y.as_deref()?))))).collect()
 }
 
-/// Periods of a recording whose inputs repeat themselves: how far each output is apart from one to the next, and their length, s. The first one, in which the
-/// device comes to its rhythm, does not count. Of a position that nothing holds, which may be elsewhere in each period, the displacement over `lag` samples is compared.
+/// Periods of a recording whose inputs repeat themselves: how far each output is apart from one to the next, and their length, s, where that is the same from
+/// period to period: the first one, in which the device comes to its rhythm, does not count, nor what still falls. Of a position that nothing holds, which may be elsewhere in each period, the displacement over `lag` samples is compared.
 fn periods(record: &Record, lag: &[usize]) -> Vec<(usize, f64, f64)> {
     let Some(length) = period_of(record) else { return Vec::new() };
     let of = |(o, samples): (usize, &Option<Vec<f64>>)| {
@@ -79,7 +79,12 @@ fn periods(record: &Record, lag: &[usize]) -> Vec<(usize, f64, f64)> {
         };
         // Both ends of a displacement have the noise of a sample.
         let ends = if lag > 0 { std::f64::consts::SQRT_2 } else { 1.0 };
-        (displaced.len() > length).then(|| (o, deviation(&displaced[length..], &displaced) / ends, length as f64 * record.period))
+        // Each period beside the one before.
+        let whole: Vec<&[f64]> = displaced.chunks_exact(length).collect();
+        let apart: Vec<f64> = whole.windows(2).map(|pair| deviation(pair[1], pair[0]) / ends).collect();
+        let [.., before, last] = apart.as_slice() else { return None };
+        // What still falls is the device coming to its rhythm.
+        (*last > tuning().recordings.settles * before).then(|| (o, apart.iter().copied().fold(f64::INFINITY, f64::min), length as f64 * record.period))
     };
     record.outputs.iter().enumerate().filter_map(of).collect()
 }
@@ -165,5 +170,8 @@ mod tests {
         // A drift of what nothing holds is no lack of repetition.
         assert!(periods(&drift, &[20])[0].1 < 1e-3);
         assert!(periods(&record(4000, 1e-3, |t| (t * t).sin(), f64::sin), &[0]).is_empty());
+        // A rhythm that it comes to over many periods is no lack of repetition either.
+        let settling = |t: f64| (std::f64::consts::TAU * t / 0.5).cos() + 0.2 * (-t).exp();
+        assert!(periods(&record(4000, 1e-3, |t| (std::f64::consts::TAU * t / 0.5).sin(), settling), &[0]).is_empty());
     }
 }

@@ -49,6 +49,8 @@ group! {
         noisy: f64 = 0.3, "-", Judgement("a tenth of the power");
         /// Squared difference of two excitations, as a share of theirs, below which they are repeats.
         repeated: f64 = 1e-6, "-", Numerics("three digits of a file");
+        /// Difference of a period from the one before, over that of those before, above which the device has come to its rhythm.
+        settles: f64 = 0.7, "-", Judgement("what the device does not repeat stays as large, what decays falls");
         /// Difference of two repeats, in noise standard deviations, above which the device does not repeat itself.
         repeats: f64 = 3.0, "noise standard deviations", Judgement("two recordings with noise of their own differ by 1, as it is computed");
         /// Correlation of a command's noise with a sensor's above which a controller closes the loop.
