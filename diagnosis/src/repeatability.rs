@@ -84,7 +84,8 @@ fn periods(record: &Record, lag: &[usize]) -> Vec<(usize, f64, f64)> {
         let apart: Vec<f64> = whole.windows(2).map(|pair| deviation(pair[1], pair[0]) / ends).collect();
         let [.., before, last] = apart.as_slice() else { return None };
         // What still falls is the device coming to its rhythm.
-        (*last > tuning().recordings.settles * before).then(|| (o, apart.iter().copied().fold(f64::INFINITY, f64::min), length as f64 * record.period))
+        (*last > tuning().recordings.settles * before)
+            .then(|| (o, apart.iter().copied().fold(f64::INFINITY, f64::min), length as f64 * record.period))
     };
     record.outputs.iter().enumerate().filter_map(of).collect()
 }
