@@ -103,6 +103,7 @@ pub fn about<T>(limit: std::time::Duration, work: impl FnOnce(&(dyn Fn(&str) + S
     tell(&bar, move |bar| format!("{}: {}", bar.message(), within(bar.elapsed(), limit)));
     let done = std::sync::atomic::AtomicBool::new(false);
     let result = std::thread::scope(|scope| {
+        let ended = Ended(&done);
         scope.spawn(|| {
             while !done.load(std::sync::atomic::Ordering::Relaxed) {
                 bar.set_position(bar.elapsed().as_millis() as u64);
@@ -110,16 +111,31 @@ pub fn about<T>(limit: std::time::Duration, work: impl FnOnce(&(dyn Fn(&str) + S
             }
         });
         let result = work(&|stage: &str| bar.set_message(stage.to_string()));
-        done.store(true, std::sync::atomic::Ordering::Relaxed);
+        drop(ended);
         result
     });
     bar.finish_and_clear();
     result
 }
 
+/// Says that work has ended, by a panic too: what waits for the bar would wait for ever.
+struct Ended<'a>(&'a std::sync::atomic::AtomicBool);
+
+impl Drop for Ended<'_> {
+    fn drop(&mut self) {
+        self.0.store(true, std::sync::atomic::Ordering::Relaxed);
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn work_that_panics_ends_the_bar_too() {
+        let ended = std::panic::catch_unwind(|| about(Duration::from_secs(1), |_| panic!("meant")));
+        assert!(ended.is_err());
+    }
 
     #[test]
     fn a_limit_is_never_told_beside_a_longer_time() {

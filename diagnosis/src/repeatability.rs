@@ -84,7 +84,7 @@ fn periods(record: &Record, lag: &[usize]) -> Vec<(usize, f64, f64)> {
         let apart: Vec<f64> = whole.windows(2).map(|pair| deviation(pair[1], pair[0]) / ends).collect();
         let [.., before, last] = apart.as_slice() else { return None };
         // What still falls is the device coming to its rhythm.
-        (*last > tuning().recordings.settles * before)
+        (*last >= tuning().recordings.settles * before)
             .then(|| (o, apart.iter().copied().fold(f64::INFINITY, f64::min), length as f64 * record.period))
     };
     record.outputs.iter().enumerate().filter_map(of).collect()
@@ -98,9 +98,11 @@ fn period_of(record: &Record) -> Option<usize> {
     let apart = |x: &[f64], lag: usize| distance(&x[lag..], x) / x.len().saturating_sub(lag).max(1) as f64;
     let power = coarse.iter().map(|x| x * x).sum::<f64>() / coarse.len().max(1) as f64;
     // Shorter periods than some twenty samples are what a sample can hardly resolve.
-    let candidates = (20usize.div_ceil(stride)..coarse.len() / 3).filter(|lag| apart(&coarse, *lag) < 0.01 * power);
+    const FEWEST: usize = 20;
+    let candidates = (FEWEST.div_ceil(stride)..coarse.len() / 3).filter(|lag| apart(&coarse, *lag) < 0.01 * power);
     let exact = |lag: usize| {
-        let near = (lag * stride).saturating_sub(stride)..=(lag + 1) * stride;
+        // A slow input is nearly its own a few samples later; after none it is so exactly, which is no period.
+        let near = (lag * stride).saturating_sub(stride).max(FEWEST)..=((lag + 1) * stride).max(FEWEST);
         near.min_by(|a, b| apart(moving, *a).total_cmp(&apart(moving, *b)))
     };
     let all = |length: &usize| record.inputs.iter().all(|x| is_repeated(&x[*length..], x));
@@ -169,8 +171,10 @@ mod tests {
         assert!((found[0].2 - 0.5).abs() < 2e-3, "{found:?}");
         assert!((found[0].1 - 0.005 / 2.0f64.sqrt()).abs() < 1e-4, "{found:?}");
         // A drift of what nothing holds is no lack of repetition.
-        assert!(periods(&drift, &[20])[0].1 < 1e-3);
+        assert!(periods(&drift, &[20]).iter().all(|found| found.1 < 1e-3));
         assert!(periods(&record(4000, 1e-3, |t| (t * t).sin(), f64::sin), &[0]).is_empty());
+        // Of a long and slow input no period of no length is told.
+        assert!(periods(&record(60_000, 1e-3, |t| (0.02 * t).sin(), f64::sin), &[0]).iter().all(|found| found.2 > 0.0));
         // A rhythm that it comes to over many periods is no lack of repetition either.
         let settling = |t: f64| (std::f64::consts::TAU * t / 0.5).cos() + 0.2 * (-t).exp();
         assert!(periods(&record(4000, 1e-3, |t| (std::f64::consts::TAU * t / 0.5).sin(), settling), &[0]).is_empty());
