@@ -28,7 +28,7 @@ pub(super) fn contradictions(problem: &Problem) -> Vec<Contradiction> {
     let position_of = |body: usize| outputs.iter().position(|o| matches!(o.kind, OutputKind::Position(own) if own == body));
     let of = |(velocity, output): (usize, &backdrive_plant::model::Output)| {
         let OutputKind::Velocity(body) = output.kind else { return None };
-        let position = position_of(body)?;
+        let position = position_of(body).filter(|position| outputs[*position].gain != 0.0)?;
         let seen: Vec<(&Record, Kinematics)> =
             problem.fit.iter().chain(&problem.held_out).filter_map(|r| Some((r, seen(r, position, velocity, problem)?))).collect();
         let first = seen.first()?;
@@ -87,5 +87,43 @@ fn seen(record: &Record, position: usize, velocity: usize, problem: &Problem) ->
     let (x, v) = (record.outputs.get(position)?.as_deref()?, record.outputs.get(velocity)?.as_deref()?);
     let far = |output: usize| record.spread[output] > MOVES * problem.noise_sd[output];
     let moves = far(position) && record.spread[velocity] > problem.noise_sd[velocity];
-    Kinematics::of(x, v, &Band::of(record.period, 1.0 / record.period)).filter(|k| moves && k.is_explained())
+    let found = Kinematics::of(x, v, &Band::of(record.period, 1.0 / record.period)).filter(|k| moves && k.is_explained())?;
+    // What the model states of its sensors, such as counts for radians or a delay, is no contradiction.
+    let (of_x, of_v) = (problem.model.outputs.get(position)?, problem.model.outputs.get(velocity)?);
+    let factor = of_x.gain / of_v.gain;
+    factor.is_finite().then(|| Kinematics { gain: found.gain * factor, lag_s: found.lag_s - (of_v.delay - of_x.delay), ..found })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use backdrive_plant::model::Model;
+    use backdrive_plant::recording::Recording;
+    use backdrive_plant::set::Initial;
+
+    #[test]
+    fn what_the_model_states_of_its_sensors_is_no_contradiction() {
+        let told = |gain: f64, scale: f64| {
+            let text = format!(
+                "motion = 'rotation'\nbodies = {{ rotor = 1e-3 }}\ninputs = [ {{ name = 'u', kind = 'force', on = 'rotor' }} ]\n\
+                 outputs = [ {{ name = 'counts', kind = 'position', of = 'rotor', gain = {gain} }}, {{ name = 'speed', kind = 'velocity', of = 'rotor' }} ]\n"
+            );
+            let model = Model::from_toml(&text, "model").unwrap();
+            let t: Vec<f64> = (0..4000).map(|i| f64::from(i) * 2e-3).collect();
+            let of = |f: &dyn Fn(f64) -> f64| t.iter().map(|t| f(*t)).collect::<Vec<f64>>();
+            let turn = |t: f64| (3.0 * t).sin() + 0.3 * (7.7 * t).sin();
+            let speed = |t: f64| 3.0 * (3.0 * t).cos() + 0.3 * 7.7 * (7.7 * t).cos();
+            let signals = vec![
+                ("u".to_string(), of(&|t| t.sin())),
+                ("counts".to_string(), of(&|t| 636.62 * turn(t))),
+                ("speed".to_string(), of(&|t| scale * speed(t))),
+            ];
+            let record = Record::new(&Recording::new("r", t.clone(), signals).unwrap(), &model, Vec::new()).unwrap();
+            let problem = Problem::new(text.clone(), "model.toml".into(), model, vec![record], Vec::new(), Initial::Free).unwrap();
+            contradictions(&problem)
+        };
+        assert!(told(636.62, 1.0).is_empty());
+        assert!(told(636.62, 3.0)[0].text.starts_with("is 3 times the derivative of counts"));
+        assert!(told(1.0, 1.0)[0].text.contains("times the derivative of counts"));
+    }
 }
