@@ -91,7 +91,7 @@ fn seen(record: &Record, position: usize, velocity: usize, problem: &Problem) ->
     // What the model states of its sensors, such as counts for radians or a delay, is no contradiction.
     let (of_x, of_v) = (problem.model.outputs.get(position)?, problem.model.outputs.get(velocity)?);
     let factor = of_x.gain / of_v.gain;
-    factor.is_finite().then(|| Kinematics { gain: found.gain * factor, lag_s: found.lag_s - (of_v.delay - of_x.delay), ..found })
+    factor.is_finite().then_some(Kinematics { gain: found.gain * factor, lag_s: found.lag_s - (of_v.delay - of_x.delay), ..found })
 }
 
 #[cfg(test)]
