@@ -25,7 +25,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     }
     for (_, change) in args.iter().zip(args.iter().skip(1)).filter(|(key, _)| *key == "--tuning") {
         let (name, value) = change.split_once('=').ok_or("--tuning takes NAME=VALUE, such as claim.alike=4 or claim.alike=x2")?;
-        let entry = tuning.quantity(name).ok_or_else(|| format!("there is no tuning entry {name}: docs/tuning.md lists them"))?;
+        let entry = tuning.quantity(name).ok_or_else(|| format!("there is no tuning entry {name}: --list-tuning lists them"))?;
         match value.strip_prefix('x') {
             Some(factor) => entry.times(factor.parse()?),
             None => entry.set(value.parse()?),

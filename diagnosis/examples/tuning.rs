@@ -1,4 +1,4 @@
-//! Prints the part of `docs/tuning.md` that the code knows: `cargo run -p backdrive-diagnosis --example tuning`.
+//! Prints the constants of a diagnosis as a page in Markdown: `cargo run -p backdrive-diagnosis --example tuning`.
 
 fn main() {
     print!("{}", backdrive_diagnosis::document::tuning_page());

@@ -1,7 +1,8 @@
-//! Every number that decides what is tried, how well it is fitted and what is claimed: with its unit, its value, and what it rests on.
+//! Every constant that decides what is tried, how well it is fitted and what is claimed: with its unit, its value and its evidence.
 //!
-//! `docs/tuning.md` is this table, and what the measurements of `diagnosis/tests/concealed/sensitivity.py` say of it. What belongs to one physics
-//! (ranges, starting values) stands in its file in `physics/`, and what follows from a formula stands in the formula.
+//! `cargo run -p backdrive-diagnosis --example tuning` prints this table. `docs/tuning.md` has the measurements of
+//! `diagnosis/tests/concealed/sensitivity.py`. What belongs to one law (ranges, starting values) is in its file in `physics/`, and what follows from a
+//! formula is in the formula.
 
 mod claim;
 mod coupling;
