@@ -18,6 +18,7 @@ const BANNED: &[&str] = &[
     "a physics",
     "anew",
     "as it is",
+    "as it was",
     "by so many",
     "edge",
     "edges",
@@ -26,14 +27,15 @@ const BANNED: &[&str] = &[
     "given back",
     "go together",
     "goes with",
+    "in so many",
     "in the place of",
     "its numbers",
     "left over",
     "leftover",
     "let go",
     "loop run again",
+    "lopsided",
     "no fit has seen",
-    "one in so many",
     "says",
     "slowness",
     "so many times",
@@ -45,10 +47,10 @@ const BANNED: &[&str] = &[
 
 /// What is counted, where, and how often it may be. A count above fails; so does one below 95 % of it, so that the number here is lowered with it.
 const COMMITTED: &[(Kind, Group, usize)] = &[
-    (Kind::LongSentence, Group::Pages, 73),
+    (Kind::LongSentence, Group::Pages, 1),
     (Kind::LongSentence, Group::DocComments, 108),
-    (Kind::BannedWord, Group::Pages, 114),
-    (Kind::BannedWord, Group::DocComments, 1295),
+    (Kind::BannedWord, Group::Pages, 7),
+    (Kind::BannedWord, Group::DocComments, 1357),
 ];
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -220,7 +222,7 @@ fn a_long_sentence_and_a_banned_word_are_found_at_their_line() {
     };
     assert_eq!(count(Kind::LongSentence, &long), [(2, MOST_WORDS + 1)]);
     assert!(count(Kind::LongSentence, &just).is_empty());
-    let text = "It is Told, as\nit is, at the edge's `edge`: *elsewhere*. Foretold, hedge, as it was.";
+    let text = "It is Told, as\nit is, at the edge's `edge`: *elsewhere*. Foretold, hedge.";
     let words: Vec<(String, usize)> =
         sentences(text).iter().flat_map(|s| Kind::BannedWord.find(s)).map(|found| (found.text, found.line)).collect();
     let expected = [("as it is", 1), ("edge", 2), ("elsewhere", 2), ("told", 1)];
