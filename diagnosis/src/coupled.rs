@@ -123,7 +123,7 @@ impl Course<'_> {
                 for (rank, start) in same.into_iter().chain(h.starts.iter().cloned()).enumerate() {
                     let mut effects = own.clone();
                     if let Some(place) = effects.get_mut(slot) {
-                        *place = (index, start);
+                        *place = (index, self.with_replaced((structure, values), h, start));
                         seeds.push((rank, Seed::beside(self.evaluator.problem, (structure, values), effects, true)));
                     }
                 }

@@ -5,7 +5,7 @@ use crate::candidate::{Candidate, candidate, key_of};
 use crate::effort::Effort;
 use crate::evaluator::Evaluator;
 use crate::fit::Fit;
-use crate::hypothesis::Hypothesis;
+use crate::hypothesis::{Hypothesis, Parameter};
 use crate::problem::{Problem, Record};
 use crate::structure::{Role, Structure};
 use crate::tuning::tuning;
@@ -185,6 +185,25 @@ impl Course<'_> {
             self.evaluator.within(budget).fit_from_derivatives(structure, &fit.values, Effort { steps, ..effort }, Some((structure, fit)))
         });
         running.extend(rest);
+    }
+
+    /// A start of a law that replaces elements of the model, with their parameters as a fit has them: the law's own starts have those of an early refit, far
+    /// from which another effect may have led.
+    pub(crate) fn with_replaced(&self, (structure, values): (&Structure, &[f64]), law: &Hypothesis, start: Vec<f64>) -> Vec<f64> {
+        let problem = self.evaluator.problem;
+        let of_replaced = |path: &str| law.replaces.iter().any(|name| path.starts_with(&format!("elements.{name}.")));
+        let fitted = structure.stated_of(problem, values);
+        let replaced: Vec<(Option<String>, f64)> = (problem.stated.iter().zip(fitted))
+            .filter(|(s, _)| of_replaced(&s.path))
+            .map(|(s, value)| (problem.model.unit_at(&s.path).ok(), value))
+            .collect();
+        let one = |(parameter, start): (&Parameter, f64)| {
+            // Where it has no effect of its own it does what the element did.
+            let is_of_element = parameter.neutral == Some(start);
+            let same = replaced.iter().find(|(unit, _)| is_of_element && unit.as_ref() == Some(&parameter.unit));
+            same.map_or(start, |(_, fitted)| fitted.clamp(parameter.range.0, parameter.range.1))
+        };
+        law.parameters.iter().zip(start).map(one).collect()
     }
 
     /// The effects of a structure by their places in the list of hypotheses, with their values.

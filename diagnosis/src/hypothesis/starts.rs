@@ -5,7 +5,7 @@ use super::types::{Family, Hypothesis, Parameter};
 /// Values with which one hypothesis does nearly what another at the same place with fewer parameters does with its own, where it is the same law resolved
 /// more finely: friction that builds up over a distance is that of many contacts, described by one state. `None` where they are no such two.
 pub(crate) fn refined(coarse: &Hypothesis, values: &[f64], finer: &Hypothesis) -> Option<Vec<f64>> {
-    if !coarse.place.same(&finer.place) || coarse.replaces != finer.replaces {
+    if !coarse.place.same(&finer.place) || !coarse.replaces.iter().all(|name| finer.replaces.contains(name)) {
         return None;
     }
     (finer.physics.facts.refine)(coarse, values, finer)

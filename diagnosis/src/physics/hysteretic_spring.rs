@@ -1,7 +1,7 @@
 //! A spring whose force runs on one line when it is stretched and on another when it is let go.
 
 use crate::hypothesis::builder::{ElementBuilder, even, log};
-use crate::hypothesis::{Against, Facts, Family, Mark, Physics, State};
+use crate::hypothesis::{Against, Facts, Family, Hypothesis, Mark, Parameter, Physics, State};
 
 pub(super) const PHYSICS: Physics = Physics {
     name: "hysteretic_spring",
@@ -16,6 +16,7 @@ pub(super) const PHYSICS: Physics = Physics {
         holds: true,
         // Without slopes, and the same both ways, it is the Dahl friction.
         contains: &["spring", "dahl"],
+        refine: |coarse, values, finer| (coarse.physics.name == super::dahl::PHYSICS.name).then(|| about(values, finer)).flatten(),
         ..Facts::NONE
     },
     propose: |sites| {
@@ -41,3 +42,19 @@ pub(super) const PHYSICS: Physics = Physics {
         sites.near().filter_map(one).collect()
     },
 };
+
+/// The same loop as Dahl friction beside the spring that stands there: each line at the level of friction, reached at the rate of its stiffness.
+fn about(dahl: &[f64], finer: &Hypothesis) -> Option<Vec<f64>> {
+    let &[stiffness, level] = dahl else { return None };
+    let first = finer.starts.first()?;
+    let value = |(p, start): (&Parameter, &f64)| {
+        let value = match p.key.as_str() {
+            "offset_positive" => level,
+            "offset_negative" => -level,
+            "bandwidth" => stiffness / level,
+            _ => p.neutral.unwrap_or(*start),
+        };
+        value.clamp(p.range.0, p.range.1)
+    };
+    Some(finer.parameters.iter().zip(first).map(value).collect())
+}

@@ -333,7 +333,8 @@ fn many_contacts_begin_where_one_bristle_ends() {
             let values = &coarse.starts[0];
             let number = |key: &str| coarse.parameters.iter().zip(values).find(|(p, _)| p.key == key).map(|(_, v)| *v);
             let (stiffness, level) = (number("stiffness").expect("has one"), number("coulomb").expect("has one"));
-            for (fine, start) in hypotheses.iter().filter_map(|h| Some((h, refined(coarse, values, h)?))) {
+            let finer = hypotheses.iter().filter(|h| h.physics.family == Family::Friction || h.physics.name == "maxwell_slip");
+            for (fine, start) in finer.filter_map(|h| Some((h, refined(coarse, values, h)?))) {
                 assert!(fine.parameters.len() > coarse.parameters.len() && fine.place.same(&coarse.place), "{name}: {}", fine.id);
                 if fine.physics.name == "lugre" {
                     let of = |key: &str| fine.parameters.iter().zip(&start).find(|(p, _)| p.key == key).map(|(_, v)| *v);
@@ -356,6 +357,44 @@ fn many_contacts_begin_where_one_bristle_ends() {
         }
     }
     assert!(sliders > 10 && bristles > 5, "{sliders} and {bristles}");
+}
+
+#[test]
+fn a_hysteretic_spring_begins_where_dahl_friction_beside_a_spring_ends() {
+    use backdrive_plant::elements::{Dahl, HystereticSpring, PathLaw};
+    let mut pairs = 0;
+    for (name, _, model) in devices() {
+        let (hypotheses, _) = hypotheses(&model);
+        for coarse in hypotheses.iter().filter(|h| h.physics.name == "dahl") {
+            let values = coarse.starts[0].clone();
+            for (fine, start) in hypotheses.iter().filter_map(|h| Some((h, refined(coarse, &values, h)?))) {
+                let &[up, down, plus, minus, bandwidth] = &start[..] else { continue };
+                if fine.physics.name != "hysteretic_spring" {
+                    continue;
+                }
+                let friction = Dahl { stiffness: values[0], coulomb: values[1] };
+                let spring = HystereticSpring {
+                    stiffness_positive: up,
+                    stiffness_negative: down,
+                    offset_positive: plus,
+                    offset_negative: minus,
+                    bandwidth,
+                };
+                assert!(up == down && (up == 0.0) == fine.replaces.is_empty(), "{name}: {}", fine.id);
+                let slip = values[1] / values[0];
+                let (mut of_friction, mut of_spring, mut from) = ([0.0], [0.0], 0.0);
+                for x in [0.3, 2.0, 1.0, 3.0, -2.0, -1.9, 4.0].map(|share| share * slip) {
+                    friction.advance(&mut of_friction, from, x, 1e-3);
+                    spring.advance(&mut of_spring, from, x, 1e-3);
+                    from = x;
+                    let (beside, alone) = (friction.force(&of_friction, x, 0.0) + up * x, spring.force(&of_spring, x, 0.0));
+                    assert!((beside - alone).abs() < 1e-9 * (values[1] + up * x.abs()), "{name}: {} at {x}: {beside} and {alone}", fine.id);
+                }
+                pairs += 1;
+            }
+        }
+    }
+    assert!(pairs > 5, "{pairs}");
 }
 
 #[test]

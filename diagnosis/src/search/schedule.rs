@@ -35,6 +35,8 @@ fn steps(is_quiet: bool, effects: usize) -> Vec<&'static dyn Step> {
     steps.extend([
         &Finer as &dyn Step,
         &Pairs,
+        &Relatives,
+        &Relatives,
         &Split::BESIDE,
         &Laws,
         &Exchanges,

@@ -1,8 +1,9 @@
-//! Simpler laws of the family of the best, in its place.
+//! Simpler laws of the family of the best in its place, and, where residuals remain, laws that contain it.
 
 use super::step::{Step, Terms};
 use crate::candidate::Candidate;
 use crate::hypothesis::{self, Hypothesis};
+use crate::physics;
 use crate::race::{Course, Seed};
 use crate::search::state::State;
 
@@ -12,7 +13,7 @@ pub(crate) struct Relatives;
 
 impl Step for Relatives {
     fn name(&self) -> &'static str {
-        "fitting simpler laws of the same family"
+        "fitting simpler and richer laws of the same family"
     }
 
     fn terms(&self) -> Terms {
@@ -27,32 +28,32 @@ impl Step for Relatives {
         state.may_be_claimed() && state.related != state.best()
     }
 
-    fn settle(&self, state: &mut State) {
-        state.related = state.best();
-    }
-
     fn propose(&self, state: &mut State) -> Vec<Seed> {
+        state.related = state.best();
         relatives(&state.course, &state.found, state.is_done())
     }
 }
 
-/// Simpler laws of the same family in the place of each effect of the best; where something is left to explain, laws that are as simple, too.
+/// Simpler laws of the same family in the place of each effect of the best. Where residuals remain, also laws that are as simple, and laws that contain it:
+/// an effect of one joint is often found as its nearest simple law, beside which no other effect can be found.
 fn relatives(course: &Course, found: &[Candidate], done: bool) -> Vec<Seed> {
     let Some(best) = found.first() else { return Vec::new() };
     let own = course.effects_of(&best.structure, &best.fit.values);
     let mut seeds = Vec::new();
     for (out, (effect, values)) in best.structure.added.iter().zip(best.structure.added_of(&best.fit.values)).enumerate() {
         let relative = |h: &Hypothesis| {
-            h.place.same(&effect.place)
-                && h.physics.family == effect.physics.family
-                && h.id != effect.id
-                && h.parameters.len() < effect.parameters.len() + if done { 0 } else { 2 }
+            let is_simple =
+                h.physics.family == effect.physics.family && h.parameters.len() < effect.parameters.len() + if done { 0 } else { 2 };
+            let is_richer = !done && physics::contains(h.physics, effect.physics);
+            h.place.same(&effect.place) && h.id != effect.id && (is_simple || is_richer)
         };
         for (index, h) in course.hypotheses.iter().enumerate().filter(|(_, h)| relative(h)) {
-            for start in hypothesis::starts_beside(effect, &values, h) {
+            let starts =
+                hypothesis::refined(effect, &values, h).map_or_else(|| hypothesis::starts_beside(effect, &values, h), |start| vec![start]);
+            for start in starts {
                 let mut effects = own.clone();
                 if let Some(slot) = effects.get_mut(out) {
-                    *slot = (index, start);
+                    *slot = (index, course.with_replaced((&best.structure, &best.fit.values), h, start));
                     seeds.push(Seed::beside(course.evaluator.problem, (&best.structure, &best.fit.values), effects, false));
                 }
             }
