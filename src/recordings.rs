@@ -1,11 +1,12 @@
 //! Recordings and the model that they are held against, as `diagnose` and `fit` are given them.
 
 use crate::failure::Failure;
-use crate::offered::{Offered, with_recover};
+use crate::offered::{Builder, with_recover};
 use crate::set_checks;
 use backdrive_bags::{Account, Reader, is_lerobot, is_rosbag};
 use backdrive_diagnosis::audit;
 use backdrive_diagnosis::problem::{MOST_OF_A_BAG, Problem, ProblemError};
+use backdrive_pages::parts::file_name;
 use backdrive_plant::model::{Fragment, Model};
 use backdrive_plant::recording::RecordingError;
 use backdrive_plant::set::RecordingSet;
@@ -169,11 +170,6 @@ pub fn not_onto(out: &Path, files: &[PathBuf], overwrite: bool) -> Result<(), Fa
     }
 }
 
-/// The last part of a path.
-pub fn file_name(path: &str) -> &str {
-    path.rsplit('/').find(|part| !part.is_empty()).unwrap_or(path)
-}
-
 fn is_recording(path: &Path) -> bool {
     path.extension().is_some_and(|e| e.eq_ignore_ascii_case("csv") || e.eq_ignore_ascii_case("mcap"))
 }
@@ -188,7 +184,7 @@ fn import_of(path: &Path) -> Option<String> {
         (false, true) => format!("{stem}.mcap"),
         (false, false) => return None,
     };
-    Some(Offered::verb("bag import").reads(path).option_writes("--bag", Path::new(&bag)).build()?.to_string())
+    Some(Builder::verb("bag import").reads(path).option_writes("--bag", Path::new(&bag)).build()?.to_string())
 }
 
 /// Single files as a set.

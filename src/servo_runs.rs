@@ -1,11 +1,11 @@
 //! `simulate` and `fit` of a model whose joints position servos drive.
 
 use crate::cli;
-use crate::estimate_text::estimate;
 use crate::failure::Failure;
 use crate::output::{self, may_replace};
 use crate::progress;
 use crate::recordings;
+use backdrive_pages::estimate::estimate;
 use backdrive_plant::model::Model;
 use backdrive_plant::recording::{Recording, write_csv};
 use backdrive_plant::servo::Numbers;
@@ -49,8 +49,11 @@ pub fn simulate(options: &cli::Simulate, model: &Model) -> Result<u8, Failure> {
     let mut runs = Vec::new();
     for (held_out, files) in [(false, &set.fit), (true, &set.held_out)] {
         for (index, file) in files.iter().enumerate() {
-            let out =
-                if is_file { options.out.clone() } else { options.out.join(Path::new(recordings::file_name(file)).with_extension("csv")) };
+            let out = if is_file {
+                options.out.clone()
+            } else {
+                options.out.join(Path::new(backdrive_pages::parts::file_name(file)).with_extension("csv"))
+            };
             may_replace(&out, options.overwrite)?;
             let positions = free_runs(&problem, &stated(&problem), held_out, index).map_err(Failure::input)?;
             runs.push(written(&problem, &positions, held_out, index, file, &out, options)?);

@@ -1,15 +1,16 @@
 //! `backdrive diagnose` of joints that position servos drive: logs of commands and positions, without torque.
 
 use crate::cli;
-use crate::diagnose_page::servo::page;
-use crate::estimate_text::estimate;
 use crate::failure::{Failure, code};
+use crate::offered::{Builder, Step};
 use crate::output;
 use crate::progress;
 use crate::recordings;
 use crate::set_checks;
 use backdrive_diagnosis::verdict::{Finding, MODEL_FILE, Parameter, VERDICT_FILE, Word};
 use backdrive_diagnosis::words as said;
+use backdrive_pages::diagnose::servo::page;
+use backdrive_pages::estimate::estimate;
 use backdrive_plant::set::RecordingSet;
 use backdrive_report::number;
 use backdrive_servo::diagnose::{Found, diagnose as diagnosed};
@@ -61,7 +62,7 @@ pub fn diagnose(
     let mut written = [VERDICT_FILE, MODEL_FILE].map(str::to_string).to_vec();
     if let Some(report) = report {
         let name = options.set.first().and_then(|p| p.file_name()).map_or(String::new(), |n| n.to_string_lossy().into_owned());
-        output::file(report, page(&problem, &found, &name, &options.out).html())?;
+        output::page(report, page(&problem, &found, &name, &to_do(found.verdict.word, &options.out)))?;
         written.push(report.strip_prefix(&options.out).unwrap_or(report).display().to_string());
     }
     let seconds = began.elapsed().as_secs_f64();
@@ -76,6 +77,14 @@ pub fn diagnose(
         output::line(format_args!("wrote     {}: {} ({seconds:.1} s)", options.out.display(), written.join(", ")))?;
     }
     Ok(found.verdict.word)
+}
+
+/// What to do next, where the model may be used.
+fn to_do(word: Word, out: &Path) -> Vec<Step> {
+    let model = out.join(MODEL_FILE);
+    let usable = matches!(word, Word::Missing | Word::Parameters | Word::NothingMissing);
+    let show = || Builder::verb("model show").reads(&model).build();
+    usable.then(|| Step::new(format!("Use {}; this shows its numbers:", model.display()), [show()])).into_iter().collect()
 }
 
 /// What was found, for a terminal.

@@ -10,7 +10,7 @@ mod write;
 
 use crate::cli::{self, Attached, Driven, Start};
 use crate::failure::Failure;
-use crate::offered::Offered;
+use crate::offered::Builder;
 use crate::output;
 use crate::output::may_replace;
 use crate::recordings as sets;
@@ -64,7 +64,7 @@ pub fn init(options: &cli::Init) -> Result<u8, Failure> {
     let opened = sets::open(std::slice::from_ref(&options.folder), None, None, &[])
         .map_err(|e| Failure { code: e.code, message: format!("wrote {wrote}, and diagnose would refuse them: {}", e.message) })?;
     let remarks = audit::audit(&opened.problem);
-    let next = Offered::verb("diagnose").reads(&options.folder).word("--out").reads_later(&options.folder.join("diagnosis")).build();
+    let next = Builder::verb("diagnose").reads(&options.folder).word("--out").reads_later(&options.folder.join("diagnosis")).build();
     if options.json {
         output::json(&json!({
             "model": model, "set": set, "fit": seen.fit, "held_out": seen.held_out,
@@ -104,7 +104,7 @@ pub fn init(options: &cli::Init) -> Result<u8, Failure> {
         let again = options
             .recording
             .iter()
-            .fold(Offered::verb("init").reads(&options.folder), |again, file| again.word("--recording").reads(file));
+            .fold(Builder::verb("init").reads(&options.folder), |again, file| again.word("--recording").reads(file));
         let of_tables = [
             ("columns", (!options.columns.is_empty()).then(|| options.columns.join(","))),
             ("rate", options.rate.map(|rate| rate.to_string())),

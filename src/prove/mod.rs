@@ -120,7 +120,7 @@ fn write(options: &cli::Prove, cases: &[Case]) -> Result<(), Failure> {
     let path = options.out.join("proof.json");
     output::file(&path, serde_json::to_string_pretty(&json).map_err(Failure::input)?)?;
     let html = options.html.clone().unwrap_or_else(|| options.out.join("proof.html"));
-    output::file(&html, page::page(options, cases).html())
+    output::page(&html, page::page(options, cases))
 }
 
 /// Joins a run in the place of its master, with a hidden plant's process behind.

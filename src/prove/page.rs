@@ -89,7 +89,7 @@ pub fn page(options: &cli::Prove, cases: &[Case]) -> Page {
         let command = format!("sha256sum {}", shell_word(&truth.display().to_string()));
         page.text(&format!("To check a seal: {command} gives the digest of the bags' title."));
     }
-    crate::page_parts::ending(&mut page, &TERMS);
+    backdrive_pages::parts::ending(&mut page, &TERMS);
     page
 }
 

@@ -191,7 +191,7 @@ pub fn errors_of(problem: &Problem, records: &[Record]) -> Result<Vec<(String, f
     let predicted = predictions(problem, records, &structure, &structure.values(problem, &given, &[], &[]))
         .ok_or_else(|| StudyError::Diagnosis("the diagnosed model cannot be simulated".to_string()))?;
     let all = qualities(problem, records, &predicted, &problem.noise_sd, false);
-    Ok(all.into_iter().map(|q| (recordings::file_name(&q.record).to_string(), q.nrmse)).collect())
+    Ok(all.into_iter().map(|q| (backdrive_pages::parts::file_name(&q.record).to_string(), q.nrmse)).collect())
 }
 
 /// Least squares: what the columns have to be multiplied with to give the right side.

@@ -1,14 +1,17 @@
 //! What happens at which gain, and with which grip.
 
 use super::words::{text, tone, word};
-use crate::stability::Point;
 use backdrive_report::{Cell, Figure, Page, Plot, Table, Tone, number, si};
 use backdrive_stability::outcome::Outcome;
+use backdrive_stability::resimulate::Run;
 use backdrive_stability::resimulate::edge::Edge;
 use backdrive_stability::verdict::{Answer, Resimulated, Word};
 
 /// Height of verdicts with no curve over them, px.
 const BARE: f64 = 90.0;
+
+/// One gain of a sweep, and what the loop did at it.
+pub type Point = (f64, Run);
 
 /// The sweep, or the search for the edge where nothing was swept.
 pub(super) fn gains(page: &mut Page, found: &Answer, curve: &[&Point]) {

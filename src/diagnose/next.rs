@@ -1,14 +1,14 @@
 //! What to do after a diagnosis, with the commands that do it.
 
-use crate::diagnose_text::next_experiment;
 use crate::offered::{Builder, Offered, Step, plain};
-use crate::summary::graph_of;
 use backdrive_bags::Reader;
 use backdrive_diagnosis::audit::Weight;
 use backdrive_diagnosis::diagnose::Diagnosis;
 use backdrive_diagnosis::verdict::{MODEL_FILE, Word};
 use backdrive_nodes::graph::{NodeKind, Overrides, Settings};
+use backdrive_pages::diagnose::said::next_experiment;
 use backdrive_report::percent;
+use backdrive_stability::summary::graph_of;
 use std::path::{Path, PathBuf};
 
 /// The graph on which a canceller is tried, where it is at hand.
@@ -62,7 +62,7 @@ pub fn next(found: &Diagnosis, out: &Path, files: &[PathBuf]) -> Vec<Step> {
 
 /// The contact task with the model in its canceller.
 fn contact(model: &Path) -> Option<Offered> {
-    let run = Offered::verb("run").reads(Path::new(CONTACT)).option_reads("--canceller", model);
+    let run = Builder::verb("run").reads(Path::new(CONTACT)).option_reads("--canceller", model);
     run.option("--high-pass", 1).option_writes("--bag", Path::new("with-diagnosed.mcap")).build()
 }
 
@@ -71,7 +71,7 @@ pub fn simulated(model: &Path, files: &[PathBuf], table: &Path) -> Option<Offere
     // A set names the columns; the model beside it is the first of the files.
     let recording = files.iter().rev().find(|file| file.extension().is_some_and(|e| e != "toml"))?;
     let set = recording.parent().map(|folder| folder.join("set.toml")).filter(|set| set.exists());
-    let simulate = Offered::verb("simulate").reads(model).reads(recording).option_writes("--out", table);
+    let simulate = Builder::verb("simulate").reads(model).reads(recording).option_writes("--out", table);
     match set {
         Some(set) => simulate.option_reads("--columns", &set).build(),
         None => simulate.build(),
@@ -89,13 +89,13 @@ fn in_the_loop(model: &Path, files: &[PathBuf]) -> Option<Offered> {
             touches && graph.gains.mu * graph.gains.lambda > 0.0 && graph.node_of(NodeKind::Operator).is_some()
         })
     })?;
-    let asked = Offered::verb("stability").reads(bag).option_reads("--canceller", model).option("--canceller-grip", "none");
+    let asked = Builder::verb("stability").reads(bag).option_reads("--canceller", model).option("--canceller-grip", "none");
     asked.option("--high-pass", 1).option_writes("--html", Path::new("stability.html")).build()
 }
 
 /// The diagnosis again, an option with twice its value.
 fn again(name: &str, usual: f64) -> Option<Offered> {
-    let again: Builder = Offered::again();
+    let again: Builder = Builder::again();
     let now = again.value_of(name).and_then(|text| text.parse::<f64>().ok()).unwrap_or(usual);
     again.option(name, plain(2.0 * now)).build().filter(|offered| offered.is("diagnose"))
 }

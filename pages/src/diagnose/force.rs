@@ -1,7 +1,7 @@
 //! The force that gave the physics away, the law over it, and the places that compete.
 
-use super::phrases::{adds, capital};
-use crate::recordings::file_name;
+use super::phrases::adds;
+use crate::parts::{file_name, sentence};
 use backdrive_diagnosis::candidate::Candidate;
 use backdrive_diagnosis::diagnose::Diagnosis;
 use backdrive_diagnosis::evidence::{Curve, Evidence, Trace, evidence};
@@ -46,7 +46,7 @@ pub(super) fn section(page: &mut Page, found: &Diagnosis, best: &Candidate) {
 /// A finding's physics and place in words, as a title.
 pub(super) fn in_words(best: &Candidate, which: usize) -> String {
     let Some(own) = best.structure.added.get(which) else { return String::new() };
-    capital(&words::named(own.physics.name, &own.place)).trim_end_matches('.').to_string()
+    sentence(&words::named(own.physics.name, &own.place)).trim_end_matches('.').to_string()
 }
 
 /// How a place reads.

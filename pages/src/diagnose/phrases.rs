@@ -9,14 +9,6 @@ pub(super) fn adds(candidate: &Candidate) -> bool {
     !candidate.structure.added.is_empty()
 }
 
-/// A sentence from a clause: its first letter large, a full stop at its end.
-pub(super) fn capital(clause: &str) -> String {
-    let mut chars = clause.chars();
-    let first: String = chars.next().map(|c| c.to_uppercase().collect()).unwrap_or_default();
-    let stop = if clause.is_empty() || clause.ends_with(['.', '!', '?', ':']) { "" } else { "." };
-    format!("{first}{}{stop}", chars.as_str())
-}
-
 /// The colour of a verdict.
 pub(super) fn tone(word: Word) -> Tone {
     match word {

@@ -1,18 +1,16 @@
 //! The report of `backdrive diagnose` on joints that position servos drive.
 
-use super::phrases::{capital, tone};
-use crate::estimate_text::estimate;
-use crate::offered::{Offered, Step};
-use crate::page_parts::{ending, todo};
-use crate::recordings::file_name;
-use backdrive_diagnosis::verdict::{MODEL_FILE, Parameter, Word};
+use super::phrases::tone;
+use crate::estimate::estimate;
+use crate::offered::Step;
+use crate::parts::{ending, file_name, sentence, todo};
+use backdrive_diagnosis::verdict::Parameter;
 use backdrive_diagnosis::words as said;
 use backdrive_report::{Colour, Dash, Figure, Page, Plot, Series, Table, Tone, number};
 use backdrive_servo::diagnose::{Answer, Found, Judged};
 use backdrive_servo::problem::Problem;
 use backdrive_servo::said::words;
 use backdrive_servo::search::scored;
-use std::path::Path;
 
 /// Records that are drawn of each joint.
 const DRAWN: usize = 2;
@@ -28,25 +26,19 @@ const TERMS: [(&str, &str); 5] = [
     ("force in rad", "over the servo's proportional gain: the angle between command and position that holds it"),
 ];
 
-/// The report.
-pub fn page(problem: &Problem, found: &Found, name: &str, out: &Path) -> Page {
+/// The report: `name` is the set, for the title, and `steps` what to do next.
+pub fn page(problem: &Problem, found: &Found, name: &str, steps: &[Step]) -> Page {
     let verdict = &found.verdict;
     let mut page = Page::new(&format!("Diagnosis of the servo joints of {name}"));
-    page.lead(tone(verdict.word), &capital(&verdict.sentence));
+    page.lead(tone(verdict.word), &sentence(&verdict.sentence));
     let Some(servo) = &verdict.servo else { return page };
-    page.text(&capital(&format!("{}.", servo.scale)));
-    let model = out.join(MODEL_FILE);
-    let mut steps = Vec::new();
-    if matches!(verdict.word, Word::Missing | Word::Parameters | Word::NothingMissing) {
-        let show = Offered::verb("model show").reads(&model);
-        steps.push(Step::new(format!("Use {}; this shows its numbers:", model.display()), [show.build()]));
-    }
-    todo(&mut page, &steps);
+    page.text(&sentence(&format!("{}.", servo.scale)));
+    todo(&mut page, steps);
     for note in &found.notes {
-        page.note(&capital(note));
+        page.note(&sentence(note));
     }
     for remark in &verdict.audit {
-        page.warning(&capital(&format!("{}: {}", remark.place, remark.message)));
+        page.warning(&sentence(&format!("{}: {}", remark.place, remark.message)));
     }
 
     page.section("What was found");
@@ -102,7 +94,7 @@ pub fn page(problem: &Problem, found: &Found, name: &str, out: &Path) -> Page {
     let rows: Vec<Vec<String>> = servo
         .joints
         .iter()
-        .flat_map(|j| j.shared.iter().map(|s| vec![j.joint.clone(), capital(&s.sentence), capital(&s.separated_by)]))
+        .flat_map(|j| j.shared.iter().map(|s| vec![j.joint.clone(), sentence(&s.sentence), sentence(&s.separated_by)]))
         .collect();
     page.table(table(["joint", "what is shared", "what tells them apart"], rows));
 

@@ -1,11 +1,14 @@
 //! The page of a comparison: one picture, one table.
 
-use super::compared::Compared;
-use super::text::{COLUMNS, row};
-use crate::page_parts::ending;
+pub mod cells;
+pub mod compared;
+
+use crate::parts::ending;
 use backdrive_report::{Cell as Shown, Colour, Figure, Page, Plot, Series, Table, Tone, number};
 use backdrive_stability::compare::{Cell, Varied};
 use backdrive_stability::outcome::Outcome;
+use cells::{COLUMNS, row};
+use compared::Compared;
 
 /// The terms of the page.
 const TERMS: [(&str, &str); 4] = [
@@ -19,7 +22,7 @@ const TERMS: [(&str, &str); 4] = [
 type Of = fn(&Cell) -> Option<f64>;
 
 /// The page.
-pub(super) fn page(compared: &Compared) -> Page {
+pub fn page(compared: &Compared) -> Page {
     let [mu, lambda] = compared.gains;
     let mut page = Page::new("Laws between master and slave");
     let (tone, sentence) = headline(compared);

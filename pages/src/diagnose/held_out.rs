@@ -1,7 +1,7 @@
 //! Measured beside predicted, and what is left over.
 
 use super::phrases::adds;
-use crate::recordings::file_name;
+use crate::parts::file_name;
 use backdrive_diagnosis::candidate::Candidate;
 use backdrive_diagnosis::compare::{Predicted, density, predictions, qualities};
 use backdrive_diagnosis::diagnose::Diagnosis;

@@ -1,8 +1,7 @@
 //! The page of `backdrive why`: what happens, why, and what would stop it, for a colleague who was not there.
 
-use super::next::{Asked, capital, commands};
 use crate::offered::Step;
-use crate::page_parts::{ending, todo};
+use crate::parts::{ending, large, todo};
 use backdrive_report::{Figure, Page, Plot, Table, Tone, number, percent};
 use backdrive_stability::session::Session;
 use backdrive_why::answer::Answer;
@@ -11,8 +10,11 @@ use backdrive_why::happening::Happening;
 /// Causes that are less likely are not shown.
 const UNLIKELY: f64 = 0.01;
 
-/// The page of an answer about a session, with what to do next.
-pub fn page(found: &Answer, session: &Session, asked: &Asked, steps: &[Step]) -> Page {
+/// Where the signals alone do not say why.
+pub const NO_CAUSE: &str = "cannot be told: what there is holds no model of the loop and no excitation that measures it";
+
+/// The page of an answer about a session, with what to do next; `tries` are the commands that try each remedy, in their order.
+pub fn page(found: &Answer, session: &Session, tries: &[Step], steps: &[Step]) -> Page {
     let name = std::path::Path::new(&found.bag).file_name().map_or(found.bag.clone(), |n| n.to_string_lossy().into_owned());
     let mut page = Page::new(&format!("Why does it shake? {name}"));
     page.lead(tone(found), &lead(found));
@@ -30,7 +32,7 @@ pub fn page(found: &Answer, session: &Session, asked: &Asked, steps: &[Step]) ->
     page.section("Causes");
     causes(&mut page, found);
     page.section("What would stop it");
-    remedies(&mut page, found, asked);
+    remedies(&mut page, found, tries);
     page.section("Where the recording is not what its graph says");
     if found.differs.is_empty() {
         page.text("Nowhere: every node does of what it was given what the graph says of it.");
@@ -66,7 +68,7 @@ fn tone(found: &Answer) -> Tone {
 }
 
 fn lead(found: &Answer) -> String {
-    let mut text = format!("{}, at μλ = {}.", capital(&found.happens), number(found.gain));
+    let mut text = format!("{}, at μλ = {}.", large(&found.happens), number(found.gain));
     if let Some(first) = found.causes.first() {
         text += &format!(" The likeliest cause is {} (confidence {}).", first.kind.words(), percent(first.confidence));
     }
@@ -109,11 +111,7 @@ fn pictures(page: &mut Page, found: &Answer, session: &Session) {
 fn causes(page: &mut Page, found: &Answer) {
     if found.causes.is_empty() {
         let trouble = found.happening.is_trouble();
-        page.text(&if trouble {
-            format!("The cause {}.", super::text::NO_CAUSE)
-        } else {
-            "Nothing shakes, so nothing is the cause.".to_string()
-        });
+        page.text(&if trouble { format!("The cause {}.", NO_CAUSE) } else { "Nothing shakes, so nothing is the cause.".to_string() });
         return;
     }
     page.text(
@@ -123,7 +121,7 @@ fn causes(page: &mut Page, found: &Answer) {
     let mut table = Table::new(["cause", "where", "confidence", "seen", "without it", "stable up to μλ, without it"]);
     for cause in found.causes.iter().filter(|c| c.confidence >= UNLIKELY) {
         table.push([
-            capital(cause.kind.words()),
+            large(cause.kind.words()),
             cause.place.clone(),
             percent(cause.confidence),
             if cause.seen { "yes" } else { "no" }.to_string(),
@@ -133,11 +131,11 @@ fn causes(page: &mut Page, found: &Answer) {
     }
     page.table(table);
     for cause in found.causes.iter().filter(|c| c.confidence >= UNLIKELY) {
-        page.text(&format!("{}: {}.", capital(cause.kind.words()), cause.evidence));
+        page.text(&format!("{}: {}.", large(cause.kind.words()), cause.evidence));
     }
 }
 
-fn remedies(page: &mut Page, found: &Answer, asked: &Asked) {
+fn remedies(page: &mut Page, found: &Answer, tries: &[Step]) {
     if found.remedies.is_empty() {
         page.text(if found.happening.is_trouble() { "Nothing could be tried." } else { "Nothing needs to be stopped." });
         return;
@@ -153,16 +151,16 @@ fn remedies(page: &mut Page, found: &Answer, asked: &Asked) {
         "how it is tried",
     ]);
     let yes = |is: bool| if is { "yes" } else { "no" }.to_string();
-    for remedy in &found.remedies {
+    for (index, remedy) in found.remedies.iter().enumerate() {
         table.push([
-            capital(&remedy.text),
+            large(&remedy.text),
             remedy.outcome.clone(),
             yes(remedy.stops),
             yes(remedy.robust),
             percent(remedy.force_kept),
             percent(remedy.motion_kept),
             remedy.throws.as_ref().map_or_else(|| "no".to_string(), ToString::to_string),
-            Step::new("", commands(found, asked, remedy)).pasted().unwrap_or_default(),
+            tries.get(index).and_then(Step::pasted).unwrap_or_default(),
         ]);
     }
     page.table(table);

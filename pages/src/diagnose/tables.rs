@@ -162,7 +162,7 @@ pub(super) fn per_record(page: &mut Page, found: &Diagnosis) {
         return;
     }
     let mut header = vec!["parameter".to_string()];
-    header.extend(fits.records.iter().map(|r| crate::recordings::file_name(r).to_string()));
+    header.extend(fits.records.iter().map(|r| crate::parts::file_name(r).to_string()));
     header.push("chance of this much scatter".to_string());
     let mut table = Table::new(header);
     for across in &fits.numbers {
@@ -196,7 +196,7 @@ pub(super) fn audit(page: &mut Page, found: &Diagnosis) {
     for (records, use_) in [(&problem.fit, "fits"), (&problem.held_out, "held out")] {
         for record in records {
             files.push([
-                crate::recordings::file_name(&record.name).to_string(),
+                crate::parts::file_name(&record.name).to_string(),
                 record.len.to_string(),
                 si(1.0 / record.period, "Hz"),
                 si(record.len as f64 * record.period, "s"),

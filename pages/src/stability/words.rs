@@ -1,5 +1,6 @@
 //! Verdicts and numbers in words.
 
+use crate::parts::sentence;
 use backdrive_report::{Cell, Tone, number};
 use backdrive_stability::energy::EnergyVerdict;
 use backdrive_stability::outcome::Outcome;
@@ -48,18 +49,9 @@ pub(super) fn interval((low, high): (f64, Option<f64>)) -> String {
     }
 }
 
-/// The last part of a path, for the title.
-pub(super) fn file_name(path: &str) -> &str {
-    path.rsplit('/').find(|part| !part.is_empty()).unwrap_or(path)
-}
-
 /// A sentence from a clause: its first letter large, a full stop at its end, the gain as the page spells it.
 pub(super) fn capital(clause: &str) -> String {
-    let clause = &spelled(clause);
-    let mut chars = clause.chars();
-    let first: String = chars.next().map(|c| c.to_uppercase().collect()).unwrap_or_default();
-    let stop = if clause.is_empty() || clause.ends_with(['.', '!', '?', ':']) { "" } else { "." };
-    format!("{first}{}{stop}", chars.as_str())
+    sentence(&spelled(clause))
 }
 
 /// The gain as the page spells it; in a terminal and in files it is `mu*lambda`.
@@ -77,6 +69,5 @@ mod tests {
         assert_eq!(capital("Done."), "Done.");
         assert_eq!(capital(""), "");
         assert_eq!(capital("the edge lies at mu*lambda = 3"), "The edge lies at μλ = 3.");
-        assert_eq!(file_name("a/b/session/"), "session");
     }
 }

@@ -5,20 +5,20 @@ mod arm_figures;
 mod arm_tables;
 mod force;
 mod held_out;
-pub mod next;
 mod phrases;
+pub mod said;
 pub mod servo;
 mod tables;
 
-use crate::diagnose_text::{alternatives, confidence, errors, parameters, shows};
 use crate::offered::Step;
-use crate::page_parts::{ending, todo};
+use crate::parts::{ending, sentence, todo};
 use backdrive_diagnosis::audit::Weight;
 use backdrive_diagnosis::diagnose::Diagnosis;
 use backdrive_diagnosis::verdict::{Verdict, chosen};
 use backdrive_diagnosis::words;
 use backdrive_report::{Cell, Page, Table, Tone, percent};
-use phrases::{adds, capital, tone};
+use phrases::{adds, tone};
+use said::{alternatives, confidence, errors, parameters, shows};
 
 /// What a report shows.
 pub struct Shown<'a> {
@@ -37,14 +37,14 @@ pub fn page(shown: &Shown) -> Page {
     let found = shown.found;
     let best = chosen(&found.search);
     let mut page = Page::new(&format!("Diagnosis of {} against {}", shown.name, found.problem.model.name));
-    page.lead(tone(found.verdict.word), &capital(&found.verdict.sentence));
+    page.lead(tone(found.verdict.word), &sentence(&found.verdict.sentence));
     page.text(&summary(found, adds(best)));
     todo(&mut page, shown.steps);
     for note in shown.notes {
-        page.note(&capital(note));
+        page.note(&sentence(note));
     }
     for remark in found.remarks.iter().filter(|r| r.weight > Weight::Note).take(4) {
-        page.warning(&capital(&remark.to_string()));
+        page.warning(&sentence(&remark.to_string()));
     }
     if found.search.cut {
         page.warning("The search was cut off by the clock (--patience) or interrupted: on another machine it may come to another verdict.");

@@ -1,8 +1,8 @@
 //! The answer as a page: one sentence, the joints, and the pictures that show each finding.
 
-use super::response;
-use crate::page_parts::ending;
-use crate::page_parts::lines_to_paste;
+pub mod response;
+
+use crate::parts::{ending, lines_to_paste};
 use backdrive_inspect::{Finding, FindingKind, Quantity, Recording, Report, Response, Signal, Weight};
 use backdrive_report::{Cell, Figure, Page, Plot, Table, Tone, number};
 

@@ -1,16 +1,16 @@
 //! What happened in a run, read from its bag.
 
-use crate::failure::Failure;
-use backdrive_bags::Reader;
+use crate::collect::Collector;
+use crate::outcome::{Outcome, Trace};
+use crate::unjudged::Unjudged;
+use backdrive_bags::{BagError, Reader};
 use backdrive_msgs::{Margin, Message, margin as known};
 use backdrive_nodes::graph::{Files, Graph, Node, NodeKind, Overrides, Settings};
 use backdrive_nodes::protocol::MarginStatus;
 use backdrive_plant::model::Motion;
-use backdrive_stability::collect::Collector;
-use backdrive_stability::outcome::{Outcome, Trace};
-use backdrive_stability::unjudged::Unjudged;
+use backdrive_plant::tomlfile::FileError;
 use std::collections::BTreeSet;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// What happened in a run.
 #[derive(Debug, Clone)]
@@ -37,16 +37,36 @@ pub struct Summary {
     pub margin: Option<String>,
 }
 
-/// The graph that a bag holds, with the command line's changes.
-pub fn graph_of(reader: &Reader, changes: &Overrides) -> Result<Graph, Failure> {
+/// Why a bag does not tell what happened in its run.
+#[derive(Debug, thiserror::Error)]
+pub enum SummaryError {
+    /// It cannot be read.
+    #[error(transparent)]
+    Bag(#[from] BagError),
+    /// It holds no graph: it was cut off before, or is no bag of a run.
+    #[error("{}: {why}", path.display())]
+    NoGraph {
+        /// The bag.
+        path: PathBuf,
+        /// Why there is none.
+        why: String,
+    },
+    /// Its graph is wrong, or the changes are.
+    #[error(transparent)]
+    Graph(#[from] FileError),
+}
+
+/// The graph that a bag holds, with changes to it.
+///
+/// # Errors
+/// The bag holds no graph, or one that is wrong with these changes.
+pub fn graph_of(reader: &Reader, changes: &Overrides) -> Result<Graph, SummaryError> {
     let path = reader.path();
-    let no_graph = || match reader.without_messages() {
-        Some(cut) => Failure::input(format!("{}: {cut}", path.display())),
-        None => Failure::input(format!("{}: is not a bag of a run: it holds no graph", path.display())),
-    };
-    let header = reader.header().ok_or_else(no_graph)?;
+    let no_graph = |why: String| SummaryError::NoGraph { path: path.to_path_buf(), why };
+    let not_begun = || reader.without_messages().map_or("is not a bag of a run: it holds no graph".to_string(), |cut| cut.to_string());
+    let header = reader.header().ok_or_else(|| no_graph(not_begun()))?;
     if header.graph_toml.is_empty() {
-        return Err(Failure::input(format!("{}: holds recordings, but no graph to run", path.display())));
+        return Err(no_graph("holds recordings, but no graph to run".to_string()));
     }
     Ok(Graph::from_text(&header.graph_toml, path, changes, &Files::Bag(&header.files))?)
 }
@@ -61,13 +81,16 @@ fn force_unit(graph: &Graph, kind: NodeKind) -> &'static str {
 }
 
 /// Reads a bag and says what happened.
-pub fn summarise(path: &Path) -> Result<Summary, Failure> {
-    let reader = Reader::open(path).map_err(Failure::input)?;
+///
+/// # Errors
+/// The bag cannot be read, or holds no graph.
+pub fn summarise(path: &Path) -> Result<Summary, SummaryError> {
+    let reader = Reader::open(path)?;
     let graph = graph_of(&reader, &Overrides::default())?;
     let mut traces = Traces::of(&graph);
-    for entry in reader.messages().map_err(Failure::input)? {
-        let entry = entry.map_err(Failure::input)?;
-        if let Some(message) = entry.message(path).map_err(Failure::input)? {
+    for entry in reader.messages()? {
+        let entry = entry?;
+        if let Some(message) = entry.message(path)? {
             traces.take(&entry.topic.name, &message);
         }
     }
@@ -183,40 +206,5 @@ impl Summary {
     /// Takes a green verdict back, where something that is not in the signals forbids it.
     pub fn hold_back(&mut self, by: Option<Unjudged>) {
         self.outcome = self.outcome.map(|outcome| outcome.held_back(by));
-    }
-
-    /// A few lines for a person.
-    pub fn text(&self) -> String {
-        let mut lines = Vec::new();
-        if let (Some(start), Some(peak)) = (self.first_contact_s, self.peak_contact_force) {
-            lines.push(format!(
-                "contact  first at {start:.3} s, {:.3} s in all, force up to {peak:.3} {}",
-                self.contact_s, self.force_units[0]
-            ));
-        } else if self.peak_contact_force.is_some() {
-            lines.push("contact  none".to_string());
-        }
-        if let Some(peak) = self.peak_feedback_force {
-            lines.push(format!("master   reflected force up to {peak:.3} {}", self.force_units[1]));
-        }
-        if let Some(margin) = &self.margin {
-            lines.push(format!("margin   {margin}"));
-        }
-        if let Some(outcome) = &self.outcome {
-            let moved = (self.last_loop_gain - self.loop_gain).abs() > 1e-9 * self.loop_gain.abs();
-            let later = if moved { format!(" at the start and {:.4} at the end", self.last_loop_gain) } else { String::new() };
-            let gain = format!("at mu*lambda = {}{later}", self.loop_gain);
-            match outcome {
-                Outcome::NotJudged { why } => {
-                    lines.push(format!("loop     it cannot be told whether it is stable {gain}: {why}"));
-                    lines.push(format!("to do    {}", why.advice()));
-                }
-                outcome => lines.push(format!("loop     {outcome} {gain}")),
-            }
-        }
-        if let Some(why) = self.no_loop {
-            lines.push(format!("loop     none to judge: {why}"));
-        }
-        lines.join("\n")
     }
 }

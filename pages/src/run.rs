@@ -2,11 +2,9 @@
 //!
 //! It is made from what went by (from the bag, or from the run itself where it was in one process) and from the supervisor's report.
 
-use crate::failure::Failure;
 use crate::offered::Step;
-use crate::page_parts::{ending, todo};
-use crate::run::Done;
-use backdrive_bags::Reader;
+use crate::parts::{ending, todo};
+use backdrive_bags::{BagError, Reader};
 use backdrive_launch::{Cause, RunReport};
 use backdrive_msgs::{Message, Status};
 use backdrive_nodes::graph::Graph;
@@ -15,6 +13,7 @@ use backdrive_report::{Cell, Colour, Dash, Figure, Page, Plot, Series, Table, To
 use backdrive_stability::collect::Collector;
 use backdrive_stability::outcome::Outcome;
 use backdrive_stability::session::{AxisSignals, Session};
+use backdrive_stability::summary::Summary;
 use std::path::Path;
 
 /// Events beyond these are counted, not listed.
@@ -65,12 +64,12 @@ impl Heard {
     ///
     /// # Errors
     /// A bag that cannot be read.
-    pub fn from_bag(graph: &Graph, bag: &Path) -> Result<Heard, Failure> {
-        let reader = Reader::open(bag).map_err(Failure::input)?;
+    pub fn from_bag(graph: &Graph, bag: &Path) -> Result<Heard, BagError> {
+        let reader = Reader::open(bag)?;
         let mut heard = Heard::of(graph);
-        for entry in reader.messages().map_err(Failure::input)? {
-            let entry = entry.map_err(Failure::input)?;
-            if let Some(message) = entry.message(bag).map_err(Failure::input)? {
+        for entry in reader.messages()? {
+            let entry = entry?;
+            if let Some(message) = entry.message(bag)? {
                 heard.take(&entry.topic.name, &message);
             }
         }
@@ -99,8 +98,26 @@ impl Heard {
     }
 }
 
+/// What a run gave, for its page.
+pub struct Shown<'a> {
+    /// Steps done by the node that did most.
+    pub steps: u64,
+    /// Wall-clock time, s.
+    pub duration_s: f64,
+    /// From the supervisor; `None` for a run in one process.
+    pub report: Option<&'a RunReport>,
+    /// Messages that are not in the bag, and samples that a node did not get.
+    pub lost: u64,
+    /// The bag, if one was recorded.
+    pub bag: Option<&'a Path>,
+    /// Whether its recorder ended and nothing is missing in it.
+    pub complete: bool,
+    /// What happened.
+    pub summary: Option<&'a Summary>,
+}
+
 /// The page of a run or of a replay, with what to do next.
-pub fn page(done: &Done, graph: &Graph, heard: &Heard, steps: &[Step]) -> Page {
+pub fn page(done: &Shown, graph: &Graph, heard: &Heard, steps: &[Step]) -> Page {
     let mut page = Page::new(if graph.title.is_empty() { "A run" } else { &graph.title });
     let (tone, sentence) = headline(done);
     page.lead(tone, &sentence);
@@ -124,17 +141,14 @@ pub fn page(done: &Done, graph: &Graph, heard: &Heard, steps: &[Step]) -> Page {
 }
 
 /// What a hurried reader takes away.
-fn headline(done: &Done) -> (Tone, String) {
-    let gain = done.summary.as_ref().map_or(String::new(), |s| format!(" at μλ = {}", number(s.last_loop_gain)));
-    let fault = done
-        .report
-        .as_ref()
-        .filter(|r| !matches!(r.cause, Cause::Completed))
-        .map(|r| format!(" The run did not go to its end: {}.", r.cause));
+fn headline(done: &Shown) -> (Tone, String) {
+    let gain = done.summary.map_or(String::new(), |s| format!(" at μλ = {}", number(s.last_loop_gain)));
+    let fault =
+        done.report.filter(|r| !matches!(r.cause, Cause::Completed)).map(|r| format!(" The run did not go to its end: {}.", r.cause));
     let fault = fault.or((done.lost > 0).then(|| format!(" {} messages were lost.", done.lost))).unwrap_or_default();
-    let Some(outcome) = done.summary.as_ref().and_then(|s| s.outcome) else {
+    let Some(outcome) = done.summary.and_then(|s| s.outcome) else {
         let tone = if fault.is_empty() { Tone::Neutral } else { Tone::Bad };
-        let why = done.summary.as_ref().and_then(|s| s.no_loop).map_or(String::new(), |why| format!(": {why}"));
+        let why = done.summary.and_then(|s| s.no_loop).map_or(String::new(), |why| format!(": {why}"));
         return (tone, format!("There is no loop whose stability could be judged{why}.{fault}"));
     };
     let (tone, text) = match outcome {
@@ -160,13 +174,13 @@ fn headline(done: &Done) -> (Tone, String) {
     (tone, format!("{text}{fault}"))
 }
 
-fn facts(done: &Done, graph: &Graph) -> Table {
+fn facts(done: &Shown, graph: &Graph) -> Table {
     let mut table = Table::new(["", ""]);
     let mut row = |name: &str, text: String| table.push([name.to_string(), text]);
     let clock = if graph.timing.clock == Clock::Realtime { "real time" } else { "lockstep" };
     let planned = graph.timing.steps.map_or(String::new(), |n| format!(" of {n}"));
     row("steps", format!("{}{planned}, at {} ({clock})", done.steps, si(graph.timing.rate_hz, "Hz")));
-    if let Some(s) = &done.summary {
+    if let Some(s) = done.summary {
         let later = if (s.last_loop_gain - s.loop_gain).abs() > 1e-9 {
             format!("; {} at the end", number(s.last_loop_gain))
         } else {
@@ -188,7 +202,7 @@ fn facts(done: &Done, graph: &Graph) -> Table {
             row("margin in contact", margin.clone());
         }
     }
-    if let Some(bag) = &done.bag {
+    if let Some(bag) = done.bag {
         let state = if done.complete { "complete".to_string() } else { format!("not complete, {} messages lost", done.lost) };
         row("bag", format!("{} ({state})", bag.file_name().unwrap_or_default().to_string_lossy()));
     }
@@ -256,8 +270,8 @@ fn plots(axis: &AxisSignals, period_s: f64, title: &str, touching: &[(f64, f64)]
     Figure::stacked([position, force])
 }
 
-fn timing(page: &mut Page, done: &Done, graph: &Graph, heard: &Heard) {
-    let Some(report) = &done.report else {
+fn timing(page: &mut Page, done: &Shown, graph: &Graph, heard: &Heard) {
+    let Some(report) = done.report else {
         page.text(&format!(
             "All nodes ran in one process, in lockstep: {} steps in {}. Nothing waits for a deadline there and nothing can be lost between nodes.",
             done.steps,
@@ -312,7 +326,7 @@ fn latency(page: &mut Page, graph: &Graph, heard: &Heard) {
     }
 }
 
-fn events(page: &mut Page, done: &Done, graph: &Graph, heard: &Heard) {
+fn events(page: &mut Page, done: &Shown, graph: &Graph, heard: &Heard) {
     let severity = |severity: u32| match severity {
         0 => Cell::from("info".to_string()),
         1 => Cell::tone("warning", Tone::Warning),
@@ -326,7 +340,7 @@ fn events(page: &mut Page, done: &Done, graph: &Graph, heard: &Heard) {
         let own = report.events.iter().filter(|e| e.step.is_none());
         own.map(|e| (e.t_s.unwrap_or(0.0), e.node.clone(), e.severity, e.text.clone())).collect()
     };
-    rows.extend(done.report.as_ref().map(supervised).unwrap_or_default());
+    rows.extend(done.report.map(supervised).unwrap_or_default());
     if rows.is_empty() {
         page.text("None.");
         return;
@@ -336,7 +350,7 @@ fn events(page: &mut Page, done: &Done, graph: &Graph, heard: &Heard) {
         table.push([Cell::from(si(time, "s")), node.into(), severity(how), text.into()]);
     }
     page.table(table);
-    let left_out = heard.events_left_out as u64 + done.report.as_ref().map_or(0, |r| r.events_left_out);
+    let left_out = heard.events_left_out as u64 + done.report.map_or(0, |r| r.events_left_out);
     if left_out > 0 {
         page.note(&format!("{left_out} more events are in the bag."));
     }

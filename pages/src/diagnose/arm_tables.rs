@@ -1,8 +1,7 @@
 //! Tables of an arm: findings, joints, inertial parameters, what was tried, logs.
 
-use super::phrases::capital;
-use crate::diagnose_text::{confidence, parameters};
-use crate::recordings::file_name;
+use super::said::{confidence, parameters};
+use crate::parts::{file_name, sentence};
 use backdrive_arms::diagnose::Tried;
 use backdrive_arms::judge::AGAINST;
 use backdrive_arms::problem::Problem;
@@ -81,7 +80,7 @@ pub(super) fn joints(page: &mut Page, verdict: &Verdict) {
          is told for the time in which the joint moves, too.",
     ));
     for open in arm.joints.iter().filter_map(unexplained) {
-        page.text(&capital(&format!("not explained: {open}")));
+        page.text(&sentence(&format!("not explained: {open}")));
     }
 }
 

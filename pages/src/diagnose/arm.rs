@@ -1,16 +1,14 @@
 //! The report of `backdrive diagnose` on an arm: pictures first, the numbers beside them.
 
-use super::phrases::{capital, tone};
+use super::phrases::tone;
 use super::{arm_figures as figures, arm_tables as tables};
-use crate::offered::{Offered, Step};
-use crate::page_parts::{ending, todo};
+use crate::offered::Step;
+use crate::parts::{ending, sentence, todo};
 use backdrive_arms::diagnose::Found;
 use backdrive_arms::problem::Problem;
-use backdrive_arms::said::unexplained;
 use backdrive_diagnosis::audit::Weight;
-use backdrive_diagnosis::verdict::{MODEL_FILE, Verdict, Word};
+use backdrive_diagnosis::verdict::Verdict;
 use backdrive_report::{Page, percent};
-use std::path::Path;
 
 /// What a report shows.
 pub struct Shown<'a> {
@@ -22,24 +20,24 @@ pub struct Shown<'a> {
     pub name: &'a str,
     /// What a reader should know first.
     pub notes: &'a [String],
-    /// The folder of the model that was written.
-    pub out: &'a Path,
+    /// What to do next.
+    pub steps: &'a [Step],
 }
 
 /// The report.
 pub fn page(shown: &Shown) -> Page {
-    let Shown { problem, found, name, notes, out } = shown;
+    let Shown { problem, found, name, notes, steps } = shown;
     let verdict = &found.verdict;
     let held = !problem.held_out.is_empty();
     let mut page = Page::new(&format!("Diagnosis of {name} against {}", problem.model.name));
-    page.lead(tone(verdict.word), &capital(&verdict.sentence));
+    page.lead(tone(verdict.word), &sentence(&verdict.sentence));
     page.text(&summary(verdict, held));
-    todo(&mut page, &to_do(verdict, out));
+    todo(&mut page, steps);
     for note in *notes {
-        page.note(&capital(note));
+        page.note(&sentence(note));
     }
     for remark in verdict.audit.iter().filter(|r| r.weight > Weight::Note).take(4) {
-        page.warning(&capital(&format!("{}: {}", remark.place, remark.message)));
+        page.warning(&sentence(&format!("{}: {}", remark.place, remark.message)));
     }
     tables::findings(&mut page, verdict);
     page.section("What remains of each joint's torque");
@@ -100,41 +98,4 @@ fn summary(verdict: &Verdict, held: bool) -> String {
         joints.join("; at "),
         backdrive_report::number(arm.corner_hz)
     )
-}
-
-/// What to do now, most useful first, with commands to copy.
-pub fn to_do(verdict: &Verdict, out: &Path) -> Vec<Step> {
-    let mut steps = Vec::new();
-    let model = out.join(MODEL_FILE);
-    let (name, export) = (model.display(), Offered::verb("export").reads(&model).option("--to", "urdf"));
-    let use_it = || [export.option_writes("--out", Path::new("arm.diagnosed.urdf")).build()];
-    match verdict.word {
-        Word::Missing | Word::Parameters => steps.push(Step::new(
-            format!("Use {name}, such as in a feed-forward or a simulation; this writes it for other programs:"),
-            use_it(),
-        )),
-        Word::Ambiguous => steps.push(Step::new(
-            format!("{name} may be used, but the physics named first could be another one: see the table below."),
-            use_it(),
-        )),
-        Word::NothingMissing => steps.push(Step::said("Keep the model: the logs ask for nothing more.")),
-        Word::Unexplained => steps.push(Step::said(
-            "Do not build on a law yet: look below at when and where the residual shows, and check the sensors of the joints named there first.",
-        )),
-        Word::CannotTell => {}
-    }
-    if verdict.word != Word::Unexplained {
-        for joint in verdict.arm.iter().flat_map(|a| &a.joints) {
-            if let Some(open) = unexplained(joint) {
-                steps.push(Step::said(format!("Look at what is left over {open}.")));
-            }
-        }
-    }
-    if let Some(next) = &verdict.next_experiment {
-        steps.push(Step::said(format!("Record next: {}", next.sentence())));
-    }
-    for remark in verdict.audit.iter().filter(|r| r.weight > Weight::Note).take(2) {
-        steps.push(Step::said(format!("Check this signal: {}: {}", remark.place, remark.message)));
-    }
-    steps
 }

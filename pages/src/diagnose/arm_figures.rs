@@ -1,7 +1,6 @@
 //! Figures of an arm: what remains, torque and its predictions, friction, the motion to record next.
 
-use super::phrases::capital;
-use crate::recordings::file_name;
+use crate::parts::{file_name, sentence};
 use backdrive_arms::drawn::{Drawn, DrawnJoint};
 use backdrive_diagnosis::verdict::Verdict;
 use backdrive_report::{Colour, Dash, Figure, Page, Plot, Series, Tone, number};
@@ -109,7 +108,7 @@ pub(super) fn friction(page: &mut Page, drawn: &Drawn) {
 /// The planned motion.
 pub(super) fn next(page: &mut Page, verdict: &Verdict, drawn: &Drawn) {
     if let Some(next) = &verdict.next_experiment {
-        page.text(&capital(next.sentence()));
+        page.text(&sentence(next.sentence()));
     }
     // Angles and lengths have an axis each.
     for unit in ["rad", "m"] {

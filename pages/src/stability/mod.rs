@@ -9,19 +9,19 @@ mod response;
 mod words;
 
 use crate::offered::Step;
-use crate::page_parts::{ending, todo};
-use crate::stability::Point;
+use crate::parts::{ending, file_name, todo};
 pub use axes::CANCELLED;
 use backdrive_report::{Cell, Page, Table, Tone, number, percent, si};
 use backdrive_stability::frequency;
 use backdrive_stability::session::Session;
 use backdrive_stability::verdict::{Answer, Method, Word};
 use energy::{energy, transparency};
+pub use gains::Point;
 use gains::gains;
 use measured::measured;
 use response::response;
 pub use words::spelled;
-use words::{capital, energy_verdict, file_name, interval, tone, verdict, word};
+use words::{capital, energy_verdict, interval, tone, verdict, word};
 
 /// The report of an answer; `session` is what was recorded, `curve` the sweep, which may be empty, `steps` what to do next.
 pub fn page(found: &Answer, session: &Session, curve: &[&Point], steps: &[Step]) -> Page {
