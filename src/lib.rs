@@ -42,7 +42,6 @@ mod stability;
 mod test_bench;
 mod why;
 
-pub use prove::hidden::{Hidden, Opened};
 pub use run::{Done, run_here};
 
 use cli::{Cli, Command};

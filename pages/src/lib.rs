@@ -11,6 +11,7 @@ pub mod estimate;
 pub mod inspect;
 pub mod offered;
 pub mod parts;
+pub mod prove;
 pub mod run;
 pub mod stability;
 pub mod why;

@@ -2,7 +2,7 @@
 
 use super::case::Case;
 use super::chosen::AS_GOOD;
-use super::raise::{ESTIMATED, Hand};
+use super::gain::{ESTIMATED, Hand};
 use super::statistics::{Share, median};
 use serde::Serialize;
 

@@ -3,7 +3,7 @@
 use super::edges::{Canceller, Loop};
 use super::files::{absolute, ours, write};
 use super::hidden::{Hidden, Opened};
-use crate::failure::Failure;
+use crate::error::ProveError;
 use backdrive_nodes::graph::{Graph, NodeKind, Settings};
 use backdrive_stability::resimulate::edge::Edge;
 use serde::Serialize;
@@ -38,13 +38,12 @@ impl LiveRun {
 }
 
 /// What the session's graph file needs to have the hidden plant in its master's place.
-pub fn hide(graph: &mut DocumentMut, hidden: &Hidden, number: u32) -> Result<(), Failure> {
-    let exe = std::env::current_exe().map_err(Failure::machine)?;
+pub(crate) fn hide(graph: &mut DocumentMut, backdrive: &Path, hidden: &Hidden, number: u32) -> Result<(), ProveError> {
     let nodes = graph.get_mut("nodes").and_then(Item::as_array_of_tables_mut);
     for node in nodes.into_iter().flat_map(|n| n.iter_mut()) {
         if node.get("kind").and_then(Item::as_str) == Some("master") {
             let mut words = Array::new();
-            words.push(exe.display().to_string());
+            words.push(backdrive.display().to_string());
             words.push("sealed-master");
             for word in hidden.words(number, 1.0) {
                 words.push(format!("--word={word}"));
@@ -59,18 +58,19 @@ pub fn hide(graph: &mut DocumentMut, hidden: &Hidden, number: u32) -> Result<(),
 ///
 /// # Errors
 /// A file that cannot be written, or a run that cannot be done.
-pub fn about(
+pub(crate) fn about(
+    backdrive: &Path,
     folder: &Path,
     the_loop: &Loop,
     canceller: &Canceller,
     edge: &Edge,
     hidden: &Hidden,
     device: &Opened,
-) -> Result<Vec<LiveRun>, Failure> {
+) -> Result<Vec<LiveRun>, ProveError> {
     let flickers = edge.flickers.map(|[_, highest_stable]| highest_stable);
     let above = edge.critical_gain.or(edge.limited_from).map(|gain| flickers.map_or(gain, |highest| gain.max(highest)));
     let points = [(edge.at_least > 0.0).then_some((BELOW * edge.at_least, true)), above.map(|gain| (ABOVE * gain, false))];
-    std::fs::create_dir_all(folder).map_err(|e| Failure::write(folder, e))?;
+    std::fs::create_dir_all(folder).map_err(|e| ProveError::write(folder, e))?;
     let mut runs = Vec::new();
     for (gain, below_edge) in points.into_iter().flatten() {
         let side = if below_edge { "below" } else { "above" };
@@ -80,8 +80,8 @@ pub fn about(
         device.tell_sensors(&mut graph);
         let model = folder.join("master.toml");
         write(&model, &master_model(&graph)?)?;
-        let mut text: DocumentMut = graph.text.parse().map_err(Failure::input)?;
-        hide(&mut text, hidden, 2000 + runs.len() as u32)?;
+        let mut text: DocumentMut = graph.text.parse().map_err(ProveError::input)?;
+        hide(&mut text, backdrive, hidden, 2000 + runs.len() as u32)?;
         let nodes = text.get_mut("nodes").and_then(Item::as_array_of_tables_mut);
         for node in nodes.into_iter().flat_map(|n| n.iter_mut()) {
             match node.get("kind").and_then(Item::as_str) {
@@ -93,20 +93,20 @@ pub fn about(
         text["gains"]["lambda"] = value(gain / graph.gains.mu);
         let path = folder.join(format!("{name}.toml"));
         write(&path, &text.to_string())?;
-        let said = ours(folder, &name, &[&"run", &path, &"--json", &"--overwrite"])?;
+        let said = ours(backdrive, folder, &name, &[&"run", &path, &"--json", &"--overwrite"])?;
         let json = said.lines().find_map(|line| serde_json::from_str::<Value>(line).ok());
         let outcome = json.and_then(|v| v["outcome"].as_str().map(str::to_string));
-        let outcome = outcome.ok_or_else(|| Failure::input(format!("{}: the run does not say what the loop did", path.display())))?;
+        let outcome = outcome.ok_or_else(|| ProveError::input(format!("{}: the run does not say what the loop did", path.display())))?;
         runs.push(LiveRun { canceller: canceller.name, gain, below_edge, outcome });
     }
     Ok(runs)
 }
 
 /// The model of the master of a graph, as a file.
-fn master_model(graph: &Graph) -> Result<String, Failure> {
+fn master_model(graph: &Graph) -> Result<String, ProveError> {
     let files = graph.nodes.iter().find(|n| n.kind == NodeKind::Master).map(|n| &n.settings);
     match files {
         Some(Settings::Master(files)) if files.model.is_some() => Ok(files.model.as_ref().map_or_else(String::new, |m| m.to_toml())),
-        _ => Err(Failure::input(format!("{}: has no master with a model", graph.path.display()))),
+        _ => Err(ProveError::input(format!("{}: has no master with a model", graph.path.display()))),
     }
 }

@@ -1,7 +1,7 @@
 //! The stable gain of a loop with one canceller after another: its master is the diagnosed model, or, once the verdict is written, the hidden plant.
 
 use super::hidden::Opened;
-use crate::failure::Failure;
+use crate::error::ProveError;
 use backdrive_nodes::graph::{Graph, NodeKind, Overrides, Settings};
 use backdrive_stability::resimulate::edge::{Edge, Search, edge};
 use backdrive_stability::resimulate::{OwnCores, RunOptions, Scenario};
@@ -77,15 +77,15 @@ impl Loop<'_> {
     }
 
     /// The edge with a canceller, the hand gripping `firmness` times as firmly as when it was recorded.
-    pub fn edge(&self, canceller: &Canceller, firmness: f64, cancel: &AtomicBool) -> Result<Edge, Failure> {
+    pub fn edge(&self, canceller: &Canceller, firmness: f64, cancel: &AtomicBool) -> Result<Edge, ProveError> {
         let scenario = self.scenario(canceller, firmness)?;
         let options = RunOptions { grip_scale: firmness, ..RunOptions::default() };
         let around = firmness == 1.0 && matches!(self.master, Moved::Hidden(..)) && scenario.duration_s() < LONG_S;
-        edge(&scenario, &Search { around, ..SEARCH }, &options, &|_, _| {}, cancel).map_err(Failure::input)
+        edge(&scenario, &Search { around, ..SEARCH }, &options, &|_, _| {}, cancel).map_err(ProveError::input)
     }
 
     /// The loop with a canceller, ready to be run.
-    pub fn scenario(&self, canceller: &Canceller, firmness: f64) -> Result<Scenario, Failure> {
+    pub fn scenario(&self, canceller: &Canceller, firmness: f64) -> Result<Scenario, ProveError> {
         let changes = self.changes(canceller);
         let mut graph = Graph::load(self.graph, &changes)?;
         let device = match &self.master {
@@ -98,7 +98,7 @@ impl Loop<'_> {
                 Some(device.clone())
             }
         };
-        let scenario = Scenario::new(graph, None, None).map_err(Failure::input)?;
+        let scenario = Scenario::new(graph, None, None).map_err(ProveError::input)?;
         let Some(device) = device else { return Ok(scenario) };
         let own: OwnCores = Arc::new(move |graph, node, firmness| {
             (node.kind == NodeKind::Master).then(|| device.core(graph, node, number_at(graph.gains.mu * graph.gains.lambda), firmness))

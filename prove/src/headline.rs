@@ -2,8 +2,8 @@
 
 use super::case::Case;
 use super::chosen::AS_GOOD;
+use super::gain::Hand;
 use super::live::LiveRun;
-use super::raise::Hand;
 use super::worth::DIAGNOSED;
 use backdrive_report::{Tone, number};
 use serde::Serialize;
@@ -126,7 +126,7 @@ impl Headline {
 
 #[cfg(test)]
 mod tests {
-    use super::super::raise::Gain;
+    use super::super::gain::Gain;
     use super::*;
     use backdrive_diagnosis::verdict::Word;
 

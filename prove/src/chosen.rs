@@ -6,7 +6,8 @@
 //! is largest for the worst of the grips and explanations.
 
 use super::edges::{Canceller, Loop, Moved};
-use crate::failure::Failure;
+use crate::error::ProveError;
+use crate::files::write;
 use backdrive_plant::model::Model;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
@@ -28,13 +29,13 @@ pub const AS_GOOD: f64 = 0.94;
 ///
 /// # Errors
 /// A run that cannot be done; `stop` was set.
-pub fn estimating(name: &'static str, models: &[PathBuf], task: &Task, stop: &AtomicBool) -> Result<Option<Canceller>, Failure> {
+pub fn estimating(name: &'static str, models: &[PathBuf], task: &Task, stop: &AtomicBool) -> Result<Option<Canceller>, ProveError> {
     let held = || models.iter().flat_map(|model| HELD.map(|grip| (model, grip)));
-    let edge = |canceller: &Canceller, (model, grip): (&PathBuf, f64)| -> Result<f64, Failure> {
+    let edge = |canceller: &Canceller, (model, grip): (&PathBuf, f64)| -> Result<f64, ProveError> {
         let the_loop = Loop { graph: task.graph, high_pass_hz: task.high_pass_hz, master: Moved::Model(model) };
         Ok(the_loop.edge(canceller, grip, stop)?.at_least)
     };
-    let without = held().map(|of| edge(&Canceller::fixed("none", None, None), of)).collect::<Result<Vec<f64>, Failure>>()?;
+    let without = held().map(|of| edge(&Canceller::fixed("none", None, None), of)).collect::<Result<Vec<f64>, ProveError>>()?;
     let edge_without = without.iter().copied().reduce(f64::min).filter(|edge| *edge > 0.0);
     let canceller = Canceller { estimates_hand: true, edge_without, ..Canceller::fixed(name, models.first().cloned(), None) };
     for (of, without) in held().zip(without) {
@@ -62,12 +63,12 @@ impl Chosen {
 
 /// Chooses, and writes the model with its outputs scaled to `path`. The hand holds the diagnosed model `model`, and every one of its `rivals`: the
 /// loop has to be stable whichever of them the device is.
-pub fn choose(model: &Path, rivals: &[PathBuf], path: &Path, task: &Task, stop: &AtomicBool) -> Result<Chosen, Failure> {
+pub fn choose(model: &Path, rivals: &[PathBuf], path: &Path, task: &Task, stop: &AtomicBool) -> Result<Chosen, ProveError> {
     let text = backdrive_plant::input_file::read_to_string(model)
-        .map_err(|e| Failure::input(format!("{}: cannot be read: {e}", model.display())))?;
+        .map_err(|e| ProveError::input(format!("{}: cannot be read: {e}", model.display())))?;
     let masters: Vec<&Path> = std::iter::once(model).chain(rivals.iter().map(PathBuf::as_path)).collect();
     // Below `enough` it does not matter by how much.
-    let worst = |canceller: &Canceller, enough: f64| -> Result<f64, Failure> {
+    let worst = |canceller: &Canceller, enough: f64| -> Result<f64, ProveError> {
         let mut worst = f64::INFINITY;
         for master in &masters {
             let the_loop = Loop { graph: task.graph, high_pass_hz: task.high_pass_hz, master: Moved::Model(master) };
@@ -102,14 +103,14 @@ pub struct Task<'a> {
 }
 
 /// The model file with every output's gain scaled.
-fn write_scaled(text: &str, model: &Path, path: &Path, share: f64) -> Result<(), Failure> {
+fn write_scaled(text: &str, model: &Path, path: &Path, share: f64) -> Result<(), ProveError> {
     use toml_edit::{DocumentMut, Item, value};
-    let bad = |e: &dyn std::fmt::Display| Failure::input(format!("{}: {e}", model.display()));
+    let bad = |e: &dyn std::fmt::Display| ProveError::input(format!("{}: {e}", model.display()));
     let parsed = Model::from_toml(text, &model.display().to_string()).map_err(|e| bad(&e))?;
     let mut document: DocumentMut = text.parse().map_err(|e| bad(&e))?;
     let outputs = document.get_mut("outputs").and_then(Item::as_array_of_tables_mut);
     for (output, known) in outputs.into_iter().flat_map(|t| t.iter_mut()).zip(&parsed.outputs) {
         output["gain"] = value(share * known.gain);
     }
-    crate::output::file(path, document.to_string())
+    write(path, document.to_string())
 }

@@ -1,21 +1,22 @@
 //! The report of a proof: what was concealed beside what was found, and what that is worth.
 
-use super::case::{Case, SHOWS};
-use super::headline::Headline;
-use super::raise::{ESTIMATED, Hand};
-use super::summary::Summary;
-use super::worth::{DIAGNOSED, Group};
-use crate::cli;
-use crate::offered::shell_word;
+use crate::parts::ending;
+use backdrive_bags::shell_word;
 use backdrive_diagnosis::hypothesis::Place;
 use backdrive_diagnosis::words;
+use backdrive_prove::Options;
+use backdrive_prove::case::{Case, SHOWS};
+use backdrive_prove::gain::{ESTIMATED, Hand};
+use backdrive_prove::headline::Headline;
+use backdrive_prove::summary::Summary;
+use backdrive_prove::worth::{DIAGNOSED, Group};
 use backdrive_report::{Cell, Figure, Page, Plot, Series, Table, Tone, number, percent};
 
 /// The cancellers in tables, in this order.
 const CANCELLERS: [&str; 7] = ["none", "nominal", "second order", "linear, refitted", "diagnosed", "chosen", ESTIMATED];
 
 /// The report over cases.
-pub fn page(options: &cli::Prove, cases: &[Case]) -> Page {
+pub fn page(options: &Options, cases: &[Case]) -> Page {
     let mut page = Page::new("Concealed effects, and what was found");
     let summary = Summary::of(cases);
     if cases.len() == 1 {
@@ -33,14 +34,14 @@ pub fn page(options: &cli::Prove, cases: &[Case]) -> Page {
                 summary.showing
             ),
         );
-        if !options.no_gains {
+        if options.gains {
             page.figure(ratios(cases), "Stable μλ with the diagnosed, the chosen and the hand-estimating canceller, over the best of no canceller and the two linear ones; above 1 is better. Cases in their order, grip of the session.");
         }
         page.section("What was found");
         page.table(table(cases));
         page.section("What was taken for what");
         page.table(confusion(&summary));
-        if !options.no_gains {
+        if options.gains {
             page.section("What it is worth");
         }
         for group in &summary.worth {
@@ -76,7 +77,7 @@ pub fn page(options: &cli::Prove, cases: &[Case]) -> Page {
          canceller, with the diagnosed, the chosen and the hand-estimating one the graph itself is run, its processes over shared memory.",
         options.seed,
         options.contact.display(),
-        options.high_pass,
+        options.high_pass_hz,
         SHOWS,
         options.regrip.display()
     ));
@@ -89,7 +90,7 @@ pub fn page(options: &cli::Prove, cases: &[Case]) -> Page {
         let command = format!("sha256sum {}", shell_word(&truth.display().to_string()));
         page.text(&format!("To check a seal: {command} gives the digest of the bags' title."));
     }
-    backdrive_pages::parts::ending(&mut page, &TERMS);
+    ending(&mut page, &TERMS);
     page
 }
 

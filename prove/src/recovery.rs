@@ -2,7 +2,7 @@
 
 use super::edges::{Canceller, Loop};
 use super::statistics::median;
-use crate::failure::Failure;
+use crate::error::ProveError;
 use backdrive_nodes::graph::{NodeKind, Settings};
 use backdrive_stability::resimulate::RunOptions;
 use std::sync::atomic::AtomicBool;
@@ -19,10 +19,10 @@ const AFTER_S: f64 = 1.2;
 ///
 /// # Errors
 /// A run that cannot be done.
-pub fn recovery(the_loop: &Loop, canceller: &Canceller, gain: f64, cancel: &AtomicBool) -> Result<Option<f64>, Failure> {
+pub fn recovery(the_loop: &Loop, canceller: &Canceller, gain: f64, cancel: &AtomicBool) -> Result<Option<f64>, ProveError> {
     let scenario = the_loop.scenario(canceller, 1.0)?;
     let options = RunOptions { keep_signals: true, ..RunOptions::default() };
-    let run = scenario.run(scenario.gain(gain), &options, cancel).map_err(Failure::input)?;
+    let run = scenario.run(scenario.gain(gain), &options, cancel).map_err(ProveError::input)?;
     let changes = match scenario.graph().node_of(NodeKind::Master).map(|n| &n.settings) {
         Some(Settings::Master(files)) => files.grip_changes.clone(),
         _ => Vec::new(),

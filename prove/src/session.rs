@@ -1,36 +1,36 @@
 //! What of a session a diagnosis gets: bags that hold the nominal model and the digest of the truth, and of the hand what a real one would.
 
-use crate::failure::Failure;
-use crate::output;
+use crate::error::ProveError;
+use crate::files::write;
 use backdrive_bags::{BagHeader, Reader, without};
 use std::path::Path;
 use toml_edit::{DocumentMut, InlineTable, Item, Table, Value, value};
 
 /// Copies a recorded session without what tells how the hidden plant was run: its command line, and where the user's body was. Where the hand
 /// is not shown, what it wanted is left out too, and the set says that it is unknown up to `hand_hz`.
-pub fn hand_over(recorded: &Path, session: &Path, shows_hand: bool, hand_hz: f64) -> Result<(), Failure> {
-    std::fs::create_dir_all(session).map_err(|e| Failure::write(session, e))?;
+pub fn hand_over(recorded: &Path, session: &Path, shows_hand: bool, hand_hz: f64) -> Result<(), ProveError> {
+    std::fs::create_dir_all(session).map_err(|e| ProveError::write(session, e))?;
     let mut names: Vec<_> = std::fs::read_dir(recorded)
         .and_then(|entries| entries.map(|e| e.map(|e| e.file_name())).collect::<Result<_, _>>())
-        .map_err(|e| Failure::input(format!("{}: cannot be read: {e}", recorded.display())))?;
+        .map_err(|e| ProveError::input(format!("{}: cannot be read: {e}", recorded.display())))?;
     names.sort();
     for name in &names {
         let (from, to) = (recorded.join(name), session.join(name));
         if Path::new(name).extension().is_some_and(|e| e == "mcap") {
-            let reader = Reader::open(&from).map_err(Failure::input)?;
+            let reader = Reader::open(&from).map_err(ProveError::input)?;
             let hidden: Vec<String> = reader.header().map_or_else(Vec::new, |header| hidden_topics(header, shows_hand));
             without(&from, &to, &|topic| hidden.iter().any(|h| h == topic), &|header| tell_less(header, shows_hand))
-                .map_err(Failure::input)?;
+                .map_err(ProveError::input)?;
         } else {
-            let bytes =
-                backdrive_plant::input_file::read(&from).map_err(|e| Failure::input(format!("{}: cannot be read: {e}", from.display())))?;
-            output::file(&to, bytes)?;
+            let bytes = backdrive_plant::input_file::read(&from)
+                .map_err(|e| ProveError::input(format!("{}: cannot be read: {e}", from.display())))?;
+            write(&to, bytes)?;
         }
     }
     if !shows_hand {
         hide_hand(&session.join("set.toml"), hand_hz)?;
     }
-    std::fs::remove_dir_all(recorded).map_err(|e| Failure::write(recorded, e))
+    std::fs::remove_dir_all(recorded).map_err(|e| ProveError::write(recorded, e))
 }
 
 /// Topics that only a simulation knows, and those of the hand where it is not shown.
@@ -73,10 +73,10 @@ fn tell_less(header: &mut BagHeader, shows_hand: bool) {
 }
 
 /// Makes the column of the hand in a set an unknown input.
-fn hide_hand(path: &Path, hand_hz: f64) -> Result<(), Failure> {
+fn hide_hand(path: &Path, hand_hz: f64) -> Result<(), ProveError> {
     let text = backdrive_plant::input_file::read_to_string(path)
-        .map_err(|e| Failure::input(format!("{}: cannot be read: {e}", path.display())))?;
-    let mut set: DocumentMut = text.parse().map_err(|e| Failure::input(format!("{}: {e}", path.display())))?;
+        .map_err(|e| ProveError::input(format!("{}: cannot be read: {e}", path.display())))?;
+    let mut set: DocumentMut = text.parse().map_err(|e| ProveError::input(format!("{}: {e}", path.display())))?;
     let Some(columns) = set.get_mut("columns").and_then(Item::as_table_like_mut) else { return Ok(()) };
     let topic = |item: &Item| item.as_table_like().and_then(|t| t.get("topic")?.as_str().map(str::to_string)).unwrap_or_default();
     let hands: Vec<String> =
@@ -89,5 +89,5 @@ fn hide_hand(path: &Path, hand_hz: f64) -> Result<(), Failure> {
         unknown.insert(hand, value(how));
     }
     set.insert("unknown", Item::Table(unknown));
-    crate::output::file(path, set.to_string())
+    write(path, set.to_string())
 }

@@ -2,20 +2,17 @@
 
 use super::edges::{Canceller, Loop, Moved};
 use super::files::at;
+use super::gain::{ESTIMATED, Gain, Hand};
 use super::hidden::{Hidden, Opened};
 use super::live::{self, LiveRun};
 use super::recovery::recovery;
-use crate::cli;
-use crate::failure::Failure;
-use crate::progress::busy;
+use crate::error::ProveError;
+use crate::options::Options;
+use crate::watch::{Watch, busy};
 use backdrive_sealed::truth::Truth;
-use serde::{Serialize, Serializer};
 use std::path::Path;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
-
-/// Name of the diagnosed canceller that estimates the hand.
-pub const ESTIMATED: &str = "hand estimated";
+use std::sync::atomic::Ordering;
 
 /// Cancellers that are compared with other hands than the session's.
 const WITH_OTHER_HANDS: [&str; 6] = ["none", "second order", "linear, refitted", "diagnosed", "chosen", ESTIMATED];
@@ -25,54 +22,6 @@ const LIVE: [&str; 4] = ["none", "diagnosed", "chosen", ESTIMATED];
 
 /// Share of its stable gain at which it is looked how soon the loop settles after a change of the grip.
 const RECOVERS_AT: f64 = 0.5;
-
-/// How a hand holds in a run.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Hand {
-    /// As firmly as in the session, times this factor.
-    Grip(f64),
-    /// It changes its grip while it pushes.
-    Changing,
-}
-
-impl Hand {
-    /// The hand of the session.
-    pub const SESSION: Hand = Hand::Grip(1.0);
-}
-
-impl std::fmt::Display for Hand {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self {
-            Hand::Grip(factor) => write!(f, "grip x{factor}"),
-            Hand::Changing => write!(f, "changing grip"),
-        }
-    }
-}
-
-impl Serialize for Hand {
-    fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
-        match self {
-            Hand::Grip(factor) => to.serialize_f64(*factor),
-            Hand::Changing => to.serialize_str("changing"),
-        }
-    }
-}
-
-/// A stable gain that was measured.
-#[derive(Debug, Clone, Serialize)]
-pub struct Gain {
-    /// Which canceller.
-    pub canceller: &'static str,
-    /// The hand: a factor on the true grip of the session, or `changing`.
-    #[serde(rename = "grip")]
-    pub hand: Hand,
-    /// Highest mu*lambda found stable; 0 where not even the lowest of the search was.
-    pub stable_to: f64,
-    /// What ends the stable range, or that nothing does.
-    pub because: String,
-    /// Whether nothing ended it.
-    pub whole_range: bool,
-}
 
 /// What the gain was raised to.
 pub struct Raised {
@@ -89,21 +38,22 @@ pub struct Raised {
 /// # Errors
 /// A file that cannot be read or written, or a run that cannot be done.
 pub fn raise(
-    options: &cli::Prove,
+    options: &Options,
     folder: &Path,
     hidden: &Hidden,
     truth: &Truth,
     cancellers: &[Canceller],
-    stop: &AtomicBool,
-) -> Result<Raised, Failure> {
-    let device = Arc::new(Opened::new(hidden, truth).map_err(Failure::input)?);
+    watch: &dyn Watch,
+) -> Result<Raised, ProveError> {
+    let device = Arc::new(Opened::new(hidden, truth).map_err(ProveError::input)?);
     let master = || Moved::Hidden(&hidden.model, hidden.grip.as_deref(), device.clone());
-    let steady = Loop { graph: &options.contact, high_pass_hz: options.high_pass, master: master() };
-    let changing = Loop { graph: &options.regrip, high_pass_hz: options.high_pass, master: master() };
+    let steady = Loop { graph: &options.contact, high_pass_hz: options.high_pass_hz, master: master() };
+    let changing = Loop { graph: &options.regrip, high_pass_hz: options.high_pass_hz, master: master() };
     let mut hands = vec![Hand::SESSION];
-    if !options.same_grip {
-        hands.extend(options.grips.iter().map(|grip| Hand::Grip(*grip)).chain([Hand::Changing]));
+    if let Some(grips) = &options.grips {
+        hands.extend(grips.iter().map(|grip| Hand::Grip(*grip)).chain([Hand::Changing]));
     }
+    let stop = watch.stop();
     let mut raised = Raised { gains: Vec::new(), live: Vec::new(), recovery_s: None };
     for hand in hands {
         let (the_loop, firmness) = match hand {
@@ -115,15 +65,15 @@ pub fn raise(
                 break;
             }
             let raising = at(folder, &format!("raising the gain with canceller \"{}\", {hand}", canceller.name));
-            let edge = busy(&raising, || the_loop.edge(canceller, firmness, stop))?;
-            if hand == Hand::SESSION && !options.no_live && LIVE.contains(&canceller.name) {
+            let edge = busy(watch, &raising, || the_loop.edge(canceller, firmness, stop))?;
+            if hand == Hand::SESSION && options.live && LIVE.contains(&canceller.name) {
                 let live_folder = folder.join("live");
-                let about = || live::about(&live_folder, the_loop, canceller, &edge, hidden, &device);
-                raised.live.extend(busy(&at(folder, "running the live graph"), about)?);
+                let about = || live::about(&options.backdrive, &live_folder, the_loop, canceller, &edge, hidden, &device);
+                raised.live.extend(busy(watch, &at(folder, "running the live graph"), about)?);
             }
             if hand == Hand::Changing && canceller.estimates_hand {
                 let settle = || recovery(the_loop, canceller, RECOVERS_AT * edge.at_least, stop);
-                raised.recovery_s = busy(&at(folder, "looking how soon it settles after a change of the grip"), settle)?;
+                raised.recovery_s = busy(watch, &at(folder, "looking how soon it settles after a change of the grip"), settle)?;
             }
             let whole_range = edge.critical_gain.is_none() && edge.limited_from.is_none() && edge.at_least > 0.0;
             raised.gains.push(Gain { canceller: canceller.name, hand, stable_to: edge.at_least, because: edge.reason, whole_range });
