@@ -11,11 +11,11 @@ use backdrive_plant::recording::{Recording, write_csv};
 use backdrive_plant::servo::Numbers;
 use backdrive_plant::set::RecordingSet;
 use backdrive_report::number;
-use backdrive_servo::fit::spread;
 use backdrive_servo::problem::Problem;
 use backdrive_servo::refit::{Refitted, refit};
 use backdrive_servo::run::free_runs;
 use backdrive_servo::search::scored;
+use backdrive_signal::statistics::deviation;
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
@@ -85,7 +85,7 @@ fn written(
         signals.push((format!("{}.position", joint.name), simulated.clone()));
         let (share, absolute) = scored(simulated, &record.position);
         // A joint that rests has no nrmse.
-        let share = (spread(&record.position) > 1e-6).then_some(share);
+        let share = (deviation(&record.position) > 1e-6).then_some(share);
         let told = share.map_or("-".to_string(), |s| format!("{s:.4}"));
         lines.push(format!("  {:<24} nrmse {told}, mean error {} mrad", joint.name, number(1e3 * absolute)));
         errors.insert(joint.name.clone(), json!({ "nrmse": share, "mean_error_rad": absolute }));

@@ -1,9 +1,9 @@
 //! How soon a loop settles after its hand has changed its grip.
 
 use super::edges::{Canceller, Loop};
-use super::statistics::median;
 use crate::error::ProveError;
 use backdrive_nodes::graph::{NodeKind, Settings};
+use backdrive_signal::statistics::median;
 use backdrive_stability::resimulate::RunOptions;
 use std::sync::atomic::AtomicBool;
 

@@ -16,10 +16,3 @@ impl std::fmt::Display for Share {
         write!(f, "{} of {}", self.are, self.of)
     }
 }
-
-/// The middle one; of an even number the mean of the middle two.
-pub fn median(mut of: Vec<f64>) -> Option<f64> {
-    of.sort_by(f64::total_cmp);
-    let n = of.len();
-    (n > 0).then(|| 0.5 * (of[(n - 1) / 2] + of[n / 2]))
-}

@@ -3,7 +3,8 @@
 use super::case::Case;
 use super::chosen::AS_GOOD;
 use super::gain::{ESTIMATED, Hand};
-use super::statistics::{Share, median};
+use super::statistics::Share;
+use backdrive_signal::statistics::median;
 use serde::Serialize;
 
 /// The cancellers that a diagnosis makes possible, in this order everywhere.

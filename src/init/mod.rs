@@ -22,6 +22,7 @@ use backdrive_diagnosis::verdict::Remark;
 use backdrive_plant::model::Hold;
 use backdrive_plant::recording::{Piece, Recording, Source, read_csv};
 use backdrive_report::number;
+use backdrive_signal::statistics::rms;
 use estimate::{Measured, Numbers, Shown, estimate};
 use found::{Recordings, recordings};
 use plan::{Plan, plan};
@@ -216,7 +217,6 @@ const AWAY: f64 = 0.02;
 
 /// Whether a recording begins in motion or away from 0.
 fn begins_moving(record: &Recording, position: Option<&str>, plan: &Plan) -> bool {
-    let rms = |x: &[f64]| (x.iter().map(|x| x * x).sum::<f64>() / x.len().max(1) as f64).sqrt();
     if let Some(x) = position.and_then(|name| record.signal(name)) {
         let first = x.first().copied().unwrap_or(0.0);
         let (low, high) = x.iter().fold((first, first), |(low, high), x| (low.min(*x), high.max(*x)));

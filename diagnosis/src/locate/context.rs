@@ -8,9 +8,9 @@ use super::smoother::Smoothed;
 use super::trajectory::Trajectory;
 use super::types::{Options, Run};
 use crate::hypothesis::Place;
-use crate::signal::rms;
 use crate::tuning::tuning;
 use backdrive_plant::model::{InputKind, Model};
+use backdrive_signal::statistics::rms;
 
 /// What all channels share.
 pub(super) struct Context<'a> {

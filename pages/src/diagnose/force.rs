@@ -74,7 +74,7 @@ fn finding(page: &mut Page, evidence: &Evidence, name: &str) {
     let place = shown(&evidence.place);
     let what = if matches!(evidence.place, Place::Between(..)) { "force" } else { "error of the signal" };
     // The record in which the law does most shows it best.
-    let size = |t: &Trace| backdrive_diagnosis::compare::rms(&t.law.force);
+    let size = |t: &Trace| backdrive_signal::statistics::rms(&t.law.force);
     let Some(main) = evidence.traces.iter().max_by(|a, b| size(a).total_cmp(&size(b))) else { return };
 
     let over = variable_name(evidence.against);
@@ -131,7 +131,7 @@ fn loose(main: &Trace, unit: &str) -> Option<String> {
     let mut wide: Vec<f64> = main.deviation.iter().copied().filter(|d| d.is_finite()).collect();
     wide.sort_by(f64::total_cmp);
     let half = 2.0 * wide.get(wide.len() / 2)?;
-    let level = backdrive_diagnosis::compare::rms(&main.law.force);
+    let level = backdrive_signal::statistics::rms(&main.law.force);
     (half > level).then(|| {
         format!(
             " Taken out of the model, this force can be told to ± {} only, more than the law itself has ({} root mean square): these sensors leave \
@@ -157,7 +157,7 @@ fn within(main: &Trace) -> String {
         return format!("{inside}.");
     }
     // The estimate is smooth: where the law jumps (friction that turns, an end of a gap) it cannot follow.
-    let level = backdrive_diagnosis::compare::rms(law);
+    let level = backdrive_signal::statistics::rms(law);
     let reach = (n / 500).max(3);
     let jumps = |k: usize| {
         let part = law.get(k.saturating_sub(reach)..(k + reach).min(n)).unwrap_or(&[]);
@@ -166,7 +166,7 @@ fn within(main: &Trace) -> String {
     };
     let at_jumps = outside.iter().filter(|k| jumps(**k)).count() as f64 / outside.len() as f64;
     let off: Vec<f64> = outside.iter().map(|k| latent[*k] - law[*k]).collect();
-    let size = backdrive_diagnosis::compare::rms(&off) / level;
+    let size = backdrive_signal::statistics::rms(&off) / level;
     let why = if at_jumps > 0.5 {
         format!(
             "{} of the rest lies where the law jumps, which an estimate from sensors of finite bandwidth follows only smoothly",

@@ -116,7 +116,7 @@ fn table<const N: usize>(headers: [&str; N], rows: Vec<Vec<String>>) -> Table {
 /// The records that move a joint most: command, recording, both free runs, and their errors.
 fn drawn(page: &mut Page, joint: &str, answer: &Answer) {
     let mut order: Vec<&Judged> = answer.judged.iter().collect();
-    let travel = |j: &Judged| backdrive_servo::fit::spread(&j.record.position);
+    let travel = |j: &Judged| backdrive_signal::statistics::deviation(&j.record.position);
     order.sort_by(|a, b| travel(b).total_cmp(&travel(a)));
     for judged in order.into_iter().take(DRAWN) {
         let record = &judged.record;

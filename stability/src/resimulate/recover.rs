@@ -12,6 +12,7 @@ use backdrive_control::operator::Intent;
 use backdrive_nodes::graph::{DeviceFiles, Graph, NodeKind, Settings};
 use backdrive_plant::elements::{Law, Side};
 use backdrive_plant::linear::{LinearModel, Operating};
+use backdrive_signal::statistics::rms;
 use realfft::num_complex::Complex;
 use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
 use std::sync::Arc;
@@ -342,10 +343,6 @@ fn filled(column: &[f64]) -> Vec<f64> {
 
 fn difference(a: &[f64], b: &[f64]) -> Vec<f64> {
     a.iter().zip(b).map(|(a, b)| a - b).collect()
-}
-
-fn rms(signal: &[f64]) -> f64 {
-    (signal.iter().map(|x| x * x).sum::<f64>() / signal.len().max(1) as f64).sqrt()
 }
 
 fn range(signal: &[f64]) -> f64 {

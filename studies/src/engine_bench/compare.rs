@@ -1,11 +1,12 @@
 //! The observer beside an extended Kalman filter, a derivative, and the engine model alone.
 
 use crate::table::Report;
-use backdrive_control::butterworth::Butterworth;
 use backdrive_control::engine::Engine;
 use backdrive_control::observer::{Derivative, ExtendedKalman};
+use backdrive_signal::butterworth::Butterworth;
+use backdrive_signal::statistics::{correlation, rms};
 use backdrive_testbench::lag::{Observation, engine_torque};
-use backdrive_testbench::{Bench, BenchError, Record, correlation, rms};
+use backdrive_testbench::{Bench, BenchError, Record};
 
 /// Corner of the Butterworth filter behind observer and derivative, Hz: the graph's.
 const CORNER_HZ: f64 = 5.0;

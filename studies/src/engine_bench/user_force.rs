@@ -5,7 +5,7 @@ use crate::table::Report;
 use crate::{Context, StudyError};
 use backdrive_bags::{Reader, Signal, signals};
 use backdrive_nodes::graph::{Graph, Overrides};
-use backdrive_testbench::{correlation, rms};
+use backdrive_signal::statistics::{correlation, rms};
 use std::path::Path;
 
 /// What the observer told of a master.
