@@ -8,13 +8,14 @@ use crate::interrupt;
 use crate::offered::Step;
 use crate::output;
 use crate::progress;
-use crate::recordings::{self, Opened};
 use answer::{Answer, to_do};
 use backdrive_diagnosis::diagnose::{self, Diagnosis};
 use backdrive_diagnosis::physics::physics_named;
 use backdrive_diagnosis::search::Settings;
 use backdrive_diagnosis::verdict::{EXPERIMENT_FILE, MODEL_FILE, VERDICT_FILE, Word, rival_file};
 use backdrive_pages::diagnose::{Shown, page};
+use backdrive_sets::open;
+use backdrive_sets::open::Opened;
 use next::next;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -42,10 +43,10 @@ pub fn diagnose(options: &cli::Diagnose) -> Result<u8, Failure> {
     }
     let stop = interrupt::heard()?;
 
-    let open = || recordings::open(&options.set, options.model.as_deref(), options.grip.as_deref(), &options.ignore_signal);
-    let opened = progress::busy("reading the recordings", open)?;
+    let opened = || open::open(&options.set, options.model.as_deref(), options.grip.as_deref(), &options.ignore_signal);
+    let opened = progress::busy("reading the recordings", opened)?;
     for name in [MODEL_FILE, EXPERIMENT_FILE] {
-        recordings::not_onto(&options.out.join(name), &opened.files, false)?;
+        open::not_onto(&options.out.join(name), &opened.files, false)?;
     }
     for note in &opened.notes {
         output::note(format_args!("note: {note}"));

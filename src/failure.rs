@@ -5,6 +5,7 @@ use backdrive_inspect::InspectError;
 use backdrive_launch::LaunchError;
 use backdrive_nodes::build::BuildError;
 use backdrive_plant::tomlfile::FileError;
+use backdrive_sets::SetError;
 use backdrive_stability::summary::SummaryError;
 use std::fmt::Display;
 
@@ -116,6 +117,12 @@ impl From<InspectError> for Failure {
 
 impl From<FileError> for Failure {
     fn from(error: FileError) -> Failure {
+        Failure::input(error)
+    }
+}
+
+impl From<SetError> for Failure {
+    fn from(error: SetError) -> Failure {
         Failure::input(error)
     }
 }

@@ -9,7 +9,6 @@ use crate::interrupt;
 use crate::offered::{Builder, Step};
 use crate::output;
 use crate::progress;
-use crate::recordings;
 use crate::servo_runs;
 use backdrive_diagnosis::audit::without_contradicted;
 use backdrive_diagnosis::compare::{Quality, predictions, qualities};
@@ -24,6 +23,7 @@ use backdrive_diagnosis::work::{Budget, Limit};
 use backdrive_pages::parts::file_name;
 use backdrive_plant::model::Model;
 use backdrive_report::{number, percent};
+use backdrive_sets::open;
 use serde_json::json;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -58,10 +58,10 @@ pub fn fit(options: &cli::Fit) -> Result<u8, Failure> {
         )));
     }
     let stop = interrupt::heard()?;
-    let open = || recordings::open(&options.set, Some(&options.model), options.grip.as_deref(), &options.ignore_signal);
-    let opened = progress::busy("reading the recordings", open)?;
+    let opened = || open::open(&options.set, Some(&options.model), options.grip.as_deref(), &options.ignore_signal);
+    let opened = progress::busy("reading the recordings", opened)?;
     if let Some(out) = &options.out {
-        recordings::not_onto(out, &opened.files, options.overwrite)?;
+        open::not_onto(out, &opened.files, options.overwrite)?;
     }
     for note in &opened.notes {
         output::note(format_args!("note: {note}"));

@@ -4,7 +4,6 @@ use crate::cli;
 use crate::failure::Failure;
 use crate::output::{self, may_replace};
 use crate::progress;
-use crate::recordings;
 use backdrive_pages::estimate::estimate;
 use backdrive_plant::model::Model;
 use backdrive_plant::recording::{Recording, write_csv};
@@ -15,6 +14,7 @@ use backdrive_servo::problem::Problem;
 use backdrive_servo::refit::{Refitted, refit};
 use backdrive_servo::run::free_runs;
 use backdrive_servo::search::scored;
+use backdrive_sets::open;
 use backdrive_signal::statistics::deviation;
 use serde_json::json;
 use std::path::{Path, PathBuf};
@@ -27,7 +27,7 @@ fn stated(problem: &Problem) -> Vec<Option<Numbers>> {
 /// Runs the joints from the commands of recordings, writes their positions, and says how far they are from what was recorded.
 pub fn simulate(options: &cli::Simulate, model: &Model) -> Result<u8, Failure> {
     let path = PathBuf::from(&options.drive);
-    let (mut set, _) = recordings::set_of(std::slice::from_ref(&path))?;
+    let (mut set, _) = open::set_of(std::slice::from_ref(&path))?;
     if let Some(columns) = &options.columns {
         let other = RecordingSet::open(columns)?;
         (set.columns, set.joints) = (other.columns, other.joints);
@@ -105,14 +105,14 @@ fn written(
 
 /// Refits the numbers that the model states of each joint, its physics as they are.
 pub fn fit(options: &cli::Fit) -> Result<u8, Failure> {
-    let (mut set, told) = recordings::set_of(&options.set)?;
+    let (mut set, told) = open::set_of(&options.set)?;
     let mut notes = Vec::new();
-    recordings::hold_out(&mut set, told, &mut notes);
+    open::hold_out(&mut set, told, &mut notes);
     notes.iter().for_each(|note| output::note(format_args!("note: {note}")));
     if let Some(out) = &options.out {
         let files: Vec<PathBuf> =
             std::iter::once(options.model.clone()).chain(set.fit.iter().chain(&set.held_out).map(|f| set.path_of(f))).collect();
-        recordings::not_onto(out, &files, options.overwrite)?;
+        open::not_onto(out, &files, options.overwrite)?;
     }
     let problem = progress::busy("reading the recordings", || Problem::open(&set, Some(&options.model))).map_err(Failure::input)?;
     let fitted = progress::busy("fitting the servo joints", || refit(&problem)).map_err(Failure::input)?;

@@ -8,7 +8,6 @@ use crate::interrupt;
 use crate::offered::{Builder, Step};
 use crate::output;
 use crate::progress;
-use crate::recordings;
 use backdrive_arms::diagnose::{EXPERIMENT_FILE, Found, Settings, Tried, diagnose as diagnosed};
 use backdrive_arms::problem::Problem;
 use backdrive_arms::said::{unexplained, words};
@@ -20,6 +19,7 @@ use backdrive_plant::model::Model;
 use backdrive_plant::robot::JointKind;
 use backdrive_plant::set::RecordingSet;
 use backdrive_report::{number, si};
+use backdrive_sets::open;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
@@ -27,13 +27,13 @@ use std::time::Instant;
 
 /// The set and the model, where the model has a robot; `None` for a device of one axis, and where the set is wrong, which is told there.
 pub fn asked(options: &cli::Diagnose) -> Result<Option<(RecordingSet, PathBuf)>, Failure> {
-    let Ok((mut set, told)) = recordings::set_of(&options.set) else { return Ok(None) };
+    let Ok((mut set, told)) = open::set_of(&options.set) else { return Ok(None) };
     let Some(model) = options.model.clone().or_else(|| set.model.clone()) else { return Ok(None) };
     if Model::load(&model)?.arm.is_none() {
         return Ok(None);
     }
     let mut notes = Vec::new();
-    recordings::hold_out(&mut set, told, &mut notes);
+    open::hold_out(&mut set, told, &mut notes);
     notes.iter().for_each(|note| output::note(format_args!("note: {note}")));
     Ok(Some((set, model)))
 }
@@ -43,7 +43,7 @@ pub fn diagnose(options: &cli::Diagnose, set: &RecordingSet, model: &Path, repor
     let files: Vec<PathBuf> =
         std::iter::once(model.to_path_buf()).chain(set.fit.iter().chain(&set.held_out).map(|f| set.path_of(f))).collect();
     for name in [MODEL_FILE, EXPERIMENT_FILE] {
-        recordings::not_onto(&options.out.join(name), &files, false)?;
+        open::not_onto(&options.out.join(name), &files, false)?;
     }
     let mut notes = arm_options::notes(options, set)?;
     notes.iter().for_each(|note| output::note(format_args!("note: {note}")));

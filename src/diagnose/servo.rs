@@ -5,8 +5,6 @@ use crate::failure::{Failure, code};
 use crate::offered::{Builder, Step};
 use crate::output;
 use crate::progress;
-use crate::recordings;
-use crate::set_checks;
 use backdrive_diagnosis::verdict::{Finding, MODEL_FILE, Parameter, VERDICT_FILE, Word};
 use backdrive_diagnosis::words as said;
 use backdrive_pages::diagnose::servo::page;
@@ -16,19 +14,20 @@ use backdrive_report::number;
 use backdrive_servo::diagnose::{Found, diagnose as diagnosed};
 use backdrive_servo::problem::{Problem, is_servo};
 use backdrive_servo::said::words;
+use backdrive_sets::{checks, open};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 /// The set and the model, where the set holds commands and no torque; `None` where it holds something else, or is wrong, which is told there.
 pub fn asked(options: &cli::Diagnose) -> Result<Option<(RecordingSet, Option<PathBuf>)>, Failure> {
-    let Ok((mut set, told)) = recordings::set_of(&options.set) else { return Ok(None) };
+    let Ok((mut set, told)) = open::set_of(&options.set) else { return Ok(None) };
     if !is_servo(&set) {
         return Ok(None);
     }
     let model = options.model.clone().or_else(|| set.model.clone());
-    let mut notes = set_checks::repeated(&set)?;
-    recordings::hold_out(&mut set, told, &mut notes);
+    let mut notes = checks::repeated(&set)?;
+    open::hold_out(&mut set, told, &mut notes);
     notes.iter().for_each(|note| output::note(format_args!("note: {note}")));
     Ok(Some((set, model)))
 }
@@ -49,7 +48,7 @@ pub fn diagnose(
     }
     let files: Vec<PathBuf> =
         model.map(Path::to_path_buf).into_iter().chain(set.fit.iter().chain(&set.held_out).map(|f| set.path_of(f))).collect();
-    recordings::not_onto(&options.out.join(MODEL_FILE), &files, false)?;
+    open::not_onto(&options.out.join(MODEL_FILE), &files, false)?;
     // What cannot be written is told before the work, not after it.
     output::folder(&options.out)?;
     report.map_or(Ok(()), output::writable)?;

@@ -1,7 +1,7 @@
 //! Shared memory, rights, timers, processors, clock, and what dead runs have left.
 
 use super::Finding;
-use backdrive_launch::RunHome;
+use crate::RunHome;
 use backdrive_nodes::clock::now_ns;
 use backdrive_nodes::graph::MAX_RATE_HZ;
 use backdrive_nodes::realtime;

@@ -1,12 +1,11 @@
 //! What is driven and measured: the answers to the questions, and how the recordings are to be read by them.
 
 use super::ask::{Asker, Question, usage};
+use super::error::InitError;
 use super::found::{Column, Recordings};
-use crate::cli::{Answer, Attached, Driven, Init, Motion};
-use crate::failure::Failure;
+use super::options::{Attached, Choice, Driven, Motion, Options};
 use backdrive_plant::recording::units::{self, Kind, Unit};
 use backdrive_plant::recording::{ColumnRule, Columns};
-use clap::ValueEnum;
 use std::io::{BufRead, Write};
 
 /// A signal of the model and where it stands in the recordings.
@@ -85,7 +84,7 @@ const NONE: &str = "none";
 ///
 /// # Errors
 /// Usage: an answer is missing or makes no sense beside the others.
-pub fn plan<R: BufRead, W: Write>(asker: &mut Asker<R, W>, options: &Init, found: &Recordings) -> Result<Plan, Failure> {
+pub fn plan<R: BufRead, W: Write>(asker: &mut Asker<R, W>, options: &Options, found: &Recordings) -> Result<Plan, InitError> {
     let mut talk = Talk { asker, found, taken: Vec::new(), names: vec!["t".to_string()] };
     let motion = talk.one_of("motion", "Does it move along a line or turn?", options.motion, Some(Motion::Translation))?;
     let driven = talk.one_of(
@@ -116,15 +115,15 @@ pub fn plan<R: BufRead, W: Write>(asker: &mut Asker<R, W>, options: &Init, found
         return Err(usage("say --position or --velocity: nothing is measured, so there is nothing to hold the model against".to_string()));
     }
     if driven != Driven::Motion {
-        plan.hand = talk.one_of("hand", "Does a hand that nobody measured hold it?", options.hand, Some(Answer::No))? == Answer::Yes;
-    } else if options.hand == Some(Answer::Yes) {
+        plan.hand = talk.one_of("hand", "Does a hand that nobody measured hold it?", options.hand, Some(false))?;
+    } else if options.hand == Some(true) {
         return Err(usage("--hand: a motion that is prescribed leaves a hand nothing to move".to_string()));
     }
     Ok(plan)
 }
 
 /// The column of the time, which a bag's messages have by themselves.
-fn time<R: BufRead, W: Write>(talk: &mut Talk<R, W>, options: &Init) -> Result<Option<Signal>, Failure> {
+fn time<R: BufRead, W: Write>(talk: &mut Talk<R, W>, options: &Options) -> Result<Option<Signal>, InitError> {
     let is_table = talk.found.columns.iter().any(|c| matches!(c.source, backdrive_plant::recording::Source::Column(_)));
     match is_table || options.time.is_some() {
         true => talk.signal(&Asked {
@@ -142,7 +141,7 @@ fn time<R: BufRead, W: Write>(talk: &mut Talk<R, W>, options: &Init) -> Result<O
 }
 
 /// What drives it.
-fn drive<R: BufRead, W: Write>(talk: &mut Talk<R, W>, options: &Init, motion: Motion, driven: Driven) -> Result<Signal, Failure> {
+fn drive<R: BufRead, W: Write>(talk: &mut Talk<R, W>, options: &Options, motion: Motion, driven: Driven) -> Result<Signal, InitError> {
     let (force, position) = ([motion.pick(Kind::Force, Kind::Torque)], [motion.pick(Kind::Length, Kind::Angle), Kind::Count]);
     let (words, kinds, likely, si): (&str, &[Kind], &[&str], &str) = match driven {
         Driven::Force => ("Which column is the force or torque that drives it?", &force, &DRIVES, motion.pick("N", "N m")),
@@ -172,13 +171,13 @@ fn is_count(s: &Signal) -> bool {
 }
 
 /// The size of a count, m or rad.
-fn per_count<R: BufRead, W: Write>(talk: &mut Talk<R, W>, options: &Init, motion: Motion) -> Result<f64, Failure> {
+fn per_count<R: BufRead, W: Write>(talk: &mut Talk<R, W>, options: &Options, motion: Motion) -> Result<f64, InitError> {
     let words = motion.pick("The size of one count, m?", "The size of one count, rad? (6.2832 over the counts of a turn)");
     talk.number("per-count", words, options.per_count, None)
 }
 
 /// What the driven body holds on to, and where a load rings against it, Hz.
-fn attached<R: BufRead, W: Write>(talk: &mut Talk<R, W>, options: &Init, driven: Driven) -> Result<(Attached, f64), Failure> {
+fn attached<R: BufRead, W: Write>(talk: &mut Talk<R, W>, options: &Options, driven: Driven) -> Result<(Attached, f64), InitError> {
     let attached = talk.one_of(
         "attached",
         "What does the driven body hold on to: nothing (its bearing only), a spring to the frame (a specimen, a return spring), or a load behind a \
@@ -196,7 +195,7 @@ fn attached<R: BufRead, W: Write>(talk: &mut Talk<R, W>, options: &Init, driven:
 }
 
 /// What is measured of a body that a force or a current drives.
-fn position_and_velocity<R: BufRead, W: Write>(talk: &mut Talk<R, W>, options: &Init, plan: &mut Plan) -> Result<(), Failure> {
+fn position_and_velocity<R: BufRead, W: Write>(talk: &mut Talk<R, W>, options: &Options, plan: &mut Plan) -> Result<(), InitError> {
     plan.position = talk.signal(&Asked {
         option: "position",
         words: "Which column is the measured position (angle) of the driven body?",
@@ -224,7 +223,12 @@ fn position_and_velocity<R: BufRead, W: Write>(talk: &mut Talk<R, W>, options: &
 }
 
 /// The measured reaction of a prescribed motion, or the force in the joint to a load.
-fn force<R: BufRead, W: Write>(talk: &mut Talk<R, W>, options: &Init, motion: Motion, driven: Driven) -> Result<Option<Signal>, Failure> {
+fn force<R: BufRead, W: Write>(
+    talk: &mut Talk<R, W>,
+    options: &Options,
+    motion: Motion,
+    driven: Driven,
+) -> Result<Option<Signal>, InitError> {
     let is_reaction = driven == Driven::Motion;
     talk.signal(&Asked {
         option: "force",
@@ -242,7 +246,7 @@ fn force<R: BufRead, W: Write>(talk: &mut Talk<R, W>, options: &Init, motion: Mo
 }
 
 /// An option that has no place beside the others.
-fn refuse(option: &str, given: &Option<String>, why: &str) -> Result<(), Failure> {
+fn refuse(option: &str, given: &Option<String>, why: &str) -> Result<(), InitError> {
     match given.as_deref().filter(|text| *text != NONE) {
         Some(text) => Err(usage(format!("--{option} {text}: {why}"))),
         None => Ok(()),
@@ -270,15 +274,15 @@ struct Talk<'a, R, W> {
 }
 
 impl<R: BufRead, W: Write> Talk<'_, R, W> {
-    fn one_of<T: ValueEnum>(&mut self, option: &str, words: &str, given: Option<T>, default: Option<T>) -> Result<T, Failure> {
-        let name = |value: &T| value.to_possible_value().map_or(String::new(), |v| v.get_name().to_string());
-        let choices: Vec<String> = T::value_variants().iter().map(name).collect();
+    fn one_of<T: Choice>(&mut self, option: &str, words: &str, given: Option<T>, default: Option<T>) -> Result<T, InitError> {
+        let name = |value: &T| value.word().to_string();
+        let choices: Vec<String> = T::ALL.iter().map(|(word, _)| word.to_string()).collect();
         let list = choices.join(", ");
         let question = Question { option, words, choices, default: default.as_ref().map(name) };
-        self.asker.ask(&question, given.as_ref().map(name), |text| T::from_str(text, true).map_err(|_| format!("expected one of {list}")))
+        self.asker.ask(&question, given.as_ref().map(name), |text| T::of(text).ok_or_else(|| format!("expected one of {list}")))
     }
 
-    fn number(&mut self, option: &str, words: &str, given: Option<f64>, default: Option<f64>) -> Result<f64, Failure> {
+    fn number(&mut self, option: &str, words: &str, given: Option<f64>, default: Option<f64>) -> Result<f64, InitError> {
         let question = Question { option, words, choices: Vec::new(), default: default.map(|d| d.to_string()) };
         self.asker.ask(&question, given.map(|g| g.to_string()), |text| match text.parse::<f64>() {
             Ok(x) if x > 0.0 && x.is_finite() => Ok(x),
@@ -286,7 +290,7 @@ impl<R: BufRead, W: Write> Talk<'_, R, W> {
         })
     }
 
-    fn signal(&mut self, asked: &Asked) -> Result<Option<Signal>, Failure> {
+    fn signal(&mut self, asked: &Asked) -> Result<Option<Signal>, InitError> {
         let taken: Vec<&Column> = self.taken.iter().collect();
         let guess = self.found.guess(asked.kinds, asked.likely, &taken).map(|c| c.name.clone());
         let mut choices: Vec<String> = self.found.columns.iter().filter(|c| !taken.contains(c)).map(|c| c.name.clone()).collect();

@@ -1,12 +1,10 @@
 //! Recordings and the model that they are held against, as `diagnose` and `fit` are given them.
 
-use crate::failure::Failure;
-use crate::offered::{Builder, with_recover};
-use crate::set_checks;
-use backdrive_bags::{Account, Reader, is_lerobot, is_rosbag};
+use crate::checks;
+use crate::error::SetError;
+use backdrive_bags::{Account, Reader, import_command, recover_command};
 use backdrive_diagnosis::audit;
 use backdrive_diagnosis::problem::{MOST_OF_A_BAG, Problem, ProblemError};
-use backdrive_pages::parts::file_name;
 use backdrive_plant::model::{Fragment, Model};
 use backdrive_plant::recording::RecordingError;
 use backdrive_plant::set::RecordingSet;
@@ -30,18 +28,18 @@ pub struct Opened {
 /// # Errors
 /// When a file is missing or wrong, a recording is fitted and held out at once, an input that was recorded has no place in the model, or the
 /// recordings cannot be fitted.
-pub fn open(paths: &[PathBuf], model: Option<&Path>, grip: Option<&Path>, ignored: &[String]) -> Result<Opened, Failure> {
+pub fn open(paths: &[PathBuf], model: Option<&Path>, grip: Option<&Path>, ignored: &[String]) -> Result<Opened, SetError> {
     let grip = grip.filter(|g| *g != Path::new("none"));
     let mut notes = Vec::new();
     let (mut set, told) = set_of(paths)?;
     if model.is_none() && set.model.is_none() {
         let first = paths.first().map_or(String::new(), |p| p.display().to_string());
-        return Err(Failure::input(format!(
+        return Err(SetError::new(format!(
             "{first}: no model is named; give one with --model MODEL.toml, or a set.toml that says model = \"...\""
         )));
     }
     hold_out(&mut set, told, &mut notes);
-    notes.extend(set_checks::repeated(&set)?);
+    notes.extend(checks::repeated(&set)?);
     notes.extend(set.fit.iter().chain(&set.held_out).filter_map(|file| unfinished(&set.path_of(file))));
     notes.extend(set.fit.iter().chain(&set.held_out).filter_map(|file| begun(&set, file)));
     let problem = match grip {
@@ -54,13 +52,13 @@ pub fn open(paths: &[PathBuf], model: Option<&Path>, grip: Option<&Path>, ignore
     };
     let problem = problem.map_err(|e| told_failure(&e, model, &set))?;
     let problem =
-        problem.without_named_outputs(|name| ignored.iter().chain(&set.ignore).any(|other| other == name)).map_err(Failure::input)?;
-    set_checks::repeated_samples(&problem)?;
-    notes.extend(set_checks::left_out(&set, &problem.model, ignored, grip.is_some())?);
+        problem.without_named_outputs(|name| ignored.iter().chain(&set.ignore).any(|other| other == name)).map_err(SetError::new)?;
+    checks::repeated_samples(&problem)?;
+    notes.extend(checks::left_out(&set, &problem.model, ignored, grip.is_some())?);
     if !set.mixed_rates {
-        audit::rates(&problem).map_err(Failure::input)?;
+        audit::rates(&problem).map_err(SetError::new)?;
     }
-    audit::usable(&problem).map_err(Failure::input)?;
+    audit::usable(&problem).map_err(SetError::new)?;
     let inputs = [model.map(Path::to_path_buf).or_else(|| set.model.clone()), grip.map(Path::to_path_buf)];
     let files = inputs.into_iter().flatten().chain(set.fit.iter().chain(&set.held_out).map(|f| set.path_of(f))).collect();
     let name = paths.first().map_or(String::new(), |p| p.file_name().map_or(p.display().to_string(), |n| n.to_string_lossy().into_owned()));
@@ -71,15 +69,15 @@ pub fn open(paths: &[PathBuf], model: Option<&Path>, grip: Option<&Path>, ignore
 ///
 /// # Errors
 /// When a file or folder is not there, or the set cannot be read.
-pub fn set_of(paths: &[PathBuf]) -> Result<(RecordingSet, bool), Failure> {
+pub fn set_of(paths: &[PathBuf]) -> Result<(RecordingSet, bool), SetError> {
     match paths {
         [one] if is_recording(one) => Ok((of_files(paths)?, false)),
         [one] => {
             if !one.exists() {
-                return Err(Failure::input(format!("{}: there is no such file or folder", one.display())));
+                return Err(SetError::new(format!("{}: there is no such file or folder", one.display())));
             }
-            if let Some(command) = import_of(one) {
-                return Err(Failure::input(format!("{}: is no set of recordings yet: `{command}` makes it one", one.display())));
+            if let Some(command) = import_command(one) {
+                return Err(SetError::new(format!("{}: is no set of recordings yet: `{command}` makes it one", one.display())));
             }
             let told = !one.is_dir() || one.join("set.toml").exists();
             Ok((RecordingSet::open(one)?, told))
@@ -102,7 +100,10 @@ pub fn hold_out(set: &mut RecordingSet, told: bool, notes: &mut Vec<String>) {
             ),
             _ => {
                 if let Some(last) = set.fit.pop() {
-                    notes.push(format!("{} is held out: no fit sees it", file_name(&last)));
+                    notes.push(format!(
+                        "{} is held out: no fit sees it",
+                        Path::new(&last).file_name().map_or(last.clone(), |n| n.to_string_lossy().into_owned())
+                    ));
                     set.held_out.push(last);
                 }
             }
@@ -111,12 +112,12 @@ pub fn hold_out(set: &mut RecordingSet, told: bool, notes: &mut Vec<String>) {
 }
 
 /// The text of a model with a grip on its axes.
-fn held(model: &Path, grip: &Path) -> Result<String, Failure> {
+fn held(model: &Path, grip: &Path) -> Result<String, SetError> {
     let (free, grip_name) = (Model::load(model)?, grip.display());
     let (held, _) = free.held_by(&Fragment::load(grip)?);
     if held == free {
         let why = if free.axes.is_empty() { "has no [[axes]]" } else { "holds the user's hand already" };
-        return Err(Failure::input(format!("{}: {why}, so {grip_name} cannot be put on it; leave --grip out", model.display())));
+        return Err(SetError::new(format!("{}: {why}, so {grip_name} cannot be put on it; leave --grip out", model.display())));
     }
     Ok(held.to_toml())
 }
@@ -129,7 +130,7 @@ fn unfinished(path: &Path) -> Option<String> {
     }
     let reader = Reader::open(path).ok()?;
     let name = path.display();
-    let recover = with_recover("what it holds is used", path);
+    let recover = format!("what it holds is used; make a clean copy: {}", recover_command(path));
     if let Some(damage) = reader.damage().first() {
         return Some(format!("{name} is damaged ({damage}): {recover}"));
     }
@@ -160,12 +161,12 @@ fn begun(set: &RecordingSet, file: &str) -> Option<String> {
 ///
 /// # Errors
 /// When `out` is one of `files`: a recording in any case, the model or the grip where `overwrite` does not allow it.
-pub fn not_onto(out: &Path, files: &[PathBuf], overwrite: bool) -> Result<(), Failure> {
-    let Some(file) = files.iter().find(|f| set_checks::is_same_file(f, out)) else { return Ok(()) };
+pub fn not_onto(out: &Path, files: &[PathBuf], overwrite: bool) -> Result<(), SetError> {
+    let Some(file) = files.iter().find(|f| checks::is_same_file(f, out)) else { return Ok(()) };
     let name = out.display();
     match (is_recording(file), overwrite) {
-        (true, _) => Err(Failure::input(format!("{name}: is a recording that is read; write to another file"))),
-        (false, false) => Err(Failure::input(format!("{name}: is read here and would be lost; write to another file, or say --overwrite"))),
+        (true, _) => Err(SetError::new(format!("{name}: is a recording that is read; write to another file"))),
+        (false, false) => Err(SetError::new(format!("{name}: is read here and would be lost; write to another file, or say --overwrite"))),
         (false, true) => Ok(()),
     }
 }
@@ -174,31 +175,18 @@ fn is_recording(path: &Path) -> bool {
     path.extension().is_some_and(|e| e.eq_ignore_ascii_case("csv") || e.eq_ignore_ascii_case("mcap"))
 }
 
-/// The command that makes a bag, or a folder of them, of a recording in another format; `None` where it is none.
-fn import_of(path: &Path) -> Option<String> {
-    let ending = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
-    let stem = path.file_stem()?.to_string_lossy().into_owned();
-    let is_table = path.is_file() && ["parquet", "mat", "tsv"].contains(&ending.as_str());
-    let bag = match (is_lerobot(path), is_table || (path.exists() && is_rosbag(path))) {
-        (true, _) => format!("{stem}-bags"),
-        (false, true) => format!("{stem}.mcap"),
-        (false, false) => return None,
-    };
-    Some(Builder::verb("bag import").reads(path).option_writes("--bag", Path::new(&bag)).build()?.to_string())
-}
-
 /// Single files as a set.
-fn of_files(paths: &[PathBuf]) -> Result<RecordingSet, Failure> {
+fn of_files(paths: &[PathBuf]) -> Result<RecordingSet, SetError> {
     for path in paths {
         if !is_recording(path) {
-            let what = match import_of(path) {
+            let what = match import_command(path) {
                 Some(command) => format!("is read as a bag: `{command}` makes it one"),
                 None => "is no recording (.csv or .mcap); give one set, or recordings only".to_owned(),
             };
-            return Err(Failure::input(format!("{}: {what}", path.display())));
+            return Err(SetError::new(format!("{}: {what}", path.display())));
         }
         if !path.is_file() {
-            return Err(Failure::input(format!("{}: there is no such file", path.display())));
+            return Err(SetError::new(format!("{}: there is no such file", path.display())));
         }
     }
     let fit = paths.iter().map(|p| p.to_string_lossy().into_owned()).collect();
@@ -206,7 +194,7 @@ fn of_files(paths: &[PathBuf]) -> Result<RecordingSet, Failure> {
 }
 
 /// The error, with what to do about it where that is not plain.
-fn told_failure(error: &ProblemError, model: Option<&Path>, set: &RecordingSet) -> Failure {
+fn told_failure(error: &ProblemError, model: Option<&Path>, set: &RecordingSet) -> SetError {
     let hint = match error {
         ProblemError::Recording(RecordingError::NoSignal { .. }) => {
             let model = model.or(set.model.as_deref()).map_or(String::new(), |m| format!(" of {}", m.display()));
@@ -221,5 +209,5 @@ fn told_failure(error: &ProblemError, model: Option<&Path>, set: &RecordingSet) 
         ProblemError::Set(_) if set.fit.is_empty() => "; name some in set.toml under fit".to_string(),
         _ => String::new(),
     };
-    Failure::input(format!("{error}{hint}"))
+    SetError::new(format!("{error}{hint}"))
 }

@@ -1,172 +1,70 @@
-//! `backdrive init`: a model and a set for recordings of one's own, asked for, written and checked.
+//! What the recordings show of what was not asked, and the last questions, whose defaults they tell.
 
-mod ask;
-mod estimate;
-mod found;
-mod made;
-mod plan;
-mod stated;
-mod write;
-
-use crate::cli::{self, Attached, Driven, Start};
-use crate::failure::Failure;
-use crate::offered::Builder;
-use crate::output;
-use crate::output::may_replace;
-use crate::recordings as sets;
-use ask::{Asker, Question, usage};
+use super::ask::{Asker, Question, usage};
+use super::error::InitError;
+use super::estimate::{Measured, Numbers, Shown, estimate};
+use super::found::Recordings;
+use super::options::{Attached, Choice, Driven, Options, Start};
+use super::plan::Plan;
+use super::write::Seen;
 use backdrive_bags::Reader;
-use backdrive_diagnosis::audit::{self, Weight};
 use backdrive_diagnosis::noise::step_of;
-use backdrive_diagnosis::verdict::Remark;
 use backdrive_plant::model::Hold;
 use backdrive_plant::recording::{Piece, Recording, Source, read_csv};
 use backdrive_report::number;
 use backdrive_signal::statistics::rms;
-use estimate::{Measured, Numbers, Shown, estimate};
-use found::{Recordings, recordings};
-use plan::{Plan, plan};
-use serde_json::json;
-use std::io::{BufRead, IsTerminal, Write};
+use std::io::{BufRead, Write};
 use std::path::Path;
-use write::Seen;
 
-const MODEL: &str = "model.toml";
-const SET: &str = "set.toml";
 /// The answer of who does not know the inertia.
-const ESTIMATE: &str = "estimate";
-
-/// Asks, writes, checks, and says what to do next.
-pub fn init(options: &cli::Init) -> Result<u8, Failure> {
-    let (model, set) = (options.folder.join(MODEL), options.folder.join(SET));
-    may_replace(&model, options.overwrite)?;
-    may_replace(&set, options.overwrite)?;
-    let found = recordings(options)?;
-    // A bag has its times by itself.
-    let made = cli::Init { time: None, time_unit: None, ..options.clone() };
-    let options = if found.made.is_some() { &made } else { options };
-    let stdin = std::io::stdin();
-    let is_terminal = stdin.is_terminal() && std::io::stderr().is_terminal();
-    let mut asker = Asker::new(stdin.lock(), std::io::stderr(), is_terminal, options.yes);
-    let plan = plan(&mut asker, options, &found)?;
-    let records = read(&plan, &found)?;
-    let assumed = stated::check(&plan, &records)?;
-    let seen = seen(&mut asker, options, &plan, &found, &records)?;
-
-    let folder = options.folder.canonicalize().unwrap_or_else(|_| options.folder.clone());
-    let name = folder.file_name().map_or("device".to_string(), |n| n.to_string_lossy().into_owned());
-    if let Some(made) = &found.made {
-        made.keep()?;
-    }
-    output::file(&model, write::model(&plan, &seen, &name))?;
-    output::file(&set, write::set(&plan, &seen, MODEL))?;
-
-    let wrote = format!("{} and {}", model.display(), set.display());
-    let opened = sets::open(std::slice::from_ref(&options.folder), None, None, &[])
-        .map_err(|e| Failure { code: e.code, message: format!("wrote {wrote}, and diagnose would refuse them: {}", e.message) })?;
-    let remarks = audit::audit(&opened.problem);
-    let next = Builder::verb("diagnose").reads(&options.folder).word("--out").reads_later(&options.folder.join("diagnosis")).build();
-    if options.json {
-        output::json(&json!({
-            "model": model, "set": set, "fit": seen.fit, "held_out": seen.held_out,
-            "start": { "inertia": seen.numbers.inertia, "damping": seen.numbers.damping, "stiffness": seen.numbers.stiffness, "from": seen.from },
-            "doubt": seen.doubt, "assumed": assumed, "notes": opened.notes, "audit": remarks.iter().map(Remark::from).collect::<Vec<_>>(), "next": next,
-        }))?;
-        return Ok(0);
-    }
-    output::line(format_args!("read      {}", told_recordings(&seen, &records)))?;
-    output::line(format_args!("start     {}", told_numbers(&plan, &seen)))?;
-    let cautions: Vec<String> = remarks.iter().filter(|r| r.weight > Weight::Note).map(|r| r.to_string()).collect();
-    let partial = found.partial.iter().map(|name| format!("{name}: is not in all of the recordings, so that it was not offered"));
-    let told: Vec<String> = seen
-        .doubt
-        .clone()
-        .into_iter()
-        .chain(assumed)
-        .chain(cautions)
-        .chain(opened.notes)
-        .chain(partial)
-        .chain(found.unread.clone())
-        .collect();
-    if told.is_empty() {
-        output::line("check     fine: diagnose takes them, and nothing in the recordings speaks against it")?;
-    }
-    for (index, text) in told.iter().enumerate() {
-        output::line(format_args!("{:<9} {text}", if index == 0 { "check" } else { "" }))?;
-    }
-    if let Some(made) = &found.made {
-        output::line(format_args!("made      {}: bags of the tables", made.names().join(", ")))?;
-    }
-    output::line(format_args!("wrote     {wrote}: look at them"))?;
-    next.iter().try_for_each(|next| output::line(format_args!("next      {next}")))?;
-    if is_terminal {
-        // What an option cannot say is what happens without it.
-        let sayable = asker.said().iter().filter(|(_, answer)| answer != ESTIMATE);
-        let again = options
-            .recording
-            .iter()
-            .fold(Builder::verb("init").reads(&options.folder), |again, file| again.word("--recording").reads(file));
-        let of_tables = [
-            ("columns", (!options.columns.is_empty()).then(|| options.columns.join(","))),
-            ("rate", options.rate.map(|rate| rate.to_string())),
-        ];
-        let of_tables = of_tables.into_iter().filter_map(|(option, value)| Some((option, value?)));
-        let again = of_tables.fold(again, |again, (option, value)| again.word(format!("--{option}")).word(value));
-        let again = sayable.fold(again, |again, (option, answer)| again.word(format!("--{option}")).word(answer));
-        // What was written now would be in its way.
-        let again = again.flag("--yes").flag("--overwrite").build();
-        again.iter().try_for_each(|again| output::line(format_args!("again     {again}")))?;
-    }
-    Ok(0)
-}
+pub const ESTIMATE: &str = "estimate";
 
 /// The signals of every recording, in SI units.
-fn read(plan: &Plan, found: &Recordings) -> Result<Vec<Recording>, Failure> {
+pub(crate) fn read(plan: &Plan, found: &Recordings) -> Result<Vec<Recording>, InitError> {
     let columns = plan.columns();
     let names: Vec<&str> = columns.iter().map(|(name, _)| name.as_str()).filter(|name| *name != "t").collect();
-    let one = |path: &Path| -> Result<Recording, Failure> {
+    let one = |path: &Path| -> Result<Recording, InitError> {
         let recording = match plan.drive.column.source {
             Source::Column(_) => read_csv(path, Some(&names), &columns, &Piece::default())?,
             Source::Topic { .. } => {
-                let reader = Reader::open(path).map_err(Failure::input)?;
-                backdrive_bags::recording(&reader, Some(&names), &columns, &Piece::default(), &|_| Hold::Linear).map_err(Failure::input)?
+                let reader = Reader::open(path).map_err(InitError::input)?;
+                backdrive_bags::recording(&reader, Some(&names), &columns, &Piece::default(), &|_| Hold::Linear)
+                    .map_err(InitError::input)?
             }
         };
         // What is looked at here stands on an even grid.
         if recording.is_regular(0.5) {
             Ok(recording)
         } else {
-            recording.onto_grid(recording.period, |_| Hold::Linear).map_err(Failure::input)
+            recording.onto_grid(recording.period, |_| Hold::Linear).map_err(InitError::input)
         }
     };
     found.paths.iter().map(|path| one(path)).collect()
 }
 
 /// What the recordings show of what was not asked, and the last questions, whose defaults they tell.
-fn seen<R: BufRead, W: Write>(
+pub(crate) fn seen<R: BufRead, W: Write>(
     asker: &mut Asker<R, W>,
-    options: &cli::Init,
+    options: &Options,
     plan: &Plan,
     found: &Recordings,
     records: &[Recording],
-) -> Result<Seen, Failure> {
+) -> Result<Seen, InitError> {
     let moving = match plan.driven {
         Driven::Motion => Some(&plan.drive),
         Driven::Force | Driven::Current => plan.position.as_ref(),
     };
-    let begins = if records.iter().any(|r| begins_moving(r, moving.map(|s| s.name.as_str()), plan)) { "free" } else { "rest" };
+    let moves = records.iter().any(|r| begins_moving(r, moving.map(|s| s.name.as_str()), plan));
+    let begins = if moves { Start::Free } else { Start::Rest };
     let question = Question {
         option: "start",
         words: "How does each recording begin: at rest at 0, or in a state that is to be estimated (free)?",
-        choices: vec!["rest".to_string(), "free".to_string()],
-        default: Some(begins.to_string()),
+        choices: vec![Start::Rest.word().to_string(), Start::Free.word().to_string()],
+        default: Some(begins.word().to_string()),
     };
-    let start =
-        asker.ask(&question, options.start.map(|s| if s == Start::Rest { "rest" } else { "free" }.to_string()), |text| match text {
-            "rest" => Ok(Start::Rest),
-            "free" => Ok(Start::Free),
-            _ => Err("expected rest or free".to_string()),
-        })?;
+    let start = asker.ask(&question, options.start.map(|s| s.word().to_string()), |text| {
+        Start::of(text).ok_or_else(|| "expected rest or free".to_string())
+    })?;
 
     let with_spring = plan.attached == Attached::Spring || plan.hand;
     let estimated = estimate(&shown(plan, records), with_spring);
@@ -252,11 +150,11 @@ fn shown<'a>(plan: &Plan, records: &'a [Recording]) -> Vec<Shown<'a>> {
 /// The recording that no fit sees: as asked, else one that is driven neither most nor least, so that what was fitted lies on both sides of it.
 fn held_out<R: BufRead, W: Write>(
     asker: &mut Asker<R, W>,
-    options: &cli::Init,
+    options: &Options,
     plan: &Plan,
     found: &Recordings,
     records: &[Recording],
-) -> Result<Option<String>, Failure> {
+) -> Result<Option<String>, InitError> {
     if found.names.len() < 2 {
         return match &options.held_out {
             Some(file) => {
@@ -282,21 +180,4 @@ fn held_out<R: BufRead, W: Write>(
         found.names.iter().find(is).cloned().ok_or_else(|| format!("is none of the recordings, {list}"))
     })?;
     Ok(Some(chosen))
-}
-
-fn told_recordings(seen: &Seen, records: &[Recording]) -> String {
-    let samples: usize = records.iter().map(Recording::len).sum();
-    let held = match seen.held_out.as_slice() {
-        [] => "none held out: record a second one".to_string(),
-        names => format!("{} held out", names.join(", ")),
-    };
-    let rate = records.first().map_or(0.0, |r| 1.0 / r.period);
-    format!("{} recordings ({held}), {samples} samples, the first at {} Hz", records.len(), number(rate))
-}
-
-fn told_numbers(plan: &Plan, seen: &Seen) -> String {
-    let (mass, damps, holds) = plan.motion.pick(("kg", "N s/m", "N/m"), ("kg m^2", "N m s/rad", "N m/rad"));
-    let Numbers { inertia, damping, stiffness } = seen.numbers;
-    let spring = if stiffness > 0.0 { format!(", stiffness {} {holds}", number(stiffness)) } else { String::new() };
-    format!("inertia {} {mass}, damping {} {damps}{spring}: {}", number(inertia), number(damping), seen.from)
 }

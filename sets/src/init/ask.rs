@@ -1,6 +1,6 @@
 //! Questions, answered by an option, on a terminal, or by their default.
 
-use crate::failure::{Failure, code};
+use super::error::InitError;
 use std::io::{BufRead, Write};
 
 /// A question.
@@ -52,7 +52,7 @@ impl<R: BufRead, W: Write> Asker<R, W> {
         question: &Question,
         given: Option<String>,
         mut read: impl FnMut(&str) -> Result<T, String>,
-    ) -> Result<T, Failure> {
+    ) -> Result<T, InitError> {
         if let Some(given) = given {
             let answer = read(&given).map_err(|why| usage(format!("--{} \"{given}\": {why}", question.option)))?;
             return Ok(self.heard(question, &given, answer));
@@ -80,7 +80,7 @@ impl<R: BufRead, W: Write> Asker<R, W> {
     }
 
     /// One line of the terminal; an empty one is the default, and a number one of the choices.
-    fn hear(&mut self, question: &Question) -> Result<String, Failure> {
+    fn hear(&mut self, question: &Question) -> Result<String, InitError> {
         self.tell(&format!("\n{}\n", question.words));
         for (index, choice) in question.choices.iter().enumerate() {
             self.tell(&format!("  {}  {choice}\n", index + 1));
@@ -92,7 +92,7 @@ impl<R: BufRead, W: Write> Asker<R, W> {
             match self.answers.read_line(&mut line) {
                 Ok(0) => return Err(usage(format!("the answers ended; {}", unanswered(question)))),
                 Ok(_) => {}
-                Err(e) => return Err(Failure::machine(format!("standard input: cannot be read: {e}"))),
+                Err(e) => return Err(InitError::Machine(format!("standard input: cannot be read: {e}"))),
             }
             let line = line.trim();
             let numbered = || line.parse::<usize>().ok().and_then(|n| question.choices.get(n.checked_sub(1)?));
@@ -119,8 +119,8 @@ fn unanswered(question: &Question) -> String {
 }
 
 /// A wrong or missing option.
-pub fn usage(message: String) -> Failure {
-    Failure { code: code::USAGE, message }
+pub(crate) fn usage(message: String) -> InitError {
+    InitError::Usage(message)
 }
 
 #[cfg(test)]
@@ -132,7 +132,7 @@ mod tests {
         Question { option: "motion", words: "How does it move?", choices, default: Some("translation".to_string()) }
     }
 
-    fn asked(answers: &str, is_terminal: bool, takes_defaults: bool, given: Option<&str>) -> (Result<String, Failure>, String) {
+    fn asked(answers: &str, is_terminal: bool, takes_defaults: bool, given: Option<&str>) -> (Result<String, InitError>, String) {
         let mut told = Vec::new();
         let mut asker = Asker::new(answers.as_bytes(), &mut told, is_terminal, takes_defaults);
         let read = |text: &str| match text {
@@ -153,7 +153,8 @@ mod tests {
         let (_, told) = asked("3\nrotation\n", true, false, None);
         assert!(told.contains("\"3\" is no motion"), "{told}");
         let ended = asked("", true, false, None).0.unwrap_err();
-        assert!(ended.code == 2 && ended.message.contains("the answers ended") && ended.message.contains("--motion"), "{}", ended.message);
+        let InitError::Usage(message) = &ended else { panic!("{ended}") };
+        assert!(message.contains("the answers ended") && message.contains("--motion"), "{message}");
     }
 
     #[test]
@@ -162,8 +163,8 @@ mod tests {
         assert_eq!(asked("", false, true, None).0.unwrap(), "translation");
         let missing = asked("", false, false, None).0.unwrap_err();
         let says = "say --motion: How does it move? (translation, rotation), or take the default, translation, with --yes";
-        assert_eq!((missing.code, missing.message.as_str()), (2, says));
+        assert!(matches!(&missing, InitError::Usage(message) if message == says), "{missing}");
         let wrong = asked("", false, false, Some("up")).0.unwrap_err();
-        assert_eq!((wrong.code, wrong.message.as_str()), (2, "--motion \"up\": \"up\" is no motion"));
+        assert!(matches!(&wrong, InitError::Usage(message) if message == "--motion \"up\": \"up\" is no motion"), "{wrong}");
     }
 }

@@ -1,9 +1,9 @@
 //! Units that nothing states: SI units are assumed, which is said, and refused where the values contradict it.
 
 use super::ask::usage;
+use super::error::InitError;
+use super::options::Driven;
 use super::plan::{Plan, Signal};
-use crate::cli::Driven;
-use crate::failure::Failure;
 use backdrive_plant::recording::Recording;
 use backdrive_plant::recording::units::Kind;
 use backdrive_report::number;
@@ -22,7 +22,7 @@ const SLOW_STEP: f64 = 0.05;
 ///
 /// # Errors
 /// Usage: an assumption that the values contradict, with the option and the heading that state the unit.
-pub fn check(plan: &Plan, records: &[Recording]) -> Result<Option<String>, Failure> {
+pub fn check(plan: &Plan, records: &[Recording]) -> Result<Option<String>, InitError> {
     let moving = if plan.driven == Driven::Motion { Some(&plan.drive) } else { plan.position.as_ref() };
     if let Some((signal, (option, unit))) = moving.and_then(|signal| Some((signal, signal.assumed.as_ref()?))) {
         let (most, other) = if unit.kind == Kind::Angle { (MOST_ANGLE, "deg") } else { (MOST_LENGTH, "mm") };
@@ -61,7 +61,7 @@ fn reach(samples: &[f64]) -> Option<f64> {
     Some((high - low).max(low.abs()).max(high.abs()))
 }
 
-fn refused(signal: &Signal, option: &str, assumed: &str, but: &str, other: &str) -> Failure {
+fn refused(signal: &Signal, option: &str, assumed: &str, but: &str, other: &str) -> InitError {
     let (column, short) = (&signal.column.name, signal.column.short_name());
     usage(format!(
         "nothing states the unit of {column}, and taken as {assumed} {but}: say --{option} {other} or --{option} {assumed}, or state it in the heading, \

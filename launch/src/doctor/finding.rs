@@ -6,7 +6,7 @@ use std::fmt;
 /// How much a finding matters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "lowercase")]
-pub(super) enum Grade {
+pub enum Grade {
     /// As it should be.
     Fine,
     /// A run works, less well than it could.
@@ -17,13 +17,14 @@ pub(super) enum Grade {
 
 /// What was found of one part of the machine.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub(super) struct Finding {
+pub struct Finding {
     part: &'static str,
-    pub(super) grade: Grade,
+    /// How much it matters.
+    pub grade: Grade,
     /// What was found.
-    pub(super) found: String,
+    pub found: String,
     /// What to do about it; empty where all is fine.
-    pub(super) advice: String,
+    pub advice: String,
 }
 
 impl Finding {

@@ -1,6 +1,6 @@
 //! What is wrong with a set of recordings before any of it is looked at: the same data as fitted and held out, and inputs that nothing takes.
 
-use crate::failure::Failure;
+use crate::error::SetError;
 use backdrive_bags::Reader;
 use backdrive_diagnosis::problem::{Problem, Record};
 use backdrive_plant::model::Model;
@@ -10,7 +10,7 @@ use std::io::Read;
 use std::path::Path;
 
 /// Refuses what is fitted and held out at once, under whichever name; a recording that is fitted twice is a note, for it counts twice.
-pub(crate) fn repeated(set: &RecordingSet) -> Result<Vec<String>, Failure> {
+pub fn repeated(set: &RecordingSet) -> Result<Vec<String>, SetError> {
     let mut notes = Vec::new();
     let all: Vec<(&String, bool)> = set.fit.iter().map(|f| (f, false)).chain(set.held_out.iter().map(|f| (f, true))).collect();
     for (i, (second, held)) in all.iter().enumerate() {
@@ -20,7 +20,7 @@ pub(crate) fn repeated(set: &RecordingSet) -> Result<Vec<String>, Failure> {
         let which =
             if first == second { format!("{second}: is given twice") } else { format!("{second}: is the same recording as {first}") };
         if held != first_held {
-            return Err(Failure::input(format!(
+            return Err(SetError::new(format!(
                 "{which}, once to be fitted and once held out; what a fit has seen cannot check it: hold out another recording, or give it once"
             )));
         }
@@ -31,12 +31,12 @@ pub(crate) fn repeated(set: &RecordingSet) -> Result<Vec<String>, Failure> {
 
 /// Refuses a recording that is both fitted and held out in another form, such as a table and the bag that it was imported into: the samples
 /// that the model takes are the same, bit for bit.
-pub(crate) fn repeated_samples(problem: &Problem) -> Result<(), Failure> {
+pub(crate) fn repeated_samples(problem: &Problem) -> Result<(), SetError> {
     let moves = |record: &Record| record.inputs.iter().chain(record.outputs.iter().flatten()).any(|s| s.iter().any(|x| *x != s[0]));
     let same = |a: &Record, b: &Record| a.inputs == b.inputs && a.outputs == b.outputs && moves(a);
     for held in &problem.held_out {
         if let Some(fitted) = problem.fit.iter().find(|fitted| same(fitted, held)) {
-            return Err(Failure::input(format!(
+            return Err(SetError::new(format!(
                 "{}: holds the same samples as {}, once to be fitted and once held out; what a fit has seen cannot check it: hold out another \
                  recording, or give it once",
                 held.name, fitted.name
@@ -73,7 +73,7 @@ pub(crate) fn is_same_file(first: &Path, second: &Path) -> bool {
 
 /// Refuses to go on where the recordings hold an input that no part of the model takes; other signals that are not used are a note.
 /// `ignored` are names that may be left out.
-pub(crate) fn left_out(set: &RecordingSet, model: &Model, ignored: &[String], has_grip: bool) -> Result<Option<String>, Failure> {
+pub(crate) fn left_out(set: &RecordingSet, model: &Model, ignored: &[String], has_grip: bool) -> Result<Option<String>, SetError> {
     let mut unused: Vec<(String, String)> = Vec::new();
     for file in set.fit.iter().chain(&set.held_out) {
         for name in unused_in(set, file, model) {
@@ -91,7 +91,7 @@ pub(crate) fn left_out(set: &RecordingSet, model: &Model, ignored: &[String], ha
             true => format!("the grip that was given is another one than \"{prefix}\""),
             false => format!("did you mean --grip {prefix}.toml (the grip that held the device), or a model that holds the hand?"),
         };
-        return Err(Failure::input(format!(
+        return Err(SetError::new(format!(
             "{file}: {name}, a motion of the hand, is in the recordings and nothing takes it: the model's inputs are {}; {hint} \
              --ignore-signal {name}, or ignore = [\"{name}\"] in set.toml, goes on without it",
             takes.join(", ")

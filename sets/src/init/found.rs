@@ -1,8 +1,8 @@
 //! The recordings that are there, and what their columns may be.
 
+use super::error::InitError;
 use super::made::{self, Made};
-use crate::cli::Init;
-use crate::failure::Failure;
+use super::options::Options;
 use backdrive_bags::{Reader, Signal, columns_of};
 use backdrive_plant::recording::units::{self, Kind, Unit};
 use backdrive_plant::recording::{Source, read_headings};
@@ -75,18 +75,18 @@ pub struct Recordings {
 ///
 /// # Errors
 /// When there are none, one cannot be read, or tables and bags are mixed.
-pub fn recordings(options: &Init) -> Result<Recordings, Failure> {
+pub fn recordings(options: &Options) -> Result<Recordings, InitError> {
     let (folder, named) = (options.folder.as_path(), options.recording.as_slice());
     let shown = folder.display();
     if !folder.is_dir() {
-        return Err(Failure::input(format!("{shown}: there is no such folder; make it and put the recordings there, or name another")));
+        return Err(InitError::input(format!("{shown}: there is no such folder; make it and put the recordings there, or name another")));
     }
     let paths: Vec<PathBuf> = match named {
         [] => made::recordings_in(folder)?,
         named => named.iter().map(|path| if path.exists() { path.clone() } else { folder.join(path) }).collect(),
     };
     if paths.is_empty() {
-        return Err(Failure::input(format!(
+        return Err(InitError::input(format!(
             "{shown}: has no recordings (.csv, .mcap, .npz, .mat or .parquet); name them with --recording"
         )));
     }
@@ -94,7 +94,7 @@ pub fn recordings(options: &Init) -> Result<Recordings, Failure> {
     let paths = made.as_ref().map_or(paths, Made::paths);
     let is_bag = |path: &PathBuf| path.extension().is_some_and(|e| e.eq_ignore_ascii_case("mcap"));
     if paths.iter().any(is_bag) && !paths.iter().all(is_bag) {
-        return Err(Failure::input(format!(
+        return Err(InitError::input(format!(
             "{shown}: holds tables and bags, whose columns are named differently; name those of one kind with --recording, or make bags of the \
              tables with `backdrive bag import`"
         )));
@@ -103,12 +103,12 @@ pub fn recordings(options: &Init) -> Result<Recordings, Failure> {
     for path in &paths {
         all.push(match is_bag(path) {
             true => {
-                let reader = Reader::open(path).map_err(Failure::input)?;
+                let reader = Reader::open(path).map_err(InitError::input)?;
                 if let Some(cut) = reader.without_messages() {
-                    return Err(Failure::input(format!("{}: {cut}", path.display())));
+                    return Err(InitError::input(format!("{}: {cut}", path.display())));
                 }
                 unread.extend(reader.topics().iter().filter_map(|topic| topic.unread()));
-                columns_of(&reader, None).map_err(Failure::input)?.into_iter().map(|signal| Column::of_topic(&reader, signal)).collect()
+                columns_of(&reader, None).map_err(InitError::input)?.into_iter().map(|signal| Column::of_topic(&reader, signal)).collect()
             }
             false => read_headings(path)?.into_iter().filter(|h| !h.is_empty()).map(Column::of_heading).collect(),
         });
@@ -124,10 +124,10 @@ pub fn recordings(options: &Init) -> Result<Recordings, Failure> {
         }
     }
     if let (true, true, Some(unread)) = (columns.is_empty(), partial.is_empty(), unread.first()) {
-        return Err(Failure::input(format!("{shown}: the recordings have no numbers that are read: {unread}")));
+        return Err(InitError::input(format!("{shown}: the recordings have no numbers that are read: {unread}")));
     }
     if columns.is_empty() {
-        return Err(Failure::input(format!(
+        return Err(InitError::input(format!(
             "{shown}: the recordings have no column in common; name those that belong together with --recording"
         )));
     }

@@ -1,8 +1,8 @@
 //! The text of the model and of the set.
 
 use super::estimate::Numbers;
+use super::options::{Attached, Driven, Start};
 use super::plan::{Plan, Signal};
-use crate::cli::{Attached, Driven, Start};
 use backdrive_plant::recording::{ColumnRule, Source};
 use backdrive_plant::write::{key, number, round_significant, string};
 use std::f64::consts::TAU;
