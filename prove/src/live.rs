@@ -92,7 +92,7 @@ pub(crate) fn about(
         }
         text["gains"]["lambda"] = value(gain / graph.gains.mu);
         let path = folder.join(format!("{name}.toml"));
-        write(&path, &text.to_string())?;
+        write(&path, text.to_string())?;
         let said = ours(backdrive, folder, &name, &[&"run", &path, &"--json", &"--overwrite"])?;
         let json = said.lines().find_map(|line| serde_json::from_str::<Value>(line).ok());
         let outcome = json.and_then(|v| v["outcome"].as_str().map(str::to_string));

@@ -266,6 +266,6 @@ fn still(options: &Options, session: &Path) -> Result<PathBuf, ProveError> {
     // No hand moves it, so there is none to be unknown.
     set.remove("unknown");
     let still = session.join("still.toml");
-    write(&still, &set.to_string())?;
+    write(&still, set.to_string())?;
     Ok(still)
 }

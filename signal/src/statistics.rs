@@ -77,7 +77,7 @@ mod tests {
     #[test]
     fn means_are_those_of_their_formulas() {
         assert_eq!((mean(&[1.0, 2.0, 6.0]), mean(&[])), (3.0, 0.0));
-        assert_eq!((rms(&[3.0, 4.0, 5.0]), rms([0.0; 0])), ((50.0f64 / 3.0).sqrt(), 0.0));
+        assert_eq!((rms([3.0, 4.0, 5.0]), rms([0.0; 0])), ((50.0f64 / 3.0).sqrt(), 0.0));
         assert_eq!((rms_of_finite([1.0, f64::NAN, -1.0]), rms_of_finite([f64::NAN])), (Some(1.0), None));
         assert_eq!((deviation(&[1.0, 3.0]), deviation(&[])), (1.0, 0.0));
     }

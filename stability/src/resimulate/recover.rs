@@ -122,7 +122,7 @@ pub fn recover_intent(session: &Session, graph: &Graph) -> Result<Recovered, Res
         }
     }
     let followed = follow(&device, &forces, &intents);
-    let residual = measured.iter().zip(&followed).map(|(x, y)| rms(&difference(x, y)) / range(x).max(f64::MIN_POSITIVE)).collect();
+    let residual = measured.iter().zip(&followed).map(|(x, y)| rms(difference(x, y)) / range(x).max(f64::MIN_POSITIVE)).collect();
     let ambiguity = (0..device.axes()).map(|axis| held_by_friction(files, axis)).collect::<Result<_, _>>()?;
     let still_s = rests.iter().map(|(from, to)| (to - from) as f64 * session.period_s).sum();
     Ok(Recovered { intents: intents.iter().map(|x| recorded(x, session.period_s)).collect(), residual, ambiguity, still_s })
@@ -371,7 +371,7 @@ mod tests {
         };
         let worst = |a: &[f64], b: &[f64]| difference(a, b).iter().fold(0.0_f64, |m, x| m.max(x.abs()));
         assert!(worst(&filter.low_pass(&wave(8.0)), &wave(8.0)) < 1e-3);
-        assert!(rms(&filter.low_pass(&wave(60.0))) < 1e-3);
+        assert!(rms(filter.low_pass(&wave(60.0))) < 1e-3);
     }
 
     #[test]

@@ -52,7 +52,7 @@ impl Tuning {
         let grid = [1.0, 5.0, 25.0, 125.0].into_iter().flat_map(|walk| [0.5, 2.0, 8.0, 32.0].map(|ripple| Tuning { walk, ripple }));
         let error = |tuning: &Tuning| {
             let found = tuning.torque(bench, observation, record);
-            rms(&found[start..].iter().zip(&truth[start..]).map(|(a, b)| a - b).collect::<Vec<_>>())
+            rms(found[start..].iter().zip(&truth[start..]).map(|(a, b)| a - b))
         };
         let told = grid.map(|tuning| (error(&tuning), tuning)).min_by(|a, b| a.0.total_cmp(&b.0));
         told.map_or(Tuning { walk: 5.0, ripple: 2.0 }, |t| t.1)
@@ -101,7 +101,7 @@ pub fn compare(bench: &Bench, observation: &Observation, record: &Record, truth:
     let estimates = estimates.into_iter().map(|(name, torque)| {
         let error = |late: usize| {
             let pairs = torque[start + late..].iter().zip(&truth[start..]);
-            rms(&pairs.map(|(a, b)| a - b).collect::<Vec<_>>())
+            rms(pairs.map(|(a, b)| a - b))
         };
         let late = (0..300).step_by(2).min_by(|a, b| error(*a).total_cmp(&error(*b))).unwrap_or(0);
         let correlation = correlation(&torque[start..], &truth[start..]);
