@@ -6,13 +6,13 @@
 //! a wrong sensor, physics in the master (which the hidden plant of `backdrive-sealed` moves, not the plant of this program). The bag holds
 //! the graph without that thing. What is asked sees the bag alone. Every fifth case hides nothing.
 
-use backdrive::{Hidden, Opened};
 use backdrive_bags::{Reader, Recorder};
 use backdrive_launch::join::{recorder_options, recording};
 use backdrive_nodes::build::{plan, plan_with};
 use backdrive_nodes::graph::{Files, Graph, NodeKind, Overrides};
 use backdrive_nodes::sequence::Sequence;
 use backdrive_nodes::stage::Impairment;
+use backdrive_prove::hidden::{Hidden, Opened};
 use backdrive_sealed::draw::{DrawOptions, draw};
 use backdrive_sealed::network::{Grip, Network};
 use backdrive_stability::by_itself::recorded::{Quantity, Recorded};

@@ -1,7 +1,6 @@
 //! `backdrive diagnose`: which physics a model leaves out, by recordings of its device.
 
 use crate::cli;
-use crate::diagnose_page::{Shown, next::next, page};
 use crate::diagnose_text::text;
 use crate::explain::explained;
 use crate::failure::{Failure, code};
@@ -9,12 +8,15 @@ use crate::interrupt;
 use crate::offered::Step;
 use crate::output;
 use crate::progress;
-use crate::recordings::{self, Opened};
 use answer::{Answer, to_do};
 use backdrive_diagnosis::diagnose::{self, Diagnosis};
 use backdrive_diagnosis::physics::physics_named;
 use backdrive_diagnosis::search::Settings;
 use backdrive_diagnosis::verdict::{EXPERIMENT_FILE, MODEL_FILE, VERDICT_FILE, Word, rival_file};
+use backdrive_pages::diagnose::{Shown, page};
+use backdrive_sets::open;
+use backdrive_sets::open::Opened;
+use next::next;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -22,6 +24,7 @@ use std::time::{Duration, Instant};
 pub mod answer;
 mod arm;
 mod arm_options;
+pub mod next;
 mod servo;
 
 /// Name of the report, where no other is asked for.
@@ -40,10 +43,10 @@ pub fn diagnose(options: &cli::Diagnose) -> Result<u8, Failure> {
     }
     let stop = interrupt::heard()?;
 
-    let open = || recordings::open(&options.set, options.model.as_deref(), options.grip.as_deref(), &options.ignore_signal);
-    let opened = progress::busy("reading the recordings", open)?;
+    let opened = || open::open(&options.set, options.model.as_deref(), options.grip.as_deref(), &options.ignore_signal);
+    let opened = progress::busy("reading the recordings", opened)?;
     for name in [MODEL_FILE, EXPERIMENT_FILE] {
-        recordings::not_onto(&options.out.join(name), &opened.files, false)?;
+        open::not_onto(&options.out.join(name), &opened.files, false)?;
     }
     for note in &opened.notes {
         output::note(format_args!("note: {note}"));
@@ -124,7 +127,7 @@ pub fn diagnose_into(
     let steps = next(&found, out, &files);
     if let Some(report) = report {
         let shown = Shown { found: &found, name: &opened.name, notes: &opened.notes, steps: &steps };
-        output::file(report, page(&shown).html())?;
+        output::page(report, page(&shown))?;
         written.push(if report == out.join(REPORT) { REPORT.to_string() } else { report.display().to_string() });
     }
     Ok(Diagnosed { found, written, steps })

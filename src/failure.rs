@@ -5,6 +5,8 @@ use backdrive_inspect::InspectError;
 use backdrive_launch::LaunchError;
 use backdrive_nodes::build::BuildError;
 use backdrive_plant::tomlfile::FileError;
+use backdrive_sets::SetError;
+use backdrive_stability::summary::SummaryError;
 use std::fmt::Display;
 
 /// A command that fails: one message and an exit code.
@@ -115,6 +117,18 @@ impl From<InspectError> for Failure {
 
 impl From<FileError> for Failure {
     fn from(error: FileError) -> Failure {
+        Failure::input(error)
+    }
+}
+
+impl From<SetError> for Failure {
+    fn from(error: SetError) -> Failure {
+        Failure::input(error)
+    }
+}
+
+impl From<SummaryError> for Failure {
+    fn from(error: SummaryError) -> Failure {
         Failure::input(error)
     }
 }

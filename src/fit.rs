@@ -3,13 +3,12 @@
 use crate::cli;
 use crate::columns::columns;
 use crate::diagnose::answer::to_do;
-use crate::diagnose_page::next::simulated;
+use crate::diagnose::next::simulated;
 use crate::failure::{Failure, code};
 use crate::interrupt;
-use crate::offered::{Offered, Step};
+use crate::offered::{Builder, Step};
 use crate::output;
 use crate::progress;
-use crate::recordings::{self, file_name};
 use crate::servo_runs;
 use backdrive_diagnosis::audit::without_contradicted;
 use backdrive_diagnosis::compare::{Quality, predictions, qualities};
@@ -21,8 +20,10 @@ use backdrive_diagnosis::problem::Problem;
 use backdrive_diagnosis::search::{Search, Settings, search};
 use backdrive_diagnosis::structure::{FreeParameter, Role, Structure};
 use backdrive_diagnosis::work::{Budget, Limit};
+use backdrive_pages::parts::file_name;
 use backdrive_plant::model::Model;
 use backdrive_report::{number, percent};
+use backdrive_sets::open;
 use serde_json::json;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -57,10 +58,10 @@ pub fn fit(options: &cli::Fit) -> Result<u8, Failure> {
         )));
     }
     let stop = interrupt::heard()?;
-    let open = || recordings::open(&options.set, Some(&options.model), options.grip.as_deref(), &options.ignore_signal);
-    let opened = progress::busy("reading the recordings", open)?;
+    let opened = || open::open(&options.set, Some(&options.model), options.grip.as_deref(), &options.ignore_signal);
+    let opened = progress::busy("reading the recordings", opened)?;
     if let Some(out) = &options.out {
-        recordings::not_onto(out, &opened.files, options.overwrite)?;
+        open::not_onto(out, &opened.files, options.overwrite)?;
     }
     for note in &opened.notes {
         output::note(format_args!("note: {note}"));
@@ -119,7 +120,7 @@ fn next(options: &cli::Fit, files: &[PathBuf], fitted: &Fitted) -> Vec<Step> {
     match &options.out {
         None => {
             let stem = options.model.file_stem().map_or_else(|| "model".to_string(), |stem| stem.to_string_lossy().into_owned());
-            let again = Offered::again().without("--json", false).option_writes("--out", Path::new(&format!("{stem}.fitted.toml")));
+            let again = Builder::again().without("--json", false).option_writes("--out", Path::new(&format!("{stem}.fitted.toml")));
             steps.push(Step::new(
                 "Write the model with these numbers: the same command with a file.",
                 [again.build().filter(|c| c.is("fit"))],
@@ -131,7 +132,7 @@ fn next(options: &cli::Fit, files: &[PathBuf], fitted: &Fitted) -> Vec<Step> {
         )),
         Some(_) => {}
     }
-    let asked = Offered::verb("diagnose");
+    let asked = Builder::verb("diagnose");
     let asked = options.set.iter().fold(asked, |asked, path| asked.reads(path)).option_reads("--model", &options.model);
     let asked = match &options.grip {
         Some(none) if none.as_os_str() == "none" => asked.option("--grip", "none"),

@@ -7,80 +7,16 @@
 use crate::caller;
 use crate::cli::Cli;
 pub use backdrive_bags::shell_word;
+pub use backdrive_pages::offered::{Offered, Step};
 use clap::Parser;
-use serde::{Serialize, Serializer};
 use std::ffi::OsString;
-use std::fmt::{self, Display};
+use std::fmt::Display;
 use std::path::{Path, PathBuf};
-
-/// A command of this program that can be pasted as it stands.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Offered(Vec<String>);
-
-impl Offered {
-    /// A command of a verb, such as `replay` or `bag recover`.
-    pub fn verb(verb: &str) -> Builder {
-        Builder { words: verb.split_whitespace().map(str::to_string).collect(), possible: true }
-    }
-
-    /// Whether it is a command of this verb.
-    pub fn is(&self, verb: &str) -> bool {
-        self.0.first().is_some_and(|word| word == verb)
-    }
-
-    /// The command that is running, to be changed and repeated.
-    pub fn again() -> Builder {
-        let words: Option<Vec<String>> = own_arguments().into_iter().map(|word| word.into_string().ok()).collect();
-        Builder { possible: words.is_some(), words: words.unwrap_or_default() }
-    }
-}
-
-impl Display for Offered {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "backdrive")?;
-        self.0.iter().try_for_each(|word| write!(f, " {}", shell_word(word)))
-    }
-}
-
-impl Serialize for Offered {
-    fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
-        to.collect_str(self)
-    }
-}
-
-/// What to do next: a sentence, and the commands that do it, in their order.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct Step {
-    /// The sentence.
-    #[serde(rename = "do")]
-    pub sentence: String,
-    /// The commands; empty where no command does it.
-    pub commands: Vec<Offered>,
-}
-
-impl Step {
-    /// A sentence with the commands that do it; where one of them cannot be offered, none is.
-    pub fn new(sentence: impl Into<String>, commands: impl IntoIterator<Item = Option<Offered>>) -> Step {
-        let commands: Option<Vec<Offered>> = commands.into_iter().collect();
-        Step { sentence: sentence.into(), commands: commands.unwrap_or_default() }
-    }
-
-    /// A sentence alone.
-    pub fn said(sentence: impl Into<String>) -> Step {
-        Step::new(sentence, [])
-    }
-
-    /// The commands as a shell takes them, one a line; `None` where there are none.
-    pub fn pasted(&self) -> Option<String> {
-        let lines: Vec<String> = self.commands.iter().map(Offered::to_string).collect();
-        (!lines.is_empty()).then(|| lines.join("\n"))
-    }
-}
 
 /// The command that makes a clean copy of a bag that was cut off or is damaged.
 pub fn recover(bag: &Path) -> Option<Offered> {
     let stem = bag.file_stem().map_or_else(String::new, |s| s.to_string_lossy().into_owned());
-    Offered::verb("bag recover").reads(bag).option_writes("--bag", &bag.with_file_name(format!("{stem}-saved.mcap"))).build()
+    Builder::verb("bag recover").reads(bag).option_writes("--bag", &bag.with_file_name(format!("{stem}-saved.mcap"))).build()
 }
 
 /// A sentence with the command that does it in it, where there is one: `what it holds is used; make a clean copy: backdrive ...`.
@@ -114,6 +50,17 @@ pub struct Builder {
 }
 
 impl Builder {
+    /// A command of a verb, such as `replay` or `bag recover`.
+    pub fn verb(verb: &str) -> Builder {
+        Builder { words: verb.split_whitespace().map(str::to_string).collect(), possible: true }
+    }
+
+    /// The command that is running, to be changed and repeated.
+    pub fn again() -> Builder {
+        let words: Option<Vec<String>> = own_arguments().into_iter().map(|word| word.into_string().ok()).collect();
+        Builder { possible: words.is_some(), words: words.unwrap_or_default() }
+    }
+
     /// A word that is no option, such as a name.
     pub fn word(mut self, word: impl Display) -> Builder {
         self.words.push(word.to_string());
@@ -200,7 +147,7 @@ impl Builder {
     pub fn build(self) -> Option<Offered> {
         let takes = || Cli::try_parse_from(std::iter::once("backdrive").chain(self.words.iter().map(String::as_str))).is_ok();
         (self.possible && takes()).then_some(())?;
-        Some(Offered(self.words))
+        Some(Offered::of(self.words))
     }
 }
 
@@ -258,14 +205,14 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let there = folder.path().join("a bag.mcap");
         std::fs::write(&there, "").unwrap();
-        let replay = || Offered::verb("replay").reads(&there);
+        let replay = || Builder::verb("replay").reads(&there);
         let text = replay().option("--lambda", 0.5).build().unwrap().to_string();
         assert_eq!(text, format!("backdrive replay '{}' --lambda 0.5", there.display()));
         // An option without its value, one that there is not, a value that is none, a file that is not there.
         assert_eq!(replay().flag("--lambda").build(), None);
         assert_eq!(replay().option("--lambad", 0.5).build(), None);
         assert_eq!(replay().option("--lambda", "LAMBDA").build(), None);
-        assert_eq!(Offered::verb("replay").reads(&folder.path().join("none.mcap")).build(), None);
+        assert_eq!(Builder::verb("replay").reads(&folder.path().join("none.mcap")).build(), None);
     }
 
     #[test]

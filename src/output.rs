@@ -9,7 +9,9 @@
 
 use crate::caller;
 use crate::failure::{Failure, code};
+use crate::offered::own_command;
 use backdrive_bags::move_into_place;
+use backdrive_report::Page;
 use clap::Parser;
 use std::fmt::Display;
 use std::fs::File;
@@ -121,6 +123,15 @@ pub fn parsed<P: Parser>() -> Result<P, ExitCode> {
 /// When it cannot be written; then what was there is there still, and nothing new.
 pub fn file(path: &Path, contents: impl AsRef<[u8]>) -> Result<(), Failure> {
     replace(path, |beside| std::fs::write(beside, contents).map_err(|e| Failure::write(beside, e)))
+}
+
+/// A page, with the command and the version that made it at its foot.
+///
+/// # Errors
+/// As [`file()`].
+pub fn page(path: &Path, mut page: Page) -> Result<(), Failure> {
+    page.text(&format!("Made by backdrive {} with: {}", env!("CARGO_PKG_VERSION"), own_command()));
+    file(path, page.html())
 }
 
 /// A file that `write` makes: at a path beside the one that is asked for, where nothing is yet and to which it may return as often as it

@@ -46,15 +46,30 @@ fn counted(bar: &ProgressBar) -> String {
     format!("{}: {done} of {all}, after {:.0} s", bar.message(), bar.elapsed().as_secs_f64())
 }
 
+/// While it lives something goes on that may take long and tells no steps; a line says that it does.
+pub struct Busy(ProgressBar);
+
+impl Busy {
+    /// From here on.
+    pub fn begin(title: &str) -> Busy {
+        let bar = ProgressBar::new_spinner();
+        bar.set_message(title.to_string());
+        bar.enable_steady_tick(Duration::from_millis(100));
+        tell(&bar, |bar| format!("{}: {:.0} s", bar.message(), bar.elapsed().as_secs_f64()));
+        Busy(bar)
+    }
+}
+
+impl Drop for Busy {
+    fn drop(&mut self) {
+        self.0.finish_and_clear();
+    }
+}
+
 /// Does what may take long and tells no steps; a line says that it goes on.
 pub fn busy<T>(title: &str, work: impl FnOnce() -> T) -> T {
-    let bar = ProgressBar::new_spinner();
-    bar.set_message(title.to_string());
-    bar.enable_steady_tick(Duration::from_millis(100));
-    tell(&bar, |bar| format!("{}: {:.0} s", bar.message(), bar.elapsed().as_secs_f64()));
-    let result = work();
-    bar.finish_and_clear();
-    result
+    let _until_then = Busy::begin(title);
+    work()
 }
 
 /// A bar that counts steps.

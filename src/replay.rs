@@ -6,15 +6,15 @@ use crate::offered::with_recover;
 use crate::output;
 use crate::progress::busy;
 use crate::run::{next, repeat_here};
-use crate::run_page::{Heard, page};
-use crate::summary::graph_of;
 use backdrive_bags::Reader;
 use backdrive_control::cycle::Cycle;
 use backdrive_control::operator::Intent;
 use backdrive_msgs::{Message, Sample};
 use backdrive_nodes::graph::{Node, NodeKind, Overrides, Settings};
 use backdrive_nodes::stage::Clock;
+use backdrive_pages::run::{Heard, page};
 use backdrive_stability::bag_gate::held_back;
+use backdrive_stability::summary::graph_of;
 use backdrive_stability::unjudged::Unjudged;
 
 /// Replays a bag in lockstep, in this process.
@@ -86,7 +86,7 @@ pub fn replay(options: &cli::Replay) -> Result<u8, Failure> {
         summary.hold_back(kept_back.filter(is_asked));
     }
     let steps = next(&done, &graph, Some(path));
-    let page = options.result.html.as_deref().map(|html| (html, page(&done, &graph, &heard, &steps)));
+    let page = options.result.html.as_deref().map(|html| (html, page(&done.shown(), &graph, &heard, &steps)));
     done.tell(page, options.result.json, &steps)
 }
 

@@ -1,21 +1,21 @@
 //! `simulate` and `fit` of a model whose joints position servos drive.
 
 use crate::cli;
-use crate::estimate_text::estimate;
 use crate::failure::Failure;
 use crate::output::{self, may_replace};
 use crate::progress;
-use crate::recordings;
+use backdrive_pages::estimate::estimate;
 use backdrive_plant::model::Model;
 use backdrive_plant::recording::{Recording, write_csv};
 use backdrive_plant::servo::Numbers;
 use backdrive_plant::set::RecordingSet;
 use backdrive_report::number;
-use backdrive_servo::fit::spread;
 use backdrive_servo::problem::Problem;
 use backdrive_servo::refit::{Refitted, refit};
 use backdrive_servo::run::free_runs;
 use backdrive_servo::search::scored;
+use backdrive_sets::open;
+use backdrive_signal::statistics::deviation;
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
@@ -27,7 +27,7 @@ fn stated(problem: &Problem) -> Vec<Option<Numbers>> {
 /// Runs the joints from the commands of recordings, writes their positions, and says how far they are from what was recorded.
 pub fn simulate(options: &cli::Simulate, model: &Model) -> Result<u8, Failure> {
     let path = PathBuf::from(&options.drive);
-    let (mut set, _) = recordings::set_of(std::slice::from_ref(&path))?;
+    let (mut set, _) = open::set_of(std::slice::from_ref(&path))?;
     if let Some(columns) = &options.columns {
         let other = RecordingSet::open(columns)?;
         (set.columns, set.joints) = (other.columns, other.joints);
@@ -49,8 +49,11 @@ pub fn simulate(options: &cli::Simulate, model: &Model) -> Result<u8, Failure> {
     let mut runs = Vec::new();
     for (held_out, files) in [(false, &set.fit), (true, &set.held_out)] {
         for (index, file) in files.iter().enumerate() {
-            let out =
-                if is_file { options.out.clone() } else { options.out.join(Path::new(recordings::file_name(file)).with_extension("csv")) };
+            let out = if is_file {
+                options.out.clone()
+            } else {
+                options.out.join(Path::new(backdrive_pages::parts::file_name(file)).with_extension("csv"))
+            };
             may_replace(&out, options.overwrite)?;
             let positions = free_runs(&problem, &stated(&problem), held_out, index).map_err(Failure::input)?;
             runs.push(written(&problem, &positions, held_out, index, file, &out, options)?);
@@ -82,7 +85,7 @@ fn written(
         signals.push((format!("{}.position", joint.name), simulated.clone()));
         let (share, absolute) = scored(simulated, &record.position);
         // A joint that rests has no nrmse.
-        let share = (spread(&record.position) > 1e-6).then_some(share);
+        let share = (deviation(&record.position) > 1e-6).then_some(share);
         let told = share.map_or("-".to_string(), |s| format!("{s:.4}"));
         lines.push(format!("  {:<24} nrmse {told}, mean error {} mrad", joint.name, number(1e3 * absolute)));
         errors.insert(joint.name.clone(), json!({ "nrmse": share, "mean_error_rad": absolute }));
@@ -102,14 +105,14 @@ fn written(
 
 /// Refits the numbers that the model states of each joint, its physics as they are.
 pub fn fit(options: &cli::Fit) -> Result<u8, Failure> {
-    let (mut set, told) = recordings::set_of(&options.set)?;
+    let (mut set, told) = open::set_of(&options.set)?;
     let mut notes = Vec::new();
-    recordings::hold_out(&mut set, told, &mut notes);
+    open::hold_out(&mut set, told, &mut notes);
     notes.iter().for_each(|note| output::note(format_args!("note: {note}")));
     if let Some(out) = &options.out {
         let files: Vec<PathBuf> =
             std::iter::once(options.model.clone()).chain(set.fit.iter().chain(&set.held_out).map(|f| set.path_of(f))).collect();
-        recordings::not_onto(out, &files, options.overwrite)?;
+        open::not_onto(out, &files, options.overwrite)?;
     }
     let problem = progress::busy("reading the recordings", || Problem::open(&set, Some(&options.model))).map_err(Failure::input)?;
     let fitted = progress::busy("fitting the servo joints", || refit(&problem)).map_err(Failure::input)?;

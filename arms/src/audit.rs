@@ -1,12 +1,13 @@
 //! What logs of an arm say of themselves before any physics: units, signs, swapped columns and joints, rates that are none, joints that do not move.
 
 use crate::log::Log;
-use crate::physics::{range, rms};
+use crate::physics::range;
 use crate::problem::Problem;
 use crate::regression::Data;
 use crate::rigid::torques;
 use backdrive_diagnosis::audit::Weight;
 use backdrive_diagnosis::verdict::Remark;
+use backdrive_signal::statistics::rms;
 
 /// A range of a joint that turns that no arm has, rad: degrees read as radians.
 const TURNS: f64 = 12.0;

@@ -1,9 +1,10 @@
 //! What is known of a joint before any fit: torque of elements that the regression has no terms for, whether it has a motor, and what its torque is compared
 //! with.
 
-use crate::physics::{AtJoints, rms};
+use crate::physics::AtJoints;
 use crate::regression::{Data, parts_of};
 use crate::stated::{self, Stated, Unused};
+use backdrive_signal::statistics::rms;
 
 impl Data<'_> {
     /// Elements whose torque is computed along the motion: those between two joints, and those whose law the regression has no terms for.

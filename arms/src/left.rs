@@ -6,8 +6,9 @@ use crate::fit::Fit;
 use crate::log::Log;
 use crate::motion::{ORDER, power_below};
 use crate::regression::{Data, correlation_time};
-use backdrive_diagnosis::low_pass::{LowPass, derivative};
 use backdrive_diagnosis::verdict::Where;
+use backdrive_signal::derivative;
+use backdrive_signal::low_pass::LowPass;
 use nalgebra::DMatrix;
 use std::ops::Range;
 
@@ -198,6 +199,7 @@ fn explained(samples: &[f64], signal: &[f64], independent: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use backdrive_signal::statistics::rms;
 
     /// Even numbers between -1 and 1: deviation 1/√3.
     fn even(count: usize) -> Vec<f64> {
@@ -224,7 +226,6 @@ mod tests {
         let (corner, rate) = (10.0, 500.0);
         let noise = even(60_000);
         let filter = LowPass::butterworth(ORDER, corner, rate);
-        let rms = |x: &[f64]| (x.iter().map(|x| x * x).sum::<f64>() / x.len() as f64).sqrt();
         let through = filter.both_ways(&noise);
         let twice = derivative(&derivative(&through, 1.0 / rate), 1.0 / rate);
         let [plain, second] = gains(corner, rate).map(|g| g / 3f64.sqrt());

@@ -5,10 +5,12 @@
 //! sides, and one sample in several is kept.
 
 use crate::log::Log;
-use backdrive_diagnosis::low_pass::{LowPass, derivative};
 use backdrive_plant::model::Hold;
 use backdrive_plant::recording::resample;
 use backdrive_plant::robot::Payload;
+use backdrive_signal::derivative;
+use backdrive_signal::low_pass::LowPass;
+use backdrive_signal::statistics::{middle_step, rms};
 use realfft::RealFftPlanner;
 
 /// Order of the Butterworth filters; run both ways the order counts twice.
@@ -42,7 +44,7 @@ pub struct Rates {
 impl Rates {
     /// For these logs: the corner follows the motion. `corner`: that of the regression, Hz, where it is given.
     pub fn of(logs: &[&Log], corner: Option<f64>) -> Rates {
-        let grid = logs.iter().map(|log| 1.0 / median_step(&log.t)).fold(f64::INFINITY, f64::min).clamp(1.0, 1e5);
+        let grid = logs.iter().map(|log| 1.0 / middle_step(&log.t).unwrap_or(1.0)).fold(f64::INFINITY, f64::min).clamp(1.0, 1e5);
         let mut highest: f64 = 0.0;
         let rough = LowPass::butterworth(ORDER, 20.0f64.min(grid / 5.0), grid);
         for log in logs {
@@ -150,7 +152,7 @@ impl Motion {
 
 /// The speed below which a joint hardly moves, rad/s or m/s: a share of its usual one, and no less than the sensor's steps leave of a rate.
 fn resting(velocity: &[f64], logged: &[f64], rates: &Rates) -> f64 {
-    let usual = (velocity.iter().map(|v| v * v).sum::<f64>() / velocity.len().max(1) as f64).sqrt();
+    let usual = rms(velocity);
     let step = logged.windows(2).map(|w| (w[1] - w[0]).abs()).filter(|d| *d > 0.0).fold(f64::INFINITY, f64::min);
     // Rounding is noise of step/√12 over half the rate; differentiated below a corner f it is 2π f/√3 times what lies below f.
     let below = (2.0 * rates.position_corner / rates.grid).sqrt() * std::f64::consts::TAU * rates.position_corner / 3f64.sqrt();
@@ -176,12 +178,6 @@ fn on_grid(t: &[f64], samples: &[f64], rate: f64) -> Vec<f64> {
     let count = ((last - first) * rate + 1e-6).floor().max(0.0) as usize + 1;
     let grid: Vec<f64> = (0..count).map(|i| first + i as f64 / rate).collect();
     resample(Hold::Linear, t, samples, &grid)
-}
-
-fn median_step(t: &[f64]) -> f64 {
-    let mut steps: Vec<f64> = t.windows(2).map(|w| w[1] - w[0]).collect();
-    let middle = steps.len() / 2;
-    if steps.is_empty() { 1.0 } else { *steps.select_nth_unstable_by(middle, f64::total_cmp).1 }
 }
 
 /// The frequency below which [`SHARE`] of the power lies, Hz.

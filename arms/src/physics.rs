@@ -6,6 +6,7 @@ use crate::rigid::Signals;
 use crate::soft::{Gear, change};
 use backdrive_diagnosis::hypothesis::Family;
 use backdrive_plant::robot::Tree;
+use backdrive_signal::statistics::rms;
 
 /// A physics that a search can add to an arm.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -283,7 +284,7 @@ impl Sight<'_> {
                 vec![vec![(j, s), (other, on_other)]]
             }
             Physics::Delay => {
-                let late = backdrive_diagnosis::low_pass::derivative(&self.load[j], self.rates.period());
+                let late = backdrive_signal::derivative(&self.load[j], self.rates.period());
                 one(late.iter().map(|x| -x).collect())
             }
             // Per unit of what gives way, 1/k or the gap: where the shape is right, the number is that.
@@ -396,11 +397,6 @@ fn periods(wide: f64, kind: backdrive_plant::robot::JointKind) -> Vec<f64> {
         }
         _ => (0..60).map(|i| 0.5 * wide * 0.93f64.powi(i)).collect(),
     }
-}
-
-pub(crate) fn rms(values: impl Iterator<Item = f64>) -> f64 {
-    let (sum, count) = values.fold((0.0, 0usize), |(s, n), x| (s + x * x, n + 1));
-    (sum / count.max(1) as f64).sqrt()
 }
 
 pub(crate) fn range(values: impl Iterator<Item = f64>) -> f64 {

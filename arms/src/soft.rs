@@ -12,8 +12,9 @@
 
 use crate::motion::{Motion, ORDER};
 use crate::rigid::{Signals, difference};
-use backdrive_diagnosis::low_pass::{LowPass, derivative};
 use backdrive_plant::robot::Tree;
+use backdrive_signal::derivative;
+use backdrive_signal::low_pass::LowPass;
 use std::f64::consts::TAU;
 
 /// Damping of a soft gear, as a share of the critical one; below its resonance little depends on it.

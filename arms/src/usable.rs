@@ -2,9 +2,9 @@
 
 use crate::log::Log;
 use crate::motion::{Motion, Rates};
-use crate::physics::rms;
 use crate::rigid::Signals;
 use backdrive_diagnosis::audit::limits_reached;
+use backdrive_signal::statistics::rms;
 
 /// Share of samples at which the links need torque of the other sign, from which on a torque of one sign is taken to be rectified.
 const OTHER_SIGN: f64 = 0.05;

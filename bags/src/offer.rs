@@ -1,6 +1,6 @@
 //! Commands that sentences about a bag offer.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// A word of a command line, in quotes where a shell would read it otherwise.
 pub fn shell_word(word: &str) -> String {
@@ -11,17 +11,22 @@ pub fn shell_word(word: &str) -> String {
 }
 
 /// The command that saves what is whole of a bag, into a file beside it that does not exist.
-pub(crate) fn recover_command(bag: &Path) -> String {
+pub fn recover_command(bag: &Path) -> String {
     let stem = bag.file_stem().map_or_else(String::new, |s| s.to_string_lossy().into_owned());
-    let numbered = (2_u32..).map(|number| bag.with_file_name(format!("{stem}-saved-{number}.mcap")));
-    let first = bag.with_file_name(format!("{stem}-saved.mcap"));
-    let free = std::iter::once(first.clone()).chain(numbered).find(|path| path.symlink_metadata().is_err()).unwrap_or(first);
-    // A name that begins with a dash is no option.
-    let word = |path: &Path| {
-        let text = path.display().to_string();
-        shell_word(&if text.starts_with('-') { format!("./{text}") } else { text })
-    };
-    format!("backdrive bag recover {} --bag {}", word(bag), word(&free))
+    format!("backdrive bag recover {} --bag {}", path_word(bag), path_word(&free(bag, &format!("{stem}-saved"), ".mcap")))
+}
+
+/// A path beside another one that is not taken: `NAME`, or `NAME-2`, `NAME-3` and so on, each with its ending.
+pub(crate) fn free(beside: &Path, name: &str, ending: &str) -> PathBuf {
+    let numbered = (2_u32..).map(|number| beside.with_file_name(format!("{name}-{number}{ending}")));
+    let first = beside.with_file_name(format!("{name}{ending}"));
+    std::iter::once(first.clone()).chain(numbered).find(|path| path.symlink_metadata().is_err()).unwrap_or(first)
+}
+
+/// A path as a word. A name that begins with a dash is no option.
+pub(crate) fn path_word(path: &Path) -> String {
+    let text = path.display().to_string();
+    shell_word(&if text.starts_with('-') { format!("./{text}") } else { text })
 }
 
 /// A sentence for a bag that was not closed, with the command that saves what there is; `None` for one that was.

@@ -1,6 +1,5 @@
 //! Pure cores: what the nodes of a graph compute, without clock, I/O or allocation while stepping.
 
-pub mod butterworth;
 pub mod canceller;
 pub mod changing_grip;
 pub mod controller;

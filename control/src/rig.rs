@@ -1,9 +1,9 @@
 //! A test rig: a ram that a PID controller moves along a demanded displacement, a specimen on it, and what its sensors say.
 
-use crate::butterworth::Butterworth;
 use crate::core::{Core, Events, Port, Tick};
 use crate::device::Device;
 use backdrive_msgs::{MAX_AXES, Sample, flag};
+use backdrive_signal::butterworth::Butterworth;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};

@@ -4,11 +4,12 @@ use crate::effort::Effort;
 use crate::evaluator::{Evaluator, measured};
 use crate::predictive::{Gain, gain};
 use crate::problem::{Problem, Record};
-pub use crate::signal::{density, rms};
+pub use crate::signal::density;
 use crate::statistics::correlation_time;
 use crate::structure::{Along, Structure};
 use crate::tuning::tuning;
 use crate::work::Budget;
+use backdrive_signal::statistics::rms;
 use serde::Serialize;
 
 /// Predictions of each output of the model in one record, in the output's unit, before rounding; `None` where it was not recorded.

@@ -4,13 +4,13 @@ use crate::candidate::Candidate;
 use crate::hypothesis::{Against, Hypothesis, Place};
 use crate::locate::{self, Course, force_along, locate};
 use crate::problem::{Problem, Record};
-use crate::signal::rate;
 use crate::structure::Structure;
 use crate::tuning::tuning;
 use backdrive_plant::describe::unit_for;
 use backdrive_plant::model::{Element, Input, InputKind, Model, Output, OutputKind};
 use backdrive_plant::set::Condition;
 use backdrive_plant::stepper::{Options, simulate};
+use backdrive_signal::derivative;
 
 /// Two curves over one variable.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -166,9 +166,9 @@ impl Scene<'_> {
             match self.against {
                 Against::Velocity => velocity.to_vec(),
                 Against::Displacement => displacement.to_vec(),
-                Against::Acceleration => rate(velocity, course.period),
+                Against::Acceleration => derivative(velocity, course.period),
                 Against::Signal => signal.clone(),
-                Against::SignalRate => rate(&signal, course.period),
+                Against::SignalRate => derivative(&signal, course.period),
                 Against::Time => time.clone(),
             }
         };

@@ -1,5 +1,6 @@
 //! How one signal follows another: lag, factor, and the share of its variance that the other explains.
 
+use backdrive_signal::statistics::mean;
 /// How one signal follows another.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Follow {
@@ -151,10 +152,6 @@ pub fn student(freedom: f64) -> f64 {
 /// How `y` follows `u` with lags between these, samples.
 pub fn follow(u: &[f64], y: &[f64], lags: (i64, i64)) -> Option<Follow> {
     Profile::new(u, y, lags, None).best(None)
-}
-
-fn mean(values: &[f64]) -> f64 {
-    values.iter().sum::<f64>() / values.len().max(1) as f64
 }
 
 #[cfg(test)]

@@ -1,7 +1,8 @@
 //! A velocity beside the derivative of its position: factor and lag, with what they have to be beyond to contradict.
 
 use crate::follow::{Follow, Profile};
-use crate::low_pass::{LowPass, derivative};
+use backdrive_signal::derivative;
+use backdrive_signal::low_pass::LowPass;
 
 /// Highest corner of the filter, Hz: what joints of arms do is below it, what encoders and converters add is mostly above.
 const CORNER_HZ: f64 = 8.0;

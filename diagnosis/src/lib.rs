@@ -32,7 +32,6 @@ pub mod intervals;
 pub mod kinematics;
 pub mod let_go;
 pub mod locate;
-pub mod low_pass;
 pub mod noise;
 pub(crate) mod normal_equations;
 pub mod parameters;

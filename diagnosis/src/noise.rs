@@ -3,6 +3,7 @@
 use crate::problem::Record;
 use crate::tuning::tuning;
 use backdrive_plant::model::Model;
+use backdrive_signal::statistics::middle;
 
 /// Standard deviation of the white part of a signal, in its unit: over differences of rising order, each scaled so that
 /// white noise keeps its size, the smallest of the medians over blocks. `None` for fewer than 40 samples.
@@ -40,11 +41,7 @@ fn median_of_orders(signals: &[Vec<Vec<f64>>]) -> f64 {
 }
 
 fn median(values: &mut [f64]) -> f64 {
-    if values.is_empty() {
-        return f64::INFINITY;
-    }
-    let middle = values.len() / 2;
-    *values.select_nth_unstable_by(middle, f64::total_cmp).1
+    middle(values).unwrap_or(f64::INFINITY)
 }
 
 /// Noise standard deviation of an output over all recordings of it, in its unit: its white part, and at least the error of rounding.

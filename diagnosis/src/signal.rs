@@ -1,19 +1,4 @@
-//! What is computed of any sampled signal: root mean square, rate of change, power spectral density.
-
-/// Root mean square; 0 of nothing.
-pub fn rms(samples: &[f64]) -> f64 {
-    (samples.iter().map(|x| x * x).sum::<f64>() / samples.len().max(1) as f64).sqrt()
-}
-
-/// Rate of change of samples `period` s apart, per second: central differences, one-sided at both ends.
-pub fn rate(samples: &[f64], period: f64) -> Vec<f64> {
-    let last = samples.len().saturating_sub(1);
-    let at = |k: usize| {
-        let (a, b) = (k.saturating_sub(1), (k + 1).min(last));
-        if b > a { (samples[b] - samples[a]) / ((b - a) as f64 * period) } else { 0.0 }
-    };
-    (0..samples.len()).map(at).collect()
-}
+//! What is computed of any sampled signal: the power spectral density.
 
 /// Power spectral density of samples `period` s apart, by Welch's method (Hann windows, half overlapping, about 16 of them): frequencies,
 /// Hz, and density in the unit squared per Hz. White noise of standard deviation s has the density 2 s² period. Empty for fewer than 32

@@ -2,6 +2,7 @@
 
 use crate::evaluator::Evaluator;
 use crate::tuning::tuning;
+use backdrive_signal::statistics::middle;
 
 /// Correlation time of residuals in samples, at least 1: so many residuals count as one independent sample. The autocorrelation is summed up to the
 /// first lag at which it does not exceed that of white noise; the mean over outputs and recordings is weighted by their cost.
@@ -64,8 +65,7 @@ fn block_statistic(parts: &[&[f64]], length: usize) -> f64 {
 
 /// Standard deviation of white noise whose sizes have this median (1/0.6745 of it): a few that are far off do not count. `sizes` is reordered; 0 for none.
 pub fn deviation_by_median(sizes: &mut [f64]) -> f64 {
-    let middle = sizes.len() / 2;
-    if sizes.is_empty() { 0.0 } else { 1.4826 * *sizes.select_nth_unstable_by(middle, f64::total_cmp).1 }
+    middle(sizes).map_or(0.0, |middle| 1.4826 * middle)
 }
 
 /// Root mean square of the residuals of each output, in noise standard deviations; 0 where it was not measured.

@@ -5,8 +5,8 @@
 //! to a sine has a residual of 1.3 % of it at the bandwidth, of 0.05 % at half of it, and hardly follows it at twice the bandwidth.
 
 use crate::problem::Record;
-use crate::signal::rms;
 use backdrive_plant::model::{InputKind, Model, OutputKind};
+use backdrive_signal::statistics::rms;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

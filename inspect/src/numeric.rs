@@ -1,6 +1,7 @@
 //! Statistics of plain slices: quantiles, ranges, runs.
 
 use backdrive_diagnosis::statistics::deviation_by_median;
+pub use backdrive_signal::statistics::{deviation, mean};
 
 /// The value below which this share of the finite values lies; 0 of none.
 pub fn quantile(values: &[f64], share: f64) -> f64 {
@@ -32,17 +33,6 @@ pub fn width(values: &[f64]) -> f64 {
 /// Difference of the largest and the smallest value.
 pub fn span(values: &[f64]) -> f64 {
     extremes(values).map_or(0.0, |(low, high)| high - low)
-}
-
-/// Mean; 0 of none.
-pub fn mean(values: &[f64]) -> f64 {
-    values.iter().sum::<f64>() / values.len().max(1) as f64
-}
-
-/// Standard deviation about the mean.
-pub fn deviation(values: &[f64]) -> f64 {
-    let middle = mean(values);
-    (values.iter().map(|x| (x - middle).powi(2)).sum::<f64>() / values.len().max(1) as f64).sqrt()
 }
 
 /// Standard deviation of the steps of a clock, s, in ms; what is below a nanosecond is rounding.

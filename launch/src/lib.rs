@@ -18,6 +18,7 @@
 #![cfg_attr(not(test), warn(clippy::print_stdout, clippy::print_stderr))]
 
 mod child;
+pub mod doctor;
 mod domain_claim;
 mod error;
 mod hosts;

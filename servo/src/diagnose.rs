@@ -19,6 +19,7 @@ use backdrive_diagnosis::verdict::{
 };
 use backdrive_plant::model::Model;
 use backdrive_plant::servo::{Number, Numbers, ServoJoint};
+use backdrive_signal::statistics::median;
 use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
 use std::collections::BTreeMap;
 
@@ -244,7 +245,7 @@ fn verdict(problem: &Problem, answers: &[Answer], audit: Vec<Remark>) -> Verdict
 }
 
 fn moves(record: &Record) -> bool {
-    crate::fit::spread(&record.position) > MOVES
+    backdrive_signal::statistics::deviation(&record.position) > MOVES
 }
 
 fn worth(claim: &Claim) -> f64 {
@@ -269,13 +270,6 @@ fn errors(answer: &Answer) -> ServoErrors {
     let (refit, refit_mae) = of(&|j| j.refit.clone());
     let (diagnosed, diagnosed_mae) = of(&|j| j.diagnosed.clone());
     ServoErrors { command, refit, diagnosed, command_mae, refit_mae, diagnosed_mae }
-}
-
-/// The median of several values.
-pub fn median(mut all: Vec<f64>) -> Option<f64> {
-    all.sort_by(f64::total_cmp);
-    let n = all.len();
-    (n > 0).then(|| 0.5 * (all[(n - 1) / 2] + all[n / 2]))
 }
 
 /// A number with its interval: the jackknife over the folds (Tukey), by Student's t.

@@ -290,10 +290,3 @@ fn slope(x: f64) -> f64 {
     let a = x.abs();
     if a <= BOUND { 1.0 } else { BOUND / a }
 }
-
-/// Standard deviation.
-pub fn spread(x: &[f64]) -> f64 {
-    let n = x.len().max(1) as f64;
-    let mean = x.iter().sum::<f64>() / n;
-    (x.iter().map(|x| (x - mean) * (x - mean)).sum::<f64>() / n).sqrt()
-}

@@ -1,9 +1,9 @@
 //! What is wrong with commands and positions before any fit: each in one sentence, with what to do.
 
 use crate::error::ServoError;
-use crate::fit::spread;
 use crate::problem::Joint;
 use crate::record::Record;
+use backdrive_signal::statistics::deviation;
 
 /// Lags are looked for up to this share of a record.
 const LAGS: f64 = 0.5;
@@ -50,8 +50,8 @@ pub fn looked_at(joint: &Joint) -> Result<Use, ServoError> {
             );
         }
     }
-    let Some(longest) = moving.iter().max_by(|a, b| spread(&a.command).total_cmp(&spread(&b.command))) else { return Ok(Use::Good) };
-    let (c, p) = (spread(&longest.command), spread(&longest.position));
+    let Some(longest) = moving.iter().max_by(|a, b| deviation(&a.command).total_cmp(&deviation(&b.command))) else { return Ok(Use::Good) };
+    let (c, p) = (deviation(&longest.command), deviation(&longest.position));
     let ratio = c / p.max(1e-12);
     if (ratio / 57.29577951308232).ln().abs() < 0.25 {
         return wrong(

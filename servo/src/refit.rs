@@ -1,8 +1,8 @@
 //! The numbers of a model's servo joints fitted again, their physics as they are.
 
-use crate::diagnose::{floor, median, numbers_of};
+use crate::diagnose::{floor, numbers_of};
 use crate::error::ServoError;
-use crate::fit::{Problem as Fits, spread, substeps};
+use crate::fit::{Problem as Fits, substeps};
 use crate::inputs::{Use, looked_at};
 use crate::problem::Problem;
 use crate::record::Record;
@@ -11,6 +11,7 @@ use crate::simulate::simulate;
 use backdrive_diagnosis::verdict::Estimate;
 use backdrive_plant::model::Model;
 use backdrive_plant::servo::{FACTS, Number, Numbers};
+use backdrive_signal::statistics::{deviation, median};
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -65,7 +66,7 @@ pub fn refit(problem: &Problem) -> Result<Fitted, ServoError> {
             let candidate = candidate_of(&fits, Vec::new(), &free.into_iter().collect::<Vec<_>>(), &given);
             let judged = if joint.held_out.is_empty() { &joint.fit } else { &joint.held_out };
             let errors = |n: &Numbers| {
-                let moving = judged.iter().filter(|r| spread(&r.position) > 1e-3);
+                let moving = judged.iter().filter(|r| deviation(&r.position) > 1e-3);
                 median(moving.map(|r| scored(&simulate(n, r, substeps(r)), &r.position).0).collect())
             };
             Refitted {

@@ -1,10 +1,11 @@
 //! Which physics a servo joint needs: one after another, each taken up only where it predicts what its fit has not seen better than without it.
 
-use crate::fit::{BLOCKS, Fit, Problem, spread};
+use crate::fit::{BLOCKS, Fit, Problem};
 use crate::physics::{ALL, BASE, Physics, Sizes, named};
 use crate::record::Record;
 use backdrive_diagnosis::predictive::{Gain, gain};
 use backdrive_plant::servo::{Number, Numbers};
+use backdrive_signal::statistics::{deviation, rms};
 use rayon::prelude::*;
 use std::collections::BTreeSet;
 
@@ -185,7 +186,7 @@ impl Searcher<'_> {
     /// The scale of errors becomes that of a fit; whether it changed much.
     fn rescale(&mut self, numbers: &Numbers) -> bool {
         let all: Vec<f64> = self.problem.errors(numbers).into_iter().flatten().collect();
-        let rms = (all.iter().map(|x| x * x).sum::<f64>() / all.len().max(1) as f64).sqrt();
+        let rms = rms(&all);
         let scale = rms.max(self.floor).max(1e-9);
         let changed = scale < 0.8 * self.problem.scale;
         if changed || self.tried.is_empty() {
@@ -452,5 +453,5 @@ pub fn scored(simulated: &[f64], recorded: &[f64]) -> (f64, f64) {
     let n = recorded.len().max(1) as f64;
     let errors = || simulated.iter().zip(recorded).map(|(s, p)| s - p);
     let rms = (errors().map(|e| e * e).sum::<f64>() / n).sqrt();
-    (rms / spread(recorded), errors().map(f64::abs).sum::<f64>() / n)
+    (rms / deviation(recorded), errors().map(f64::abs).sum::<f64>() / n)
 }

@@ -119,16 +119,6 @@ pub enum Motion {
     Rotation,
 }
 
-impl Motion {
-    /// One word or another.
-    pub fn pick<T>(self, translation: T, rotation: T) -> T {
-        match self {
-            Motion::Translation => translation,
-            Motion::Rotation => rotation,
-        }
-    }
-}
-
 /// See [`Init::driven`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Driven {

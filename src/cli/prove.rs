@@ -18,7 +18,7 @@ hand, and every live run did what the stability limits say; 1 when not, 2 usage,
 6 a node failed, 130 interrupted.";
 
 /// `backdrive prove`
-#[derive(Debug, Args)]
+#[derive(Debug, Clone, Args)]
 pub struct Prove {
     /// What is concealed is drawn from this; further cases from the numbers after it.
     #[arg(long, default_value_t = 1)]

@@ -2,13 +2,13 @@
 
 use crate::cli;
 use crate::failure::Failure;
-use crate::summary::graph_of;
 use backdrive_bags::Reader;
 use backdrive_control::operator::Intent;
 use backdrive_nodes::graph::{Graph, NodeKind, Overrides};
 use backdrive_stability::compare::{Comparison, Condition, Rival, Varied};
 use backdrive_stability::resimulate::recover::recorded_intents;
 use backdrive_stability::session::Session;
+use backdrive_stability::summary::graph_of;
 
 pub(super) struct Loaded {
     pub(super) comparison: Comparison,
@@ -27,7 +27,7 @@ impl Loaded {
             let coupling = coupling.map(str::to_string);
             let changes = Overrides { coupling, lambda: options.lambda, ..options.parts.overrides() };
             match &bag {
-                Some(reader) => graph_of(reader, &changes),
+                Some(reader) => Ok(graph_of(reader, &changes)?),
                 None => Ok(Graph::load(path, &changes)?),
             }
         };

@@ -1,14 +1,13 @@
 //! `backdrive compare`: the same session through each law between master and slave, and through the canceller.
 
-mod compared;
 mod loaded;
-mod page;
 mod text;
 
 use crate::failure::{Failure, code};
 use crate::{cli, interrupt, output, progress};
+use backdrive_pages::compare::compared::Compared;
+use backdrive_pages::compare::page;
 use backdrive_stability::compare::Cell;
-use compared::Compared;
 use loaded::Loaded;
 use serde_json::json;
 use std::sync::atomic::Ordering;
@@ -51,7 +50,7 @@ pub fn compare(options: &cli::Compare) -> Result<u8, Failure> {
         output::line(text::text(&compared))?;
     }
     if let Some(html) = &options.html {
-        output::file(html, page::page(&compared).html())?;
+        output::page(html, page(&compared))?;
         output::note(format_args!("wrote {}", html.display()));
     }
     if cancel.load(Ordering::SeqCst) {

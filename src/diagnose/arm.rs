@@ -3,22 +3,23 @@
 use super::answer::{self, Answer};
 use super::arm_options;
 use crate::cli;
-use crate::diagnose_page::arm::{Shown, page, to_do};
 use crate::failure::{Failure, code};
 use crate::interrupt;
+use crate::offered::{Builder, Step};
 use crate::output;
 use crate::progress;
-use crate::recordings;
 use backdrive_arms::diagnose::{EXPERIMENT_FILE, Found, Settings, Tried, diagnose as diagnosed};
 use backdrive_arms::problem::Problem;
 use backdrive_arms::said::{unexplained, words};
 use backdrive_diagnosis::audit::Weight;
-use backdrive_diagnosis::verdict::{Estimate, Finding, MODEL_FILE, Parameter, VERDICT_FILE, Word};
+use backdrive_diagnosis::verdict::{Estimate, Finding, MODEL_FILE, Parameter, VERDICT_FILE, Verdict, Word};
 use backdrive_diagnosis::words as said;
+use backdrive_pages::diagnose::arm::{Shown, page};
 use backdrive_plant::model::Model;
 use backdrive_plant::robot::JointKind;
 use backdrive_plant::set::RecordingSet;
 use backdrive_report::{number, si};
+use backdrive_sets::open;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
@@ -26,13 +27,13 @@ use std::time::Instant;
 
 /// The set and the model, where the model has a robot; `None` for a device of one axis, and where the set is wrong, which is told there.
 pub fn asked(options: &cli::Diagnose) -> Result<Option<(RecordingSet, PathBuf)>, Failure> {
-    let Ok((mut set, told)) = recordings::set_of(&options.set) else { return Ok(None) };
+    let Ok((mut set, told)) = open::set_of(&options.set) else { return Ok(None) };
     let Some(model) = options.model.clone().or_else(|| set.model.clone()) else { return Ok(None) };
     if Model::load(&model)?.arm.is_none() {
         return Ok(None);
     }
     let mut notes = Vec::new();
-    recordings::hold_out(&mut set, told, &mut notes);
+    open::hold_out(&mut set, told, &mut notes);
     notes.iter().for_each(|note| output::note(format_args!("note: {note}")));
     Ok(Some((set, model)))
 }
@@ -42,7 +43,7 @@ pub fn diagnose(options: &cli::Diagnose, set: &RecordingSet, model: &Path, repor
     let files: Vec<PathBuf> =
         std::iter::once(model.to_path_buf()).chain(set.fit.iter().chain(&set.held_out).map(|f| set.path_of(f))).collect();
     for name in [MODEL_FILE, EXPERIMENT_FILE] {
-        recordings::not_onto(&options.out.join(name), &files, false)?;
+        open::not_onto(&options.out.join(name), &files, false)?;
     }
     let mut notes = arm_options::notes(options, set)?;
     notes.iter().for_each(|note| output::note(format_args!("note: {note}")));
@@ -62,14 +63,14 @@ pub fn diagnose(options: &cli::Diagnose, set: &RecordingSet, model: &Path, repor
     write(MODEL_FILE, &found.model)?;
     write(EXPERIMENT_FILE, &found.experiment)?;
     let mut written = [VERDICT_FILE, MODEL_FILE, EXPERIMENT_FILE].map(str::to_string).to_vec();
+    let steps = to_do(&found.verdict, &options.out);
     if let Some(report) = report {
         let name = options.set.first().and_then(|p| p.file_name()).map_or(String::new(), |n| n.to_string_lossy().into_owned());
-        output::file(report, page(&Shown { problem: &problem, found: &found, name: &name, notes: &notes, out: &options.out }).html())?;
+        output::page(report, page(&Shown { problem: &problem, found: &found, name: &name, notes: &notes, steps: &steps }))?;
         written.push(report.strip_prefix(&options.out).unwrap_or(report).display().to_string());
     }
     let seconds = began.elapsed().as_secs_f64();
     write("time.txt", &format!("{seconds:.2}\n"))?;
-    let steps = to_do(&found.verdict, &options.out);
     if options.json {
         output::json(&Answer { verdict: &found.verdict, next: &steps })?;
     } else {
@@ -84,6 +85,43 @@ pub fn diagnose(options: &cli::Diagnose, set: &RecordingSet, model: &Path, repor
         return Err(Failure { code: code::INTERRUPTED, message: "stopped; what was found until then is written".to_string() });
     }
     Ok(found.verdict.word)
+}
+
+/// What to do now, most useful first, with commands to copy.
+fn to_do(verdict: &Verdict, out: &Path) -> Vec<Step> {
+    let mut steps = Vec::new();
+    let model = out.join(MODEL_FILE);
+    let (name, export) = (model.display(), Builder::verb("export").reads(&model).option("--to", "urdf"));
+    let use_it = || [export.option_writes("--out", Path::new("arm.diagnosed.urdf")).build()];
+    match verdict.word {
+        Word::Missing | Word::Parameters => steps.push(Step::new(
+            format!("Use {name}, such as in a feed-forward or a simulation; this writes it for other programs:"),
+            use_it(),
+        )),
+        Word::Ambiguous => steps.push(Step::new(
+            format!("{name} may be used, but the physics named first could be another one: see the table below."),
+            use_it(),
+        )),
+        Word::NothingMissing => steps.push(Step::said("Keep the model: the logs ask for nothing more.")),
+        Word::Unexplained => steps.push(Step::said(
+            "Do not build on a law yet: look below at when and where the residual shows, and check the sensors of the joints named there first.",
+        )),
+        Word::CannotTell => {}
+    }
+    if verdict.word != Word::Unexplained {
+        for joint in verdict.arm.iter().flat_map(|a| &a.joints) {
+            if let Some(open) = unexplained(joint) {
+                steps.push(Step::said(format!("Look at what is left over {open}.")));
+            }
+        }
+    }
+    if let Some(next) = &verdict.next_experiment {
+        steps.push(Step::said(format!("Record next: {}", next.sentence())));
+    }
+    for remark in verdict.audit.iter().filter(|r| r.weight > Weight::Note).take(2) {
+        steps.push(Step::said(format!("Check this signal: {}: {}", remark.place, remark.message)));
+    }
+    steps
 }
 
 /// What was found, for a terminal.

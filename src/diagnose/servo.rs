@@ -1,33 +1,33 @@
 //! `backdrive diagnose` of joints that position servos drive: logs of commands and positions, without torque.
 
 use crate::cli;
-use crate::diagnose_page::servo::page;
-use crate::estimate_text::estimate;
 use crate::failure::{Failure, code};
+use crate::offered::{Builder, Step};
 use crate::output;
 use crate::progress;
-use crate::recordings;
-use crate::set_checks;
 use backdrive_diagnosis::verdict::{Finding, MODEL_FILE, Parameter, VERDICT_FILE, Word};
 use backdrive_diagnosis::words as said;
+use backdrive_pages::diagnose::servo::page;
+use backdrive_pages::estimate::estimate;
 use backdrive_plant::set::RecordingSet;
 use backdrive_report::number;
 use backdrive_servo::diagnose::{Found, diagnose as diagnosed};
 use backdrive_servo::problem::{Problem, is_servo};
 use backdrive_servo::said::words;
+use backdrive_sets::{checks, open};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 /// The set and the model, where the set holds commands and no torque; `None` where it holds something else, or is wrong, which is told there.
 pub fn asked(options: &cli::Diagnose) -> Result<Option<(RecordingSet, Option<PathBuf>)>, Failure> {
-    let Ok((mut set, told)) = recordings::set_of(&options.set) else { return Ok(None) };
+    let Ok((mut set, told)) = open::set_of(&options.set) else { return Ok(None) };
     if !is_servo(&set) {
         return Ok(None);
     }
     let model = options.model.clone().or_else(|| set.model.clone());
-    let mut notes = set_checks::repeated(&set)?;
-    recordings::hold_out(&mut set, told, &mut notes);
+    let mut notes = checks::repeated(&set)?;
+    open::hold_out(&mut set, told, &mut notes);
     notes.iter().for_each(|note| output::note(format_args!("note: {note}")));
     Ok(Some((set, model)))
 }
@@ -48,7 +48,7 @@ pub fn diagnose(
     }
     let files: Vec<PathBuf> =
         model.map(Path::to_path_buf).into_iter().chain(set.fit.iter().chain(&set.held_out).map(|f| set.path_of(f))).collect();
-    recordings::not_onto(&options.out.join(MODEL_FILE), &files, false)?;
+    open::not_onto(&options.out.join(MODEL_FILE), &files, false)?;
     // What cannot be written is told before the work, not after it.
     output::folder(&options.out)?;
     report.map_or(Ok(()), output::writable)?;
@@ -61,7 +61,7 @@ pub fn diagnose(
     let mut written = [VERDICT_FILE, MODEL_FILE].map(str::to_string).to_vec();
     if let Some(report) = report {
         let name = options.set.first().and_then(|p| p.file_name()).map_or(String::new(), |n| n.to_string_lossy().into_owned());
-        output::file(report, page(&problem, &found, &name, &options.out).html())?;
+        output::page(report, page(&problem, &found, &name, &to_do(found.verdict.word, &options.out)))?;
         written.push(report.strip_prefix(&options.out).unwrap_or(report).display().to_string());
     }
     let seconds = began.elapsed().as_secs_f64();
@@ -76,6 +76,14 @@ pub fn diagnose(
         output::line(format_args!("wrote     {}: {} ({seconds:.1} s)", options.out.display(), written.join(", ")))?;
     }
     Ok(found.verdict.word)
+}
+
+/// What to do next, where the model may be used.
+fn to_do(word: Word, out: &Path) -> Vec<Step> {
+    let model = out.join(MODEL_FILE);
+    let usable = matches!(word, Word::Missing | Word::Parameters | Word::NothingMissing);
+    let show = || Builder::verb("model show").reads(&model).build();
+    usable.then(|| Step::new(format!("Use {}; this shows its numbers:", model.display()), [show()])).into_iter().collect()
 }
 
 /// What was found, for a terminal.

@@ -1,12 +1,12 @@
 //! What leaving something out costs: the error on recordings with it and without.
 
 use crate::failure::Failure;
-use crate::recordings;
 use backdrive_diagnosis::compare::{predictions, qualities};
 use backdrive_diagnosis::problem::{Problem, Record};
 use backdrive_diagnosis::structure::Structure;
 use backdrive_export::{Change, LeftOut, change_all};
 use backdrive_plant::model::Model;
+use backdrive_sets::open;
 use std::path::{Path, PathBuf};
 
 /// Errors of a model on recordings, as nrmse: over the standard deviation of what was measured, mean of all outputs and records.
@@ -28,7 +28,7 @@ pub struct Errors {
 /// # Errors
 /// When a recording is wrong, or the model itself cannot be simulated.
 pub fn errors(on: &[PathBuf], model: &Path, ignored: &[String], left_out: &[LeftOut]) -> Result<Errors, Failure> {
-    let opened = recordings::open(on, Some(model), None, ignored)?;
+    let opened = open::open(on, Some(model), None, ignored)?;
     let problem = opened.problem;
     let (records, of) = match problem.held_out.is_empty() {
         true => (problem.fit.clone(), "the recordings, none of which is held out"),

@@ -1,12 +1,11 @@
 //! `backdrive inspect`: is a recording right?
 
-mod page;
-mod response;
 mod text;
 
 use crate::failure::Failure;
 use crate::{cli, output, progress};
 use backdrive_inspect::{Options, Source, inspect_with_data};
+use backdrive_pages::inspect::page;
 use serde_json::json;
 
 /// Inspects, and says what was found.
@@ -26,7 +25,7 @@ pub fn inspect(options: &cli::Inspect) -> Result<u8, Failure> {
         output::text(text::text(&report))?;
     }
     if let Some(html) = &options.html {
-        output::file(html, page::page(&report, &recordings).html())?;
+        output::page(html, page(&report, &recordings))?;
         output::note(format_args!("wrote {}", html.display()));
     }
     Ok(u8::from(report.wrong().next().is_some()))

@@ -1,8 +1,8 @@
 //! The answer for a terminal.
 
-use super::response;
 use crate::columns::columns;
 use backdrive_inspect::{Finding, Quantity, Report, Weight};
+use backdrive_pages::inspect::response;
 use backdrive_report::number;
 use std::fmt::Write as _;
 

@@ -3,10 +3,11 @@
 use crate::failure::{Failure, code};
 use crate::offered::{Step, lines};
 use crate::output;
-use crate::summary::Summary;
 use backdrive_launch::{Cause, RunReport};
+use backdrive_pages::run::Shown;
 use backdrive_report::{Page, percent};
 use backdrive_stability::outcome::Outcome;
+use backdrive_stability::summary::Summary;
 use serde_json::json;
 use std::path::{Path, PathBuf};
 
@@ -34,6 +35,19 @@ pub struct Done {
 const SHOWN: usize = 2;
 
 impl Done {
+    /// What its page shows of it.
+    pub fn shown(&self) -> Shown<'_> {
+        Shown {
+            steps: self.steps,
+            duration_s: self.duration_s,
+            report: self.report.as_ref(),
+            lost: self.lost,
+            bag: self.bag.as_deref(),
+            complete: self.complete,
+            summary: self.summary.as_ref(),
+        }
+    }
+
     /// 0 judged and stable, or there is no loop, which its text says; 1 not stable, 7 it cannot be told; before these, of a run that did not go as it should:
     /// 4 lost data, 5 a stranger on the network, 6 a node failed, 130 interrupted.
     pub fn exit_code(&self) -> u8 {
@@ -64,7 +78,7 @@ impl Done {
     /// `steps` are what to do next.
     pub fn tell(&self, page: Option<(&Path, Page)>, json: bool, steps: &[Step]) -> Result<u8, Failure> {
         if let Some((html, page)) = page {
-            output::file(html, page.html())?;
+            output::page(html, page)?;
             output::note(format_args!("wrote {}", html.display()));
         }
         if json {
@@ -103,7 +117,7 @@ impl Done {
             }
         }
         if let Some(summary) = &self.summary {
-            lines.push(summary.text());
+            lines.push(happened(summary));
         }
         if let Some(bag) = &self.bag {
             let complete = match self.lost {
@@ -150,6 +164,41 @@ impl Done {
             "run": report,
         })
     }
+}
+
+/// What happened, in a few lines for a person.
+fn happened(summary: &Summary) -> String {
+    let mut lines = Vec::new();
+    if let (Some(start), Some(peak)) = (summary.first_contact_s, summary.peak_contact_force) {
+        lines.push(format!(
+            "contact  first at {start:.3} s, {:.3} s in all, force up to {peak:.3} {}",
+            summary.contact_s, summary.force_units[0]
+        ));
+    } else if summary.peak_contact_force.is_some() {
+        lines.push("contact  none".to_string());
+    }
+    if let Some(peak) = summary.peak_feedback_force {
+        lines.push(format!("master   reflected force up to {peak:.3} {}", summary.force_units[1]));
+    }
+    if let Some(margin) = &summary.margin {
+        lines.push(format!("margin   {margin}"));
+    }
+    if let Some(outcome) = &summary.outcome {
+        let moved = (summary.last_loop_gain - summary.loop_gain).abs() > 1e-9 * summary.loop_gain.abs();
+        let later = if moved { format!(" at the start and {:.4} at the end", summary.last_loop_gain) } else { String::new() };
+        let gain = format!("at mu*lambda = {}{later}", summary.loop_gain);
+        match outcome {
+            Outcome::NotJudged { why } => {
+                lines.push(format!("loop     it cannot be told whether it is stable {gain}: {why}"));
+                lines.push(format!("to do    {}", why.advice()));
+            }
+            outcome => lines.push(format!("loop     {outcome} {gain}")),
+        }
+    }
+    if let Some(why) = summary.no_loop {
+        lines.push(format!("loop     none to judge: {why}"));
+    }
+    lines.join("\n")
 }
 
 /// Share of a node's steps that may miss their deadline before it is worth a word of advice.

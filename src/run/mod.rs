@@ -13,8 +13,8 @@ pub use way::{Way, repeat_here, run_graph, run_here};
 use crate::cli;
 use crate::failure::{Failure, code};
 use crate::output;
-use crate::run_page::{Heard, page};
 use backdrive_launch::RunHome;
+use backdrive_pages::run::{Heard, page};
 use std::time::Duration;
 
 /// Runs a graph, or each experiment of one.
@@ -41,10 +41,10 @@ pub fn run(options: &cli::Run) -> Result<u8, Failure> {
         Way::Here | Way::Processes(_) => run_graph(&graph, &way)?,
     };
     if let (Way::Processes(_), Some(bag), true) = (&way, &done.bag, options.result.html.is_some()) {
-        heard = Heard::from_bag(&graph, bag)?;
+        heard = Heard::from_bag(&graph, bag).map_err(Failure::input)?;
     }
     let steps = next(&done, &graph, None);
-    let page = options.result.html.as_deref().map(|html| (html, page(&done, &graph, &heard, &steps)));
+    let page = options.result.html.as_deref().map(|html| (html, page(&done.shown(), &graph, &heard, &steps)));
     done.tell(page, options.result.json, &steps)
 }
 

@@ -1,7 +1,7 @@
 //! What to do after a run or a replay, with the commands that do it.
 
 use super::done::Done;
-use crate::offered::{Offered, Step, free, plain, recover};
+use crate::offered::{Builder, Offered, Step, free, plain, recover};
 use backdrive_nodes::graph::Graph;
 use backdrive_report::number;
 use backdrive_stability::outcome::Outcome;
@@ -20,7 +20,7 @@ pub fn next(done: &Done, graph: &Graph, source: Option<&Path>) -> Vec<Step> {
         (Some(bag), _) => (Vec::new(), Some(bag.to_path_buf())),
         (None, Some(_)) => {
             let bag = free(&PathBuf::from("replayed.mcap"));
-            let replay = Offered::again().without("--html", true).without("--json", false).without("--overwrite", false);
+            let replay = Builder::again().without("--html", true).without("--json", false).without("--overwrite", false);
             // Each step begins with it, and a user may take more than one.
             (vec![replay.option_writes("--bag", &bag).flag("--overwrite").build()], Some(bag))
         }
@@ -28,7 +28,7 @@ pub fn next(done: &Done, graph: &Graph, source: Option<&Path>) -> Vec<Step> {
     };
     let ask = |verb: &str, page: &str| -> Vec<Option<Offered>> {
         let Some(bag) = &bag else { return vec![None] };
-        let asked = Offered::verb(verb).reads_later(bag).option_writes("--html", Path::new(page)).build();
+        let asked = Builder::verb(verb).reads_later(bag).option_writes("--html", Path::new(page)).build();
         first.iter().cloned().chain([asked]).collect()
     };
     let summary = done.summary.as_ref();
@@ -48,8 +48,8 @@ pub fn next(done: &Done, graph: &Graph, source: Option<&Path>) -> Vec<Step> {
             ));
             let lower = plain(LOWER * graph.gains.lambda);
             let again = match (source, &done.bag) {
-                (Some(_), _) => Some(Offered::again().without("--json", false).without("--bag", true)),
-                (None, Some(bag)) if done.unreadable.is_none() && graph.hosts.is_empty() => Some(Offered::verb("replay").reads(bag)),
+                (Some(_), _) => Some(Builder::again().without("--json", false).without("--bag", true)),
+                (None, Some(bag)) if done.unreadable.is_none() && graph.hosts.is_empty() => Some(Builder::verb("replay").reads(bag)),
                 (None, _) => None,
             };
             let again = again.and_then(|again| again.option("--lambda", lower).option_writes("--html", Path::new("lower.html")).build());
@@ -60,7 +60,7 @@ pub fn next(done: &Done, graph: &Graph, source: Option<&Path>) -> Vec<Step> {
         steps.push(Step::new("The bag was cut off: make a clean copy of what it holds.", [recover(bag)]));
     }
     if done.lost > 0 || done.report.as_ref().is_some_and(|r| r.missed_deadlines > 0) {
-        steps.push(Step::new("See what of this machine delays messages.", [Offered::verb("doctor").build()]));
+        steps.push(Step::new("See what of this machine delays messages.", [Builder::verb("doctor").build()]));
     }
     steps
 }

@@ -2,9 +2,9 @@
 
 use crate::failure::Failure;
 use crate::offered::free;
-use crate::summary::graph_of;
 use backdrive_bags::Reader;
 use backdrive_nodes::graph::{Files, Graph, Overrides};
+use backdrive_stability::summary::graph_of;
 use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};

@@ -5,7 +5,6 @@ use crate::cli::{self, Transport};
 use crate::failure::Failure;
 use crate::graph::buildable;
 use crate::network::place;
-use crate::summary::{Traces, summarise};
 use crate::{output, progress};
 use backdrive_bags::{Completeness, Reader, Recorder, RecorderOptions, check_target};
 use backdrive_launch::join::{recorder_options, recording};
@@ -16,6 +15,7 @@ use backdrive_nodes::graph::{Graph, NodeKind};
 use backdrive_nodes::sequence::Sequence;
 use backdrive_nodes::stage::Clock;
 use backdrive_nodes::transport::ros2::Courier;
+use backdrive_stability::summary::{Traces, summarise};
 use backdrive_stability::unjudged::Unjudged;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -95,7 +95,7 @@ fn run_processes(graph: &Graph, place: &Place) -> Result<Done, Failure> {
     let read = bag.as_ref().map(|bag| progress::busy(&format!("reading {}", bag.display()), || read(bag)));
     let (summary, (complete, mut unreadable)) = read.map_or((None, (false, None)), |(summary, whole)| (Some(summary), whole));
     let told = |e: Failure| output::note(format_args!("warning: {}", e.message));
-    let mut summary = summary.and_then(|summary| summary.map_err(told).ok());
+    let mut summary = summary.and_then(|summary| summary.map_err(|e| told(e.into())).ok());
     if report.bag.as_deref().is_some_and(|bag| !bag.exists()) {
         unreadable = Some("is not there any more".to_string());
     }

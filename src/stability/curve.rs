@@ -2,15 +2,13 @@
 
 use crate::failure::Failure;
 use crate::progress;
+use backdrive_pages::stability::Point;
 use backdrive_stability::outcome::Outcome;
 use backdrive_stability::resimulate::sweep::sweep;
-use backdrive_stability::resimulate::{Run, RunOptions, Scenario};
+use backdrive_stability::resimulate::{RunOptions, Scenario};
 use backdrive_stability::verdict::Question;
 use serde_json::{Value, json};
 use std::sync::atomic::AtomicBool;
-
-/// One gain of a sweep.
-pub type Point = (f64, Run);
 
 /// Runs the loop again at every gain.
 pub(super) fn curve(question: &Question, gains: &[f64], cancel: &AtomicBool) -> Result<Vec<Option<Point>>, Failure> {

@@ -3,7 +3,6 @@
 use crate::cli;
 use crate::failure::Failure;
 use crate::offered::with_recover;
-use crate::summary::graph_of;
 use backdrive_bags::Reader;
 use backdrive_control::operator::Intent;
 use backdrive_nodes::graph::{Graph, NodeKind, Overrides};
@@ -13,6 +12,7 @@ use backdrive_stability::resimulate::recover::{recorded_intents, recover_intent}
 use backdrive_stability::resimulate::script::Script;
 use backdrive_stability::roles::Roles;
 use backdrive_stability::session::Session;
+use backdrive_stability::summary::graph_of;
 use backdrive_stability::verdict::{Question, Swapped, is_coupled};
 
 /// Gain products that can be asked about. Beyond them the rounding of forces and positions decides, not the loop.
@@ -47,7 +47,7 @@ impl Loaded {
         let reader = Reader::open(path).map_err(Failure::input)?;
         let hint = |f: Failure| Failure { message: format!("{}; a bag that we did not record needs --roles FILE", f.message), ..f };
         let is_cut = reader.without_messages().is_some();
-        let recorded = graph_of(&reader, &Overrides::default()).map_err(|f| if is_cut { f } else { hint(f) })?;
+        let recorded = graph_of(&reader, &Overrides::default()).map_err(|e| if is_cut { e.into() } else { hint(e.into()) })?;
         let asked = graph_of(&reader, &changes)?;
         let mut session = Session::from_bag(&reader, &recorded).map_err(Failure::input)?;
         if !reader.ended_cleanly() {

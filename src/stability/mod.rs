@@ -5,11 +5,10 @@ mod loaded;
 mod next;
 mod text;
 
-pub use curve::Point;
-
 use crate::failure::{Failure, code};
 use crate::offered::{Step, lines};
 use crate::{cli, interrupt, output, progress};
+use backdrive_pages::stability::{self as pages, Point};
 use backdrive_stability::resimulate::ResimulateError;
 use backdrive_stability::verdict::{Answer, AnswerError, Word, answer};
 use curve::{curve, curve_text, point_json};
@@ -70,8 +69,8 @@ pub fn stability(options: &cli::Stability) -> Result<u8, Failure> {
     let found = found.ok_or_else(interrupted)?;
     if let Some(html) = &options.html {
         let points: Vec<&Point> = curve.iter().flatten().flatten().collect();
-        let page = crate::stability_page::page(&found, question.session, &points, &steps);
-        output::file(html, page.html())?;
+        let page = pages::page(&found, question.session, &points, &steps);
+        output::page(html, page)?;
         output::note(format_args!("wrote {}", html.display()));
     }
     if cancel.load(Ordering::SeqCst) {

@@ -3,8 +3,8 @@
 use crate::cli;
 use crate::offered::{Builder, Offered, Step, free, plain};
 use crate::run::runs_from_its_bag;
-use crate::stability_page::spelled;
 use backdrive_nodes::graph::{Graph, NodeKind, Settings};
+use backdrive_pages::stability::spelled;
 use backdrive_report::{number, percent};
 use backdrive_stability::verdict::{Answer, Word};
 use std::path::Path;
@@ -63,7 +63,7 @@ pub fn next(found: &Answer, options: &cli::Stability, asked: Option<&Graph>) -> 
 fn at(found: &Answer, options: &cli::Stability, asked: Option<&Graph>, gain: f64, page: &str) -> Option<Offered> {
     let lambda = plain(gain / found.gain.mu);
     if asked.is_some() && options.script.is_none() && options.roles.is_none() {
-        let replay = Offered::verb("replay").reads(&options.recording).words(options.parts.words());
+        let replay = Builder::verb("replay").reads(&options.recording).words(options.parts.words());
         let replay = options.coupling.iter().fold(replay, |replay, law| replay.option("--coupling", law));
         let replay = options.mu.iter().fold(replay, |replay, mu| replay.option("--mu", mu));
         return replay.option("--lambda", lambda).option_writes("--html", Path::new(page)).build();
@@ -78,7 +78,7 @@ fn at(found: &Answer, options: &cli::Stability, asked: Option<&Graph>, gain: f64
 
 /// The same question, to be changed.
 fn asked_again(page: &str) -> Builder {
-    let again = ["--gain", "--mu", "--lambda", "--sweep"].iter().fold(Offered::again(), |again, name| again.without(name, true));
+    let again = ["--gain", "--mu", "--lambda", "--sweep"].iter().fold(Builder::again(), |again, name| again.without(name, true));
     again.without("--json", false).option_writes("--html", Path::new(page))
 }
 
@@ -90,7 +90,7 @@ fn cancelled(options: &cli::Stability, asked: Option<&Graph>) -> Option<Step> {
         let text = "Or cancel with a better model of the master: this finds what the present one lacks.";
         return Some(Step::new(text, [why(options)]));
     }
-    let again = Offered::again().without("--sweep", true).without("--json", false).option_writes("--html", Path::new("cancelled.html"));
+    let again = Builder::again().without("--sweep", true).without("--json", false).option_writes("--html", Path::new("cancelled.html"));
     let text = "Or take the induced master motion out by a canceller. With the model and the grip that the graph gives its master:";
     Some(Step::new(text, [again.option("--canceller", "master").option("--high-pass", 1).build()]))
 }
@@ -104,12 +104,12 @@ fn dithered(options: &cli::Stability, asked: Option<&Graph>, advice: &str) -> Ve
     }
     let bag = free(Path::new("dithered.mcap"));
     let run =
-        Offered::verb("run").reads(&options.recording).option("--dither", excitation).option_writes("--bag", &bag).flag("--overwrite");
-    vec![run.build(), Offered::verb("stability").reads_later(&bag).build()]
+        Builder::verb("run").reads(&options.recording).option("--dither", excitation).option_writes("--bag", &bag).flag("--overwrite");
+    vec![run.build(), Builder::verb("stability").reads_later(&bag).build()]
 }
 
 fn why(options: &cli::Stability) -> Option<Offered> {
-    let why = Offered::verb("why").reads(&options.recording);
+    let why = Builder::verb("why").reads(&options.recording);
     let why = options.roles.iter().fold(why, |why, roles| why.option_reads("--roles", roles));
     why.option_writes("--html", Path::new("why.html")).build()
 }

@@ -1,6 +1,6 @@
 //! The answer as text.
 
-use crate::stability_page::CANCELLED;
+use backdrive_pages::stability::CANCELLED;
 use backdrive_stability::nyquist::Limit;
 use backdrive_stability::verdict::Answer;
 use std::fmt::Write as _;

@@ -1,24 +1,25 @@
 //! `backdrive why`: what a recorded loop does, why, and what would stop it.
 
 mod next;
-mod page;
 mod text;
 
 use crate::failure::{Failure, code};
+use crate::offered::Step;
 use crate::run::runs_from_its_bag;
-use crate::summary::graph_of;
 use crate::{cli, interrupt, output, progress};
 use backdrive_bags::Reader;
 use backdrive_nodes::graph::{Graph, Overrides};
+use backdrive_pages::why::page;
 use backdrive_stability::by_itself::recorded::Recorded;
 use backdrive_stability::resimulate::Gain;
 use backdrive_stability::resimulate::recover::{recorded_intents, recover_intent};
 use backdrive_stability::roles::Roles;
 use backdrive_stability::session::Session;
+use backdrive_stability::summary::graph_of;
 use backdrive_why::answer::{Answer, PATIENCE, Question, WhyError, why as answer};
 use backdrive_why::foreign::why_of_signals;
 use backdrive_why::happening::Happening;
-use next::{Asked, next};
+use next::{Asked, commands, next};
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -71,7 +72,8 @@ pub fn why(options: &cli::Why) -> Result<u8, Failure> {
         output::line(text(&found, &steps))?;
     }
     if let Some(html) = &options.html {
-        output::file(html, page::page(&found, &session, &asked, &steps).html())?;
+        let tries: Vec<Step> = found.remedies.iter().map(|remedy| Step::new("", commands(&found, &asked, remedy))).collect();
+        output::page(html, page(&found, &session, &tries, &steps))?;
         output::note(format_args!("wrote {}", html.display()));
     }
     Ok(exit_code(&found))
@@ -82,7 +84,7 @@ fn of_our_bag(path: &Path, cancel: &Arc<AtomicBool>) -> Result<(Answer, Session,
     let hint = |f: Failure| Failure { message: format!("{}; a recording that we did not make needs --roles FILE", f.message), ..f };
     let reader = Reader::open(path).map_err(Failure::input)?;
     let is_cut = reader.without_messages().is_some();
-    let graph = graph_of(&reader, &Overrides::default()).map_err(|f| if is_cut { f } else { hint(f) })?;
+    let graph = graph_of(&reader, &Overrides::default()).map_err(|e| if is_cut { e.into() } else { hint(e.into()) })?;
     let read = || -> Result<(Session, Recorded), Failure> {
         let session = Session::from_bag(&reader, &graph).map_err(Failure::input)?;
         Ok((session, Recorded::read(&reader).map_err(Failure::input)?))

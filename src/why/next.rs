@@ -1,8 +1,9 @@
 //! What to do after an answer: the remedies that stop the loop, each with the commands that try it.
 
 use crate::cli::{Cli, Command};
-use crate::offered::{Offered, Step, free};
+use crate::offered::{Builder, Offered, Step, free};
 use backdrive_nodes::graph::Overrides;
+use backdrive_pages::parts::large;
 use backdrive_report::percent;
 use backdrive_why::answer::Answer;
 use backdrive_why::happening::Happening;
@@ -39,8 +40,8 @@ pub fn next(found: &Answer, asked: &Asked) -> Vec<Step> {
     if stop.is_empty() && found.happening.is_trouble() {
         let dithered = asked.runs.then(|| {
             let bag = free(Path::new("dithered.mcap"));
-            let run = Offered::verb("run").reads(asked.recording).flag("--dither").option_writes("--bag", &bag).flag("--overwrite").build();
-            [run, Offered::verb("stability").reads_later(&bag).build()]
+            let run = Builder::verb("run").reads(asked.recording).flag("--dither").option_writes("--bag", &bag).flag("--overwrite").build();
+            [run, Builder::verb("stability").reads_later(&bag).build()]
         });
         let text = if found.remedies.is_empty() && !found.reproduced {
             "The loop does not shake when it is run again with the models in the bag, so no remedy could be tried. Put right what differs, or record the loop with a dither and measure its stability limit."
@@ -60,10 +61,10 @@ pub fn commands(found: &Answer, asked: &Asked, remedy: &Remedy) -> Vec<Option<Of
     if let Some(roles) = asked.roles {
         // No loop can be run again; the measured one is asked at the lower gain.
         let gain = format!("{:.4}", found.gain * remedy.force_kept);
-        return vec![Offered::verb("stability").reads(asked.recording).option_reads("--roles", roles).option("--gain", gain).build()];
+        return vec![Builder::verb("stability").reads(asked.recording).option_reads("--roles", roles).option("--gain", gain).build()];
     }
     if found.differences.is_empty() {
-        return vec![with(Offered::verb("replay").reads(asked.recording), asked, remedy, None)];
+        return vec![with(Builder::verb("replay").reads(asked.recording), asked, remedy, None)];
     }
     // Of what is not as the graph states, only another master can be put into a replay.
     let of_master = |d: &backdrive_why::difference::Difference| d.device.as_ref().is_some_and(|device| device.files.is_some());
@@ -75,10 +76,10 @@ pub fn commands(found: &Answer, asked: &Asked, remedy: &Remedy) -> Vec<Option<Of
         None => {
             let stem = asked.recording.file_stem().map_or_else(String::new, |s| s.to_string_lossy().into_owned());
             let file: PathBuf = free(&PathBuf::from(format!("{stem}-master.toml")));
-            (file.clone(), Some(Offered::verb("why").reads(asked.recording).option_writes("--out", &file).build()))
+            (file.clone(), Some(Builder::verb("why").reads(asked.recording).option_writes("--out", &file).build()))
         }
     };
-    let replay = Offered::verb("replay").reads(asked.recording).word("--master").reads_later(&file).option("--grip", "none");
+    let replay = Builder::verb("replay").reads(asked.recording).word("--master").reads_later(&file).option("--grip", "none");
     write.into_iter().chain([with(replay, asked, remedy, Some(&file))]).collect()
 }
 
@@ -87,11 +88,11 @@ fn run(found: &Answer, asked: &Asked, remedy: &Remedy) -> Option<Offered> {
     if !asked.runs || !found.differences.is_empty() {
         return None;
     }
-    with(Offered::verb("run").reads(asked.recording), asked, remedy, None)
+    with(Builder::verb("run").reads(asked.recording), asked, remedy, None)
 }
 
 /// A command with the options of a remedy, if the graph of the bag takes them.
-fn with(command: crate::offered::Builder, asked: &Asked, remedy: &Remedy, master: Option<&Path>) -> Option<Offered> {
+fn with(command: Builder, asked: &Asked, remedy: &Remedy, master: Option<&Path>) -> Option<Offered> {
     let words: Option<Vec<String>> = remedy
         .options
         .as_ref()?
@@ -125,15 +126,9 @@ fn sentence(remedy: &Remedy) -> String {
     let throws = remedy.throws.as_ref().map_or_else(String::new, |throw| format!("; {throw}"));
     format!(
         "{}: {}, {hands}; {} of the force and {} of the motion remain{throws}.",
-        capital(&remedy.text),
+        large(&remedy.text),
         remedy.outcome,
         percent(remedy.force_kept),
         percent(remedy.motion_kept)
     )
-}
-
-/// A sentence's first letter.
-pub fn capital(text: &str) -> String {
-    let mut letters = text.chars();
-    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
 }

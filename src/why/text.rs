@@ -1,6 +1,7 @@
 //! The answer for a terminal.
 
 use crate::offered::{Step, lines};
+use backdrive_pages::why::NO_CAUSE;
 use backdrive_why::answer::Answer;
 use backdrive_why::cause::Cause;
 use backdrive_why::happening::Happening;
@@ -11,9 +12,6 @@ const SHOWN: usize = 5;
 
 /// A cause that is less likely is not worth a line.
 const UNLIKELY: f64 = 0.03;
-
-/// Where the signals alone do not say why.
-pub const NO_CAUSE: &str = "cannot be told: what there is holds no model of the loop and no excitation that measures it";
 
 /// The answer for a terminal, and what to do next.
 pub fn text(answer: &Answer, steps: &[Step]) -> String {

@@ -30,6 +30,7 @@ pub mod sensors;
 pub mod session;
 mod signal_role;
 pub mod spectra;
+pub mod summary;
 pub mod transparency;
 pub mod unjudged;
 pub mod verdict;

@@ -10,6 +10,7 @@
 //! | does not follow | it explains less than a tenth of what the other sensor of the same quantity moves | two sensors of one quantity are in proportion |
 
 use crate::grid::step_of;
+use backdrive_signal::statistics::rms;
 use serde::Serialize;
 
 /// A column of a recording.
@@ -165,7 +166,7 @@ fn clipped(values: &[f64], at: f64) -> Option<(f64, f64)> {
     }
     // As fast as it is elsewhere, and by more than the rounding of a slow signal.
     let moves: Vec<f64> = values.windows(2).filter_map(|w| Some((w.first()? - w.get(1)?).abs())).filter(|d| *d > 1.01 * step).collect();
-    let typical = (moves.iter().map(|d| d * d).sum::<f64>() / moves.len().max(1) as f64).sqrt();
+    let typical = rms(&moves);
     let (mut arrivals, mut row) = (0, 0);
     while let Some(rest) = values.get(row..) {
         let Some(next) = rest.iter().position(|x| there(*x)) else { break };

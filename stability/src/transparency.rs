@@ -9,6 +9,7 @@ use crate::phases::{contacts, holds};
 use crate::session::{AxisSignals, Session};
 use crate::spectra::{Averaging, welch};
 use backdrive_nodes::graph::Graph;
+use backdrive_signal::statistics::{correlation, rms_of_finite};
 use nalgebra::Complex;
 use serde::Serialize;
 use std::f64::consts::TAU;
@@ -29,7 +30,7 @@ pub struct Transparency {
     pub force_contact_rms: Option<f64>,
     /// RMS of lambda F_s in contact, N: what the former is to be held against.
     pub reflected_rms: Option<f64>,
-    /// rms(x_mf) / rms(x_mu) in contact: what the reflected force does to the master over what the hand does, by the master's model.
+    /// rms_of_finite(x_mf) / rms_of_finite(x_mu) in contact: what the reflected force does to the master over what the hand does, by the master's model.
     pub induced_ratio: Option<f64>,
     /// How well the canceller predicted the induced motion after the first contact.
     pub cancellation: Option<Cancellation>,
@@ -67,7 +68,7 @@ pub struct Cancellation {
     pub contact_s: f64,
     /// Time from there that was looked at, s.
     pub window_s: f64,
-    /// 1 - rms(x_mf - x^_mf) / rms(x_mf): 1 is perfect, 0 as good as none, below 0 worse.
+    /// 1 - rms_of_finite(x_mf - x^_mf) / rms_of_finite(x_mf): 1 is perfect, 0 as good as none, below 0 worse.
     pub quality: f64,
     /// Correlation coefficient of x_mf and x^_mf; `None` where one of them does not move.
     pub correlation: Option<f64>,
@@ -107,15 +108,6 @@ pub fn transparency(session: &Session, graph: Option<&Graph>) -> Vec<Transparenc
     session.axes.iter().enumerate().map(one).collect()
 }
 
-fn rms(values: impl Iterator<Item = f64>) -> Option<f64> {
-    let (mut sum, mut count) = (0.0, 0_usize);
-    for value in values.filter(|v| v.is_finite()) {
-        sum += value * value;
-        count += 1;
-    }
-    (count > 0).then(|| (sum / count as f64).sqrt())
-}
-
 fn at(column: &[f64], row: usize) -> f64 {
     column.get(row).copied().unwrap_or(f64::NAN)
 }
@@ -135,14 +127,14 @@ fn tracking(session: &Session, axis: &AxisSignals) -> Transparency {
     }
     let tip = axis.slave.as_ref().unwrap_or(&axis.command);
     let (contact, free): (Vec<usize>, Vec<usize>) = (0..session.len()).partition(|row| touches.get(*row).copied().unwrap_or(false));
-    let position = |rows: &[usize]| rms(rows.iter().map(|row| at(tip, *row) - at(&session.mu, *row) * at(&axis.master, *row)));
+    let position = |rows: &[usize]| rms_of_finite(rows.iter().map(|row| at(tip, *row) - at(&session.mu, *row) * at(&axis.master, *row)));
     let felt = |row: usize| at(&session.lambda, row) * at(&axis.contact, row);
     let mut found = Transparency {
         name: axis.name.clone(),
         position_free_rms: position(&free),
         position_contact_rms: position(&contact),
-        force_contact_rms: rms(contact.iter().map(|row| reflected(axis, *row) - felt(*row))),
-        reflected_rms: rms(contact.iter().map(|row| felt(*row))),
+        force_contact_rms: rms_of_finite(contact.iter().map(|row| reflected(axis, *row) - felt(*row))),
+        reflected_rms: rms_of_finite(contact.iter().map(|row| felt(*row))),
         ..Transparency::default()
     };
     if axis.slave.is_none() {
@@ -158,7 +150,7 @@ fn induced(session: &Session, axis: &AxisSignals, with: &[f64], without: &[f64],
     let touching = contacts(axis, session.period_s);
     let induced = |row: usize| at(with, row) - at(without, row);
     let rows = || touching.iter().flat_map(|r| r.clone());
-    if let (Some(by_force), Some(by_hand)) = (rms(rows().map(induced)), rms(rows().map(|row| at(without, row))))
+    if let (Some(by_force), Some(by_hand)) = (rms_of_finite(rows().map(induced)), rms_of_finite(rows().map(|row| at(without, row))))
         && by_hand > 0.0
     {
         found.induced_ratio = Some(by_force / by_hand);
@@ -173,30 +165,23 @@ fn induced(session: &Session, axis: &AxisSignals, with: &[f64], without: &[f64],
         .map(|row| (induced(row), at(predicted, row)))
         .filter(|(x, p)| x.is_finite() && p.is_finite())
         .collect();
-    let size = rms(pairs.iter().map(|p| p.0)).unwrap_or(0.0);
+    let size = rms_of_finite(pairs.iter().map(|p| p.0)).unwrap_or(0.0);
     if size == 0.0 || pairs.len() < 2 {
         found.notes.push("no force moved the master within 50 ms of the first contact: there was nothing to cancel".to_owned());
         return;
     }
-    let left = rms(pairs.iter().map(|p| p.0 - p.1)).unwrap_or(f64::NAN);
+    let left = rms_of_finite(pairs.iter().map(|p| p.0 - p.1)).unwrap_or(f64::NAN);
     found.cancellation = Some(Cancellation {
         contact_s: first as f64 * session.period_s,
         window_s: pairs.len() as f64 * session.period_s,
         quality: 1.0 - left / size,
-        correlation: correlation(&pairs),
+        correlation: correlated(&pairs),
     });
 }
 
-fn correlation(pairs: &[(f64, f64)]) -> Option<f64> {
-    let n = pairs.len() as f64;
-    let (mx, my) = (pairs.iter().map(|p| p.0).sum::<f64>() / n, pairs.iter().map(|p| p.1).sum::<f64>() / n);
-    let (mut xx, mut yy, mut xy) = (0.0, 0.0, 0.0);
-    for (x, y) in pairs {
-        xx += (x - mx) * (x - mx);
-        yy += (y - my) * (y - my);
-        xy += (x - mx) * (y - my);
-    }
-    (xx > 0.0 && yy > 0.0).then(|| xy / (xx * yy).sqrt())
+fn correlated(pairs: &[(f64, f64)]) -> Option<f64> {
+    let (x, y): (Vec<f64>, Vec<f64>) = pairs.iter().copied().unzip();
+    Some(correlation(&x, &y)).filter(|r| r.is_finite())
 }
 
 fn impedance(session: &Session, axis: &AxisSignals) -> Result<Impedance, String> {

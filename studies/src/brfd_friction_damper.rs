@@ -9,6 +9,7 @@ use backdrive_diagnosis::structure::{Role, Structure};
 use backdrive_diagnosis::tuning::tuning;
 use backdrive_diagnosis::verdict::MODEL_FILE;
 use backdrive_plant::model::Model;
+use backdrive_signal::statistics::middle;
 
 pub(crate) const STUDY: Study = Study {
     name: "brfd_friction_damper",
@@ -88,7 +89,7 @@ fn run(context: &Context) -> Result<Report, StudyError> {
     report.word("instead", &others.join(" "));
     let text = if others.is_empty() { "nothing".to_string() } else { others.join(", ") };
     report.line("or instead", text, "", "", None);
-    let middle = median(&mut dead);
+    let middle = middle(&mut dead).unwrap_or(f64::NAN);
     if let Some((gap, [low, high])) = parameter(verdict, "backlash", "gap") {
         report.figure("gap", gap);
         let measured = format!("{:.2} mm ({:.2} to {:.2})", 1e3 * gap, 1e3 * low, 1e3 * high);
@@ -204,12 +205,7 @@ fn plateaus(context: &Context, file: &str) -> Result<[f64; 2], StudyError> {
             }
         }
     }
-    Ok([median(&mut levels[0]), median(&mut levels[1])])
-}
-
-fn median(values: &mut [f64]) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
+    Ok([0, 1].map(|side| middle(&mut levels[side]).unwrap_or(f64::NAN)))
 }
 
 /// Paths of the band's friction forward and backward.

@@ -6,9 +6,10 @@
 use crate::run::{Ask, LIKELY, diagnose, diagnosed_model, errors_of, findings, instead, parameter, percent, read, said, total, write};
 use crate::table::Report;
 use crate::{Context, Study, StudyError, csv_columns};
-use backdrive_diagnosis::low_pass::{LowPass, derivative};
 use backdrive_diagnosis::problem::Problem;
 use backdrive_diagnosis::verdict::{MODEL_FILE, Verdict};
+use backdrive_signal::derivative;
+use backdrive_signal::low_pass::LowPass;
 
 pub(crate) const STUDY: Study = Study {
     name: "dfki_double_pendulum",

@@ -6,9 +6,9 @@ use crate::table::Report;
 use crate::{Context, Study, StudyError, csv_columns};
 use backdrive_diagnosis::compare::{predictions, qualities};
 use backdrive_diagnosis::diagnose::Diagnosis;
-use backdrive_diagnosis::low_pass::LowPass;
 use backdrive_diagnosis::structure::Structure;
 use backdrive_diagnosis::verdict::chosen;
+use backdrive_signal::low_pass::LowPass;
 
 pub(crate) const STUDY: Study = Study {
     name: "kuka_kr300",
@@ -120,7 +120,7 @@ fn prepare(context: &Context, axis: usize, run: &str) -> Result<f64, StudyError>
     let t: Vec<f64> = (0..columns[0].len()).map(|i| i as f64 * period).collect();
     let file = context.out.join(format!("axis-{axis}-{run}.csv"));
     csv_columns::write(&file, &["t", "motor_angle", "arm_angle", "torque"], &[&t, &columns[0], &columns[1], &columns[2]])?;
-    let speed = backdrive_diagnosis::low_pass::derivative(&columns[0], period);
+    let speed = backdrive_signal::derivative(&columns[0], period);
     let difference: Vec<f64> = columns[0].iter().zip(&columns[1]).map(|(m, a)| m - a).collect();
     Ok(slope(&speed, &difference))
 }

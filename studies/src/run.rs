@@ -2,7 +2,6 @@
 
 use crate::{Context, StudyError};
 use backdrive::diagnose::{Diagnosed, REPORT, diagnose_into};
-use backdrive::recordings;
 use backdrive_diagnosis::audit::{Remark, audit};
 use backdrive_diagnosis::compare::{predictions, qualities};
 use backdrive_diagnosis::diagnose::Diagnosis;
@@ -12,6 +11,7 @@ use backdrive_diagnosis::search::Settings;
 use backdrive_diagnosis::structure::Structure;
 use backdrive_diagnosis::verdict::{Estimate, Finding, MODEL_FILE, Parameter, Verdict};
 use backdrive_plant::model::Model;
+use backdrive_sets::open;
 use nalgebra::{DMatrix, DVector};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
@@ -41,7 +41,7 @@ pub struct Ask<'a> {
 /// When a file cannot be read or written, or the diagnosis fails.
 pub fn diagnose(context: &Context, ask: &Ask) -> Result<Diagnosis, StudyError> {
     let (out, set) = placed(context, ask)?;
-    let opened = recordings::open(std::slice::from_ref(&set), None, None, &[])?;
+    let opened = open::open(std::slice::from_ref(&set), None, None, &[]).map_err(backdrive::failure::Failure::from)?;
     let settings = Settings {
         without: ask.without.iter().map(|s| s.to_string()).collect(),
         effects: ask.effects,
@@ -191,7 +191,7 @@ pub fn errors_of(problem: &Problem, records: &[Record]) -> Result<Vec<(String, f
     let predicted = predictions(problem, records, &structure, &structure.values(problem, &given, &[], &[]))
         .ok_or_else(|| StudyError::Diagnosis("the diagnosed model cannot be simulated".to_string()))?;
     let all = qualities(problem, records, &predicted, &problem.noise_sd, false);
-    Ok(all.into_iter().map(|q| (recordings::file_name(&q.record).to_string(), q.nrmse)).collect())
+    Ok(all.into_iter().map(|q| (backdrive_pages::parts::file_name(&q.record).to_string(), q.nrmse)).collect())
 }
 
 /// Least squares: what the columns have to be multiplied with to give the right side.

@@ -5,6 +5,7 @@ use crate::table::Report;
 use crate::{Context, Study, StudyError, csv_columns};
 use backdrive_plant::model::Model;
 use backdrive_plant::stepper::{Options, simulate};
+use backdrive_signal::statistics::rms;
 use std::ops::Range;
 
 pub(crate) const STUDY: Study = Study {
@@ -105,8 +106,4 @@ fn errors(model: &Model, u: &[f64], y: &[f64], from: usize, to: usize) -> Result
     let simulated = simulate(model, &[&u[from..to]], 1.0 / RATE, &Options::default()).map_err(|e| failed(&e))?;
     let predicted = simulated.first().ok_or_else(|| StudyError::Diagnosis("the model has no output".to_string()))?;
     Ok(predicted.iter().zip(&y[from..to]).map(|(p, m)| m - p).collect())
-}
-
-fn rms(x: &[f64]) -> f64 {
-    (x.iter().map(|v| v * v).sum::<f64>() / x.len().max(1) as f64).sqrt()
 }

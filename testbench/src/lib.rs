@@ -5,7 +5,6 @@
 //! observer and the engine's lag from it. A [`Bench`] simulates itself; [`validate`] gives
 //! the correlations that the paper validates with.
 
-mod columns;
 mod dynamometer;
 mod fit;
 mod identify;
@@ -17,7 +16,6 @@ mod record;
 mod simulate;
 mod validate;
 
-pub use columns::{correlation, mean, rms, smooth};
 pub use identify::{Asked, Identified, identify};
 pub use numbers::Bench;
 pub use record::{BenchError, Record};

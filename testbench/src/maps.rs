@@ -1,8 +1,8 @@
 //! Static maps from stationary points.
 
-use crate::columns::mean;
 use crate::record::{BenchError, Record};
 use backdrive_control::engine::Grid;
+use backdrive_signal::statistics::mean;
 
 /// A stretch over which pedal and wanted speed did not change.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -1,11 +1,11 @@
 //! Inertias, stiffness and damping of the shaft.
 
-use crate::columns::smooth;
 use crate::fit::{Fitted, positive};
 use crate::numbers::Bench;
 use crate::record::{BenchError, Record};
 use crate::simulate::closed_loop;
 use backdrive_control::observer::Shaft;
+use backdrive_signal::butterworth::{Butterworth, both_ways};
 use nalgebra::{Complex, DMatrix, DVector};
 use realfft::RealFftPlanner;
 
@@ -18,7 +18,7 @@ const CORNER_HZ: f64 = 8.0;
 /// # Errors
 /// When the speed does not change.
 pub fn inertia_of_dynamometer(record: &Record) -> Result<f64, BenchError> {
-    let smoothed = |column: &[f64]| smooth(column, CORNER_HZ, record.period_s);
+    let smoothed = |column: &[f64]| both_ways(&Butterworth::new(2, CORNER_HZ, record.period_s), column.iter().copied());
     let (speed, torque, shaft) = (smoothed(&record.dyno_speed), smoothed(&record.torque), smoothed(&record.shaft_torque));
     // The torque of step k is held until k+1, the shaft's is taken at the middle of that time too.
     let rows: Vec<[f64; 2]> =

@@ -1,11 +1,11 @@
 //! The paper's validations: correlations of what the identified bench does with what was measured.
 
-use crate::columns::correlation;
 use crate::dynamometer::torque_of;
 use crate::lag::{Observation, engine_torque};
 use crate::numbers::Bench;
 use crate::record::{BenchError, Record};
 use crate::simulate::{Trajectory, closed_loop, open_loop};
+use backdrive_signal::statistics::correlation;
 
 /// Correlation coefficients, 0 to 1, and the signals that they are of.
 pub struct Validation {

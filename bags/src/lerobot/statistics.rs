@@ -2,6 +2,7 @@
 
 use crate::number_type::NumberType;
 use crate::parquet_writer::{Values, Written};
+use backdrive_signal::statistics::quantile;
 use serde_json::{Map, Value, json};
 
 /// Quantiles that a dataset tells, by their names.
@@ -77,12 +78,4 @@ impl Feature<'_> {
 /// The columns as they are written.
 pub(super) fn written(columns: &[(String, NumberType, usize, Vec<f64>)]) -> impl Iterator<Item = Written<'_>> {
     columns.iter().map(|(name, of, width, values)| Written { name: name.clone(), values: Values::Lists(values, *width, *of) })
-}
-
-/// Between the two values that lie beside it, as NumPy's `quantile` takes it.
-fn quantile(sorted: &[f64], share: f64) -> f64 {
-    let place = share * (sorted.len().max(1) - 1) as f64;
-    let at = |place: f64| sorted.get(place as usize).copied().unwrap_or(f64::NAN);
-    let (below, above) = (at(place.floor()), at(place.ceil()));
-    below + (above - below) * place.fract()
 }

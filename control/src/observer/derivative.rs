@@ -1,7 +1,6 @@
 //! What is there without an observer: the equation of motion of the whole shaft, with speeds differentiated.
 
-use crate::butterworth::Butterworth;
-
+use backdrive_signal::butterworth::Butterworth;
 /// `T_C = J_C w_C' + J_A w_A' - T_A`, derivatives as differences of two samples, behind a Butterworth low-pass.
 #[derive(Debug, Clone)]
 pub struct Derivative {

@@ -2,10 +2,10 @@
 
 use super::design::stacked;
 use super::system::System;
-use crate::butterworth::Butterworth;
 use crate::core::{Core, Events, Port, Tick};
 use crate::freshness::Freshness;
 use backdrive_msgs::{MAX_AXES, Sample};
+use backdrive_signal::butterworth::Butterworth;
 use nalgebra::DMatrix;
 
 /// `xhat' = A xhat + B u + E fhat + K (y - C xhat)`, `fhat' = L (y - C xhat)` (Blumenschein et al., eq (3)), exact from sample to sample for

@@ -1,10 +1,11 @@
 //! Recordings of a band: motion and force through the same low-pass, and as many samples as the band needs.
 
-use crate::low_pass::{LowPass, derivative};
 use crate::problem::{Problem, Record};
 use crate::tuning::tuning;
 use backdrive_plant::model::{InputKind, Model, OutputKind};
 use backdrive_plant::stepper::segments;
+use backdrive_signal::derivative;
+use backdrive_signal::low_pass::LowPass;
 use std::sync::Arc;
 
 /// From this share of the sample rate on a motion is taken for noise of its sensor.

@@ -6,10 +6,10 @@ use super::types::{Experiment, Reason};
 use super::words::{described, short};
 use crate::evaluator::Evaluator;
 use crate::problem::Problem;
-use crate::signal::rms;
 use crate::structure::{Role, Structure};
 use crate::tuning::tuning;
 use crate::work::Budget;
+use backdrive_signal::statistics::rms;
 
 /// The excitation that determines parameters of a structure which the recordings do not: `numbers` are places among
 /// [`Structure::free`], `told` the standard deviation that is told of each number, in the fit's own unit. It is wider than

@@ -9,11 +9,12 @@ use super::period::scan;
 use super::regression::Samples;
 use super::reversals::Reversals;
 use crate::tuning::tuning;
+use backdrive_signal::derivative;
+use backdrive_signal::statistics::rms;
 
 use super::smoother::Smoothed;
 use super::types::{Candidate, Course};
 use crate::hypothesis::Place;
-use crate::signal::{rate, rms};
 use backdrive_plant::model::InputKind;
 
 impl Context<'_> {
@@ -77,8 +78,9 @@ impl Context<'_> {
 
     fn samples(&self, courses: &[Course], signals: &[Vec<f64>]) -> Samples {
         let joined = |of: fn(&Course) -> &Vec<f64>| courses.iter().flat_map(|c| of(c).iter().copied()).collect::<Vec<f64>>();
-        let rates =
-            |columns: &mut dyn Iterator<Item = (&Vec<f64>, f64)>| columns.flat_map(|(c, period)| rate(c, period)).collect::<Vec<f64>>();
+        let rates = |columns: &mut dyn Iterator<Item = (&Vec<f64>, f64)>| {
+            columns.flat_map(|(c, period)| derivative(c, period)).collect::<Vec<f64>>()
+        };
         let (mut x, mut v) = (joined(|c| &c.displacement), joined(|c| &c.velocity));
         let mut acceleration = rates(&mut courses.iter().map(|c| (&c.velocity, c.period)));
         if !signals.is_empty() {

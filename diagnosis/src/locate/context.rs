@@ -8,9 +8,9 @@ use super::smoother::Smoothed;
 use super::trajectory::Trajectory;
 use super::types::{Options, Run};
 use crate::hypothesis::Place;
-use crate::signal::rms;
 use crate::tuning::tuning;
 use backdrive_plant::model::{InputKind, Model};
+use backdrive_signal::statistics::rms;
 
 /// What all channels share.
 pub(super) struct Context<'a> {
@@ -69,7 +69,7 @@ impl Context<'_> {
     /// Typical displacement and speed of the deviation, and size of the unknown.
     pub(super) fn scales(&self, channel: Channel) -> [f64; 3] {
         let of_bodies = |columns: fn(&Trajectory) -> &Vec<Vec<f64>>| {
-            self.trajectories.iter().flat_map(|t| columns(t).iter().map(|c| rms(c))).fold(0.0, f64::max).max(1e-12)
+            self.trajectories.iter().flat_map(|t| columns(t).iter().map(rms)).fold(0.0, f64::max).max(1e-12)
         };
         let (x, v) = (of_bodies(|t| &t.position), of_bodies(|t| &t.velocity));
         let size = match channel {
@@ -89,7 +89,7 @@ impl Context<'_> {
     /// Largest root mean square of a predicted output over the runs, in its unit.
     pub(super) fn largest_reading(&self, output: usize) -> f64 {
         let columns = self.trajectories.iter().filter_map(|t| t.rows.iter().position(|r| *r == output).map(|row| &t.predicted[row]));
-        columns.map(|c| rms(c)).fold(0.0, f64::max)
+        columns.map(rms).fold(0.0, f64::max)
     }
 
     /// What the filter of a run is given; `known` is a known part of the unknown.

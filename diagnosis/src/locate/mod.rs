@@ -27,12 +27,12 @@ mod trajectory;
 mod types;
 
 use crate::tuning::tuning;
+use backdrive_signal::statistics::rms;
 pub use character::Character;
 pub use law::{Form, Law, Point, Variable};
 pub use period::{Ripple, scan};
 pub use types::{Candidate, Class, Course, LocateError, Location, Options, Run, Where};
 
-use crate::signal::rms;
 use backdrive_plant::model::Model;
 use channel::{Channel, channels};
 use context::{Context, noise_of};

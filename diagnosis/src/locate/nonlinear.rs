@@ -2,9 +2,9 @@
 
 use super::equations::Linearisation;
 use super::trajectory::Trajectory;
-use crate::signal::rms;
 use crate::tuning::tuning;
 use backdrive_plant::elements::{Law, Role, Rubbing, Side};
+use backdrive_signal::statistics::rms;
 
 /// What the deviation from the simulated motion adds to the forces of the nonlinear elements, beyond their linear part: one column for each element of
 /// [`Linearisation::nonlinear`].

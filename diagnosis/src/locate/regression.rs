@@ -4,7 +4,7 @@
 use super::law::{Form, Law, Point, Variable};
 use super::period::{Ripple, least_squares};
 use super::reversals::Reversals;
-use crate::signal::rms;
+use backdrive_signal::statistics::rms;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 /// Everything at a place, all runs one after the other.

@@ -3,12 +3,12 @@
 use super::error::ProblemError;
 use super::logged::Logged;
 use super::outliers::{Outliers, beside, places};
-use crate::low_pass::LowPass;
 use crate::tuning::tuning;
 use backdrive_plant::model::{Hold, Input, Model, OutputKind};
 use backdrive_plant::recording::{Jitter, Recording};
 use backdrive_plant::set::Condition;
 use backdrive_plant::stepper::{Segment, segments};
+use backdrive_signal::low_pass::LowPass;
 use std::sync::Arc;
 
 /// One recording, ready to be simulated and compared.

@@ -7,7 +7,7 @@ use crate::joints::Joint;
 use crate::numeric::{quantile, width};
 use crate::recording::{Recording, Signal};
 use backdrive_diagnosis::follow::{Follow, Profile, follow};
-use backdrive_diagnosis::low_pass::LowPass;
+use backdrive_signal::low_pass::LowPass;
 
 /// Lags that are tried: a command may be this late, and the position this early (columns exchanged), s.
 const LATE_S: f64 = 1.0;

@@ -10,7 +10,7 @@ use crate::numeric::{deviation, extremes};
 use crate::recording::Recording;
 use backdrive_diagnosis::follow::student;
 use backdrive_diagnosis::kinematics::Band;
-use backdrive_diagnosis::low_pass::derivative;
+use backdrive_signal::derivative;
 use nalgebra::{SMatrix, SVector};
 
 /// Terms of the regression: acceleration, velocity, direction, position, its sine and cosine, a constant.

@@ -6,9 +6,10 @@ use crate::numeric::{extremes, median, resolution, span, width};
 use crate::quantity::Quantity;
 use crate::recording::{Recording, Signal};
 use backdrive_diagnosis::audit::limits_reached;
-use backdrive_diagnosis::low_pass::{LowPass, derivative};
 use backdrive_diagnosis::noise;
 use backdrive_plant::recording::units::Kind;
+use backdrive_signal::derivative;
+use backdrive_signal::low_pass::LowPass;
 
 /// A limit is entered at this share of the usual step at least: what comes to rest there by itself slows down before.
 const ENTERED: f64 = 0.4;

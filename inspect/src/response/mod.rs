@@ -9,7 +9,8 @@ use crate::joints::Joint;
 use crate::numeric::{span, thinned};
 use crate::recording::Recording;
 use backdrive_diagnosis::follow::Profile;
-use backdrive_diagnosis::low_pass::derivative;
+use backdrive_signal::derivative;
+use backdrive_signal::statistics::rms;
 
 pub use rate_limit::RateLimit;
 pub use types::{Bandwidth, Interval, Response};
@@ -86,7 +87,7 @@ fn of_joint(recording: &Recording, joint: &Joint) -> Option<(Response, Option<Ra
 /// Lags while the command rises and while it falls, where their intervals do not touch.
 fn by_direction(u: &[f64], y: &[f64], lags: (i64, i64), period: f64, in_ms: &dyn Fn(f64, f64) -> Interval) -> Option<[Interval; 2]> {
     let rate = derivative(u, period);
-    let usual = (rate.iter().map(|v| v * v).sum::<f64>() / rate.len().max(1) as f64).sqrt();
+    let usual = rms(&rate);
     let one = |sign: f64| {
         let keep: Vec<bool> = rate.iter().map(|v| sign * v > MOVES * usual).collect();
         let profile = Profile::new(u, y, lags, Some(&keep));

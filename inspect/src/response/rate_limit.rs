@@ -1,7 +1,8 @@
 //! A joint that moves at a limit of its speed while its command goes on.
 
 use crate::numeric::{median, quantile, span};
-use backdrive_diagnosis::low_pass::{LowPass, derivative};
+use backdrive_signal::derivative;
+use backdrive_signal::low_pass::LowPass;
 
 /// A limit of speed that was reached.
 #[derive(Debug, Clone, PartialEq)]

@@ -3,6 +3,7 @@
 use super::hold::resample;
 use super::units::{self, Unit};
 use crate::model::{Hold, Model};
+use backdrive_signal::statistics::middle_step;
 
 /// One experiment: signals on one time axis.
 #[derive(Debug, Clone, PartialEq)]
@@ -241,7 +242,7 @@ impl Recording {
             let t = (0..self.len()).map(|i| self.t[0] + i as f64 * self.period).collect();
             return Recording::new(self.name.clone(), t, self.signals.clone());
         }
-        self.onto_grid(median_step(&self.t, self.period), |name| {
+        self.onto_grid(middle_step(&self.t).unwrap_or(self.period), |name| {
             model.inputs.iter().find(|i| i.name == name).map_or(Hold::Linear, |i| i.hold)
         })
     }
@@ -250,18 +251,12 @@ impl Recording {
 /// Periods by which the rounding of written times may put a sample off its place.
 const ROUNDED: f64 = 1e-6;
 
-fn median_step(t: &[f64], otherwise: f64) -> f64 {
-    let mut steps: Vec<f64> = t.windows(2).map(|w| w[1] - w[0]).collect();
-    let middle = steps.len() / 2;
-    if steps.is_empty() { otherwise } else { *steps.select_nth_unstable_by(middle, f64::total_cmp).1 }
-}
-
 impl Jitter {
     fn of(t: &[f64], period: f64) -> Jitter {
         let first = t.first().copied().unwrap_or(0.0);
         let off = |i: usize| (t[i] - first - i as f64 * period).abs();
         let mean_square = (0..t.len()).map(|i| off(i) * off(i)).sum::<f64>() / t.len().max(1) as f64;
-        let median = median_step(t, period);
+        let median = middle_step(t).unwrap_or(period);
         let gaps = t
             .windows(2)
             .filter(|w| w[1] - w[0] >= 1.5 * median)

@@ -1,6 +1,7 @@
 //! A signal as it was recorded beside what it should have been: by how much they differ, and what simple thing would make one of the other.
 
 use super::ways::{MOST_LATE, MOST_LATE_S, unsteady};
+use backdrive_signal::statistics::rms;
 use serde::Serialize;
 
 /// What simple thing makes the recorded signal of the predicted one.
@@ -154,15 +155,6 @@ pub fn compare(recorded: &[f64], predicted: &[f64], sensor: &Sensor, period_s: f
         return said(AsIf::Noisy { deviation: error }, 0.0);
     }
     said(AsIf::Otherwise, share)
-}
-
-fn rms(values: impl Iterator<Item = f64>) -> f64 {
-    let (mut sum, mut count) = (0.0, 0.0);
-    for x in values {
-        sum += x * x;
-        count += 1.0;
-    }
-    if count > 0.0 { (sum / count).sqrt() } else { 0.0 }
 }
 
 fn spread(values: impl Iterator<Item = f64> + Clone) -> f64 {

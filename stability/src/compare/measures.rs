@@ -3,6 +3,7 @@
 use crate::outcome::Outcome;
 use crate::phases::{contacts, holds};
 use crate::session::{AxisSignals, Session};
+use backdrive_signal::statistics::rms_of_finite;
 use serde::Serialize;
 
 /// Half the time over which a velocity is told from positions, s.
@@ -36,7 +37,7 @@ impl Measures {
     /// Of a run with its verdict: of one that does not rest no stiffness is told.
     pub fn of(session: &Session, outcome: &Outcome) -> Measures {
         let rows = 0..session.len();
-        let size = |axis: &AxisSignals| rms(rows.clone().map(|row| at(&axis.contact, row))).unwrap_or(0.0);
+        let size = |axis: &AxisSignals| rms_of_finite(rows.clone().map(|row| at(&axis.contact, row))).unwrap_or(0.0);
         let Some(axis) = session.axes.iter().max_by(|a, b| size(a).total_cmp(&size(b))) else { return Measures::default() };
         let tip = axis.slave.as_ref().unwrap_or(&axis.command);
         let pieces = contacts(axis, session.period_s);
@@ -47,9 +48,9 @@ impl Measures {
         Measures {
             stiffness_share: if outcome.is_stable() { stiffness_share(session, axis, tip, first) } else { None },
             drag: drag(axis, first, session.period_s),
-            tracking_free: rms((0..first).map(apart)),
-            tracking_contact: rms(touching().map(apart)),
-            effort: rms(touching().map(|row| at(&axis.force, row))),
+            tracking_free: rms_of_finite((0..first).map(apart)),
+            tracking_contact: rms_of_finite(touching().map(apart)),
+            effort: rms_of_finite(touching().map(|row| at(&axis.force, row))),
             effort_peak: largest(&axis.force),
             contact_peak: largest(&axis.contact),
         }
@@ -58,11 +59,6 @@ impl Measures {
 
 fn at(column: &[f64], row: usize) -> f64 {
     column.get(row).copied().unwrap_or(f64::NAN)
-}
-
-fn rms(values: impl Iterator<Item = f64>) -> Option<f64> {
-    let (sum, count) = values.filter(|v| v.is_finite()).fold((0.0, 0.0), |(sum, count), v| (sum + v * v, count + 1.0));
-    (count > 0.0).then(|| f64::sqrt(sum / count))
 }
 
 /// Means over the last quarter of the longest hold: force over depth at the master, over the same at the slave.

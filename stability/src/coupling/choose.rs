@@ -2,8 +2,9 @@
 
 use super::fit::{Fit, Ready, mean_square};
 use super::law::Term;
-use super::prepared::{BLOCKS, Side, spread};
+use super::prepared::{BLOCKS, Side};
 use super::types::{Rival, SideLaw};
+use backdrive_signal::statistics::deviation;
 use rayon::prelude::*;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 use std::ops::Range;
@@ -65,7 +66,7 @@ pub(super) fn choose(side: &Side) -> Option<SideLaw> {
     let possible: Vec<Vec<Term>> = laws().into_iter().filter(|terms| terms.iter().all(|t| side.has(*t))).collect();
     let mut roughly: Vec<Fit> = possible.par_iter().filter_map(|terms| ready.fit(terms, &side.blocks, ROUGH_STEPS)).collect();
     roughly.sort_by(|a, b| a.loss.total_cmp(&b.loss));
-    let variance = spread(&ready.force).powi(2).max(f64::MIN_POSITIVE);
+    let variance = deviation(&ready.force).powi(2).max(f64::MIN_POSITIVE);
     let least = roughly.first()?.loss.max(EXACT * variance);
     let near = roughly.iter().filter(|f| f.loss <= HOPELESS * least).count();
     roughly.truncate(near + HOPELESS_TOLD);
@@ -112,7 +113,7 @@ fn attempt(side: &Side, ready: &Ready, rough: Fit) -> Option<Tried> {
         }
     }
     let total = unseen.iter().sum::<f64>() / BLOCKS as f64;
-    let least = ready.rounding(&fit).max(VISIBLE * spread(&ready.force));
+    let least = ready.rounding(&fit).max(VISIBLE * deviation(&ready.force));
     let stands_out = ready.contributions(&fit).iter().all(|c| *c > least);
     total.is_finite().then_some(Tried { fit, unseen, total, stands_out })
 }

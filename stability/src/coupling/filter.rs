@@ -1,6 +1,6 @@
 //! Delays, filtered rates and zero-phase low-passes of sampled signals.
 
-use std::f64::consts::{PI, SQRT_2};
+use backdrive_signal::butterworth::{Butterworth, both_ways};
 
 /// A signal as it was `rows` samples before, by the cubic through its four neighbours; `rows` may be negative. Beyond its ends the signal stays
 /// as it is there.
@@ -56,47 +56,26 @@ impl FilteredRate {
 /// A Butterworth low-pass of second order run forward and backward, so that nothing is delayed; half of the amplitude passes at its corner.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct BothWays {
-    b: f64,
-    a: [f64; 2],
+    corner_hz: f64,
+    period_s: f64,
 }
 
 impl BothWays {
     /// With its corner, Hz; `None` where that lies so near half the sample rate that nothing would be left out.
     pub(crate) fn new(corner_hz: f64, period_s: f64) -> Option<BothWays> {
-        if corner_hz * period_s > 0.4 {
-            return None;
-        }
-        let w = (PI * corner_hz * period_s).tan();
-        let norm = 1.0 + SQRT_2 * w + w * w;
-        Some(BothWays { b: w * w / norm, a: [2.0 * (w * w - 1.0) / norm, (1.0 - SQRT_2 * w + w * w) / norm] })
+        (corner_hz * period_s <= 0.4).then_some(BothWays { corner_hz, period_s })
     }
 
     /// The signal filtered.
     pub(crate) fn of(self, signal: &[f64]) -> Vec<f64> {
-        let mut once: Vec<f64> = self.run(signal.iter().copied());
-        once.reverse();
-        let mut twice = self.run(once.iter().copied());
-        twice.reverse();
-        twice
-    }
-
-    fn run(self, signal: impl Iterator<Item = f64>) -> Vec<f64> {
-        // At rest at the first value.
-        let mut state: Option<[f64; 4]> = None;
-        signal
-            .map(|x| {
-                let [x1, x2, y1, y2] = state.unwrap_or([x; 4]);
-                let y = self.b * (x + 2.0 * x1 + x2) - self.a[0] * y1 - self.a[1] * y2;
-                state = Some([x, x1, y, y1]);
-                y
-            })
-            .collect()
+        both_ways(&Butterworth::new(2, self.corner_hz, self.period_s), signal.iter().copied())
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::f64::consts::PI;
 
     const PERIOD: f64 = 1e-3;
 

@@ -5,8 +5,9 @@
 
 use super::filter::{FilteredRate, delayed};
 use super::law::{Law, Term, direction};
-use super::prepared::{BLOCKS, Side, spread};
+use super::prepared::{BLOCKS, Side};
 use super::types::{Estimate, Gain};
+use backdrive_signal::statistics::deviation;
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 use std::ops::Range;
@@ -70,7 +71,7 @@ impl<'a> Ready<'a> {
             own: side.smooth(&side.own),
             own_force: side.own_force.as_deref().map(|f| side.smooth(f)).unwrap_or_default(),
             other_force: side.other_force.as_deref().map(|f| side.smooth(f)).unwrap_or_default(),
-            speed: spread(&speeds),
+            speed: deviation(&speeds),
             side,
         }
     }
@@ -141,7 +142,7 @@ impl<'a> Ready<'a> {
     /// RMS of what each term of a fit adds to the force.
     pub(super) fn contributions(&self, fit: &Fit) -> Vec<f64> {
         let columns = self.columns(&fit.terms, fit.shape);
-        columns.iter().zip(&fit.coefficients).take(fit.terms.len()).map(|(column, c)| c.abs() * spread(column)).collect()
+        columns.iter().zip(&fit.coefficients).take(fit.terms.len()).map(|(column, c)| c.abs() * deviation(column)).collect()
     }
 
     /// The force that a law makes of one step of the position sensor: what adds less cannot be told from rounding.

@@ -4,6 +4,7 @@ use super::filter::{BothWays, FilteredRate};
 use super::law::Term;
 use super::types::{NoCoupling, Signals};
 use crate::spectra::welch;
+use backdrive_signal::statistics::deviation;
 use std::ops::Range;
 
 /// Blocks of time over which residuals count as independent, and by which held-out time is drawn.
@@ -68,7 +69,7 @@ impl Side {
         let own_force = own_force.map(take);
         let other_force = other_force.map(take);
         let (force, own, other) = (take(force), take(&own), take(&other));
-        if spread(&force) <= 0.0 || (spread(&own) <= 0.0 && spread(&other) <= 0.0) {
+        if deviation(&force) <= 0.0 || (deviation(&own) <= 0.0 && deviation(&other) <= 0.0) {
             return Err(NoCoupling::NoMotion { master });
         }
         let limit = clamp(&force);
@@ -99,8 +100,8 @@ impl Side {
     /// Whether what a term looks at was recorded.
     pub(super) fn has(&self, term: Term) -> bool {
         match term {
-            Term::OwnForce => self.own_force.as_ref().is_some_and(|f| spread(f) > 0.0),
-            Term::OtherForce => self.other_force.as_ref().is_some_and(|f| spread(f) > 0.0),
+            Term::OwnForce => self.own_force.as_ref().is_some_and(|f| deviation(f) > 0.0),
+            Term::OtherForce => self.other_force.as_ref().is_some_and(|f| deviation(f) > 0.0),
             Term::Position | Term::Rate | Term::Damping | Term::Friction => true,
         }
     }
@@ -136,11 +137,6 @@ fn filled(signal: &[f64]) -> Vec<f64> {
         before
     };
     signal.iter().map(value).collect()
-}
-
-pub(super) fn spread(signal: &[f64]) -> f64 {
-    let mean = signal.iter().sum::<f64>() / signal.len().max(1) as f64;
-    (signal.iter().map(|x| (x - mean) * (x - mean)).sum::<f64>() / signal.len().max(1) as f64).sqrt()
 }
 
 /// The size at which a force is clamped.

@@ -4,6 +4,7 @@ use super::holds::{LEAST_HOLD_S, TRANSIENT_S};
 use super::swings::{GROWS, WANDER};
 use crate::outcome::{LOWEST_HZ, NOISE, Outcome, Trace};
 use crate::spectra::welch;
+use backdrive_signal::statistics::rms;
 
 /// Of the spectra that tell a dither's share, s.
 const SEGMENT_S: f64 = 0.5;
@@ -14,7 +15,6 @@ pub(super) fn of_one_level(trace: &Trace, (from, to): (usize, usize)) -> Vec<(us
     let Some(dither) = trace.dither.get(from..to).filter(|d| d.len() >= 2 * window && d.iter().any(|f| *f != 0.0)) else {
         return vec![(from, to)];
     };
-    let rms = |piece: &[f64]| (piece.iter().map(|f| f * f).sum::<f64>() / piece.len() as f64).sqrt();
     let (transient, least) = ((TRANSIENT_S / trace.period_s) as usize, (LEAST_HOLD_S / trace.period_s) as usize);
     let mut pieces = Vec::new();
     let (mut start, mut level) = (from, rms(&dither[..window]));

@@ -12,6 +12,7 @@ use backdrive_control::operator::Intent;
 use backdrive_nodes::graph::{DeviceFiles, Graph, NodeKind, Settings};
 use backdrive_plant::elements::{Law, Side};
 use backdrive_plant::linear::{LinearModel, Operating};
+use backdrive_signal::statistics::rms;
 use realfft::num_complex::Complex;
 use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
 use std::sync::Arc;
@@ -121,7 +122,7 @@ pub fn recover_intent(session: &Session, graph: &Graph) -> Result<Recovered, Res
         }
     }
     let followed = follow(&device, &forces, &intents);
-    let residual = measured.iter().zip(&followed).map(|(x, y)| rms(&difference(x, y)) / range(x).max(f64::MIN_POSITIVE)).collect();
+    let residual = measured.iter().zip(&followed).map(|(x, y)| rms(difference(x, y)) / range(x).max(f64::MIN_POSITIVE)).collect();
     let ambiguity = (0..device.axes()).map(|axis| held_by_friction(files, axis)).collect::<Result<_, _>>()?;
     let still_s = rests.iter().map(|(from, to)| (to - from) as f64 * session.period_s).sum();
     Ok(Recovered { intents: intents.iter().map(|x| recorded(x, session.period_s)).collect(), residual, ambiguity, still_s })
@@ -344,10 +345,6 @@ fn difference(a: &[f64], b: &[f64]) -> Vec<f64> {
     a.iter().zip(b).map(|(a, b)| a - b).collect()
 }
 
-fn rms(signal: &[f64]) -> f64 {
-    (signal.iter().map(|x| x * x).sum::<f64>() / signal.len().max(1) as f64).sqrt()
-}
-
 fn range(signal: &[f64]) -> f64 {
     let (low, high) = signal.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(*x), h.max(*x)));
     if high > low { high - low } else { 0.0 }
@@ -374,7 +371,7 @@ mod tests {
         };
         let worst = |a: &[f64], b: &[f64]| difference(a, b).iter().fold(0.0_f64, |m, x| m.max(x.abs()));
         assert!(worst(&filter.low_pass(&wave(8.0)), &wave(8.0)) < 1e-3);
-        assert!(rms(&filter.low_pass(&wave(60.0))) < 1e-3);
+        assert!(rms(filter.low_pass(&wave(60.0))) < 1e-3);
     }
 
     #[test]

@@ -7,6 +7,7 @@ use crate::table::Report;
 use crate::{Context, StudyError};
 use backdrive_plant::model::{Hold, InputKind, Model, OutputKind};
 use backdrive_plant::stepper::{Options, simulate};
+use backdrive_signal::statistics::rms;
 use nalgebra::{DMatrix, DVector};
 
 /// Bar on the error in the record with the pulses, mm.
@@ -134,7 +135,7 @@ fn residuals(model: &Model, record: &Record) -> Result<Vec<f64>, StudyError> {
 /// Root mean square of the position error from the first sample to the last, mm.
 fn rmse(model: &Model, record: &Record) -> Result<f64, StudyError> {
     let all = residuals(model, record)?;
-    Ok(1e3 * (all.iter().map(|x| x * x).sum::<f64>() / all.len().max(1) as f64).sqrt())
+    Ok(1e3 * rms(&all))
 }
 
 #[cfg(test)]

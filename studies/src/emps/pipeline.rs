@@ -3,9 +3,10 @@
 
 use super::prepare::{RATE, Record};
 use crate::StudyError;
-use backdrive_diagnosis::low_pass::{LowPass, derivative};
 use backdrive_plant::model::Model;
 use backdrive_plant::stepper::{Options, simulate};
+use backdrive_signal::derivative;
+use backdrive_signal::low_pass::LowPass;
 use nalgebra::{DMatrix, DVector};
 
 /// Filter on every column: order, Hz.

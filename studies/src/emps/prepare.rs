@@ -4,7 +4,7 @@
 //! a reversal, over some milliseconds, and a diagnosis would find that blur. So strokes are cut where it ends.
 
 use crate::{StudyError, csv_columns};
-use backdrive_diagnosis::low_pass::LowPass;
+use backdrive_signal::low_pass::LowPass;
 use std::path::Path;
 
 /// Sample rate of the records, Hz.

@@ -1,11 +1,12 @@
 //! The observer beside an extended Kalman filter, a derivative, and the engine model alone.
 
 use crate::table::Report;
-use backdrive_control::butterworth::Butterworth;
 use backdrive_control::engine::Engine;
 use backdrive_control::observer::{Derivative, ExtendedKalman};
+use backdrive_signal::butterworth::Butterworth;
+use backdrive_signal::statistics::{correlation, rms};
 use backdrive_testbench::lag::{Observation, engine_torque};
-use backdrive_testbench::{Bench, BenchError, Record, correlation, rms};
+use backdrive_testbench::{Bench, BenchError, Record};
 
 /// Corner of the Butterworth filter behind observer and derivative, Hz: the graph's.
 const CORNER_HZ: f64 = 5.0;
@@ -51,7 +52,7 @@ impl Tuning {
         let grid = [1.0, 5.0, 25.0, 125.0].into_iter().flat_map(|walk| [0.5, 2.0, 8.0, 32.0].map(|ripple| Tuning { walk, ripple }));
         let error = |tuning: &Tuning| {
             let found = tuning.torque(bench, observation, record);
-            rms(&found[start..].iter().zip(&truth[start..]).map(|(a, b)| a - b).collect::<Vec<_>>())
+            rms(found[start..].iter().zip(&truth[start..]).map(|(a, b)| a - b))
         };
         let told = grid.map(|tuning| (error(&tuning), tuning)).min_by(|a, b| a.0.total_cmp(&b.0));
         told.map_or(Tuning { walk: 5.0, ripple: 2.0 }, |t| t.1)
@@ -100,7 +101,7 @@ pub fn compare(bench: &Bench, observation: &Observation, record: &Record, truth:
     let estimates = estimates.into_iter().map(|(name, torque)| {
         let error = |late: usize| {
             let pairs = torque[start + late..].iter().zip(&truth[start..]);
-            rms(&pairs.map(|(a, b)| a - b).collect::<Vec<_>>())
+            rms(pairs.map(|(a, b)| a - b))
         };
         let late = (0..300).step_by(2).min_by(|a, b| error(*a).total_cmp(&error(*b))).unwrap_or(0);
         let correlation = correlation(&torque[start..], &truth[start..]);

@@ -5,7 +5,7 @@ use crate::table::Report;
 use crate::{Context, StudyError};
 use backdrive_bags::{Reader, Signal, signals};
 use backdrive_nodes::graph::{Graph, Overrides};
-use backdrive_testbench::{correlation, rms};
+use backdrive_signal::statistics::{correlation, rms};
 use std::path::Path;
 
 /// What the observer told of a master.
@@ -47,7 +47,7 @@ pub fn run(context: &Context) -> Result<Vec<Told>, StudyError> {
         let found = signals(&reader, &wanted).map_err(failed)?;
         let [truth, estimate]: [Vec<f64>; 2] = found.columns.try_into().map_err(|_| failed("a bag without its two columns"))?;
         let most = truth.iter().fold(0.0_f64, |most, f| most.max(f.abs()));
-        let error = rms(&truth.iter().zip(&estimate).map(|(a, b)| a - b).collect::<Vec<_>>());
+        let error = rms(truth.iter().zip(&estimate).map(|(a, b)| a - b));
         let correlation = correlation(&truth, &estimate);
         Ok(Told { name, time: found.t, truth, estimate, error: [error, error / most], correlation })
     })

@@ -8,9 +8,9 @@ use super::record::{ENDS, Record, mean};
 use super::sessions::{Judged, laws_without};
 use crate::StudyError;
 use crate::table::Report;
-use backdrive_diagnosis::low_pass::derivative;
 use backdrive_plant::model::{Hold, Input, InputKind, Model, Output, OutputKind};
 use backdrive_plant::stepper::{Options, Plant, Segment, simulate};
+use backdrive_signal::derivative;
 use backdrive_stability::coupling::{Law, Running, Seen};
 
 /// Stiffness and damping of a hand at the arm of 75 mm, N m/rad and N m s/rad: the comfortable grasp of `plant/grips/normal.toml`

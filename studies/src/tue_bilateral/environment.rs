@@ -2,7 +2,7 @@
 
 use super::record::{ENDS, Record, mean};
 use crate::run::solved;
-use backdrive_diagnosis::low_pass::derivative;
+use backdrive_signal::derivative;
 
 /// A contact: it pushes back once the slave is beyond its place.
 #[derive(Debug, Clone, Copy, PartialEq)]

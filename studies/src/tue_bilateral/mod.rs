@@ -10,9 +10,9 @@ use crate::run::{Ask, LIKELY, diagnose, diagnosed_model, findings, instead, para
 use crate::table::Report;
 use crate::{Context, Study, StudyError, csv_columns};
 use again::{Levers, again};
-use backdrive_diagnosis::low_pass::LowPass;
 use backdrive_diagnosis::verdict::Verdict;
 use backdrive_plant::model::Model;
+use backdrive_signal::low_pass::LowPass;
 use record::{ENDS, FILES, Record, SAME, mean};
 use sessions::judge;
 
@@ -275,8 +275,8 @@ fn prepare(context: &Context, file: &str, known: &mut Known) -> Result<(), Study
     let [x, motor, a, b] = &own;
     csv_columns::write(&context.out.join(format!("slave-{name}")), &names, &[&t, x, motor, a, b])?;
     if name.contains("free_motion") {
-        let speed = backdrive_diagnosis::low_pass::derivative(x, KEPT as f64 / RATE);
-        let acceleration = backdrive_diagnosis::low_pass::derivative(&speed, KEPT as f64 / RATE);
+        let speed = backdrive_signal::derivative(x, KEPT as f64 / RATE);
+        let acceleration = backdrive_signal::derivative(&speed, KEPT as f64 / RATE);
         let sign: Vec<f64> = speed.iter().map(|v| (v / SLOW).tanh()).collect();
         let numbers = solved(&[&acceleration, &speed, &sign, &vec![1.0; speed.len()]], motor)?;
         known.friction.push([numbers[2], numbers[1]]);

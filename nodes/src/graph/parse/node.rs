@@ -6,7 +6,6 @@ use crate::graph::coupling;
 use crate::graph::hosts::read_host;
 use crate::graph::overrides::absolute;
 use crate::graph::{DeviceFiles, Direction, Node, NodeKind, ObserverFiles, Settings, bench};
-use backdrive_control::butterworth::MOST_ORDER;
 use backdrive_control::changing_grip::GripChange;
 use backdrive_control::hand::HandSettings;
 use backdrive_control::observer::{Quantity, Weights};
@@ -15,6 +14,7 @@ use backdrive_control::speed_control::SpeedControl;
 use backdrive_msgs::MAX_AXES;
 use backdrive_plant::elements::Range;
 use backdrive_plant::tomlfile::{FileError, Table};
+use backdrive_signal::butterworth::MOST_ORDER;
 use std::path::Path;
 
 impl NodeReader<'_> {

@@ -1,0 +1,21 @@
+//! What a comparison gave.
+
+use backdrive_stability::compare::Cell;
+
+/// What was compared, for text, page and JSON.
+pub struct Compared<'a> {
+    /// The file.
+    pub session: String,
+    /// What the hand does there.
+    pub title: &'a str,
+    /// mu and lambda at which the numbers are told.
+    pub gains: [f64; 2],
+    /// Highest mu*lambda up to which edges were looked for.
+    pub highest: f64,
+    /// The cells that were done, condition by condition.
+    pub cells: Vec<Cell>,
+    /// How many were asked for.
+    pub asked: usize,
+    /// What a reader has to know.
+    pub notes: &'a [String],
+}

@@ -1,0 +1,134 @@
+//! The page of a comparison: one picture, one table.
+
+pub mod cells;
+pub mod compared;
+
+use crate::parts::ending;
+use backdrive_report::{Cell as Shown, Colour, Figure, Page, Plot, Series, Table, Tone, number};
+use backdrive_stability::compare::{Cell, Varied};
+use backdrive_stability::outcome::Outcome;
+use cells::{COLUMNS, row};
+use compared::Compared;
+
+/// The terms of the page.
+const TERMS: [(&str, &str); 4] = [
+    ("μλ", "the loop's gain: the position scale μ from master to slave times the force scale λ from slave to master"),
+    ("edge", "the μλ at which the loop stops being stable in the hand's push on the wall"),
+    ("link", "what packets between master and slave go through: the same delay, jitter and loss each way"),
+    ("canceller", "the law direct on a motion from which the master's own answer to the reflected force is taken out"),
+];
+
+/// A quantity of a cell, for one curve of the picture.
+type Of = fn(&Cell) -> Option<f64>;
+
+/// The page.
+pub fn page(compared: &Compared) -> Page {
+    let [mu, lambda] = compared.gains;
+    let mut page = Page::new("Laws between master and slave");
+    let (tone, sentence) = headline(compared);
+    page.lead(tone, &sentence);
+    page.text(&format!("{}: {}", compared.session, compared.title));
+    for note in compared.notes {
+        page.note(note);
+    }
+    if compared.cells.len() < compared.asked {
+        page.warning(&format!("It was stopped: {} of {} were done.", compared.cells.len(), compared.asked));
+    }
+    page.section("Over the delay of the link");
+    if let Some(figure) = picture(compared) {
+        let caption = format!(
+            "Edge above: higher is better; where no edge was found the gain up to which it was stable is drawn. Below it, at μλ = {}: the share of \
+             the wall's stiffness that the hand is shown while it pushes (100 % is transparent; none is told where the loop does not rest), the \
+             drag in free motion, and how far the slave is from where it shall be before contact.",
+            number(mu * lambda)
+        );
+        page.figure(figure, &caption);
+    } else {
+        page.text("No delay was compared, so there is nothing to draw over it.");
+    }
+    page.section("All conditions");
+    let mut table = Table::new(std::iter::once("link").chain(COLUMNS.map(|c| c.0)));
+    for cell in &compared.cells {
+        let mut cells = vec![Shown::from(cell.condition.text())];
+        for (column, text) in row(cell, compared.highest).into_iter().enumerate() {
+            cells.push(match column {
+                2 => Shown::tone(text, tone_of(&cell.outcome)),
+                _ => Shown::from(text),
+            });
+        }
+        table.push(cells);
+    }
+    page.table(table.caption(&format!(
+        "At μ = {}, λ = {}. Edges were looked for up to μλ = {}, to within 5 %.",
+        number(mu),
+        number(lambda),
+        number(compared.highest)
+    )));
+    let terms: Vec<(&str, &str)> = TERMS.into_iter().chain(COLUMNS.into_iter().skip(2)).collect();
+    ending(&mut page, &terms);
+    page
+}
+
+fn tone_of(outcome: &Outcome) -> Tone {
+    match outcome {
+        Outcome::Stable => Tone::Good,
+        Outcome::LimitCycle { .. } => Tone::Warning,
+        Outcome::Unstable { .. } => Tone::Bad,
+        Outcome::Limited { .. } => Tone::Limited,
+        Outcome::NotJudged { .. } => Tone::Unsure,
+    }
+}
+
+/// Which laws are stable at the gain of the comparison under every condition.
+fn headline(compared: &Compared) -> (Tone, String) {
+    let laws = laws(compared);
+    let always = |law: &&&str| compared.cells.iter().filter(|c| c.rival == **law).all(|c| c.outcome.is_stable());
+    let good: Vec<&str> = laws.iter().filter(always).copied().collect();
+    let [mu, lambda] = compared.gains;
+    let at = number(mu * lambda);
+    match good.len() {
+        0 => (Tone::Bad, format!("At μλ = {at} no law is stable under every condition compared.")),
+        n if n == laws.len() => (Tone::Good, format!("At μλ = {at} every law is stable under every condition compared.")),
+        _ => (Tone::Neutral, format!("At μλ = {at} stable under every condition compared: {}.", good.join(", "))),
+    }
+}
+
+/// The laws in the order of the table.
+fn laws<'a>(compared: &'a Compared) -> Vec<&'a str> {
+    let mut laws: Vec<&str> = Vec::new();
+    for cell in &compared.cells {
+        if !laws.contains(&cell.rival.as_str()) {
+            laws.push(&cell.rival);
+        }
+    }
+    laws
+}
+
+/// Four quantities over the delay, a line per law.
+fn picture(compared: &Compared) -> Option<Figure> {
+    let over_delay: Vec<&Cell> = compared.cells.iter().filter(|c| c.condition.varied == Varied::Delay).collect();
+    if over_delay.is_empty() {
+        return None;
+    }
+    let laws = laws(compared);
+    let plot = |plot: Plot, of: Of| {
+        laws.iter().enumerate().fold(plot, |plot, (index, law)| {
+            let points = over_delay.iter().filter(|c| c.rival == *law).filter_map(|c| Some((1e3 * c.condition.delay_s, of(c)?)));
+            let (x, y): (Vec<f64>, Vec<f64>) = points.unzip();
+            // A line through one point is none.
+            let series = if x.len() > 1 { Series::line(law, &x, &y) } else { Series::points(law, &x, &y) };
+            plot.series(series.colour(Colour::Nth(index)))
+        })
+    };
+    let edge: Of = |c| c.critical_gain.or((c.stable_up_to > 0.0).then_some(c.stable_up_to));
+    let first = Plot::new("Edge").x_axis("delay each way", "ms").y_axis("edge μλ", "").y_log().height(230.0);
+    let share = Plot::new("Shown stiffness").y_axis("of the wall's", "%").include_y(0.0).horizontal(100.0, "", Tone::Good).height(180.0);
+    let drag = Plot::new("Drag in free motion").y_axis("drag", "N s/m").include_y(0.0).height(180.0);
+    let off = Plot::new("Slave beside master in free motion").y_axis("off", "m").include_y(0.0).height(180.0);
+    Some(Figure::stacked([
+        plot(first, edge),
+        plot(share, |c| c.measures.stiffness_share.map(|s| 100.0 * s)),
+        plot(drag, |c| c.measures.drag),
+        plot(off, |c| c.measures.tracking_free),
+    ]))
+}

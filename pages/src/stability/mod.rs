@@ -1,0 +1,221 @@
+//! The report of `backdrive stability`: pictures first, the numbers beside them.
+
+mod axes;
+mod coupled;
+mod energy;
+mod gains;
+mod measured;
+mod response;
+mod words;
+
+use crate::offered::Step;
+use crate::parts::{ending, file_name, todo};
+pub use axes::CANCELLED;
+use backdrive_report::{Cell, Page, Table, Tone, number, percent, si};
+use backdrive_stability::frequency;
+use backdrive_stability::session::Session;
+use backdrive_stability::verdict::{Answer, Method, Word};
+use energy::{energy, transparency};
+pub use gains::Point;
+use gains::gains;
+use measured::measured;
+use response::response;
+pub use words::spelled;
+use words::{capital, energy_verdict, interval, tone, verdict, word};
+
+/// The report of an answer; `session` is what was recorded, `curve` the sweep, which may be empty, `steps` what to do next.
+pub fn page(found: &Answer, session: &Session, curve: &[&Point], steps: &[Step]) -> Page {
+    let is_pair = !found.coupled.is_empty();
+    let mut page = Page::new(&match is_pair {
+        true => coupled::title(file_name(&found.bag)),
+        false => format!("Stability of {} at μλ = {}", file_name(&found.bag), number(found.gain.product())),
+    });
+    page.lead(tone(found.verdict), &lead(found));
+    page.text(&capital(&found.reason));
+    todo(&mut page, steps);
+    for d in &found.disagreements {
+        page.warning(&capital(&d.text));
+    }
+    for warning in &found.warnings {
+        page.note(&capital(&warning.to_string()));
+    }
+    if is_pair {
+        page.section("Coupling");
+        coupled::coupled(&mut page, found);
+        page.section("Response, as recorded");
+    } else {
+        page.table(methods(found));
+        page.section("Loop, measured");
+        measured(&mut page, found);
+        axes::axes(&mut page, found);
+        page.section("Gain");
+        gains(&mut page, found, curve);
+        page.section(&format!("Response at μλ = {}", number(found.gain.product())));
+    }
+    response(&mut page, found, session);
+    page.section("Energy");
+    match &found.resimulated {
+        Some(again) => {
+            energy(&mut page, &again.energy, &format!("run again at μλ = {}", number(found.gain.product())));
+            page.details("Energy as recorded", |inside| energy(inside, &found.recorded_energy, "as recorded"));
+        }
+        None => energy(&mut page, &found.recorded_energy, "as recorded"),
+    }
+    page.section("Transparency, as recorded");
+    transparency(&mut page, &found.transparency);
+    if !found.checks.is_empty() || found.loop_check.is_some() {
+        page.section("Models against the recording");
+        models(&mut page, found);
+    }
+    ending(&mut page, &TERMS);
+    page
+}
+
+/// The terms of the page.
+const TERMS: [(&str, &str); 10] = [
+    ("μλ", "the loop's gain: the position scale μ from master to slave times the force scale λ from slave to master"),
+    ("critical μλ, edge", "the lowest gain at which the loop is not stable; at it the loop oscillates without growing"),
+    (
+        "L",
+        "the loop's frequency response, once round: reflected force to master to slave to environment and back; the closed loop is 1/(1 − L)",
+    ),
+    ("margins", "by how much the gain may rise, the phase or the delay grow, and how near L comes to +1, before the loop is on its edge"),
+    ("coherence", "share of a signal's power that the excitation explains, 0 to 1, at each frequency"),
+    ("re-simulation", "the loop of the bag run again from its models with the recorded hand"),
+    ("limit cycle", "an oscillation that neither dies out nor grows while the hand holds still"),
+    ("limited", "a clamp or the end of the travel decides what happens; never called stable"),
+    ("passive port", "one that never gives more energy than it has taken"),
+    ("95 %", "interval that holds the value in 95 of 100 such recordings"),
+];
+
+/// The verdict in a sentence.
+fn lead(found: &Answer) -> String {
+    let gain = number(found.gain.product());
+    if !found.coupled.is_empty() {
+        let said = match found.verdict {
+            Word::Stable => "Stable",
+            Word::LimitCycle => "Not stable: it oscillates in a limit cycle",
+            Word::Unstable => "Unstable",
+            Word::Limited => "Limited: a clamp decides, not the loop",
+            Word::CannotTell => "It cannot be told whether the pair is stable",
+        };
+        return format!("{said}, at the gains of the recording.");
+    }
+    let verdict = match found.verdict {
+        Word::Stable => format!("Stable at μλ = {gain}"),
+        Word::LimitCycle => format!("Not stable at μλ = {gain}: it oscillates in a limit cycle"),
+        Word::Unstable => format!("Unstable at μλ = {gain}"),
+        Word::Limited => format!("Limited at μλ = {gain}: a clamp or the travel decides, not the loop"),
+        Word::CannotTell => format!("It cannot be told whether the loop is stable at μλ = {gain}"),
+    };
+    let edge = match (found.critical_gain, found.at_least) {
+        (Some(edge), _) => {
+            let interval = found.critical_gain_ci95.map_or(String::new(), |ci| format!(" (95 %: {})", interval(ci)));
+            let how = match found.critical_frequency_hz {
+                Some(hz) if hz > 0.0 => format!(", where it oscillates at {}", si(hz, "Hz")),
+                Some(_) => ", where it runs away without oscillating".to_string(),
+                None => String::new(),
+            };
+            let by = found.decided_by.as_deref().map_or(String::new(), |by| format!(", by {by}"));
+            format!(" The edge is at μλ = {}{interval}{how}{by}.", number(edge))
+        }
+        // Beyond a clamp or an end of the travel no edge can be seen.
+        (None, Some(least)) if least < found.gain.product() => {
+            let by = found.decided_by.as_deref().map_or(String::new(), |by| format!(", by {by}"));
+            format!(" It is stable only up to μλ = {}{by}.", number(least))
+        }
+        (None, Some(least)) => format!(" No edge up to μλ = {}.", number(least)),
+        (None, None) => String::new(),
+    };
+    format!("{verdict}.{edge}")
+}
+
+/// Each method's verdict and edge.
+fn methods(found: &Answer) -> Table {
+    let mut table = Table::new(["method", "verdict", "critical μλ", "95 % interval", "frequency", "why"]);
+    let edge = |gain: Option<f64>, least: Option<f64>| match (gain, least) {
+        (Some(gain), _) => number(gain),
+        (None, Some(least)) if least > 0.0 => format!("≥ {}", number(least)),
+        _ => "–".to_string(),
+    };
+    let mark = |name: &str, leads: bool| if leads { format!("{name} (leads)") } else { name.to_string() };
+    if let Some(f) = &found.frequency_answer {
+        let word = match f.verdict {
+            frequency::Verdict::Stable => Word::Stable,
+            frequency::Verdict::Unstable => Word::Unstable,
+            frequency::Verdict::CannotTell => Word::CannotTell,
+        };
+        table.push([
+            Cell::from(mark("frequency response", found.from == Method::Frequency)),
+            verdict(word),
+            edge(f.critical_gain, f.at_least).into(),
+            f.critical_gain_ci95.map_or("–".to_string(), interval).into(),
+            f.frequency_hz.map_or("–".to_string(), |hz| si(hz, "Hz")).into(),
+            spelled(&f.reason).into(),
+        ]);
+    }
+    match &found.resimulated {
+        Some(again) => table.push([
+            Cell::from(mark("re-simulation", found.from == Method::Resimulation)),
+            verdict(word(&again.outcome)),
+            edge(again.edge.critical_gain, Some(again.edge.at_least)).into(),
+            "–".into(),
+            again.edge.frequency_hz.filter(|hz| *hz > 0.0).map_or("–".to_string(), |hz| si(hz, "Hz")).into(),
+            spelled(&format!("{}; {}", again.outcome, again.edge.reason)).into(),
+        ]),
+        None => table.push([
+            Cell::from("re-simulation"),
+            verdict(Word::CannotTell),
+            "–".into(),
+            "–".into(),
+            "–".into(),
+            spelled(found.no_resimulation.as_deref().unwrap_or_default()).into(),
+        ]),
+    }
+    let energy = found.resimulated.as_ref().map_or(&found.recorded_energy, |r| &r.energy);
+    let (text, tone) = energy_verdict(energy.verdict);
+    table.push([Cell::from("energy"), Cell::tone(text, tone), "–".into(), "–".into(), "–".into(), energy.reason.clone().into()]);
+    if let Some(outcome) = &found.recorded_outcome {
+        let at = found.recorded_gain.map_or(String::new(), |[low, high]| {
+            if high - low < 1e-9 {
+                format!(" at μλ = {}", number(low))
+            } else {
+                format!(" at μλ = {} to {}", number(low), number(high))
+            }
+        });
+        table.push([
+            Cell::from(mark("the recording itself", found.from == Method::Recording)),
+            verdict(word(outcome)),
+            "–".into(),
+            "–".into(),
+            "–".into(),
+            format!("{outcome}{at}").into(),
+        ]);
+    }
+    table
+}
+
+fn models(page: &mut Page, found: &Answer) {
+    let agrees = |yes: bool| if yes { Cell::tone("agrees", Tone::Good) } else { Cell::tone("does not", Tone::Bad) };
+    if !found.checks.is_empty() {
+        let mut table = Table::new(["model", "axis", "compared", "error", "of an effect of", "sensor explains", ""]);
+        for c in &found.checks {
+            let unit = if c.part == "master" { "m" } else { "N" };
+            table.push([
+                Cell::from(c.part),
+                c.axis.to_string().into(),
+                c.quantity.into(),
+                si(c.error_rms, unit).into(),
+                si(c.effect_rms, unit).into(),
+                si(c.floor_rms, unit).into(),
+                agrees(c.agrees),
+            ]);
+        }
+        page.table(table.caption("Each device's model run alone on what the device was given in the recording; root mean squares."));
+    }
+    if let Some(check) = &found.loop_check {
+        let mut table = Table::new(["measured loop against the models' loop", "noise explains", ""]);
+        table.push([Cell::from(percent(check.difference)), percent(check.noise).into(), agrees(check.agrees)]);
+        page.table(table);
+    }
+}

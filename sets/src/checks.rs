@@ -1,0 +1,134 @@
+//! What is wrong with a set of recordings before any of it is looked at: the same data as fitted and held out, and inputs that nothing takes.
+
+use crate::error::SetError;
+use backdrive_bags::Reader;
+use backdrive_diagnosis::problem::{Problem, Record};
+use backdrive_plant::model::Model;
+use backdrive_plant::recording::{Source, read_headings, signals_of, units};
+use backdrive_plant::set::RecordingSet;
+use std::io::Read;
+use std::path::Path;
+
+/// Refuses what is fitted and held out at once, under whichever name; a recording that is fitted twice is a note, for it counts twice.
+pub fn repeated(set: &RecordingSet) -> Result<Vec<String>, SetError> {
+    let mut notes = Vec::new();
+    let all: Vec<(&String, bool)> = set.fit.iter().map(|f| (f, false)).chain(set.held_out.iter().map(|f| (f, true))).collect();
+    for (i, (second, held)) in all.iter().enumerate() {
+        let same = |first: &String| overlap(set, first, second) && same_data(&set.path_of(first), &set.path_of(second));
+        let Some((first, first_held)) = all[..i].iter().find(|(first, _)| same(first)) else { continue };
+        let (first, second) = (set.path_of(first).display().to_string(), set.path_of(second).display().to_string());
+        let which =
+            if first == second { format!("{second}: is given twice") } else { format!("{second}: is the same recording as {first}") };
+        if held != first_held {
+            return Err(SetError::new(format!(
+                "{which}, once to be fitted and once held out; what a fit has seen cannot check it: hold out another recording, or give it once"
+            )));
+        }
+        notes.push(format!("{which}: its samples count twice, so that intervals are too narrow"));
+    }
+    Ok(notes)
+}
+
+/// Refuses a recording that is both fitted and held out in another form, such as a table and the bag that it was imported into: the samples
+/// that the model takes are the same, bit for bit.
+pub(crate) fn repeated_samples(problem: &Problem) -> Result<(), SetError> {
+    let moves = |record: &Record| record.inputs.iter().chain(record.outputs.iter().flatten()).any(|s| s.iter().any(|x| *x != s[0]));
+    let same = |a: &Record, b: &Record| a.inputs == b.inputs && a.outputs == b.outputs && moves(a);
+    for held in &problem.held_out {
+        if let Some(fitted) = problem.fit.iter().find(|fitted| same(fitted, held)) {
+            return Err(SetError::new(format!(
+                "{}: holds the same samples as {}, once to be fitted and once held out; what a fit has seen cannot check it: hold out another \
+                 recording, or give it once",
+                held.name, fitted.name
+            )));
+        }
+    }
+    Ok(())
+}
+
+/// Whether the rows that count in two files of a set have some in common, were the files the same.
+fn overlap(set: &RecordingSet, first: &str, second: &str) -> bool {
+    let (a, b) = (set.rules_of(first).piece, set.rules_of(second).piece);
+    let [from_a, to_a] = a.rows.unwrap_or([0, usize::MAX]);
+    let [from_b, to_b] = b.rows.unwrap_or([0, usize::MAX]);
+    from_a < to_b && from_b < to_a && a.keep == b.keep
+}
+
+/// Whether two paths lead to one file, or to files of the same bytes. What cannot be read is told where it is used.
+pub(crate) fn same_data(first: &Path, second: &Path) -> bool {
+    if is_same_file(first, second) {
+        return true;
+    }
+    let open = |path: &Path| {
+        backdrive_plant::input_file::open(path).ok().map(|f| (f.metadata().map_or(0, |m| m.len()), std::io::BufReader::new(f)))
+    };
+    let (Some((size, first)), Some((other, second))) = (open(first), open(second)) else { return false };
+    size == other && size > 0 && first.bytes().zip(second.bytes()).all(|(a, b)| matches!((a, b), (Ok(a), Ok(b)) if a == b))
+}
+
+/// Whether two paths lead to one file that is there.
+pub(crate) fn is_same_file(first: &Path, second: &Path) -> bool {
+    matches!((first.canonicalize(), second.canonicalize()), (Ok(a), Ok(b)) if a == b)
+}
+
+/// Refuses to go on where the recordings hold an input that no part of the model takes; other signals that are not used are a note.
+/// `ignored` are names that may be left out.
+pub(crate) fn left_out(set: &RecordingSet, model: &Model, ignored: &[String], has_grip: bool) -> Result<Option<String>, SetError> {
+    let mut unused: Vec<(String, String)> = Vec::new();
+    for file in set.fit.iter().chain(&set.held_out) {
+        for name in unused_in(set, file, model) {
+            if !unused.iter().any(|(other, _)| *other == name) {
+                unused.push((name, set.path_of(file).display().to_string()));
+            }
+        }
+    }
+    let may_be_left = |name: &String| ignored.contains(name) || set.ignore.contains(name);
+    unused.retain(|(name, _)| !may_be_left(name));
+    if let Some((name, file)) = unused.iter().find(|(name, _)| is_hand(name)) {
+        let takes: Vec<&str> = model.inputs.iter().map(|i| i.name.as_str()).collect();
+        let prefix = name.strip_suffix("hand").map_or("", |p| p.trim_end_matches(['.', '_']));
+        let hint = match has_grip {
+            true => format!("the grip that was given is another one than \"{prefix}\""),
+            false => format!("did you mean --grip {prefix}.toml (the grip that held the device), or a model that holds the hand?"),
+        };
+        return Err(SetError::new(format!(
+            "{file}: {name}, a motion of the hand, is in the recordings and nothing takes it: the model's inputs are {}; {hint} \
+             --ignore-signal {name}, or ignore = [\"{name}\"] in set.toml, goes on without it",
+            takes.join(", ")
+        )));
+    }
+    let names: Vec<&str> = unused.iter().map(|(name, _)| name.as_str()).collect();
+    Ok(match names.as_slice() {
+        [] => None,
+        names => Some(format!("recorded and not used, for the model has no such input or output: {}", names.join(", "))),
+    })
+}
+
+/// The name that a grip's hand has in recordings: `GRIP.hand`, or `GRIP_hand` where a name may have no point (topics).
+fn is_hand(name: &str) -> bool {
+    name.ends_with(".hand") || name.ends_with("_hand")
+}
+
+/// Signals of one file that are neither the model's nor named by the set; none of a file that cannot be read, which is told elsewhere.
+fn unused_in(set: &RecordingSet, file: &str, model: &Model) -> Vec<String> {
+    let path = set.path_of(file);
+    let own = signals_of(model);
+    let by_rule = |heading: &str| set.columns.iter().any(|(_, rule)| matches!(&rule.source, Source::Column(c) if c == heading));
+    let topic_by_rule =
+        |name: &str| set.columns.iter().any(|(_, rule)| matches!(&rule.source, Source::Topic { topic, .. } if topic == name));
+    if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("mcap")) {
+        let Ok(reader) = Reader::open(&path) else { return Vec::new() };
+        let flat: Vec<String> = own.iter().map(|s| s.replace('.', "_")).collect();
+        let names = reader.topics().iter().filter(|t| !topic_by_rule(&t.name)).filter_map(|t| t.name.strip_prefix("/recording/"));
+        return names.filter(|n| !own.contains(n) && !flat.iter().any(|f| f == n)).map(str::to_string).collect();
+    }
+    let Ok(headings) = read_headings(&path) else { return Vec::new() };
+    let rows_by = set.rules_of(file).piece.keep;
+    let is_own = |h: &str| {
+        // A heading is meant by its whole text or by its name without the unit.
+        [h, units::split(h).0]
+            .iter()
+            .any(|name| *name == "t" || own.contains(name) || by_rule(name) || rows_by.iter().any(|(c, _)| c == name))
+    };
+    headings.into_iter().filter(|h| !h.is_empty() && !is_own(h)).collect()
+}

@@ -1,0 +1,10 @@
+//! Sets of recordings: [`open`]ed and checked as a diagnosis or a fit takes them, made of the [`experiments`] of a graph, and begun
+//! for recordings of one's own ([`init`]).
+
+pub mod checks;
+mod error;
+pub mod experiments;
+pub mod init;
+pub mod open;
+
+pub use error::SetError;

@@ -1,0 +1,101 @@
+//! What to do after a diagnosis, with the commands that do it.
+
+use crate::offered::{Builder, Offered, Step, plain};
+use backdrive_bags::Reader;
+use backdrive_diagnosis::audit::Weight;
+use backdrive_diagnosis::diagnose::Diagnosis;
+use backdrive_diagnosis::verdict::{MODEL_FILE, Word};
+use backdrive_nodes::graph::{NodeKind, Overrides, Settings};
+use backdrive_pages::diagnose::said::next_experiment;
+use backdrive_report::percent;
+use backdrive_stability::summary::graph_of;
+use std::path::{Path, PathBuf};
+
+/// The graph on which a canceller is tried, where it is at hand.
+const CONTACT: &str = "launch/contact.toml";
+
+/// What to do, the most useful first. `out` is the folder of the model that was written, `files` are the recordings.
+pub fn next(found: &Diagnosis, out: &Path, files: &[PathBuf]) -> Vec<Step> {
+    let held = &found.verdict.held_out;
+    let model = out.join(MODEL_FILE);
+    // A canceller takes the model of a master: one that says where it is held, pushed and read.
+    let is_master = !found.problem.model.axes.is_empty();
+    let (before, after) = (held.nrmse_before.unwrap_or(f64::NAN), held.nrmse_after.unwrap_or(f64::NAN));
+    let worth = format!("its error is {} of what was measured, that of the model as given {}", percent(after), percent(before));
+    let place = if is_master { "a canceller" } else { "a feed-forward or a simulation" };
+    let use_it = if is_master { vec![contact(&model)] } else { vec![simulated(&model, files, Path::new("predicted.csv"))] };
+    let mut steps = Vec::new();
+    match found.verdict.word {
+        Word::Missing | Word::Parameters => {
+            let text = format!("Use {} where the motion is predicted, such as in {place}: {worth}.", model.display());
+            steps.push(Step::new(text, use_it));
+            if let Some(asked) = Some(is_master).filter(|is| *is).and_then(|_| in_the_loop(&model, files)) {
+                let text = "See what it is worth in the loop: the stability limit with it, in the recording of a contact.";
+                steps.push(Step::new(text, [Some(asked)]));
+            }
+        }
+        Word::Ambiguous => steps.push(Step::new(
+            format!("{} may be used ({worth}), but hold what is built on it against the rivals below too.", model.display()),
+            use_it,
+        )),
+        Word::NothingMissing => steps.push(Step::said("Keep the model: the recordings ask for nothing more.")),
+        Word::Unexplained => steps.push(Step::said(
+            "Do not build on a law yet: look at when and where the residual shows, and check the sensors named there first.",
+        )),
+        Word::CannotTell => {}
+    }
+    if let Some(next) = &found.verdict.next_experiment {
+        steps.push(Step::said(format!("Record next: {}", next_experiment(next))));
+    }
+    if let Some(remark) = found.remarks.iter().find(|r| r.weight > Weight::Note && !r.signal.is_empty()) {
+        steps.push(Step::said(format!("Check this signal: {remark}")));
+    }
+    if found.search.cut {
+        let text = "Let the search come to its end: the same command with more time on the clock.";
+        steps.push(Step::new(text, [again("--patience", 600.0)]));
+    } else if found.search.exhausted {
+        let text = "Let it search more: the same command with twice the effort.";
+        steps.push(Step::new(text, [again("--effort", 1.0)]));
+    }
+    steps
+}
+
+/// The contact task with the model in its canceller.
+fn contact(model: &Path) -> Option<Offered> {
+    let run = Builder::verb("run").reads(Path::new(CONTACT)).option_reads("--canceller", model);
+    run.option("--high-pass", 1).option_writes("--bag", Path::new("with-diagnosed.mcap")).build()
+}
+
+/// The model's prediction of a recording, into a table of this name or one like it.
+pub fn simulated(model: &Path, files: &[PathBuf], table: &Path) -> Option<Offered> {
+    // A set names the columns; the model beside it is the first of the files.
+    let recording = files.iter().rev().find(|file| file.extension().is_some_and(|e| e != "toml"))?;
+    let set = recording.parent().map(|folder| folder.join("set.toml")).filter(|set| set.exists());
+    let simulate = Builder::verb("simulate").reads(model).reads(recording).option_writes("--out", table);
+    match set {
+        Some(set) => simulate.option_reads("--columns", &set).build(),
+        None => simulate.build(),
+    }
+}
+
+/// The question of the stability limit with the model in the canceller, of the first recording that holds a loop with one.
+fn in_the_loop(model: &Path, files: &[PathBuf]) -> Option<Offered> {
+    let changes = Overrides { canceller: Some(model.to_path_buf()), canceller_grip: Some("none".into()), ..Overrides::default() };
+    let bags = files.iter().filter(|file| file.extension().is_some_and(|e| e == "mcap"));
+    let bag = bags.into_iter().find(|bag| {
+        let graph = Reader::open(bag).ok().and_then(|reader| graph_of(&reader, &changes).ok());
+        graph.is_some_and(|graph| {
+            let touches = graph.node_of(NodeKind::Slave).is_some_and(|n| matches!(&n.settings, Settings::Slave(f) if f.fragment.is_some()));
+            touches && graph.gains.mu * graph.gains.lambda > 0.0 && graph.node_of(NodeKind::Operator).is_some()
+        })
+    })?;
+    let asked = Builder::verb("stability").reads(bag).option_reads("--canceller", model).option("--canceller-grip", "none");
+    asked.option("--high-pass", 1).option_writes("--html", Path::new("stability.html")).build()
+}
+
+/// The diagnosis again, an option with twice its value.
+fn again(name: &str, usual: f64) -> Option<Offered> {
+    let again: Builder = Builder::again();
+    let now = again.value_of(name).and_then(|text| text.parse::<f64>().ok()).unwrap_or(usual);
+    again.option(name, plain(2.0 * now)).build().filter(|offered| offered.is("diagnose"))
+}
