@@ -1,10 +1,10 @@
 //! A diagnosis from its problem to its verdict: the audit, the search, the force located, what is claimed, and each record by itself.
 
 use crate::audit::{Remark, Weight, audit, without_contradicted};
-use crate::candidate::price;
+use crate::candidate::{Candidate, price};
+use crate::compare::unseen;
 use crate::contenders::with_contenders;
 use crate::equation_error::{OnForces, inverse, search_on_forces};
-use crate::evaluator::measured;
 use crate::hold;
 use crate::let_go::let_go;
 use crate::locate::{self, Location, locate};
@@ -101,7 +101,7 @@ fn searched(
     let best = chosen(&simulated.1);
     let is_explained = best.levels.iter().all(|level| *level < tuning().noise.unexplained);
     let on_forces = match direct {
-        Some(found) => Some(found).filter(|found| !is_explained && !leaves_less(&simulated, found)),
+        Some(found) => Some(found).filter(|found| !leaves_less(&simulated, found)),
         None => {
             turned.filter(|_| !is_explained && best.structure.added.is_empty()).and_then(|t| search_on_forces(&t, settings, limit, report))
         }
@@ -115,13 +115,15 @@ fn searched(
     }
 }
 
-/// Whether a search by simulation leaves far less of the measured force in held-out recordings than one on forces.
+/// Whether a search by simulation leaves far less of the measured force of held-out recordings than one on forces. Both are compared in the band of that one: beyond
+/// it a motion's steps and noise, differentiated twice, count as noise of the force and hide what either leaves.
 fn leaves_less(simulated: &(Problem, Search), on_forces: &(Problem, Search)) -> bool {
-    let left = |(problem, search): &(Problem, Search)| {
-        let output = measured(problem.held_out.first()?).next()?;
-        Some(search.noise_sd.get(output)? * chosen(search).unseen.as_ref()?.mean_square.sqrt())
-    };
-    left(simulated).zip(left(on_forces)).is_some_and(|(simulated, found)| simulated < tuning().equation_error.sharper * found)
+    let (problem, found) = on_forces;
+    let records = if problem.held_out.is_empty() { &problem.fit } else { &problem.held_out };
+    let left = |c: &Candidate| Some(unseen(problem, records, &c.structure, &c.fit.values, &found.noise_sd)?.mean_square.sqrt());
+    left(chosen(&simulated.1))
+        .zip(left(chosen(found)))
+        .is_some_and(|(simulated, found)| simulated < tuning().equation_error.sharper * found)
 }
 
 /// What a reader has to know of a search on forces.

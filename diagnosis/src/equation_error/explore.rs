@@ -1,5 +1,6 @@
 //! Every law, every pair, and of the best of those every third: what each predicts of stretches that were left out, in all bands, and which is enough.
 
+use super::gram::Left;
 use super::room::{Chosen, Room};
 use crate::tuning::tuning;
 use rayon::prelude::*;
@@ -16,12 +17,19 @@ pub(crate) struct Looked {
     pub errors: Vec<f64>,
     /// Numbers that they add.
     pub numbers: usize,
+    /// What is left of stretches that were left out, in each band.
+    left: Vec<Left>,
 }
 
 impl Looked {
     /// Mean over the stretches.
     pub fn mean(&self) -> f64 {
         self.errors.iter().sum::<f64>() / self.errors.len().max(1) as f64
+    }
+
+    /// What they cost: their numbers, and for each law that it was picked among a dozen.
+    pub fn cost(&self) -> f64 {
+        self.numbers as f64 + tuning().equation_error.picked * self.laws.len() as f64
     }
 }
 
@@ -52,7 +60,9 @@ pub(crate) fn explore(rooms: &[Room], most: usize) -> Option<Explored> {
     let look = |laws: Vec<usize>, before: &[Vec<Chosen>]| {
         let chosen: Option<Vec<Vec<Chosen>>> =
             rooms.iter().enumerate().map(|(r, room)| chosen(room, before.get(r).map_or(&[], Vec::as_slice), &laws)).collect();
-        looked(rooms, &scales, &vec![SMALLEST; rooms.len()], laws, chosen?)
+        let chosen = chosen?;
+        let left = rooms.iter().zip(&chosen).map(|(room, chosen)| room.left(chosen)).collect::<Option<_>>()?;
+        Some(looked(rooms, &scales, &vec![SMALLEST; rooms.len()], Looked { laws, chosen, errors: Vec::new(), numbers: 0, left }))
     };
     let mut all: BTreeMap<Vec<usize>, Looked> = BTreeMap::new();
     all.insert(Vec::new(), look(Vec::new(), &[])?);
@@ -78,14 +88,11 @@ pub(crate) fn explore(rooms: &[Room], most: usize) -> Option<Explored> {
     }
     // Where a drive rests and logs zeros there is no error at all: what is far below what the best leaves says nothing, of whichever structure.
     let best = all.values().min_by(|a, b| a.mean().total_cmp(&b.mean()))?.clone();
-    let floor = |((room, scale), chosen): ((&Room, &f64), &Vec<Chosen>)| {
-        Some(tuning().equation_error.floor * mean(&room.left_out(chosen)?) / scale)
-    };
-    let floors: Vec<f64> = rooms.iter().zip(&scales).zip(&best.chosen).map(floor).collect::<Option<_>>()?;
-    let floored = |l: Looked| looked(rooms, &scales, &floors, l.laws, l.chosen);
-    let mut all: Vec<Looked> = all.into_values().collect::<Vec<_>>().into_par_iter().filter_map(floored).collect();
+    let floor = |((room, scale), left): ((&Room, &f64), &Left)| tuning().equation_error.floor * mean(&room.mean_square(left)) / scale;
+    let floors: Vec<f64> = rooms.iter().zip(&scales).zip(&best.left).map(floor).collect();
+    let mut all: Vec<Looked> = all.into_values().map(|l| looked(rooms, &scales, &floors, l)).collect();
     all.sort_by(|a, b| a.mean().total_cmp(&b.mean()));
-    let enough = enough(&all);
+    let enough = enough(rooms, &all);
     Some(Explored { all, enough })
 }
 
@@ -96,15 +103,17 @@ fn mean(x: &[f64]) -> f64 {
 /// What is as small as rounding says nothing.
 const SMALLEST: f64 = 1e-12;
 
-fn looked(rooms: &[Room], scales: &[f64], floors: &[f64], laws: Vec<usize>, chosen: Vec<Vec<Chosen>>) -> Option<Looked> {
+/// The same with its errors and numbers, from what it leaves.
+fn looked(rooms: &[Room], scales: &[f64], floors: &[f64], mut l: Looked) -> Looked {
     let mut errors: Vec<f64> = Vec::new();
-    for (((room, scale), floor), chosen) in rooms.iter().zip(scales).zip(floors).zip(&chosen) {
-        let own = room.left_out(chosen)?;
+    for (((room, scale), floor), left) in rooms.iter().zip(scales).zip(floors).zip(&l.left) {
+        let own = room.mean_square(left);
         errors.resize(own.len(), 0.0);
         errors.iter_mut().zip(own).for_each(|(sum, e)| *sum += (e / scale).max(floor.max(SMALLEST)).ln() / rooms.len() as f64);
     }
-    let numbers = laws.iter().map(|law| rooms.first().map_or(0, |room| room.laws[*law].numbers)).sum();
-    Some(Looked { laws, chosen, errors: errors.into_iter().map(f64::exp).collect(), numbers })
+    l.numbers = l.laws.iter().map(|law| rooms.first().map_or(0, |room| room.laws[*law].numbers)).sum();
+    l.errors = errors.into_iter().map(f64::exp).collect();
+    l
 }
 
 /// The choices of the nonlinear numbers of laws in a band, from those of some of them on.
@@ -157,17 +166,42 @@ pub(crate) fn better(first: &Looked, second: &Looked) -> Better {
     Better { mean, error: (variance / n).sqrt(), share: first.mean() / second.mean().max(f64::MIN_POSITIVE) - 1.0 }
 }
 
-/// The simplest that predicts left-out stretches alike.
-fn enough(all: &[Looked]) -> usize {
+/// How surely what a richer structure has more of the force is in what a simpler one leaves of left-out stretches, in standard errors.
+///
+/// After Clark and West (2007): the mean product of the two, each stretch in its own error. A comparison of errors alone is lost by
+/// a richer structure whose numbers are hardly known, also where it is the right one.
+fn shows(rooms: &[Room], simple: &Looked, rich: &Looked) -> f64 {
+    let mut products: Vec<f64> = Vec::new();
+    for ((room, simple), rich) in rooms.iter().zip(&simple.left).zip(&rich.left) {
+        let [own, other, both] = [(simple, simple), (rich, rich), (simple, rich)].map(|(a, b)| room.mean_product(a, b));
+        let floor = (tuning().equation_error.floor * mean(&other)).max(f64::MIN_POSITIVE);
+        products.resize(own.len(), 0.0);
+        for (sum, ((own, other), both)) in products.iter_mut().zip(own.into_iter().zip(other).zip(both)) {
+            *sum += (own - both) / (own.max(floor) * other.max(floor)).sqrt();
+        }
+    }
+    let square: f64 = products.iter().map(|x| x * x).sum();
+    products.iter().sum::<f64>() / square.sqrt().max(f64::MIN_POSITIVE)
+}
+
+/// The simplest that predicts left-out stretches alike, of those whose laws all predict better beside the others.
+fn enough(rooms: &[Room], all: &[Looked]) -> usize {
     let tuning = &tuning().equation_error;
-    let priced = |l: &Looked| l.mean() * (1.0 + tuning.worth * l.numbers as f64);
+    let priced = |l: &Looked| l.mean() * (1.0 + tuning.worth * l.cost());
     let Some((at, best)) = all.iter().enumerate().min_by(|a, b| priced(a.1).total_cmp(&priced(b.1))) else { return 0 };
-    let mut simpler: Vec<(usize, &Looked)> = all.iter().enumerate().filter(|(_, l)| l.numbers < best.numbers).collect();
-    simpler.sort_by(|a, b| a.1.numbers.cmp(&b.1.numbers).then(a.1.mean().total_cmp(&b.1.mean())));
-    let is_enough = |l: &Looked| {
-        let gain = better(l, best);
-        let numbers = (best.numbers - l.numbers) as f64;
-        gain.mean < tuning.sure * gain.error || gain.share < tuning.least_gain.max(tuning.worth * numbers)
+    let is_enough = |simple: &Looked, rich: &Looked| {
+        let gain = better(simple, rich);
+        let numbers = rich.numbers.saturating_sub(simple.numbers) as f64;
+        let surely = gain.mean >= tuning.sure * gain.error || shows(rooms, simple, rich) >= tuning.shown;
+        !surely || gain.share < tuning.least_gain.max(tuning.worth * numbers)
     };
-    simpler.into_iter().find(|(_, l)| is_enough(l)).map_or(at, |(index, _)| index)
+    let is_needed = |l: &Looked, law: &usize| {
+        let is_rest = |other: &&Looked| {
+            other.laws.len() + 1 == l.laws.len() && !other.laws.contains(law) && other.laws.iter().all(|o| l.laws.contains(o))
+        };
+        all.iter().find(is_rest).is_none_or(|rest| !is_enough(rest, l))
+    };
+    let mut simpler: Vec<(usize, &Looked)> = all.iter().enumerate().filter(|(_, l)| l.cost() < best.cost()).collect();
+    simpler.sort_by(|a, b| a.1.cost().total_cmp(&b.1.cost()).then(a.1.mean().total_cmp(&b.1.mean())));
+    simpler.into_iter().find(|(_, l)| is_enough(l, best) && l.laws.iter().all(|law| is_needed(l, law))).map_or(at, |(index, _)| index)
 }

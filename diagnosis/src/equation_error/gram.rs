@@ -24,6 +24,9 @@ pub(crate) struct Sum {
     pub by: Vec<usize>,
 }
 
+/// What a sum leaves of each stretch: columns, each over its root mean square, with their factors.
+pub(crate) type Left = Vec<Vec<(usize, f64)>>;
+
 impl Gram {
     /// Of columns that are all as long, in these stretches of them, of which fits see the first `seen`.
     pub fn of(columns: &[Vec<f64>], stretches: &[Range<usize>], seen: usize) -> Gram {
@@ -77,20 +80,35 @@ impl Gram {
         Some((sum.by.iter().zip(factors.iter()).map(|(c, x)| x / self.scales[*c]).collect(), left))
     }
 
-    /// Mean square of what is left of each stretch by factors that were found on all others that fits see.
-    pub fn left_out(&self, sum: &Sum) -> Option<Vec<f64>> {
+    /// What is left of each stretch by factors that were found on all others that fits see.
+    pub fn left(&self, sum: &Sum) -> Option<Left> {
         let (matrix, vector, _) = self.parts(&self.total, sum);
         let of_all = Gram::solve(&matrix, &vector)?;
-        let one = |(index, (samples, products)): (usize, &(usize, Vec<f64>))| {
-            let (own_matrix, own_vector, own) = self.parts(products, sum);
+        let one = |(index, (_, products)): (usize, &(usize, Vec<f64>))| {
+            let (own_matrix, own_vector, _) = self.parts(products, sum);
             let factors = match index < self.seen {
                 true => Gram::solve(&(&matrix - &own_matrix), &(&vector - &own_vector))?,
                 false => of_all.clone(),
             };
-            let left = own - 2.0 * factors.dot(&own_vector) + factors.dot(&(&own_matrix * &factors));
-            Some(left.max(0.0) / (*samples).max(1) as f64)
+            let target = sum.target.iter().map(|t| (*t, self.scales[*t]));
+            Some(target.chain(sum.by.iter().zip(factors.iter()).map(|(by, factor)| (*by, -factor))).collect())
         };
         self.stretches.iter().enumerate().map(one).collect()
+    }
+
+    /// Mean product of what two sums leave, stretch by stretch.
+    pub fn mean_product(&self, a: &Left, b: &Left) -> Vec<f64> {
+        let one = |(index, (samples, products)): (usize, &(usize, Vec<f64>))| {
+            let (a, b) = (a.get(index).map_or(&[][..], Vec::as_slice), b.get(index).map_or(&[][..], Vec::as_slice));
+            let with = |(column, factor): &(usize, f64)| factor * b.iter().map(|(c, f)| f * self.at(products, *column, *c)).sum::<f64>();
+            a.iter().map(with).sum::<f64>() / (*samples).max(1) as f64
+        };
+        self.stretches.iter().enumerate().map(one).collect()
+    }
+
+    /// Mean square of what is left of each stretch.
+    pub fn mean_square(&self, left: &Left) -> Vec<f64> {
+        self.mean_product(left, left).into_iter().map(|x| x.max(0.0)).collect()
     }
 }
 
@@ -110,7 +128,7 @@ mod tests {
         let (factors, left) = gram.fit(&sum).unwrap();
         assert!((factors[0] - 2.0).abs() < 0.05 && (factors[1] + 500.0).abs() < 30.0, "{factors:?}");
         assert!((left - 0.005).abs() < 0.001, "{left}");
-        let errors = gram.left_out(&sum).unwrap();
+        let errors = gram.mean_square(&gram.left(&sum).unwrap());
         for (stretch, error) in stretches.iter().zip(errors) {
             let rows: Vec<usize> = (0..n).filter(|i| !stretch.contains(i)).collect();
             let matrix = DMatrix::from_fn(rows.len(), 2, |r, c| if c == 0 { a[rows[r]] } else { b[rows[r]] });

@@ -1,6 +1,6 @@
 //! Every law that can be looked at on forces along a motion, as columns beside those of the nominal model's own numbers.
 
-use super::gram::{Gram, Sum};
+use super::gram::{Gram, Left, Sum};
 use crate::hypothesis::{Family, ForceSpan, Hypothesis, Run, Scales, Seen, apply_edits};
 use crate::physics;
 use crate::problem::{Problem, Record};
@@ -294,9 +294,24 @@ impl Room {
         written.iter().zip(values).all(|(a, b)| (a - b).abs() <= 1e-6 * b.abs().max(f64::MIN_POSITIVE))
     }
 
+    /// What laws leave of stretches that were left out.
+    pub fn left(&self, laws: &[Chosen]) -> Option<Left> {
+        self.gram.left(&self.sum(laws))
+    }
+
+    /// The mean product of that of two structures, stretch by stretch, force squared.
+    pub fn mean_product(&self, a: &Left, b: &Left) -> Vec<f64> {
+        self.gram.mean_product(a, b)
+    }
+
+    /// Its mean square, stretch by stretch, force squared.
+    pub fn mean_square(&self, left: &Left) -> Vec<f64> {
+        self.gram.mean_square(left)
+    }
+
     /// What laws leave of stretches that were left out: mean squares, force squared.
     pub fn left_out(&self, laws: &[Chosen]) -> Option<Vec<f64>> {
-        self.gram.left_out(&self.sum(laws))
+        self.left(laws).map(|left| self.mean_square(&left))
     }
 
     /// The choice of a law's nonlinear numbers that leaves least beside others.

@@ -63,7 +63,9 @@ pub(crate) fn search_on_forces(
     let beliefs: Vec<(String, Belief)> = best.laws.iter().map(|law| (id(law), belief(&rooms, &explored, *law))).collect();
     let is_alike = |l: &&&Looked| {
         let ahead = better(l, best);
-        l.laws != best.laws && l.laws.len() == best.laws.len() && ahead.in_errors() < tuning().equation_error.sure
+        l.laws != best.laws
+            && (l.laws.len() == best.laws.len() || l.cost() <= best.cost())
+            && ahead.in_errors() < tuning().equation_error.sure
     };
     let alike: Vec<String> = match beliefs.iter().all(|(_, b)| b.law >= tuning().equation_error.claimed) {
         true => Vec::new(),

@@ -35,6 +35,10 @@ group! {
         least_gain: f64 = 0.03, "-", Judgement("as worth, of all its numbers");
         /// Standard errors of the mean, stretch by stretch, by which a richer structure has to be better.
         sure: f64 = 1.0, "standard errors", Statistics("the richer one was chosen as the best of many already, and pays for its numbers");
+        /// Standard errors by which the force that a richer structure has more shows in what the simpler one leaves, where the errors do not decide.
+        shown: f64 = 1.645, "standard errors", Statistics("one in twenty by chance, as Clark and West have it for models that contain each other");
+        /// What it costs that a law is one of many, in numbers.
+        picked: f64 = 1.0, "numbers", Statistics("which of a dozen laws it is says as much as a number known to a tenth; two laws are a rarer cause than one with their numbers");
         /// Numbers that a rival may have more than the chosen structure.
         rival_numbers: usize = 2, "numbers", Judgement("what needs more than one law more explains anything");
         /// Log-odds of a law: a constant, then one for each of its figures, see [`crate::equation_error::Figures`].
