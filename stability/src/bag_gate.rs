@@ -73,8 +73,8 @@ fn lost(account: &Account, reader: &Reader) -> Option<Unjudged> {
     beyond.then(|| Unjudged::Lost { messages: account.lost() })
 }
 
-/// What in a recording keeps back the green answer of a loop that is run again from it: the same as `stability` says of the bag at its own gain. The notes
-/// say what it is in detail.
+/// What in a recording prevents the answer "stable" for a re-simulation of its loop: the same conditions as those of `stability` for the bag at its own
+/// gain. The notes say what it is in detail.
 ///
 /// # Errors
 /// The bag cannot be read.

@@ -51,7 +51,7 @@ pub struct Collector {
     axes: Vec<Columns>,
     /// Flags of the master's and the slave's samples, together.
     flags: Vec<u32>,
-    /// (row, mu, lambda) as told.
+    /// (row, mu, lambda) as reported.
     gains: Vec<(usize, f64, f64)>,
     /// The first step heard is row 0.
     origin: Option<u64>,
@@ -345,7 +345,7 @@ impl Collector {
         Session { axes: axes.collect(), mu, lambda, ..self.blank.clone() }
     }
 
-    /// mu*lambda as it was last told.
+    /// mu*lambda as last reported.
     pub fn last_loop_gain(&self) -> f64 {
         self.gains.last().map_or(f64::NAN, |(_, mu, lambda)| mu * lambda)
     }

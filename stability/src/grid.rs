@@ -2,7 +2,7 @@
 
 use backdrive_plant::model::Hold;
 
-/// A signal as it was recorded.
+/// A recorded signal.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Series {
     /// Header stamps, ns; of messages without one, or with none filled in, the log time.

@@ -1,5 +1,5 @@
-//! What a run did: stable, a limit cycle, unstable, limited, or nothing that can be judged; and the signals of one axis, from which
-//! [`crate::judgement::judge`] says which.
+//! What a run did: stable, a limit cycle, unstable, limited, or nothing that can be judged. Also the signals of one axis, from which
+//! [`crate::judgement::judge`] decides which.
 
 use crate::unjudged::{Gaps, Unjudged};
 use backdrive_plant::model::Motion;
@@ -158,18 +158,18 @@ impl Outcome {
         matches!(self, Outcome::LimitCycle { .. } | Outcome::Unstable { .. })
     }
 
-    /// The same, but not judged in the place of stable where something keeps a green answer back. What speaks against the loop stands.
+    /// The same, but not judged instead of stable where something prevents the answer "stable". What speaks against the loop stands.
     pub fn held_back(self, by: Option<Unjudged>) -> Outcome {
         match (self, by) {
             (Outcome::Stable, Some(why)) => Outcome::NotJudged { why },
-            // That something is lost says more than that nothing was touched in what is left.
+            // A loss is more informative than that nothing was touched in the rest.
             (Outcome::NotJudged { why: before }, Some(why)) if !before.is_loss() && why.is_loss() => Outcome::NotJudged { why },
             (outcome, _) => outcome,
         }
     }
 
-    /// How bad it is, for several axes: the worst counts. An axis that touched nothing says nothing of one that did, but one of which
-    /// something is missing takes a green answer from all.
+    /// How bad it is, for several axes: the worst counts. An axis that touched nothing is no evidence on one that did, but one with missing data
+    /// prevents the answer "stable" for all.
     pub(crate) fn rank(&self) -> u8 {
         match self {
             // Of several that say nothing, the one that came farther.

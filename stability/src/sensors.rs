@@ -6,7 +6,7 @@
 //! |---|---|---|
 //! | constant | every sample is the same | whatever it measures, its noise would show |
 //! | within its resolution | three values at most, all within a thousandth of the largest | a converter flickers by one step to either side of a value that does not move; a signal that switches has values far apart |
-//! | clipped | it stops dead at one and the same extreme value, three times at least, for a hundredth of the time | a signal that turns round slows down first, and takes an extreme value once; one that a converter clips comes at full speed and stays |
+//! | clipped | it stops dead at one and the same extreme value, three times at least, for a hundredth of the time | a signal that reverses slows down first, and takes an extreme value once. A signal that a converter clips arrives at full speed and stays |
 //! | does not follow | it explains less than a tenth of what the other sensor of the same quantity moves | two sensors of one quantity are in proportion |
 
 use crate::grid::step_of;
@@ -21,7 +21,7 @@ pub struct Column<'a> {
     pub values: &'a [f64],
     /// Whether it is a position: then it may come to rest at a stop, and nothing is said of its extremes.
     pub position: bool,
-    /// The signal that it measures too, sample by sample; `None` where there is none or nobody says.
+    /// The signal that it measures too, sample by sample; `None` where there is none or none is stated.
     pub twin: Option<Twin<'a>>,
 }
 
@@ -44,7 +44,7 @@ pub struct SensorFault {
     pub fault: Fault,
 }
 
-/// Ways in which a signal says nothing, or not always.
+/// Faults of a signal that is without information always or at times.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(tag = "fault", rename_all = "snake_case")]
 pub enum Fault {
@@ -77,7 +77,7 @@ pub enum Fault {
 }
 
 impl SensorFault {
-    /// Whether the signal says nothing at all.
+    /// Whether the signal has no information at all.
     pub fn is_dead(&self) -> bool {
         !matches!(self.fault, Fault::Clipped { .. } | Fault::DoesNotFollow { .. })
     }
@@ -163,7 +163,7 @@ fn clipped(values: &[f64], at: f64) -> Option<(f64, f64)> {
     if share < LEAST_CLIPPED {
         return None;
     }
-    // As fast as it is elsewhere, and by more than the rounding of a slow signal.
+    // As fast as in other places, and by more than the rounding of a slow signal.
     let moves: Vec<f64> = values.windows(2).filter_map(|w| Some((w.first()? - w.get(1)?).abs())).filter(|d| *d > 1.01 * step).collect();
     let typical = (moves.iter().map(|d| d * d).sum::<f64>() / moves.len().max(1) as f64).sqrt();
     let (mut arrivals, mut row) = (0, 0);

@@ -62,17 +62,17 @@ pub struct AxisSignals {
     pub hand: Option<Vec<f64>>,
     /// Whether a clamp or rate limit acted, or an input was stale.
     pub clamped: Vec<bool>,
-    /// Whether an input of the master or the slave was stale, so that the loop was open; empty where it never was or nobody says.
+    /// Whether an input of the master or the slave was stale, so that the loop was open; empty where it never was or this is not known.
     pub stale: Vec<bool>,
     /// The master's limits of motion, m or rad.
     pub travel: Option<[f64; 2]>,
     /// Step of the master's position sensor, m or rad; 0 for an ideal one.
     pub resolution: f64,
-    /// Standard deviation of that sensor's noise, m or rad; 0 where there is none or nobody says.
+    /// Standard deviation of that sensor's noise, m or rad; 0 where there is none or it is not known.
     pub noise: f64,
     /// In what positions are counted.
     pub unit: Unit,
-    /// What closes the loop, as the graph says.
+    /// What closes the loop, from the graph.
     pub closes: Closes,
 }
 

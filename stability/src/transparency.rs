@@ -1,8 +1,8 @@
 //! Transparency: what the hand feels of what the slave touches, and how well each follows the other.
 //!
-//! The transmitted impedance Z_t = -S_{r,F_f-d} / (jw S_{r,x_m}) is held against mu lambda Z_e, Z_e = -S_{r,F_s} / (jw S_{r,x_s}), with
-//! r an exogenous signal, the dither d or else the operator's intent: correlating with r keeps what the loop feeds back out of both.
-//! Their distance is Lawrence's (1993): the mean of |ln |Z_t / (mu lambda Z_e)|| over the band in which all four correlate with r.
+//! The transmitted impedance Z_t = -S_{r,F_f-d} / (jw S_{r,x_m}) is compared with mu lambda Z_e, Z_e = -S_{r,F_s} / (jw S_{r,x_s}). Here r is an
+//! exogenous signal, the dither d or else the operator's intent: correlating with r removes what the loop feeds back from both. Their distance is
+//! Lawrence's (1993): the mean of |ln |Z_t / (mu lambda Z_e)|| over the band in which all four correlate with r.
 
 use crate::master_run::{Wanted, run_master};
 use crate::phases::{contacts, holds};
@@ -14,7 +14,7 @@ use serde::Serialize;
 use std::f64::consts::TAU;
 use std::ops::Range;
 
-/// Transparency of one axis. What cannot be told is `None`, and the notes say why.
+/// Transparency of one axis. Values that cannot be determined are `None`, and the notes give the reason.
 #[derive(Debug, Clone, PartialEq, Serialize, Default)]
 pub struct Transparency {
     /// Name of the axis.
@@ -79,7 +79,7 @@ const WINDOW_S: f64 = 0.05;
 const LEAST_COHERENCE: f64 = 0.8;
 /// Segments that a coherence needs to mean something.
 const LEAST_SEGMENTS: usize = 6;
-/// A frequency at which the exogenous signal has less than this share of its peak power tells nothing.
+/// A frequency at which the exogenous signal has less than this share of its peak power is not used.
 const LEAST_POWER: f64 = 1e-6;
 
 /// Transparency of every axis. `graph` is the one that made the session, where it is ours: the induced motion comes from its master.

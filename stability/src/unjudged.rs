@@ -36,7 +36,7 @@ pub enum Unjudged {
     NotClosed,
     /// A node died or failed while it ran.
     NodeDied,
-    /// The recording says two things that exclude each other, or what its graph does not make of it.
+    /// The recording contradicts itself, or differs from what its graph computes.
     Contradictory,
     /// The models in the bag do not do what was recorded.
     ModelsApart,
@@ -119,7 +119,7 @@ pub struct Gaps {
     /// Longest gap that the loop bridges by holding its last force, s: the graph's `stale_after_s`. Beyond it the nodes let the force go, so
     /// that it is another loop.
     pub bridged_s: f64,
-    /// Rows that there should be; 0 where nobody says.
+    /// Rows that there should be; 0 where this is not stated.
     pub planned: usize,
 }
 

@@ -165,7 +165,7 @@ struct Contradiction {
 }
 
 enum How {
-    /// Nothing comes in so many steps in which something is put out.
+    /// No input arrives during this number of steps in which something is put out.
     Silent(usize),
     /// In words.
     Differs(String),
@@ -259,7 +259,7 @@ fn is_unsteady(graph: &Graph, index: usize) -> bool {
     ways.filter_map(|way| way.impairment).any(|impairment| impairment.jitter_s > 0.0 || impairment.loss > 0.0)
 }
 
-/// Gains that a node had in force, as it told them.
+/// Gains that a node had in force, as it reported them.
 fn gains_of(window: &Window, node: &Node) -> Vec<Gains> {
     let topic = format!("/{}/gains", node.name);
     let mut gains: Vec<Gains> = window.gains.iter().filter(|(of, _)| *of == topic).map(|(_, gains)| *gains).collect();
@@ -308,7 +308,7 @@ fn differs(place: &Place, compared: &Compared, recorded: &[f64], predicted: &[f6
     };
     let rows: Vec<usize> = (0..recorded.len().min(predicted.len())).filter(differs).collect();
     let (first, last) = (rows.first().copied().unwrap_or(0), rows.last().copied().unwrap_or(0));
-    // The factor where they differ: elsewhere it is 1.
+    // The factor where they differ; 1 in all other places.
     let (mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0);
     for row in rows.iter().filter(|row| recorded[**row].is_finite()) {
         xx += predicted[*row] * predicted[*row];

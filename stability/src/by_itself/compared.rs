@@ -1,4 +1,4 @@
-//! A signal as it was recorded beside what it should have been: by how much they differ, and what simple thing would make one of the other.
+//! A recorded signal compared with its expected value: the size of the difference, and which simple change would explain it.
 
 use super::ways::{MOST_LATE, MOST_LATE_S, unsteady};
 use serde::Serialize;

@@ -15,16 +15,16 @@ pub struct Recorded {
     pub rows: usize,
     /// One track per topic of samples.
     pub tracks: Vec<Track>,
-    /// What nodes told: kind, text, number.
+    /// Events that nodes reported: kind, text, number.
     pub events: Vec<Told>,
     /// Gains in force, by topic.
     pub gains: Vec<(String, Gains)>,
 }
 
-/// An event as it was told.
+/// A reported event.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Told {
-    /// Topic of the node that told it.
+    /// Topic of the node that reported it.
     pub topic: String,
     /// Machine-readable kind.
     pub kind: String,

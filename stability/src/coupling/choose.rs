@@ -10,7 +10,7 @@ use std::ops::Range;
 
 /// Folds of held-out time: every fourth block.
 const FOLDS: usize = 4;
-/// A law that leaves so many times more in unseen time is worse, in however few blocks.
+/// A law whose residual on held-out time is larger by this factor is worse, even if there are few blocks.
 const SURELY_WORSE: f64 = 2.0;
 /// A term is worth a word only where it takes away at least this share of what is left: what a recording does not tell of filters and rounding is of
 /// that size.
@@ -25,11 +25,12 @@ const ROUGH_STEPS: usize = 5;
 const FULL_STEPS: usize = 12;
 /// See [`ROUGH_STEPS`].
 const FOLD_STEPS: usize = 2;
-/// A first fit that leaves so many times more than the best is surely worse in unseen time too; the best few of these are told as rivals.
+/// A first fit whose residual is larger than the best by this factor is surely worse on held-out time too; the best few of these are reported as
+/// rivals.
 const HOPELESS: f64 = 8.0;
 /// See [`HOPELESS`].
 const HOPELESS_TOLD: usize = 3;
-/// Rivals that are told.
+/// Number of rivals that are reported.
 const RIVALS: usize = 5;
 
 /// The laws that are tried, simplest first.

@@ -1,7 +1,7 @@
 //! One law fitted to one side: coefficients by least squares for each shape (filter, delays), the shape by Gauss-Newton steps.
 //!
-//! Separable least squares (Golub and Pereyra 1973). Intervals: residuals are neither white nor of one size, so the covariance is the sandwich with
-//! the scores summed over blocks of time (Liang and Zeger 1986), and t of as many degrees of freedom as there are blocks less one.
+//! Separable least squares (Golub and Pereyra 1973). Intervals: residuals are neither white nor of constant size. The covariance is therefore the
+//! sandwich with the scores summed over blocks of time (Liang and Zeger 1986). Student's t has one degree of freedom less than there are blocks.
 
 use super::filter::{FilteredRate, delayed};
 use super::law::{Law, Term, direction};
@@ -144,7 +144,7 @@ impl<'a> Ready<'a> {
         columns.iter().zip(&fit.coefficients).take(fit.terms.len()).map(|(column, c)| c.abs() * spread(column)).collect()
     }
 
-    /// The force that a law makes of one step of the position sensor: what adds less cannot be told from rounding.
+    /// The force that a law computes from one step of the position sensor: a term that adds less cannot be distinguished from rounding.
     pub(super) fn rounding(&self, fit: &Fit) -> f64 {
         let position = fit.terms.iter().position(|t| *t == Term::Position).and_then(|i| fit.coefficients.get(i));
         position.map_or(0.0, |c| c.abs() * self.side.resolution)
@@ -221,7 +221,7 @@ impl<'a> Ready<'a> {
         Some(fit)
     }
 
-    /// A shape moved by a step of one of its numbers: the filter in its logarithm, delays in rows.
+    /// A shape with one of its parameters moved by a step: the filter in its logarithm, delays in rows.
     fn stepped(&self, shape: Shape, number: Number, step: f64) -> Shape {
         let period = self.side.period_s;
         match number {

@@ -5,7 +5,7 @@
 //! compensation of friction, reflected force, and four channels. Every candidate is fitted with the filter of its speeds and its delays as numbers of
 //! the fit, predicts blocks of time that its fit has not seen, and the simplest one wins that predicts no worse than the best.
 //!
-//! What is looked at ends where the motion no longer tells the force (coherence), for above that a law would be fitted to the rounding of encoders.
+//! The band ends where the motion no longer determines the force (coherence), because above that a law would be fitted to the rounding of encoders.
 
 mod choose;
 mod filter;

@@ -12,8 +12,8 @@ pub(super) const BLOCKS: usize = 20;
 const MOST_ROWS: usize = 60_000;
 /// A shorter recording holds no motion to fit, s.
 const LEAST_S: f64 = 1.0;
-/// Coherence below which a line says more of noise than of the law: where all noise is in what the law looks at, the law comes out too weak by one
-/// less the coherence (Bendat and Piersol, Random Data, 4th ed., 6.1).
+/// Coherence below which a line contains more noise than law. Where all noise is in the inputs of the law, the law is underestimated by one minus the
+/// coherence (Bendat and Piersol, Random Data, 4th ed., 6.1).
 const COHERENT: f64 = 0.9;
 /// No band ends below this, Hz.
 const LEAST_BAND_HZ: f64 = 5.0;
@@ -150,11 +150,11 @@ fn clamp(force: &[f64]) -> Option<f64> {
     (largest > 0.0 && there >= 10 && there as f64 >= CLAMPED_SHARE * force.len() as f64).then_some(largest)
 }
 
-/// Up to which frequency what the law may look at tells the force, Hz.
+/// Upper limit of the band in which the possible inputs of the law determine the force, Hz.
 fn band(force: &[f64], own: &[f64], other: &[f64], forces: [Option<&[f64]>; 2], period_s: f64) -> f64 {
     let half = 0.5 / period_s;
     let error: Vec<f64> = other.iter().zip(own).map(|(r, x)| r - x).collect();
-    // A law of a speed is not told from a position that wanders, for that leaks over every line.
+    // A law of velocity cannot be identified from a position that drifts, because drift leaks over every line.
     let rate = |x: &[f64]| FilteredRate::of(x, 2.0 * period_s, period_s);
     let (error_rate, own_rate) = (rate(&error), rate(own));
     let mut columns: Vec<&[f64]> = vec![force, &error, own, &error_rate, &own_rate];

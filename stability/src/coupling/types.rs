@@ -56,7 +56,7 @@ impl<'a> Signals<'a> {
     }
 }
 
-/// Why no coupling can be told.
+/// Why no coupling can be identified.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum NoCoupling {
     /// Too little of it.
@@ -120,7 +120,7 @@ pub struct SideLaw {
     pub unexplained: f64,
     /// RMS of what it leaves there, N or N m.
     pub left: f64,
-    /// Upper end of the band in which the motion tells the force, Hz: what is above is not looked at.
+    /// Upper end of the band in which the motion determines the force, Hz: higher frequencies are not used.
     pub band_hz: f64,
     /// Other laws, the best first.
     pub rivals: Vec<Rival>,

@@ -22,7 +22,7 @@ const POOLED: usize = 6;
 pub(super) const DITHERED: f64 = 1e-4;
 /// The same of a hand, or of a command, whose power falls steeply with frequency: 100 dB.
 pub(super) const MOVED: f64 = 1e-10;
-/// Estimates lie no closer than this share of their frequency: what is smooth need not be told more often.
+/// Estimates lie no closer than this share of their frequency: a smooth response needs no more.
 const SPACING: f64 = 0.005;
 /// Of the noise of one line with the next, Hann window: `(2/3)^2`; as a moving average of two.
 const NEXT_LINE: f64 = 0.61;
@@ -80,7 +80,7 @@ pub(super) fn shaken(spectra: &CrossSpectra, instruments: &[usize], least_power:
 
 /// Estimates a transfer matrix. `narrow` divides the width of the windows: what changes with it is bias.
 ///
-/// `None` where too few lines are shaken, or the inputs cannot be told apart.
+/// `None` where too few lines are excited, or the inputs cannot be separated.
 pub(super) fn fit(spectra: &CrossSpectra, columns: Columns, narrow: f64) -> Option<LocalFit> {
     let Columns { outputs, inputs, instruments, least_power } = columns;
     let (ny, nu) = (outputs.len(), inputs.len());

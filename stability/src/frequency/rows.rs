@@ -71,7 +71,7 @@ pub(super) struct Rows {
     pub hand_moves: bool,
 }
 
-/// Bridges short gaps of every column; says how many rows that are, in any column.
+/// Bridges short gaps of every column; returns how many rows these are, in any column.
 pub(super) fn bridge(session: &mut Session) -> usize {
     let mut bridged = vec![false; session.len()];
     for axis in &mut session.axes {

@@ -1,12 +1,13 @@
-//! The loops of several axes together, told from the models: the generalised Nyquist criterion.
+//! The loops of several axes together, computed from the models: the generalised Nyquist criterion.
 //!
-//! With `L(jω)` the matrix of the loops per unit of gain, from the forces on the master round to the reflected ones, and `k` = μλ, the closed loop is stable
-//! where `det(I - k L(jω))` does not wind about 0 from -∞ to ∞; `L` itself is stable, for its parts are. The same is said by the eigenvalues of `k L`, the
-//! eigenloci, which must not encircle +1 taken together (A. MacFarlane and I. Postlethwaite, Int. J. Control 25 (1977) 81-127; proven by C. Desoer and
-//! Y.-T. Wang, IEEE Trans. Automatic Control 25 (1980) 187-196). Our sign: a force comes back with its sign, so +1 stands where textbooks have -1.
+//! `L(jω)` is the matrix of the loops per unit of gain, from the forces on the master round to the reflected ones, and `k` = μλ. The closed loop is stable
+//! where `det(I - k L(jω))` does not wind about 0 from -∞ to ∞; `L` itself is stable, because its parts are. An equivalent condition uses the eigenvalues of
+//! `k L`, the eigenloci, which must not encircle +1 taken together (A. MacFarlane and I. Postlethwaite, Int. J. Control 25 (1977) 81-127; proven by C.
+//! Desoer and Y.-T. Wang, IEEE Trans. Automatic Control 25 (1980) 187-196). Our sign: a force comes back with its sign, so +1 stands where textbooks have
+//! -1.
 //!
-//! Where an axis is looked at alone, the others open, its loop is the element on the diagonal. **That each of these is stable says nothing of all of them
-//! closed**: what an axis does to another and back is in none of them. `tests` has a loop whose axes are stable to eight times the gain at which
+//! Where an axis is looked at alone, the others open, its loop is the element on the diagonal. **Even if each of these is stable, all of them closed may
+//! not be**: the path from one axis to another and back is in none of them. `tests` has a loop whose axes are stable to eight times the gain at which
 //! they are not together.
 //!
 //! The models are linear here, about their pose and about the contact that was recorded; dry friction is left out, whose loss makes a loop more stable.
@@ -63,7 +64,7 @@ pub struct CoupledLoops {
 }
 
 impl CoupledLoops {
-    /// The lowest gain at which an axis alone is on its edge; infinite where none is.
+    /// The lowest gain at which an axis alone is at its stability limit; infinite where none is.
     pub fn lowest_alone(&self) -> f64 {
         self.alone.iter().filter_map(|(_, limit)| limit.critical_gain).fold(f64::INFINITY, f64::min)
     }

@@ -220,13 +220,13 @@ fn environment_stiffness(scenario: &Scenario, options: &RunOptions, cancel: &Ato
 /// The canceller beside none.
 #[derive(Debug, Clone)]
 pub struct AgainstNone {
-    /// The edge without a canceller.
+    /// The stability limit without a canceller.
     pub without: Edge,
     /// Where the canceller makes it worse.
     pub warning: Option<String>,
 }
 
-/// Whether the canceller raises the edge at all: a wrong model can make the loop worse than none. `None` where nothing is cancelled.
+/// Whether the canceller raises the stability limit at all: a wrong model can make the loop worse than none. `None` where nothing is cancelled.
 ///
 /// # Errors
 /// A run that cannot be done; `cancel` was set.
@@ -243,7 +243,7 @@ pub fn against_none(
         return Ok(None);
     }
     let without = edge(&scenario.without_canceller(), search, options, done, cancel)?;
-    // Of an edge below the searched range only that is known.
+    // Of a limit below the searched range only that is known.
     let ends = |edge: &Edge| edge.critical_gain.unwrap_or(if edge.at_least > 0.0 { edge.at_least } else { search.lowest });
     let (end, end_without) = (ends(with), ends(&without));
     let warning = (with.outcome_beyond.is_some() && end < end_without * (1.0 - search.tolerance)).then(|| {

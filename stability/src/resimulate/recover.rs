@@ -1,9 +1,8 @@
 //! The operator's intent from a bag that did not record it.
 //!
-//! Kuchenbecker & Niemeyer's x^_mu = x_m - Ghat_f F_f is where the hand alone would have taken the master. The hand that takes
-//! it there is found by playing the recorded F_f and a hand x_u to the master's model, and correcting x_u by the error of x_m,
-//! through the inverse of the model's response to the hand, again and again: without lag, for the whole record is known, and
-//! with friction and hysteresis, for the model has them.
+//! Kuchenbecker & Niemeyer's x^_mu = x_m - Ghat_f F_f is where the hand alone would have taken the master. The hand that takes it there is found by
+//! iteration: the recorded F_f and a hand x_u drive the master's model, and the inverse of the model's response to the hand corrects x_u by the error
+//! of x_m. There is no lag, because the whole record is known, and friction and hysteresis are included, because the model has them.
 
 use super::ResimulateError;
 use crate::session::Session;
@@ -42,8 +41,8 @@ pub struct Recovered {
     pub intents: Vec<Intent>,
     /// RMS of what is left between x_m and the model moved by that hand, as a share of the range of x_m, per axis.
     pub residual: Vec<f64>,
-    /// By how much the hand may have been elsewhere without x_m showing it, per axis, m or rad: what dry friction holds against
-    /// the grip. With friction the edge depends on what the hand does, so where this is large the edge is less sure.
+    /// How far the true hand may have been from the recovered one without an effect on x_m, per axis, m or rad: the motion that dry friction holds
+    /// against the grip. With friction the stability limit depends on what the hand does, so where this is large the limit is less certain.
     pub ambiguity: Vec<f64>,
     /// Time in which the hand holds still on all axes, s: only there a verdict can be drawn.
     pub still_s: f64,

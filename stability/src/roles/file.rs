@@ -8,7 +8,7 @@ use backdrive_plant::model::{Hold, Motion};
 use backdrive_plant::tomlfile::{FileError, Table};
 use std::path::Path;
 
-/// What a roles file says.
+/// The contents of a roles file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Roles {
     /// The signals of each axis.
@@ -107,7 +107,7 @@ impl Roles {
             if found.is_empty() {
                 if required && (role != SignalRole::Command || commanded) {
                     let what = format!("missing key \"{key}\": {}; without it {}", role.text(), role.without());
-                    // A misspelt key is told as such.
+                    // A misspelt key is reported as such.
                     let misspelt = signals.missing(key);
                     return Err(if misspelt.message.contains("did you mean") { misspelt } else { signals.error(what) });
                 }

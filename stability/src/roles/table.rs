@@ -1,4 +1,4 @@
-//! The wanted signals from a table (CSV): columns in the place of topics.
+//! The wanted signals from a table (CSV): columns instead of topics.
 
 use super::file::{Located, Roles};
 use crate::grid::Series;

@@ -47,7 +47,7 @@ impl Word {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Method {
-    /// The loop run again with the models in the bag.
+    /// Re-simulation with the models in the bag.
     Resimulation,
     /// The measured frequency response.
     Frequency,
