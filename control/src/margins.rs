@@ -1,4 +1,4 @@
-//! How far a loop is from its edge: margins of a frequency response, pure and without allocation.
+//! The stability margins of a loop, from a frequency response, pure and without allocation.
 //!
 //! `L` is the transfer once round the loop, of a closed loop `F_f = d + L F_f`: the critical point is `+1`, on the positive
 //! real axis, at any frequency and also at DC, where a loop of positive feedback runs away without oscillating.
@@ -12,7 +12,7 @@ use std::f64::consts::{PI, TAU};
 /// Where `k L` passes through `+1`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Crossing {
-    /// The factor `k` by which the gain may be multiplied until the loop is on its edge, above 0.
+    /// The factor `k` by which the gain may be multiplied until the loop is at its stability limit, above 0.
     pub factor: f64,
     /// Hz; 0 for a loop that runs away without oscillating.
     pub frequency_hz: f64,
@@ -21,15 +21,15 @@ pub struct Crossing {
 /// The margins of a loop at the gain at which `L` is given.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Margins {
-    /// By how much the gain may rise, dB; negative where the loop is beyond its edge; `None` where no gain reaches it.
+    /// By how much the gain may rise, dB; negative where the loop is above its stability limit; `None` where no gain reaches it.
     pub gain_db: Option<f64>,
-    /// Smallest angle of `L` from `+1` where `|L| = 1`, degrees; negative beyond the edge; `None` where `|L|` never is 1.
+    /// Smallest angle of `L` from `+1` where `|L| = 1`, degrees; negative above the stability limit; `None` where `|L|` never is 1.
     pub phase_deg: Option<f64>,
-    /// Smallest extra loop delay that makes it unstable, ms; 0 beyond the edge; `None` where no delay does.
+    /// Smallest extra loop delay that makes it unstable, ms; 0 above the stability limit; `None` where no delay does.
     pub delay_ms: Option<f64>,
     /// Smallest `|1 - L|`: 1 over the peak of the sensitivity.
     pub modulus: f64,
-    /// The edge: the smallest factor on the gain at which the loop is no longer stable.
+    /// The stability limit: the smallest factor on the gain at which the loop is no longer stable.
     pub critical: Option<Crossing>,
 }
 
@@ -110,17 +110,17 @@ fn crossings<'a>(hz: &'a [f64], l: &'a [Complex<f64>]) -> impl Iterator<Item = C
     dc.into_iter().chain(spans(hz, l).filter_map(|(a, b)| between(a, b)))
 }
 
-/// The smallest `k > 0` at which `k L` passes through `+1`: for a loop that is stable open, the edge of stability.
+/// The smallest `k > 0` at which `k L` passes through `+1`: for a loop that is stable open, the stability limit.
 ///
-/// `hz` rises; `l` is `L` at each. `None` where no gain reaches the edge within the lines.
+/// `hz` rises; `l` is `L` at each. `None` where no gain reaches the stability limit within the lines.
 pub fn critical_factor(hz: &[f64], l: &[Complex<f64>]) -> Option<Crossing> {
     crossings(hz, l).min_by(|a, b| a.factor.total_cmp(&b.factor))
 }
 
 /// Whether the closed loop is stable, by Nyquist's criterion: `1 - L` does not wind about 0 between DC and the last line.
 ///
-/// `L` must be stable open, the lowest line below everything that moves in it, and the lines so close that it turns by less than half a circle about `+1` from one to the next.
-/// A loop that is stable only between two gains is judged as it is. Without lines it is stable: nothing is fed back.
+/// `L` must be stable open, the lowest line below everything that moves in it, and the lines so close that it turns by less than half a circle about `+1` from
+/// one to the next. A loop that is stable only between two gains is judged at its own gain. Without lines it is stable: nothing is fed back.
 pub fn is_stable(hz: &[f64], l: &[Complex<f64>]) -> bool {
     let one = Complex::new(1.0, 0.0);
     let (Some(dc), Some((_, last))) = (at_dc(hz, l), lines(hz, l).last()) else { return true };
@@ -194,7 +194,7 @@ mod tests {
         hz.iter().map(|f| l(Complex::new(0.0, TAU * f))).collect()
     }
 
-    /// `L = -K e^{-s T} / s`: on the edge at `w = pi / (2 T)`, for `K = pi / (2 T)`.
+    /// `L = -K e^{-s T} / s`: at the stability limit at `w = pi / (2 T)`, for `K = pi / (2 T)`.
     #[test]
     fn an_integrator_with_delay_has_its_closed_form() {
         let (delay, gain) = (0.004, 100.0);
@@ -220,7 +220,7 @@ mod tests {
         }
     }
 
-    /// A hand on a spring against a wall, `L = -k G(s) e^{-s T}`: the edge solves `arg G - w T = -pi`.
+    /// A hand on a spring against a wall, `L = -k G(s) e^{-s T}`: the stability limit solves `arg G - w T = -pi`.
     #[test]
     fn a_second_order_loop_with_delay_has_its_closed_form() {
         let (mass, damping, stiffness, delay, wall) = (0.03, 3.0, 4000.0, 0.002, 500.0);

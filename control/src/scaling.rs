@@ -132,7 +132,7 @@ impl Core for Forward {
         self.gains.set(gains);
     }
 
-    // The backward path tells the gains of both, for the guard acts there.
+    // The backward path reports the gains of both, because the guard acts there.
 }
 
 /// Inputs `contact` (effort F_s), `measured` (the master's, one step late: what the guard watches); outputs

@@ -68,7 +68,7 @@ pub struct NearNode {
 }
 
 impl NearNode {
-    /// The side at the master for so many axes. Velocities are told from positions behind a low-pass of the corner `velocity_hz`.
+    /// The side at the master for so many axes. Velocities are computed from positions behind a low-pass of the corner `velocity_hz`.
     pub fn new(axes: usize, law: &Law, plan: GainPlan, conditions: &Conditions, velocity_hz: f64, stale_after_s: f64) -> NearNode {
         let period_s = conditions.period_s;
         let axis = |_| (law.near(conditions), Velocity::new(velocity_hz, period_s));
@@ -133,7 +133,7 @@ impl Core for NearNode {
 /// Inputs `contact` (position, velocity and effort of the slave, one step late), `from_near` (the link); outputs `command` (position),
 /// `to_near` (the link).
 ///
-/// Before the first packet the slave is told to stay where it is. When packets or contact samples stop coming, the law stands still, the slave
+/// Before the first packet the slave is commanded to stay where it is. When packets or contact samples stop coming, the law stands still, the slave
 /// holds, and the packets carry the flag STALE.
 pub struct FarNode {
     period_s: f64,

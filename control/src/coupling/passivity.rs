@@ -5,11 +5,11 @@
 //! Mechatronics 20, 2010. The energy that has gone in at a port is sent along; as it only grows, an old value is never too much.
 //! So at each port, at every step: energy out <= energy that went in at the other port, as last heard, whatever the link does.
 //!
-//! In steps a force acts after it is told: it is held over a step that begins when it arrives. Work is counted when it is done, by the
-//! force that acted and the way that it acted along (exact for a held force: Ryu, Kim & Hannaford, "Stability guaranteed control: time
-//! domain passivity approach", IEEE Trans. Control Systems Technology 12, 2004); what would come out next is told from the present
-//! motion. Where a force acts at once ([`Conditions::held_steps`] 0) energy out never exceeds what went in; else only by what the motion
-//! changes within these steps, and that is taken back before anything more comes out.
+//! In discrete time a force acts after it is computed: it is held over a step that begins when it arrives. Work is counted when it is done, by the
+//! force that acted and the way that it acted along (exact for a held force: Ryu, Kim & Hannaford, "Stability guaranteed control: time domain
+//! passivity approach", IEEE Trans. Control Systems Technology 12, 2004). The next output is predicted from the present motion. Where a force acts at
+//! once ([`Conditions::held_steps`] 0) energy out never exceeds what went in; else only by what the motion changes within these steps, and that is
+//! taken back before anything more comes out.
 //!
 //! At the master the controller takes force away (a damper beside the port), at the slave it takes motion away (a damper in line).
 //! Motion that was taken leaves the slave behind; it catches up as the energy allows (after Artigas, Ryu & Preusche 2010).
@@ -84,7 +84,7 @@ pub struct NearSide {
     observer: Observer,
     contact: f64,
     harvest: f64,
-    /// Forces that were told, by step.
+    /// Forces that were put out, by step.
     told: [f64; MOST_HELD],
     held: u64,
     step: u64,

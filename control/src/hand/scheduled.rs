@@ -7,11 +7,11 @@ use backdrive_msgs::MAX_AXES;
 
 /// An estimate with a relative deviation above this is a guess.
 const GUESS_AT: f64 = 0.1;
-/// By so many times of what a guess exceeds that a hand is taken to be firmer than it is estimated to be.
+/// Conservatism gain: raises the assumed grip stiffness in proportion to the excess relative standard deviation of the estimate.
 const GUESS_COSTS: f64 = 5.0;
 /// Most of the predicted motion that is cancelled where it is fast: what is cancelled whole may be too much.
 const MOST: f64 = 0.97;
-/// What is left over acts as no canceller at this share of the gain that the loop bears without one.
+/// The part that is not cancelled acts as no canceller at this share of the gain that is stable without one.
 const LEFT: f64 = 0.3;
 /// Where it is slow this much of the share is cancelled: what cannot be known at rest is left to the hand, which without a canceller is stable there.
 const SLOW: f64 = 0.5;
@@ -23,12 +23,12 @@ const NO_FORCE: f64 = 0.02;
 const LEAST_FORCE: f64 = 1e-3;
 /// How fast the largest force is forgotten, s.
 const FORCE_MEMORY_S: f64 = 5.0;
-/// Over which time a displacement that is left where no force acts is let go, s.
+/// Time constant with which a remaining displacement decays where no force acts, s.
 const LET_GO_S: f64 = 0.2;
 
-/// A hand is told where its relative deviation is below this.
+/// A hand is reported where its relative deviation is below this.
 const TELLS_AT: f64 = 0.1;
-/// And where it differs from the one told last by more than this, in the logarithm of the firmness.
+/// And where it differs from the last reported one by more than this, in the logarithm of the firmness.
 const TELLS_AFTER: f64 = 0.2;
 
 /// One axis.
@@ -43,7 +43,7 @@ pub(super) struct Axis {
     /// Its slow part.
     slow: f64,
     largest_force: f64,
-    /// The firmness that was told last, if one was.
+    /// The last reported firmness, if there was one.
     told: Option<f64>,
 }
 
@@ -122,8 +122,8 @@ impl Scheduled {
         self.bank.is_finite()
     }
 
-    /// The next step: the force that was held until now, and the position of each axis where it is measured. The induced motion, m or rad. A hand that is
-    /// surely another than the one told last is told in an event.
+    /// The next step: the force that was held until now, and the position of each axis where it is measured. The induced motion, m or rad. A hand that
+    /// surely differs from the last reported one is reported in an event.
     pub fn step(&mut self, force: &[f64; MAX_AXES], measured: Option<&[f64; MAX_AXES]>, events: &mut Events) -> [f64; MAX_AXES] {
         let known = self.bank.axes();
         if self.started {

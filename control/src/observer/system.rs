@@ -192,7 +192,7 @@ impl System {
         (a, c)
     }
 
-    /// Whether states and unknown inputs can be told from what is measured (rank of the observability matrix, time and columns scaled).
+    /// Whether states and unknown inputs can be determined from the measured signals (rank of the observability matrix, time and columns scaled).
     ///
     /// # Errors
     /// [`SystemError::Unobservable`] where they cannot.

@@ -3,7 +3,7 @@ use crate::coupling::{Conditions, passivity, position_position, wave, wave_line}
 
 const PERIOD: f64 = 1e-3;
 
-/// Forces act within the step in which they are told.
+/// Forces act within the step in which they are computed.
 const AT_ONCE: Conditions = Conditions { period_s: PERIOD, round_trip_s: 0.4, held_steps: 0 };
 
 /// A wall that only pushes, with damping, at 5 mm.
@@ -134,7 +134,7 @@ fn swings(settings: &position_position::Settings, delay: u64, steps: u64) -> (f6
         back.send(step, packet);
         (speed, tip) = ((command - tip) / PERIOD, command);
         let wanted = if step < 1000 { 0.01 } else { 0.0 };
-        // Implicit in the hand's own damper and spring, the law's force held as it is.
+        // Implicit in the hand's own damper and spring, the law's force held constant.
         v = (mass * v + PERIOD * (force - stiffness * (x - wanted))) / (mass + PERIOD * (damping + stiffness * PERIOD));
         x += PERIOD * v;
         put_in += (-force * v + felt * speed) * PERIOD;
