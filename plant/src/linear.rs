@@ -346,7 +346,7 @@ impl<'a> LinearModel<'a> {
         s * s * self.inertia[(i, j)] + s * self.damping[(i, j)] + self.stiffness[(i, j)]
     }
 
-    /// What an output says of that.
+    /// The value of an output in that response.
     fn read(&self, output: usize, Answer { motion, force }: &Answer, frequency_hz: f64) -> Complex<f64> {
         let (output, s) = (&self.model.outputs[output], Complex::new(0.0, TAU * frequency_hz));
         let at = |place: Place| place.map_or(Complex::new(0.0, 0.0), |body| motion[body]);

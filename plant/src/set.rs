@@ -113,7 +113,7 @@ impl RecordingSet {
         self.folder.join(source_of(&self.files, file))
     }
 
-    /// What is particular to a file; the defaults where the set says nothing.
+    /// What is particular to a file; the defaults where the set has no entry.
     pub fn rules_of(&self, file: &str) -> FileRules {
         self.files.iter().find(|f| f.0 == file).map(|f| f.1.clone()).unwrap_or_default()
     }

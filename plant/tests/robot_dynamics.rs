@@ -164,7 +164,7 @@ fn fixed_links_are_one_body_with_what_carries_them() {
     tree.place(&[std::f64::consts::FRAC_PI_2], &mut work);
     let tip = tree.link_placement(2, &work).unwrap().translation;
     assert!((tip - Vector3::new(0.0, 0.0, 0.5)).norm() < 1e-15);
-    // Seen from elsewhere it is the same body.
+    // Seen from another frame it is the same body.
     let seen = Inertia::new(0.4, tool.centre, tool.about_centre).outside(&Placement::at(Vector3::new(0.5, 0.0, 0.0)));
     assert!((seen.rotational[(1, 1)] - (1e-3 + 0.4 * 0.25)).abs() < 1e-14);
 }

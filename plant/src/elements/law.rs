@@ -111,7 +111,7 @@ pub trait PathLaw {
     /// Largest slopes of its force.
     fn slopes(&self) -> Slopes;
 
-    /// Force at `x` and `v` with the memory as it is.
+    /// Force at `x` and `v` with the present memory.
     fn force(&self, memory: &[f64], x: f64, v: f64) -> f64;
 
     /// Energy that can be had back, J.

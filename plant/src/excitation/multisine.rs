@@ -17,7 +17,7 @@ pub(super) struct Lines {
 
 /// The lines of a band on a grid, as multiples of the inverse period; from 1 on.
 pub(super) fn lines_in(band: [f64; 2], period: f64, grid: Grid) -> Vec<usize> {
-    // Rounding must not lose a line that lies on the edge of the band.
+    // Rounding must not lose a line that lies at the end of the band.
     let first = (band[0] * period - 1e-9).ceil().max(1.0) as usize;
     let last = (band[1] * period + 1e-9).floor().max(0.0) as usize;
     (first..=last).filter(|k| grid == Grid::Full || k % 2 == 1).collect()

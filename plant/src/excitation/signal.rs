@@ -10,7 +10,7 @@ use std::f64::consts::PI;
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(try_from = "String", into = "String")]
 pub struct Excitation {
-    /// The kind and its numbers.
+    /// The kind and its parameters.
     pub shape: Shape,
     /// Rest before it, s.
     pub quiet: f64,

@@ -11,11 +11,11 @@ pub struct JointColumns {
     pub name: String,
     /// Whether its velocity was logged.
     pub has_velocity: bool,
-    /// Torque per current that the set states, N m/A or N/A, where the current was logged in the place of the torque.
+    /// Torque per current that the set states, N m/A or N/A, where the current was logged instead of the torque.
     pub torque_constant: Option<f64>,
-    /// Whether the set says `torque = 0`: the joint has no motor, and no column holds its torque.
+    /// Whether the set has `torque = 0`: the joint has no motor, and no column holds its torque.
     pub is_passive: bool,
-    /// Whether the position that its servo was told was logged.
+    /// Whether the position command of its servo was logged.
     pub has_command: bool,
     /// Whether its torque was logged, or a current with a torque constant. Only a joint with a command may be without.
     pub has_torque: bool,
@@ -37,7 +37,7 @@ impl JointColumns {
         format!("{}.torque", self.name)
     }
 
-    /// Name of the signal of the position that its servo was told, rad or m.
+    /// Name of the signal of its servo's position command, rad or m.
     pub fn command(&self) -> String {
         format!("{}.command", self.name)
     }

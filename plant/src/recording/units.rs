@@ -54,7 +54,7 @@ impl Kind {
 /// A unit: what it measures, and its size in the SI unit of that.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Unit {
-    /// As it is written.
+    /// Its spelling.
     pub name: &'static str,
     /// What it measures.
     pub kind: Kind,

@@ -19,7 +19,7 @@ const REACH: f64 = 1.0;
 pub struct Arm {
     /// The robot file's text.
     pub xml: String,
-    /// What the file says.
+    /// The content of the file.
     pub robot: Robot,
     /// The robot ready for computing, without armatures.
     pub tree: Tree,

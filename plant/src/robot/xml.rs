@@ -17,7 +17,7 @@ pub(super) fn parse<'a>(text: &'a str, file: &str) -> Result<Document<'a>, FileE
     let options = roxmltree::ParsingOptions { allow_dtd: true, ..Default::default() };
     Document::parse_with_options(text, options).map_err(|error| {
         let (line, message) = (error.pos().row as usize, error.to_string());
-        // The parser says line and column in its own way.
+        // The parser formats line and column in its own way.
         let message = message.split(" at ").next().unwrap_or(&message).to_string();
         FileError::at(file, line, "", format!("is not valid XML at column {}: {message}", error.pos().col))
     })

@@ -92,8 +92,8 @@ impl Work {
 }
 
 impl Constraints {
-    /// Lists the friction contacts and those path elements that are too stiff for the substep; the latter are told so. `from_forces` are what the bodies
-    /// answer to forces, and how their points move: first as they begin, then as they may come to answer where that changes on the way.
+    /// Lists the friction contacts and those path elements that are too stiff for the substep; the latter are informed of it. `from_forces` are what the
+    /// bodies answer to forces, and how their points move: first as they begin, then as they may come to answer where that changes on the way.
     pub(super) fn new(
         from_forces: &[(Columns, Points)],
         free: usize,

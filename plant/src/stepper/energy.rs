@@ -21,8 +21,8 @@ pub struct Energy {
 }
 
 impl Plant {
-    /// Counts the work of inputs, dampers and friction from the next start on, and starts anew. It costs time; a linear
-    /// model is then stepped by substeps instead of exactly, so its number of substeps should be given.
+    /// Counts the work of inputs, dampers and friction from the next start on, and restarts. It costs time; a linear model is then stepped by
+    /// substeps instead of exactly, so its number of substeps should be given.
     pub fn track_energy(&mut self) {
         self.energy = Some(Account::default());
         self.reset();

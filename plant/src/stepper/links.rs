@@ -134,7 +134,7 @@ impl Links {
         self.tree.coriolis_matrix_here(&self.v, &mut self.work, &mut self.coriolis);
         self.tree.gravity_here(&mut self.work, &mut self.gravity);
         let free = fixed.free;
-        // C(v₀) v₁, as far as it is known before: of free bodies at v₀.
+        // C(v₀) v₁, the part that is known before: of free bodies at v₀.
         self.bias_with(|slot| if slot < free { v[slot] } else { motion.end_velocity[slot] });
         for slot in self.slots.iter().filter(|slot| **slot < free) {
             motion.force[*slot] -= self.bias[*slot];

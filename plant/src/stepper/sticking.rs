@@ -64,7 +64,7 @@ impl Sticking {
         self.count = count;
     }
 
-    /// The factor of the set's compliance, of which `changes` says how often it has changed.
+    /// The factor of the set's compliance; `changes` counts how often it has changed.
     pub(super) fn factorise(&mut self, changes: u64, compliance: impl Fn(usize, usize) -> f64) {
         if self.factored == Some(changes) {
             return;

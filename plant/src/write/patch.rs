@@ -83,7 +83,7 @@ pub enum PatchError {
     Section(String),
 }
 
-/// Makes the edits in their order; everything else of `original` stays as it is, comments included.
+/// Makes the edits in their order; everything else of `original` stays unchanged, comments included.
 pub fn patch(original: &str, edits: &[Edit]) -> Result<String, PatchError> {
     let mut document: DocumentMut = original.parse().map_err(|e: toml_edit::TomlError| PatchError::NotToml(e.message().to_string()))?;
     for edit in edits {

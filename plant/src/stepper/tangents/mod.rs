@@ -1,9 +1,10 @@
 //! Derivatives of a motion by parameters, carried along with the motion (forward mode).
 //!
-//! The plant moves under the model as it is. Beside it each parameter has a lane: the derivatives of all positions and velocities by it, which obey the
-//! linear equations of a substep with the sticking and sliding of the plant's own (a tangent linear model), and the memories of the elements as they are
-//! where the parameter is a small step further. A substep of a lane thus solves no law and searches no contact that sticks; it only differences each law
-//! once along the lane's own direction. Where dry friction comes to rest and goes on the other way, the moment of rest moves along, too.
+//! The plant moves under the unchanged model. Beside it each parameter has a lane: the derivatives of all positions and velocities with respect to it,
+//! and the memories of the elements for a parameter that is a small step larger. The derivatives obey the linear equations of a substep with the
+//! sticking and sliding of the plant's own (a tangent linear model). A substep of a lane thus solves no law and searches no contact that sticks; it only
+//! differences each law once along the lane's own direction. Where dry friction comes to rest and goes on the other way, the moment of rest moves along,
+//! too.
 
 mod contacts;
 mod lane;
