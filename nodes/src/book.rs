@@ -1,4 +1,4 @@
-//! What a node tells beside its samples: events, gains and status, as the messages they become.
+//! What a node reports beside its samples: events, gains and status, as the messages they become.
 //!
 //! The processes and the single-process executor share it, so that both tell the same.
 
@@ -25,7 +25,7 @@ pub(crate) struct Book {
     margin_due: u64,
 }
 
-/// What a status says that the node must look up.
+/// The parts of a status that the node must look up.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Health {
     pub missed_deadlines: u64,
@@ -76,7 +76,7 @@ impl Book {
         }
     }
 
-    /// The gains in force at `step`, if they differ from those told last.
+    /// The gains in force at `step`, if they differ from those last reported.
     pub fn gains(&mut self, step: u64, stamp_ns: i64, now: (f64, f64)) -> Option<Gains> {
         let bits = |g: (f64, f64)| (g.0.to_bits(), g.1.to_bits());
         if self.gains_told.is_some_and(|told| bits(told) == bits(now)) {

@@ -38,13 +38,13 @@ const AHEAD_OF_RECORDER: u64 = 1024;
 /// Steps by which a source may run ahead of its listeners in lockstep where nothing records.
 const AHEAD_OF_LISTENERS: u64 = 256;
 
-/// Topic on which a recorder says how far it has come; each host's has its own.
+/// Topic on which a recorder reports its progress; each host's has its own.
 pub fn credit_topic(host: Option<&str>) -> Topic {
     let name = host.map_or("/recorder/credit".to_string(), |host| format!("/recorder/credit_{host}"));
     Topic { name, kind: Kind::Sample }
 }
 
-/// Topic on which a host's supervisor tells of the other hosts: their clocks, and when they are gone.
+/// Topic on which a host's supervisor reports on the other hosts: their clocks, and when they are gone.
 pub fn host_topic(host: &str) -> Topic {
     Topic { name: format!("/host_{host}/events"), kind: Kind::Event }
 }

@@ -75,7 +75,7 @@ impl Input {
         self.subscriber.set_awaited(awaited);
     }
 
-    /// Takes in what has arrived, and tells whether the port is satisfied for `step`.
+    /// Takes in what has arrived, and returns whether the port is satisfied for `step`.
     pub fn poll(&mut self, step: u64) -> Result<bool, TransportError> {
         let Some(wanted) = step.checked_sub(self.delay) else {
             return Ok(true);

@@ -1,4 +1,4 @@
-//! What each kind of event says to a person. A kind without a line here says its own name.
+//! The sentence for each kind of event, for a person. A kind without a line here shows its own name.
 
 use backdrive_msgs::measured;
 use backdrive_msgs::text::Text;

@@ -286,7 +286,7 @@ impl Sequence {
 }
 
 impl Node {
-    /// What it tells beside its samples, in the order in which a process sends it.
+    /// What it reports beside its samples, in the order in which a process sends it.
     fn tell(&mut self, stage: &Stage, step: u64, stamp_ns: i64, noted: &mut Events, tap: Tap) {
         let events = self.events;
         self.book.drain(step, stamp_ns, noted, |_, event| tap(events, &Message::Event(event)));

@@ -1,4 +1,4 @@
-//! Graph files with a coupling: its keys, and a coupling in the place of scaling.
+//! Graph files with a coupling: its keys, and a coupling instead of scaling.
 
 use backdrive_nodes::graph::{Files, Graph, NodeKind, Overrides, Settings, coupling::conditions};
 use std::path::{Path, PathBuf};
@@ -11,7 +11,7 @@ fn with(law: &str) -> Overrides {
     Overrides { coupling: Some(law.into()), ..Overrides::default() }
 }
 
-/// The graph of `launch/coupling.toml` with other text in the place of some.
+/// The graph of `launch/coupling.toml` with some of its text replaced.
 fn changed(from: &str, to: &str) -> Result<Graph, String> {
     let path = file("launch/coupling.toml");
     let text = std::fs::read_to_string(&path).unwrap();

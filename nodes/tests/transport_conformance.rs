@@ -212,7 +212,7 @@ fn odd_sample(sequence: u64) -> Sample {
     sample
 }
 
-/// The sequence number of the first sample that does not arrive as it was sent.
+/// The sequence number of the first sample that arrives changed.
 fn first_difference(world: &dyn World, sender: &mut dyn Publisher, receiver: &mut dyn Subscriber) -> Option<u64> {
     (0..1000).find(|sequence| {
         sender.send(&Message::Sample(odd_sample(*sequence))).unwrap();
@@ -461,7 +461,7 @@ fn tells_when_each_message_came(world: &dyn World, _: &dyn World) {
     for (before, after) in sent {
         assert!(next(world, &mut *receiver).is_some());
         let (arrived, latest) = (receiver.arrived_ns(), if world.arrives_at_once() { after } else { now_ns() });
-        // What the middleware says by the wall clock is true to the microsecond.
+        // The middleware's wall-clock time is true to the microsecond.
         assert!((before - 1_000..=latest).contains(&arrived), "sent from {before} to {after}, came at {arrived}");
         assert!(arrived >= last);
         last = arrived;
@@ -574,7 +574,7 @@ mod killed {
 mod strangers {
     use super::*;
 
-    /// What a subscriber of the run says of messages that `transport` sends on its topic of forces, none of which it takes.
+    /// The report of a subscriber of the run on messages that `transport` sends on its topic of forces, none of which it takes.
     fn said_of(domain: &Domain, mut transport: Ros2) -> (String, bool) {
         let mut run = domain.join("run");
         let mut receiver = run.subscriber(&samples(), 64, true).unwrap();

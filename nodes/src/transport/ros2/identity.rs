@@ -33,7 +33,7 @@ pub struct Member {
     pub key: Key,
 }
 
-/// What the supervisor tells the processes of a run, in a file that only their user can read.
+/// What the supervisor passes to the processes of a run, in a file that only their user can read.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Known {
     /// This host's run.

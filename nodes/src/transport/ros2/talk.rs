@@ -67,7 +67,7 @@ impl Ends {
 }
 
 impl Talk {
-    /// Says something to everybody who is there now. What cannot be sent is dropped: all that is said is said again.
+    /// Sends a text to all present participants. What cannot be sent is dropped: everything is sent repeatedly.
     pub fn say(&self, text: &str) {
         let _ = self.ends.writer.write(Words { data: text.to_string() }, None);
     }
