@@ -6,7 +6,7 @@ use std::io::{ErrorKind, Read, Seek, SeekFrom, Write};
 use std::os::unix::fs::{FileTypeExt, MetadataExt};
 use std::path::{Path, PathBuf};
 
-/// Opens a file for a bag, empty and locked for as long as it is open: a second writer is refused, whatever it was told.
+/// Opens a file for a bag, empty and locked while it is open: a second writer is refused, whatever its options.
 ///
 /// A file that holds something is replaced only with `overwrite`, and only if it is a bag. What is no regular file (a
 /// device, a pipe) is refused: a bag is written at several places and read again at the end. Errors: [`BagError::Exists`], [`BagError::InUse`], [`BagError::Create`].
@@ -63,7 +63,7 @@ pub(crate) fn lock(path: &Path, overwrite: bool) -> Result<File, BagError> {
     }
 }
 
-/// Why a device or a pipe takes no bag: what it says itself where it takes nothing at all, such as `/dev/full`.
+/// Why a device or a pipe takes no bag: its own error where it takes nothing at all, such as `/dev/full`.
 fn no_file(path: &Path, mut file: File, kind: std::fs::FileType) -> BagError {
     let refused = if kind.is_char_device() { file.write_all(&[0]).err() } else { None };
     let why = "it is a device or a pipe, and what is written there cannot be read again; name a file";

@@ -4,7 +4,7 @@
 const MISSING: f64 = 1.5;
 /// A step that differs from the usual one by more than this share of it is uneven.
 const UNEVEN: f64 = 0.05;
-/// Steps are told to be uneven where more than this share of them is.
+/// Steps are reported as uneven where more than this share of them is.
 const UNEVEN_SHARE: f64 = 0.01;
 
 /// What is wrong with a clock.

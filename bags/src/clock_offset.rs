@@ -1,4 +1,4 @@
-//! What a bag says of the clocks of several hosts.
+//! A bag's records of the clocks of several hosts.
 
 use std::fmt;
 

@@ -1,4 +1,4 @@
-//! Which messages a chunk holds, in few bytes: what stands behind every chunk of ours in the place of MCAP's message index.
+//! Which messages a chunk holds, in few bytes: it stands behind every chunk of ours instead of MCAP's message index.
 //!
 //! MCAP's own index takes 16 bytes a message, half of a lockstep bag whose messages compress to as much. What is needed of it here,
 //! the log time of every message by channel and place, grows nearly evenly: of the second differences most are zero in lockstep, and

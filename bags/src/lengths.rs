@@ -1,4 +1,4 @@
-//! Lengths inside the body of a record, looked at before the body is parsed: the crate `mcap` makes room for what a length says before it reads.
+//! Lengths inside the body of a record, checked before the body is parsed: the crate `mcap` allocates the stated length before it reads.
 
 use mcap::records::op;
 

@@ -188,12 +188,11 @@ impl Recorder {
         }
     }
 
-    /// Says that every topic has been asked for its messages since the last checkpoint. An ordered bag is then
-    /// exactly in order; without checkpoints the order is settled every 50 ms, which a machine that stalls
-    /// for longer may defeat for events, gains and status.
+    /// Marks that every topic has been asked for its messages since the last checkpoint. An ordered bag is then exactly in order; without checkpoints
+    /// the order is settled every 50 ms, which a machine that stalls for longer may defeat for events, gains and status.
     pub fn checkpoint(&mut self) {
         if let Some(queue) = &self.queue {
-            // A full queue means that the thread is behind; the next checkpoint says the same.
+            // A full queue means that the thread is behind; the next checkpoint has the same effect.
             let _ = queue.try_send(Item::Checkpoint);
         }
     }
@@ -237,7 +236,7 @@ impl Recorder {
         });
         let completeness = Completeness { topics: counted.collect(), late: 0, recovered: self.open_end };
         if let Some(queue) = self.queue.take() {
-            // Waits for room. A thread that has stopped says why below.
+            // Waits for room. A thread that has stopped gives the reason below.
             let _ = queue.send(Item::Finish(completeness));
         }
         match self.thread.take().map(JoinHandle::join) {
@@ -278,7 +277,7 @@ impl Scribe {
             Ok(completeness) => Some(completeness),
             Err(error) => {
                 let _ = self.shared.error.set(error.to_string());
-                // What is on the disk stays as it is: closing the bag would write to a disk that has just refused.
+                // What is on the disk stays unchanged: closing the bag would write to a disk that has just refused.
                 self.writer.abandon();
                 None
             }

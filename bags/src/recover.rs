@@ -48,8 +48,7 @@ pub struct RecoverReport {
     pub was_clean: bool,
     /// Records or chunks that are damaged, with their place.
     pub damaged: Vec<String>,
-    /// Messages in the copy that stand in a damaged chunk: they are where its index says and decode as their type says, but no
-    /// checksum vouches for their values.
+    /// Messages in the copy from a damaged chunk: they are at the place in its index and decode by their type, but no checksum confirms their values.
     pub unconfirmed: u64,
     /// Messages that the file held when it was whole, where its statistics or the indices of its chunks tell.
     pub expected: Option<u64>,
@@ -63,9 +62,9 @@ pub struct RecoverReport {
 
 /// Copies everything that is whole into a clean bag, which has all of MCAP's indices: so this is the way to a bag in which a player can jump, too.
 ///
-/// Of a bag that was cut off the chunk that was open is lost, and of it the messages that had not reached the file. Of a damaged
-/// chunk those messages are saved that can still be read, stand where the chunk's index says, and hold what their type says.
-/// Errors: `from` cannot be read or is no MCAP file, `to` exists (unless it may be replaced), is being written, or cannot be.
+/// Of a bag that was cut off the chunk that was open is lost, and of it the messages that had not reached the file. Of a damaged chunk those messages
+/// are saved that can still be read, are at the place in the chunk's index, and have the content of their type. Errors: `from` cannot be read or is
+/// no MCAP file, `to` exists (unless it may be replaced), is being written, or cannot be.
 pub fn recover(from: &Path, to: &Path, overwrite: bool) -> Result<RecoverReport, BagError> {
     not_itself(from, to)?;
     let mut frames = Frames::open(from)?;
@@ -128,7 +127,7 @@ fn copy(from: &Path, frames: &mut Frames, to: &Path, file: File) -> Result<Recov
             }
         }
     }
-    // Only a walk to the very end tells whether the file was closed.
+    // Only a walk to the very end shows whether the file was closed.
     while frames.next()?.is_some() {}
     // Topics on which nothing was said are topics of the bag too.
     for id in copy.found.channels.keys().copied().collect::<Vec<_>>() {
@@ -296,7 +295,7 @@ impl Copy<'_> {
         Ok(statistics)
     }
 
-    /// What a channel carries, as it was described.
+    /// The content of a channel, from its description.
     fn carries(&self, id: u16) -> Carries {
         let Some(channel) = self.found.channels.get(&id) else { return Carries::Foreign };
         if self.found.says_steps(channel) {
@@ -312,8 +311,8 @@ impl Copy<'_> {
         decode(kind, said.of(topic, header.sequence).as_ref(), data)
     }
 
-    /// Of what can be read in a damaged chunk: the messages of which the chunk's index knows, in the index' order, that hold what
-    /// their type says, and a sample only if the chunk says which step it is of. The others are counted as missing.
+    /// Of what can be read in a damaged chunk: the messages in the chunk's index, in its order, that have the content of their type. A sample counts
+    /// only if the chunk states which step it is of. The others are counted as missing.
     fn believable(&mut self, read: Vec<Record<'static>>, index: Index) -> Vec<Record<'static>> {
         let mut due: BTreeMap<u16, Due> =
             index.into_iter().map(|(channel, times)| (channel, Due { times: times.into(), ..Due::default() })).collect();

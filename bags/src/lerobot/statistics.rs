@@ -4,7 +4,7 @@ use crate::number_type::NumberType;
 use crate::parquet_writer::{Values, Written};
 use serde_json::{Map, Value, json};
 
-/// Quantiles that a dataset tells, by their names.
+/// Quantiles that a dataset contains, by their names.
 const QUANTILES: [(&str, f64); 5] = [("q01", 0.01), ("q10", 0.1), ("q50", 0.5), ("q90", 0.9), ("q99", 0.99)];
 
 /// A feature of all episodes.

@@ -141,7 +141,7 @@ impl Target {
         Ok(())
     }
 
-    /// Ends the bag. One without a message is removed again, and its report says 0 messages.
+    /// Ends the bag. One without a message is removed again, and its report has 0 messages.
     pub(crate) fn finish(mut self) -> Result<RosbagReport, BagError> {
         self.mcap.finish().map_err(failed(&self.path))?;
         if self.topics.iter().any(|topic| topic.told.messages > 0) {

@@ -10,7 +10,7 @@ use std::path::Path;
 
 /// The times of the rows.
 pub(super) struct Times<'a> {
-    /// Place of their column; `None` where the rate tells them.
+    /// Place of their column; `None` where the rate gives them.
     pub(super) place: Option<usize>,
     /// s, rising.
     pub(super) values: Cow<'a, [f64]>,
