@@ -63,9 +63,8 @@ pub fn kind_of(type_name: &str) -> Option<Kind> {
 
 /// Writes the payload of `message` into `payload`, replacing what was there (its memory is reused).
 ///
-/// `axis_names` become `JointState.name`; missing ones are called `axis0`, `axis1`, … and names beyond
-/// the message's axes are left out. Of a sample its [`Facts`] are not in it: see [`encode_steps`]. Errors: none for any value of `message` as it is built today; the
-/// encoder's own are passed on.
+/// `axis_names` become `JointState.name`; missing ones are called `axis0`, `axis1`, … and names beyond the message's axes are left out. Of a sample its
+/// [`Facts`] are not in it: see [`encode_steps`]. Errors: none for any value of `message` that can be built today; the encoder's own are passed on.
 pub fn encode(message: &Message, axis_names: &[String], payload: &mut Vec<u8>) -> Result<(), RosError> {
     payload.clear();
     payload.extend_from_slice(&ENCAPSULATION);
@@ -104,8 +103,7 @@ pub fn header_holds(stamp_ns: i64) -> bool {
     time::Time::from_ns(stamp_ns).to_ns() == stamp_ns
 }
 
-/// Reads a sample that [`encode`] wrote, of which `facts` are known from elsewhere. One that carries its own, as in older bags, is read
-/// by those.
+/// Reads a sample that [`encode`] wrote, with `facts` from another source. One that carries its own, as in older bags, is read by those.
 ///
 /// Errors: as of [`decode`].
 pub fn decode_sample(payload: &[u8], facts: &Facts) -> Result<Sample, RosError> {

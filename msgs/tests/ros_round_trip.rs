@@ -67,7 +67,7 @@ fn there_and_back(message: &Message, payload: &mut Vec<u8>) -> Message {
             ros::encode_steps("/t", sent, &mut said).expect("it encodes");
             let (topic, facts) = ros::decode_steps(&said).expect("it decodes");
             assert_eq!(topic, "/t");
-            // The header says the time of all but those that it cannot hold.
+            // The header holds the time of all but those that it cannot represent.
             let facts = Facts { stamp_ns: facts.stamp_ns.filter(|stamp| !ros::header_holds(*stamp)), ..facts };
             Message::Sample(ros::decode_sample(&bytes, &facts).expect("it decodes"))
         }
