@@ -141,7 +141,7 @@ impl Child {
         self.pid.as_raw()
     }
 
-    /// Tells it something. One that does not listen is not waited for.
+    /// Sends it words. One that does not listen is not waited for.
     pub fn tell(&self, words: &ToNode) {
         if let Ok(line) = serde_json::to_string(words) {
             let _ = self.to.try_send(line + "\n");

@@ -17,7 +17,7 @@ const LAST_LINES: usize = 20;
 pub(crate) enum Phase {
     /// Started, not yet connected.
     Joining,
-    /// Connected, not yet told to start.
+    /// Connected, not yet started.
     Ready,
     /// In the loop.
     Running,
@@ -149,7 +149,7 @@ impl Slot {
         }
     }
 
-    /// Takes what a node of the process says of itself; one that it does not name is the first.
+    /// Takes the report of a node of the process on itself; one that it does not name is the first.
     pub fn take_status(&mut self, node: Option<&str>, status: NodeStatus, now: Instant) {
         let index = node.and_then(|name| self.members.iter().position(|m| m.node.name == name)).unwrap_or(0);
         if self.members.get_mut(index).is_some_and(|m| m.take_status(status, now)) {
@@ -166,7 +166,7 @@ impl Slot {
         self.members.first().and_then(|m| m.status.as_ref()).map_or(0, |s| s.steps)
     }
 
-    /// How its process ended, as it says itself or as the system says.
+    /// How its process ended, by its own report or the system's.
     pub fn how(&self, end: End) -> String {
         match (&self.failed, self.done) {
             (Some((error, _)), _) => error.clone(),

@@ -1,4 +1,4 @@
-//! What the supervisor tells a person during the run, and the report after it.
+//! What the supervisor shows a person during the run, and the report after it.
 
 use crate::member::Member;
 use crate::plan::Named;
@@ -24,7 +24,7 @@ impl Supervisor {
         self.event(None, event);
     }
 
-    /// Keeps an event and shows it, unless its node tells too many.
+    /// Keeps an event and shows it, unless its node reports too many.
     pub fn event(&mut self, from: Option<usize>, event: RunEvent) {
         let now = Instant::now();
         // While the run is stopped, nodes tell that others are gone; that is kept, but no news.

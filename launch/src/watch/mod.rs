@@ -155,7 +155,7 @@ impl Supervisor {
         }
     }
 
-    /// An event that a node tells. Where a stranger sends what moves something, the run ends; nothing of it was taken.
+    /// An event that a node reports. Where a stranger sends what moves something, the run ends; nothing of it was taken.
     fn happened(&mut self, index: usize, now: Instant, event: RunEvent) {
         let stranger = (event.kind == STRANGER && event.severity >= 2).then(|| (event.node.clone(), event.text.clone()));
         self.event(Some(index), RunEvent { t_s: self.start.map(|s| seconds_since(now, s.at)), ..event });
