@@ -131,7 +131,7 @@ fn joint_moves(recording: &Recording, joint: Option<&Joint>, signal: &Signal, fr
     })
 }
 
-/// Whether what goes with a signal moved on while it stood: of a position its command, of a command its position.
+/// Whether the partner of a signal moved on while it stood: of a position its command, of a command its position.
 fn partner_moves(recording: &Recording, joint: Option<&Joint>, signal: &Signal, from: usize, to: usize, jump: f64) -> bool {
     let partner = match signal.quantity {
         Quantity::Position => joint.and_then(|joint| joint.command),

@@ -49,7 +49,7 @@ pub fn steady(recording: &Recording, joint: &Joint, u: &[f64], y: &[f64], lag: f
                 let level = mean(&u[from..to]);
                 let error = mean(tail) - level;
                 errors.push(error);
-                // The command before the hold says from which side it was approached.
+                // The command before the hold shows from which side it was approached.
                 let before = from.checked_sub(((0.3 / period) as usize).max(2)).map(|place| u[place]);
                 match before {
                     Some(before) if before > level + 4.0 * STILL * range => above.push(error),
