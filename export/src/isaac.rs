@@ -14,7 +14,7 @@ use crate::{ExportError, Exported, of_robot};
 use backdrive_plant::model::Model;
 use backdrive_plant::robot::Joint;
 
-/// A joint's name, what the file says of the joint, and what it is now.
+/// A joint's name, its description in the file, and its present terms.
 type Row<'a> = (&'a str, &'a Joint, JointTerms);
 
 /// The joints of a model's robot as a Python file with one `ImplicitActuatorCfg`.
