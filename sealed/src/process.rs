@@ -9,7 +9,7 @@ use crate::master::{Reading, SealedMaster};
 use std::io::{self, BufRead, BufReader, Read, Write};
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 
-/// What the process says first; the number is the version of the protocol.
+/// The process's first output; the number is the version of the protocol.
 pub const GREETING: &str = "backdrive-sealed 1";
 
 /// A device of more axes than this is a mistake of the other end.
@@ -83,7 +83,7 @@ pub enum RemoteError {
     Start {
         /// The program.
         program: String,
-        /// What the system says.
+        /// The system's message.
         error: io::Error,
     },
     /// It said something else first. Why it ended stands in its own error output.
@@ -97,7 +97,7 @@ pub enum RemoteError {
 /// The hidden plant of another process, as whoever drives it sees it.
 pub struct RemoteMaster {
     child: Child,
-    /// `None` once the process has been told to end.
+    /// `None` once the process has been asked to end.
     input: Option<ChildStdin>,
     output: BufReader<ChildStdout>,
     asked: Vec<u8>,

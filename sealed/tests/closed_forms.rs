@@ -126,7 +126,7 @@ fn a_gap_carries_nothing_inside_and_the_shaft_outside() {
     let rows = run(&mut plant, 4000, 1e-3, |t| vec![1e-3 * (t + 1e-3)]);
     assert!(rows[..900].iter().all(|row| row[0] == 0.0));
     near(rows[2999][0], 5000.0 * (3e-3 - 1e-3) + 10.0 * 1e-3, 1e-6);
-    // Rounded: the same far away, and the closed form at the edge.
+    // Rounded: the same far away, and the closed form at the end of the gap.
     let (k, gap, w) = (5000.0, 2e-3, 1e-4);
     let law = RoundedGap { gap, rounding: w, stiffness: k, damping: 0.0 };
     let network = device(RAM);

@@ -25,8 +25,8 @@ pub struct DrawOptions {
 }
 
 impl Default for DrawOptions {
-    /// One effect of any kind; numbers wrong by up to 15 %, a grip by up to 20 %; encoder steps of up to 1/5000 and noise of up to
-    /// 1/1000 of the range; a contact task of 3 N and 5 mm at 5 kHz.
+    /// One effect of any kind; parameters wrong by up to 15 %, a grip by up to 20 %. Encoder steps of up to 1/5000 and noise of up to 1/1000 of the
+    /// range; a contact task of 3 N and 5 mm at 5 kHz.
     fn default() -> DrawOptions {
         DrawOptions {
             effects: 1,

@@ -3,8 +3,8 @@
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
-/// Share of the working force that dry friction takes. Below 3 % it is under what a hand tells apart in a force (some
-/// 7 % of it, Jones 1989) and little for a stability margin; above 15 % no one would call the device backdrivable.
+/// Share of the working force that dry friction takes. Below 3 % it is under the difference in force that a hand perceives (some 7 %, Jones 1989) and
+/// little for a stability margin; above 15 % no one would call the device backdrivable.
 pub(crate) const FRICTION: [f64; 2] = [0.03, 0.15];
 
 /// Share of the working force that viscous and back-EMF forces take at the working speed: as friction, and somewhat more,

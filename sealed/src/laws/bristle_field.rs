@@ -90,7 +90,7 @@ impl Described for BristleField {
         let (friction, stiffness, speed) = match here {
             Here::Body(at) => (at.friction, at.friction / presliding(at.travel, random), at.speed),
             Here::Joint(at) => {
-                // Rubbing flanks: 5 to 20 % of the working force, let go within 3 to 30 % of the working stretch.
+                // Rubbing flanks: 5 to 20 % of the working force, released within 3 to 30 % of the working stretch.
                 let friction = rounded(share([0.05, 0.2], random) * at.force);
                 (friction, friction / (at.stretch * between(0.03, 0.3, random)), at.speed)
             }

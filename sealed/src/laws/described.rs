@@ -1,4 +1,4 @@
-//! What a law says of itself: how files name it, what sort of law it is, how it is drawn, and what a verdict may call it.
+//! A law's description of itself: its name in files, its sort, how it is drawn, and what a verdict may call it.
 
 use super::around::Around;
 use super::draw::{Draw, Here};
@@ -43,7 +43,7 @@ pub(crate) trait Described: Sized {
     /// Its equations, ready to step.
     fn to_force(&self) -> Box<dyn ForceLaw>;
 
-    /// Its numbers, and what its equations take.
+    /// Its parameters, and the ranges that its equations accept.
     fn numbers(&self) -> Vec<Checked>;
 
     /// A law of a size that shows here, at one of the places of `DRAWS`; `None` where the device does not move there.
@@ -54,7 +54,7 @@ pub(crate) trait Described: Sized {
         vec![Self::NAME]
     }
 
-    /// Answers that are right beside its own names at its own place, since nothing tells them apart.
+    /// Answers that are right beside its own names at its own place, because nothing distinguishes them.
     fn same_as(&self, _around: &Around) -> Vec<Answer> {
         Vec::new()
     }

@@ -49,7 +49,7 @@ macro_rules! register {
         $(mod $file;)*
         $(pub use $file::$law;)*
 
-        /// A law of force with its numbers.
+        /// A law of force with its parameters.
         #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
         #[serde(tag = "physics", content = "parameters", rename_all = "snake_case")]
         pub enum Law { $(#[doc = concat!("See [`", stringify!($law), "`].")] $law($law)),* }
@@ -83,7 +83,7 @@ macro_rules! register {
                 match self { $(Law::$law(_) => <$law as Described>::FACTS),* }
             }
 
-            /// Its numbers, and what its equations take.
+            /// Its parameters, and the ranges that its equations accept.
             pub(crate) fn numbers(&self) -> Vec<Checked> {
                 match self { $(Law::$law(law) => law.numbers()),* }
             }

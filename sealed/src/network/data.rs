@@ -10,7 +10,7 @@ pub type Place = Option<usize>;
 /// What a device is said to be: bodies, what joins them, and the signals that drive it and are read.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Network {
-    /// The model file that says so.
+    /// The model file that states this.
     pub nominal: Named,
     /// The grip that holds it, where one does.
     pub grip: Option<Named>,
@@ -74,7 +74,7 @@ pub enum Hold {
 pub enum InputKind {
     /// A force onto the body, N.
     Force,
-    /// The body's position, m: the body moves as it says.
+    /// The body's position, m: the body moves with the input.
     Motion,
 }
 

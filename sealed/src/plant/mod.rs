@@ -30,7 +30,7 @@ use crate::truth::Truth;
 /// `phase^2/24`, 1e-4 of itself, and that of a mode ten times slower by 1e-6.
 const PHASE_PER_SUBSTEP: f64 = 0.05;
 
-/// Substeps of a period at least, for reversals, dead times and edges that fall inside it.
+/// Substeps of a period at least, for reversals, dead times and jumps that fall inside it.
 const SUBSTEPS_AT_LEAST: usize = 20;
 
 /// The same where a look is enough: the fastest frequency is off by 4e-4 of itself.
