@@ -87,7 +87,7 @@ fn run(context: &Context) -> Result<Report, StudyError> {
     Ok(report)
 }
 
-/// Normalised error of each output over the runs that no fit has seen.
+/// Normalised error of each output over the held-out runs.
 fn unseen(found: &Diagnosis, structure: &Structure, values: &[f64]) -> Result<Vec<(String, f64)>, StudyError> {
     let records = &found.problem.held_out;
     let failed = || StudyError::Diagnosis("the model cannot be simulated on the unseen runs".to_string());

@@ -1,4 +1,4 @@
-//! What a study says: measured beside published, and whether it is where it should be.
+//! The result of a study: measured beside published, and whether it is in its range.
 
 use std::fmt::Write as _;
 

@@ -30,7 +30,7 @@ const ROUNDS: usize = 30;
 /// See [`ROUNDS`].
 const DIFFERENCE: f64 = 1e-4;
 
-/// The published models as they are, and a found one as it is and with its numbers refitted to the training record's position.
+/// The published models unchanged, and a found one both unchanged and with its parameters refitted to the training record's position.
 pub(super) fn run(report: &mut Report, context: &Context, found: &Model, train: &Record, pulses: &Record) -> Result<(), StudyError> {
     let error = |model: &Model| -> Result<[f64; 2], StudyError> { Ok([rmse(model, train)?, rmse(model, pulses)?]) };
     for (what, file) in [("symmetric form", "symmetric.toml"), ("asymmetric form", "asymmetric.toml")] {
@@ -78,7 +78,7 @@ fn driven(model: &Model) -> Model {
     model
 }
 
-/// A model with its numbers fitted to a record's position by Levenberg-Marquardt steps.
+/// A model with its parameters fitted to a record's position by Levenberg-Marquardt steps.
 fn refitted(mut model: Model, record: &Record) -> Result<Model, StudyError> {
     let paths: Vec<&str> = NUMBERS.iter().copied().filter(|path| model.values_at(path).is_ok()).collect();
     let moved = |model: &Model, steps: &[f64]| -> Result<Model, StudyError> {

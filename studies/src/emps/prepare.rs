@@ -19,7 +19,7 @@ const ENDS: usize = 50;
 const BLUR: usize = 8;
 /// Samples of a stroke, at least.
 const SHORTEST: usize = 200;
-/// One sample in so many is kept: the position holds nothing above the low-pass.
+/// One in this number of samples is kept: the position holds nothing above the low-pass.
 const THIN: usize = 2;
 
 /// A record.

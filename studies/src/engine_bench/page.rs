@@ -1,4 +1,4 @@
-//! The page: the paper's figures as far as its text tells them, and ours.
+//! The page: the paper's figures where its text gives them, and ours.
 
 use super::told::Told;
 use super::user_force;

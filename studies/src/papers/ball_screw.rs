@@ -37,7 +37,7 @@ fn bench(text: &str) -> Result<Model, StudyError> {
     Ok(model)
 }
 
-/// The model file with LuGre friction in the place of its own: about the true slope at a reversal and level of sliding.
+/// The model file with LuGre friction instead of its own: about the true slope at a reversal and level of sliding.
 fn lugre(text: &str) -> Result<String, StudyError> {
     let mut document: DocumentMut = text.parse().map_err(|e| StudyError::File(format!("{FILE}: {e}")))?;
     for element in document.get_mut("elements").and_then(Item::as_array_of_tables_mut).into_iter().flat_map(|t| t.iter_mut()) {

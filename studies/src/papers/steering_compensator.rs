@@ -35,8 +35,8 @@ const STEPS: &[Step] = &[
     Step { paper: "backlash, 0.336 mm", accept: &["backlash"], places: &[["ram", "disc"]] },
 ];
 
-// With c1 between disc and ground, the force on the disc is that of b1, c1, and c in series with b. A damper d between flywheel and ground gives
-// the same one at every frequency with c' = c + c1, b' = b (c'/c)^2, d = c' c1/c: no measurement at the ram tells them apart.
+// With c1 between disc and ground, the force on the disc is that of b1, c1, and c in series with b. A damper d between flywheel and ground gives the
+// same one at every frequency with c' = c + c1, b' = b (c'/c)^2, d = c' c1/c: no measurement at the ram distinguishes them.
 
 /// A model whose only output is the force, as on the rig.
 fn rig(name: &str) -> Result<Model, StudyError> {

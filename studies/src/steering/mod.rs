@@ -1,4 +1,5 @@
-//! Paper 001's system whole: the compensator on its rig, the admittances of four oils, its numbers found again from them, and the paper's figures.
+//! Paper 001's system whole: the compensator on its rig, the admittances of four oils, its parameters identified again from them, and the paper's
+//! figures.
 
 pub mod bench;
 pub mod device;

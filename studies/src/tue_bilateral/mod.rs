@@ -1,5 +1,6 @@
-//! Two levers of a real force-reflecting teleoperator, of which nothing is stated but an inertia: what they have besides, which gauge is dead, how
-//! late the hand's torque is recorded, which law couples them, whether they were stable with it, and the sessions run again with what was found.
+//! Two levers of a real force-reflecting teleoperator, of which nothing is stated but an inertia. The study finds what they have besides, which gauge
+//! is dead, how late the hand's torque is recorded, which law couples them and whether they were stable with it. It then re-simulates the sessions
+//! with what was found.
 
 mod again;
 mod environment;
@@ -110,7 +111,7 @@ fn run(context: &Context) -> Result<Report, StudyError> {
     Ok(report)
 }
 
-/// What the audit says of the gauges.
+/// The audit's result on the gauges.
 fn gauges(report: &mut Report, context: &Context) -> Result<(), StudyError> {
     for lever in ["master", "slave"] {
         let (set, model) = (format!("set-{lever}-gauges.toml"), format!("{lever}-gauges.toml"));
