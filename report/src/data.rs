@@ -71,7 +71,7 @@ struct SeriesData {
     x: Vec<f64>,
     #[serde(serialize_with = "short")]
     y: Vec<f64>,
-    /// The other edge of a band, the radii of discs.
+    /// The other boundary of a band, the radii of discs.
     #[serde(skip_serializing_if = "Option::is_none", serialize_with = "short_if_any")]
     z: Option<Vec<f64>>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -152,7 +152,7 @@ impl Shown {
         Self { scale, factor, unit, decimals }
     }
 
-    /// As it is written; NaN (which JSON writes as null) for what cannot stand on this axis.
+    /// The value that is written; NaN (which JSON writes as null) for what cannot stand on this axis.
     fn round(&self, value: f64) -> f64 {
         let shown = value / self.factor;
         if !drawable(value, self.scale.log) {

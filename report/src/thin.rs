@@ -42,8 +42,8 @@ pub struct Thinned {
     pub dense: bool,
 }
 
-/// A line in pixels as it is drawn in `window`. Where x never turns back, each pixel column keeps its first, lowest, highest and last
-/// point; elsewhere points closer than a third of a pixel to the one before go, and what has been drawn already is not drawn again.
+/// A line in pixels for `window`. Where x never turns back, each pixel column keeps its first, lowest, highest and last point. In other places,
+/// points closer than a third of a pixel to the one before are dropped, and what has been drawn already is not drawn again.
 pub fn line(points: impl Iterator<Item = (f64, f64)>, window: Rect) -> Thinned {
     let mut out: Vec<Vec<(f64, f64)>> = Vec::new();
     for stroke in strokes(points) {
@@ -207,7 +207,7 @@ fn cut(stroke: &[(f64, f64)], window: Rect) -> Vec<Vec<(f64, f64)>> {
     out
 }
 
-/// A band in pixels as (x, one edge, the other), x never turning back: per pixel column its outermost points, one stretch between gaps.
+/// A band in pixels as (x, one boundary, the other), x never turning back: per pixel column its outermost points, one stretch between gaps.
 pub fn band(points: impl Iterator<Item = (f64, f64, f64)>) -> Vec<Vec<(f64, f64, f64)>> {
     let mut stretches: Vec<Vec<(f64, f64, f64)>> = vec![Vec::new()];
     for (x, a, b) in points {
