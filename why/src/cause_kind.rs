@@ -6,7 +6,7 @@ use serde::Serialize;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum CauseKind {
-    /// mu*lambda is beyond what this device, as it is, allows.
+    /// mu*lambda is beyond what the real device allows.
     GainTooHigh,
     /// The way is long, or the rate low.
     Delay,
@@ -48,7 +48,7 @@ pub enum CauseKind {
     Clock,
     /// Two nodes that speak on one topic.
     TwoPublishers,
-    /// A node does something else than its graph says, and none of these.
+    /// A node differs from its graph, by none of these causes.
     Unknown,
 }
 

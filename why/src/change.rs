@@ -49,7 +49,7 @@ pub enum Change {
         /// Hz; 0 for none.
         hz: f64,
     },
-    /// A way has only the delay that the graph says.
+    /// A way has only the delay in the graph.
     WayRepaired {
         /// Node at its end.
         node: String,
@@ -61,14 +61,14 @@ pub enum Change {
         /// Factor.
         factor: f64,
     },
-    /// A sensor does what its model says.
+    /// A sensor behaves like its model.
     SensorRepaired {
         /// The node that reads it.
         node: String,
     },
     /// Sensors that neither round nor are noisy.
     FinerSensors,
-    /// Dry friction between the master's bodies and ground made up for by the motor, as far as it is known.
+    /// The motor compensates dry friction between the master's bodies and ground, where it is known.
     FrictionCompensated {
         /// Share of the friction that is made up for, 0 to 1.
         share: f64,

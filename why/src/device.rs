@@ -29,14 +29,14 @@ pub struct DeviceFound {
     pub sentence: String,
     /// Physics that the model leaves out, most important first.
     pub physics: Vec<PhysicsFound>,
-    /// Numbers of the model that are others: path, as the model has it, as it is.
+    /// Parameters of the model that differ: path, value in the model, true value.
     pub numbers: Vec<NumberFound>,
     /// The device with all that.
     #[serde(skip)]
     pub files: Option<Box<DeviceFiles>>,
 }
 
-/// A physics at a place.
+/// An effect at a place.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PhysicsFound {
     /// Its name.
@@ -60,7 +60,7 @@ pub struct NumberFound {
     pub path: String,
     /// In the graph's model.
     pub declared: f64,
-    /// As it is.
+    /// The value that was found.
     pub found: f64,
     /// Whether it belongs to the hand's grip.
     pub of_grip: bool,
@@ -191,7 +191,7 @@ fn explained(problem: &Problem, patience: Duration, stop: &AtomicBool) -> Option
     let best = search.found.iter().chain([&search.nominal]).min_by(|a, b| cost(a).total_cmp(&cost(b)))?;
     let left = level(&best.levels) / given;
     let family = |c: &Candidate| c.structure.added.first().map(|h| h.physics.family);
-    // How much more the best of another kind leaves says how sure the kind is.
+    // The additional residual of the best of another kind shows how certain the kind is.
     let rival = search
         .found
         .iter()

@@ -43,7 +43,7 @@ pub struct Look {
     pub patience: Duration,
 }
 
-/// Compares every node of a graph with its bag; `hear` is told which.
+/// Compares every node of a graph with its bag; `hear` receives its name.
 ///
 /// # Errors
 /// A node that cannot be built.
@@ -178,7 +178,7 @@ fn is_known(settings: &Settings) -> bool {
     }
 }
 
-/// What the model says of the sensor of a master's position.
+/// The model of the sensor of a master's position.
 fn sensor_of(settings: &Settings, quantity: Quantity, axis: usize) -> Sensor {
     let (Settings::Master(DeviceFiles { model: Some(model), real_sensors: true, .. }), Quantity::Position) = (settings, quantity) else {
         return Sensor::default();
