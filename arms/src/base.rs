@@ -51,7 +51,7 @@ pub fn base(problem: &Problem) -> Result<Vec<Base>, ArmError> {
         .map(|signals| DVector::from_iterator(signals.len() * STATES, signals.iter().flatten().copied()))
         .collect();
     let largest = columns.iter().map(DVector::norm).fold(0.0, f64::max);
-    // From the last body inwards, so that what cannot be told apart is named by the body that is nearer to the base.
+    // From the last body inwards, so that a combination that cannot be separated is named by the body that is nearer to the base.
     let mut orthogonal: Vec<DVector<f64>> = Vec::new();
     let (mut free, mut bound) = (Vec::new(), Vec::new());
     for index in (0..columns.len()).rev() {

@@ -1,9 +1,10 @@
-//! The next experiment: of the motions that were drawn the one that tells most of what the logs leave open, with a known payload where it takes one.
+//! The next experiment: of the motions that were drawn the one with the most information on what the logs leave open, with a known payload where it
+//! takes one.
 //!
 //! A question has an answer, the structure that was found, and a rival. The torque that the answer's own term makes along a motion is what the rival has
-//! to make up for by all its numbers, which are known as well as logs and motion together say. What it cannot make up for, in standard deviations of the
-//! residuals, is the separation (the noncentrality of Atkinson & Fedorov, The design of experiments for discriminating between two rival models,
-//! Biometrika 62(1), 1975, for models that are linear in their numbers).
+//! to compensate with all its parameters, which are known as well as logs and motion together determine them. The part that it cannot compensate, in
+//! standard deviations of the residuals, is the separation. It is the noncentrality of Atkinson & Fedorov (The design of experiments for discriminating
+//! between two rival models, Biometrika 62(1), 1975) for models that are linear in their parameters.
 
 use crate::error::ArmError;
 use crate::excitation::{Excitation, draw};
@@ -49,7 +50,7 @@ struct Question {
 pub struct Plan {
     /// The motion.
     pub excitation: Excitation,
-    /// What it tells apart, question by question; empty where nothing is open.
+    /// The pairs that it separates, question by question; empty where nothing is open.
     pub between: Vec<[String; 2]>,
     /// By how much it separates what it separates least, standard deviations, with all that is recorded but one playing.
     pub separation: Option<f64>,

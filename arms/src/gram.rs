@@ -41,7 +41,7 @@ impl Gram {
 }
 
 impl Data<'_> {
-    /// Inner products of a structure's columns and of the torque of some terms with their numbers, the logs counted so many times.
+    /// Inner products of a structure's columns and of the torque of some terms with their parameters, with the given weight of the logs.
     pub fn gram(&self, structure: &Structure, terms: &[(Term, Vec<f64>)], weights: &Weights, times: f64) -> Option<Gram> {
         let (columns, _) = self.all_columns(structure);
         let mut torque = vec![0.0; self.layout.rows];

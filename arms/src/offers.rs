@@ -118,7 +118,7 @@ pub(crate) fn shaped(data: &Data, fit: Fit, index: usize, weights: &Weights) -> 
         return best;
     }
     if matches!(term.physics, Physics::Compliance | Physics::Backlash) {
-        // The shape that the number says, as long as that is better.
+        // The shape that follows from the fitted value, while that is better.
         for _ in 0..4 {
             let mut structure = best.structure.clone();
             let value = best.values[best.places[index].start];
@@ -179,7 +179,7 @@ pub(crate) fn slipped(data: &Data, fit: Fit, weights: &Weights) -> Fit {
     best
 }
 
-/// The tolerance of the inertial parameters that is worth its numbers.
+/// The fit with the tolerance of the inertial parameters that has the best score.
 pub(crate) fn tolerated(data: &Data, fit: Fit, weights: &Weights) -> Fit {
     let others = (0..=data.most_tolerance).filter_map(|tolerance| data.fit(&Structure { tolerance, ..fit.structure.clone() }, weights));
     others.fold(fit.clone(), |best, other| if other.score < best.score - 1e-9 { other } else { best })

@@ -7,7 +7,7 @@ use crate::soft::{Gear, change};
 use backdrive_diagnosis::hypothesis::Family;
 use backdrive_plant::robot::Tree;
 
-/// A physics that a search can add to an arm.
+/// An effect that a search can add to an arm.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Physics {
     /// Viscous friction.
@@ -34,7 +34,7 @@ pub enum Physics {
     Inertia,
     /// Torque that is read by a wrong factor (torque constant), at a joint or at all.
     Gain,
-    /// A joint whose zero is not where its sensor says.
+    /// A joint whose zero differs from that of its sensor.
     Offset,
     /// A mass at the last link.
     Payload,
@@ -52,7 +52,7 @@ pub enum Physics {
     Backlash,
 }
 
-/// Everything that is known of a physics.
+/// Everything that is known of an effect.
 pub struct Facts {
     /// Name in verdicts: an element kind, the key of a signal, or one that only arms have.
     pub name: &'static str,
@@ -121,7 +121,7 @@ impl Physics {
     }
 }
 
-/// Where a physics acts.
+/// Where an effect acts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum At {
     /// At a joint.
@@ -142,7 +142,7 @@ impl At {
     }
 }
 
-/// A physics at a place, with the numbers in which the torque is not linear.
+/// An effect at a place, with the parameters in which the torque is not linear.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Term {
     /// What.
@@ -273,7 +273,7 @@ impl Sight<'_> {
                 let before = |i: usize| term.shape.get(i).copied().unwrap_or(0.0);
                 sideways.iter().enumerate().map(|(i, s)| plus(all(s, 1.0), down, -0.5 * before(i))).collect()
             }
-            // As it was measured: the motor carries the other joint's friction too.
+            // The measured torque: the motor carries the other joint's friction too.
             Physics::Coupling => one(motion.torque[other].clone()),
             Physics::CoupledFriction => {
                 let ratio = shape(0);

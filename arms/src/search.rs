@@ -18,11 +18,11 @@ const FITTED: usize = 10;
 const FITTED_BESIDE: usize = 3;
 /// Which of [`TOLERANCES`] is that of a file that somebody made with care.
 const STATED: usize = 1;
-/// By how much the information criterion has to fall for a physics to be taken up. A Bayes factor of 150 ("very strong", Kass & Raftery 1995) is 10.
+/// By how much the information criterion has to fall for an effect to be added. A Bayes factor of 150 ("very strong", Kass & Raftery 1995) is 10.
 const WORTH: f64 = 10.0;
-/// The least share of the mean squared residual of unseen stretches, at the joint where it shows most, that a physics has to take.
+/// The least share of the mean squared residual of held-out segments, at the joint where it shows most, that an effect has to explain.
 pub const LEAST_SHARE: f64 = 0.03;
-/// The least share of the rms torque of a joint, that where it shows most, that a physics has to be.
+/// The least share of the rms torque of a joint, that where it shows most, that an effect has to be.
 pub const LEAST_TORQUE: f64 = 0.01;
 
 /// The load at a joint has to spread by this share of its median for friction that grows with it to be tried.
@@ -62,7 +62,7 @@ pub struct Search {
     pub freed: Vec<Option<f64>>,
 }
 
-/// Another structure, with a term in the place of one that was found.
+/// Another structure, with a term instead of one that was found.
 #[derive(Debug, Clone)]
 pub struct Rival {
     /// The term.
@@ -76,8 +76,8 @@ pub struct Rival {
 /// Looks for what is missing. `without`: names of physics that are not considered; `most`: physics that are added at most; `stop`: set by whoever interrupts,
 /// which ends the search with what was found until then.
 ///
-/// Where a joint has no motor and much of the torque of one with a motor remains, the bodies stay those of the file: a law that is missing is no measurement of
-/// a mass, and the friction of a joint without a motor is known only in the size of its inertia.
+/// Where a joint has no motor and much of the torque of one with a motor remains, the bodies stay those of the file. The residual of a missing law does not
+/// measure a mass, and the friction of a joint without a motor is known only in the size of its inertia.
 ///
 /// # Errors
 /// Where a fit cannot be computed at all.
@@ -305,7 +305,7 @@ fn is_as_good(data: &Data, simple: &Fit, other: &Fit, weights: &Weights) -> bool
     largest_share(data, simple, other) < LEAST_SHARE || (!sure && simple.score < other.score + WORTH)
 }
 
-/// Puts another physics in the place of one that was added, where that is better.
+/// Replaces an added effect by another, where that is better.
 fn exchange(data: &Data, pool: &[Term], best: &mut Fit, weights: &Weights) {
     for _ in 0..2 {
         let mut changed = false;
@@ -356,7 +356,7 @@ fn exchange(data: &Data, pool: &[Term], best: &mut Fit, weights: &Weights) {
     }
 }
 
-/// Whether inertial parameters, freed, can make up for a physics.
+/// Whether released inertial parameters can compensate an effect.
 fn is_like_bodies(physics: Physics) -> bool {
     matches!(physics, Physics::Payload | Physics::Inertia)
 }
@@ -394,13 +394,13 @@ fn shrink(data: &Data, best: &mut Fit, weights: &Weights) {
     }
 }
 
-/// The nominal structure with its numbers refitted, inertial parameters as free as is worth it.
+/// The nominal structure with its parameters refitted, inertial parameters as free as is worth it.
 fn refitted(data: &Data, nominal: &Structure, slip: &[f64], weights: &Weights) -> Option<Fit> {
     let fit = data.fit(&Structure { slip: slip.to_vec(), ..nominal.clone() }, weights)?;
     Some(tolerated(data, fit, weights))
 }
 
-/// What could stand in the place of an added term, with the score above the best one's.
+/// What could replace an added term, with the score above the best one's.
 fn rivals(data: &Data, pool: &[Term], best: &Fit, index: usize, weights: &Weights) -> Vec<Rival> {
     let less = without(&best.structure, index);
     let pool: Vec<Term> = pool.iter().filter(|t| !t.is_like(&best.structure.terms[index])).cloned().collect();

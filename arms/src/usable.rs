@@ -1,4 +1,4 @@
-//! Which samples of the logged torque may be used, and at which joints: clipped torque is left out, and torque without its sign says nothing of a joint.
+//! Which samples of the logged torque may be used, and at which joints: clipped torque is left out, and a joint's torque without its sign is not used.
 
 use crate::log::Log;
 use crate::motion::{Motion, Rates};

@@ -1,4 +1,4 @@
-//! What a search says, in the form of the verdict file.
+//! The result of a search, in the form of the verdict file.
 
 use crate::base;
 use crate::error::ArmError;
@@ -38,7 +38,7 @@ pub struct Parts<'a> {
     pub audit: Vec<Remark>,
     /// Torque that a loop has to add, by the refitted nominal and by the diagnosed model.
     pub loops: [Option<Vec<f64>>; 2],
-    /// Of each added term what a simulation says of it.
+    /// The result of a simulation for each added term.
     pub judged: Vec<Option<Judged>>,
     /// What to record next.
     pub next: Option<NextExperiment>,

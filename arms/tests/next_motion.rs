@@ -1,4 +1,4 @@
-//! The motion that is planned tells what the logs leave open, and a payload that is said counts.
+//! The planned motion determines what the logs leave open, and a stated payload counts.
 
 mod common;
 
@@ -65,7 +65,7 @@ fn friction_under_one_load_is_left_open_and_the_planned_motion_tells() {
     let plan = planned(&first);
     assert!(plan.separation_sd.unwrap() > 4.0, "{plan:?}");
     assert!(plan.between.iter().any(|b| b.contains("grows with the load") && b.contains("shoulder")), "{plan:?}");
-    // Done as it says.
+    // Done by its description.
     let path = tracked(&first.experiment);
     let count = (200.0 * plan.duration_s.unwrap()) as i32;
     for (seed, name) in ["d.csv", "e.csv", "f.csv"].iter().enumerate() {
