@@ -15,7 +15,7 @@ const LATEST: f64 = 1.0;
 pub enum Use {
     /// Its commands move it.
     Good,
-    /// It says nothing, for this reason.
+    /// It has no information, for this reason.
     Still(String),
 }
 

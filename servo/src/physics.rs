@@ -2,7 +2,7 @@
 
 use backdrive_plant::servo::{Number, Numbers};
 
-/// A physics that may be added.
+/// An effect that may be added.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Physics {
     /// Its name in a verdict.
@@ -54,7 +54,7 @@ pub const ALL: [Physics; 14] = [
     physics("quadratic_drag", "drag that grows with the square of the speed", &[Number::QuadraticDamping], &[], &[]),
 ];
 
-/// A physics by its name.
+/// An effect by its name.
 pub fn named(name: &str) -> Option<&'static Physics> {
     ALL.iter().find(|p| p.name == name)
 }

@@ -19,7 +19,7 @@ use std::collections::{BTreeMap, BTreeSet};
 pub struct Refitted {
     /// Its name.
     pub joint: String,
-    /// Its numbers by key, with their intervals.
+    /// Its parameters by key, with their intervals.
     pub numbers: BTreeMap<String, Estimate>,
     /// Median nrmse of free runs of the given numbers on held-out recordings, else on those that were fitted; `None` where the joint rests in all.
     pub given: Option<f64>,

@@ -13,12 +13,12 @@ const SCREEN: usize = 4;
 const FULL: usize = 15;
 /// Physics of a round that are looked at on unseen recordings.
 const FINALISTS: usize = 3;
-/// A physics has to lower the mean loss on unseen recordings by this share.
+/// An effect has to lower the mean loss on held-out recordings by this share.
 const LEAST: f64 = 0.02;
 /// What shows in few recordings has to lower it by this share, and others may lose this share of what those gain.
 const MUCH: f64 = 0.05;
 const FEW: f64 = 0.25;
-/// Errors up to so many times what the position sensor resolves are its own.
+/// Errors up to this many resolutions of the position sensor are the sensor's own.
 const NOISE: f64 = 1.4;
 /// Physics that are also tried two at a time: neither alone need show.
 const PAIRS: [[&str; 2]; 5] = [
@@ -42,7 +42,7 @@ pub struct Candidate {
     pub unseen: Vec<[f64; BLOCKS]>,
 }
 
-/// A physics that was looked at on unseen recordings.
+/// An effect that was evaluated on held-out recordings.
 #[derive(Debug, Clone)]
 pub struct Tried {
     /// What was added.
@@ -281,12 +281,12 @@ impl Searcher<'_> {
         is_no_worse && lowers > MUCH && losses < FEW * gains && rest > 0.2 * LEAST * total(base) * self.problem.records.len() as f64
     }
 
-    /// Whether one in the place of another lowers the mean loss on unseen recordings, and is no worse in most of them.
+    /// Whether one instead of another lowers the mean loss on held-out recordings, and is no worse in most of them.
     fn is_no_worse(&self, base: &Candidate, better: &Candidate) -> bool {
         total(better) < (1.0 - LEAST) * total(base) && self.gain(base, better).is_none_or(|g| g.mean > 0.0)
     }
 
-    /// What a round may do, in two stages: add a physics, or two that need each other; put one in the place of a rival.
+    /// What a round may do, in two stages: add an effect, or two that need each other; replace one by a rival.
     fn moves(&self, best: &Candidate, stage: usize) -> Vec<Move> {
         let singles = ALL.iter().filter(|p| self.may(p, &best.added)).map(|p| Move { adds: vec![p], drops: None });
         let pairs = PAIRS.iter().filter_map(|[a, b]| {
@@ -352,7 +352,7 @@ impl Searcher<'_> {
             let lowers = 1.0 - total(&candidate) / total(best);
             let names = change.adds.iter().map(|p| p.name).collect();
             self.tried.push(Tried { adds: names, drops: change.drops.map(|p| p.name), gain, lowers, taken: false });
-            // One in the place of another has to be better only; a second number of two has to be worth it as well.
+            // A replacement has to be better only; the second effect of a pair has to be worth it as well.
             let enough = match change.drops {
                 Some(_) => self.is_no_worse(best, &candidate),
                 None => self.is_better(best, &candidate) && lowers > LEAST * change.adds.len() as f64,

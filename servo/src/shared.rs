@@ -4,7 +4,7 @@ use crate::search::Found;
 use backdrive_diagnosis::verdict::SharedCause;
 use backdrive_plant::servo::Number;
 
-/// A rival this many standard errors behind is told apart.
+/// A rival this many standard errors behind is rejected.
 const APART: f64 = 2.5;
 
 /// Causes that share what was seen.
