@@ -1,8 +1,8 @@
 //! Limit cycles with known answers: a relay, Coulomb friction with delay, backlash in the loop.
 //!
-//! Each loop is built of model files and run by the product, and its verdict compared with a solution of the same loop by code
-//! that shares nothing with it: between samples each of these loops is linear (or slides under a constant force), so it is
-//! carried from sample to sample in closed form, the sampled delay included. The describing function's own answer stands beside.
+//! Each loop is built of model files and run by the product, and its verdict compared with a solution of the same loop by code that shares nothing
+//! with it. Between samples each of these loops is linear (or slides under a constant force), so it is carried from sample to sample in closed form,
+//! the sampled delay included. The describing function's own answer stands beside.
 
 use backdrive_control::operator::Intent;
 use backdrive_nodes::graph::{DeviceFiles, Graph, NodeKind, Overrides, Settings};
@@ -103,7 +103,7 @@ fn fragment(element: &str) -> String {
     format!("name = \"environment\"\nkind = \"fragment\"\n{element}")
 }
 
-/// A slave that is where it is told to be: what it touches is all that it adds to the loop.
+/// A slave that is exactly at its command: what it touches is all that it adds to the loop.
 fn ideal_slave() -> String {
     device("tip = 0.0", "", "tip", "motion", "tip", "tip")
 }
@@ -329,9 +329,8 @@ fn backlash_in_the_slave_s_drive() {
     assert_close("backlash, amplitude", amplitude, known_amplitude, 0.03);
     assert_close("backlash, frequency", frequency, known_frequency, 0.03);
 
-    // The describing function of play (Gelb & Vander Velde 1968): the loop feeds in 4 K g (A - g) per cycle and the damper takes
-    // pi b w A^2, with g half the gap and K g' for the delay; the larger root is the stable cycle. Near, not within 3 %: the
-    // force of play is far from a sine.
+    // The describing function of play (Gelb & Vander Velde 1968): the loop feeds in 4 K g (A - g) per cycle and the damper takes pi b w A^2, with g
+    // half the gap and K g' for the delay. The larger root is the stable cycle. Near, not within 3 %: the force of play is far from a sine.
     let k = lambda * wall * ratio;
     let g = 0.5 * gap + tip_friction / shaft;
     let omega = 2.0 * PI * known_frequency;

@@ -1,4 +1,4 @@
-//! A program of the user's own in the place of a node: examples/own_master.rs, started by launch/own-master.toml.
+//! A program of the user's own instead of a node: examples/own_master.rs, started by launch/own-master.toml.
 
 use backdrive_bags::{Reader, Signal, signals};
 use std::path::{Path, PathBuf};

@@ -97,13 +97,13 @@ fn a_sealed_effect_is_diagnosed_without_its_truth() {
     assert!(gain("none") > 0.05 && gain("diagnosed") > 0.0 && gain("chosen") >= 0.94 * gain("none").min(gain("diagnosed")));
     assert!(place.path("proof/proof.html").is_file());
 
-    // All effects count once, and again where the refitted nominal model stays away from what no fit has seen.
+    // All effects count once, and again where the refitted nominal model differs from held-out data.
     let floors = found["refit_floors"].as_f64().unwrap();
     assert!(floors > 0.5, "{floors}");
     let summary = &proof["summary"];
     assert_eq!((&summary["place"]["of"], &summary["showing"]["place"]["of"]), (&1.into(), &usize::from(floors >= 3.0).into()), "{summary}");
 
-    // The graph itself was run below and above the edge without canceller; its bags are there.
+    // The graph itself was run below and above the critical gain without canceller; its bags are there.
     let live = found["live"].as_array().unwrap();
     let of_none = |below: bool| live.iter().find(|run| run["canceller"] == "none" && run["below_edge"] == below).unwrap();
     assert_eq!(of_none(true)["outcome"], "stable");
@@ -134,7 +134,7 @@ fn what_cannot_be_proven_is_told_in_one_line() {
     assert!(ended.code == Some(2) && ended.stderr.contains("from 0 to 3"), "{ended:?}");
     let ended = prove_with(&place, &[("--session", "nothing.toml")], &["--out", "other"]);
     assert!(ended.code == Some(3) && ended.stderr.contains("nothing.toml"), "{ended:?}");
-    // Of what is needed last it is told first, and nothing is sealed that would stand in the way of the next try.
+    // An error in what is needed last is reported first, and nothing is sealed that would prevent the next try.
     let ended = prove_with(&place, &[("--contact", "no-task.toml")], &["--out", "third"]);
     assert_eq!(ended.code, Some(3), "{ended:?}");
     assert!(ended.stderr.contains("no-task.toml") && ended.stderr.contains("--contact"), "{}", ended.stderr);

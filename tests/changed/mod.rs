@@ -139,7 +139,7 @@ impl Bag {
         self.messages.iter().filter(|m| m.topic == topic).count()
     }
 
-    /// Keeps the messages of which `keep` says so: topic, place on its topic, of how many.
+    /// Keeps the messages that `keep` accepts: topic, place on its topic, of how many.
     pub fn keep(&mut self, keep: impl Fn(&str, usize, usize) -> bool) {
         let mut counts: BTreeMap<String, usize> = BTreeMap::new();
         self.messages.iter().for_each(|m| *counts.entry(m.topic.clone()).or_default() += 1);
