@@ -23,7 +23,8 @@ const MOST_A_SAMPLE: f64 = 0.5;
 
 /// Gains of the loop at each joint, N m/rad and N m s/rad. The loop is critically damped at 4 Hz at most with the joint's inertia while the others are
 /// free. The pose is that of least inertia, because a loop that is stable there is stable everywhere. Loop gains are also limited by the rotor inertia
-/// alone, because the link is decoupled inside the backlash. The models that are compared have the same loop, that of the one with most in it. `None` where the model is no arm.
+/// alone, because the link is decoupled inside the backlash. The models that are compared have the same loop, that of the one with most in it. `None`
+/// where the model is no arm.
 pub fn gains(data: &Data, model: &Model) -> Option<Vec<[f64; 2]>> {
     let arm = model.arm.as_ref()?;
     let period = data.rates.period();
