@@ -3,8 +3,8 @@
 //!
 //!     cargo bench -p backdrive-plant --bench cost -- docs/step-cost.svg      (from the root; without a file nothing is drawn)
 //!
-//! Prints microseconds per step of one substep (the fastest of several rounds), and the exponent of a power of the number of bodies fitted from 8 bodies on,
-//! and of the number of contacts from 2 on.
+//! Prints microseconds per step of one substep (the fastest of several rounds). Also prints the exponent of a power of the number of bodies fitted from 8
+//! bodies on, and of the number of contacts from 2 on.
 
 use backdrive_plant::model::Model;
 use backdrive_plant::stepper::{Options, Plant, Segment};

@@ -1,8 +1,7 @@
 //! A model as a linear system about rest: modes, poles, frequency responses.
 //!
-//! Elements that are not linear are replaced by what they look like to a sine of a stated amplitude
-//! ([`Operating`]), so one model gives a stiff linkage at small amplitude and a soft one at large. A delay
-//! acts on frequency responses and not on poles.
+//! Elements that are not linear are replaced by their equivalent for a sine of a stated amplitude ([`Operating`]), so one model gives a stiff linkage
+//! at small amplitude and a soft one at large. A delay acts on frequency responses and not on poles.
 
 pub use crate::elements::DryFriction as Friction;
 
@@ -279,8 +278,8 @@ impl<'a> LinearModel<'a> {
         Ok(matrix)
     }
 
-    /// Force on a body per force of an element, N per N or N m per N: of an element at a point of a robot what it is on a joint at the pose, `Jᵀ`. 0 where
-    /// it does not reach the body, or there is no such element.
+    /// Force on a body per force of an element, N per N or N m per N; for an element at a point of a robot its effect on a joint at the pose, `Jᵀ`. 0
+    /// where it does not reach the body, or there is no such element.
     pub fn force_share(&self, element: usize, body: usize) -> f64 {
         let share = |place: Place| match place {
             Some(end) if end == body => 1.0,

@@ -58,7 +58,8 @@ impl Model {
 pub struct Body {
     /// Unique in the model.
     pub name: String,
-    /// kg or kg m², at least 0; 0 only where an inerter or a motion input makes that possible, or for a joint of a robot, whose links have theirs, and for a point of one.
+    /// kg or kg m², at least 0. It is 0 only where an inerter or a motion input makes that possible, for a joint of a robot, whose links have theirs, and for a
+    /// point of one.
     pub inertia: f64,
 }
 

@@ -171,7 +171,7 @@ fn fixed_links_are_one_body_with_what_carries_them() {
 
 #[test]
 fn a_frictionless_arm_keeps_its_energy() {
-    // Runge and Kutta's rule of fourth order: what is left shrinks by 16 as its step halves.
+    // Runge and Kutta's rule of fourth order: the error shrinks by 16 as its step halves.
     let tree = Tree::new(&rods(&[(1.7, 0.6), (0.8, 0.45), (0.5, 0.3)])).unwrap();
     let drift = |steps: usize| {
         let (mut q, mut v, h) = (vec![0.3, 0.5, -1.0], vec![1.0, -2.0, 3.0], 1.0 / steps as f64);

@@ -66,8 +66,8 @@ pub fn of_path(law: &impl PathLaw, at: &Sine) -> Linear {
             break;
         }
     }
-    // A loop that has not closed yet (asymmetric hysteresis under a small sine creeps for thousands of cycles) gains as much force per distance on
-    // each cycle: that creep is no response to the sine.
+    // A loop that has not closed yet gains as much force per distance on each cycle: that creep is no response to the sine. Asymmetric hysteresis
+    // under a small sine creeps for thousands of cycles.
     let (_, _, after, travelled) = cycle(None);
     let (in_phase, in_quadrature, ..) = cycle(Some((after - before) / travelled));
     let scale = TAU / STEPS as f64 / (PI * amplitude);

@@ -120,7 +120,7 @@ impl PreisachLugre {
         if creeps { v.abs() / self.level(v) } else { 0.0 }
     }
 
-    /// Lets the bristles creep along `way` (m, above 0) in `direction` (±1) under the level `level`, and gives what is left of the way.
+    /// Lets the bristles creep along `way` (m, above 0) in `direction` (±1) under the level `level`, and returns the rest of the way.
     #[inline]
     fn creep(&self, memory: &mut [f64], way: f64, direction: f64, level: f64, is_last: bool) -> f64 {
         let z = memory[0];

@@ -76,7 +76,7 @@ fn wave(lines: &[(usize, f64)]) -> Vec<Complex<f64>> {
     spectrum
 }
 
-/// One round of clipping the wave and keeping the phases of what is left (Van der Ouderaa et al. 1988).
+/// One round of clipping the wave and keeping the phases of the result (Van der Ouderaa et al. 1988).
 fn lower_crest(lines: &mut [(usize, f64)], round: u32) {
     let mut wave = wave(lines);
     let highest = wave.iter().fold(0.0_f64, |a, x| a.max(x.re.abs()));

@@ -32,7 +32,7 @@ pub fn read_headings(path: &Path) -> Result<Vec<String>, FileError> {
     Ok(heading_of(&mut table, &name)?.1.iter().map(str::to_string).collect())
 }
 
-/// What is said of a table whose first row holds numbers.
+/// The error for a table whose first row holds numbers.
 pub const NO_HEADING: &str = "there is no heading: expected names of columns such as t,force,position, found numbers; \
      write one, or name the columns of `backdrive bag import` or `backdrive init` with --columns t,force,position (and --rate HZ where no column is \
      the time); a line that begins with # is a comment";
@@ -59,7 +59,7 @@ fn heading_of<R: BufRead>(table: &mut TextTable<R>, name: &str) -> Result<(usize
 
 /// Reads the signals of a model from a CSV file: its inputs, and those of its outputs that were recorded. Other columns may hold anything.
 ///
-/// Where an input is missing that `may_be_absent` does not excuse, all columns are read, so that who asks for it can tell what there is.
+/// Where an input is missing that `may_be_absent` does not excuse, all columns are read, so that the caller can list what there is.
 ///
 /// # Errors
 /// As [`read_csv`].
@@ -254,7 +254,7 @@ impl Headings<'_> {
                 continue;
             }
             let heading = heading.to_string();
-            // A column that nobody asked for may be in any unit: where it is not known, the column keeps its whole heading as its name.
+            // A column that was not requested may be in any unit: where it is not known, the column keeps its whole heading as its name.
             let known = unit.map(units::parse).transpose().ok().filter(|_| !wanted.iter().any(|w| w.signal == name));
             wanted.push(match known {
                 Some(unit) => {

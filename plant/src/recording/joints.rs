@@ -42,7 +42,7 @@ impl JointColumns {
         format!("{}.command", self.name)
     }
 
-    /// A joint of a position servo whose torque nobody logged, with a column of each of these headings as it stands.
+    /// A joint of a position servo whose torque was not logged, with a column of each of these headings as it stands.
     pub fn of_servo(name: &str, command: &str, position: &str, columns: &mut Columns) -> JointColumns {
         let joint = JointColumns {
             name: name.to_string(),
@@ -90,8 +90,8 @@ fn is_zero(table: &mut Table, key: &str) -> Result<bool, FileError> {
     }
 }
 
-/// Reads `[joints.NAME]` tables: `position`, `torque` (0 for a joint without a motor) or `current` with `torque_constant`, or the `command` of a position servo, and perhaps
-/// `velocity`; each a heading or a table as in `[columns]`. The rules are added to `columns`.
+/// Reads `[joints.NAME]` tables: `position`, `torque` (0 for a joint without a motor) or `current` with `torque_constant`, or the `command` of a position
+/// servo. `velocity` is optional. Each is a heading or a table as in `[columns]`. The rules are added to `columns`.
 pub(crate) fn read_joints(mut table: Table, columns: &mut Columns) -> Result<Vec<JointColumns>, FileError> {
     let mut joints = Vec::new();
     for name in table.keys() {

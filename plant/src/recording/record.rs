@@ -17,7 +17,7 @@ pub struct Recording {
     pub signals: Vec<(String, Vec<f64>)>,
     /// How regular the time axis is.
     pub jitter: Jitter,
-    /// Units that the file names for its signals, which are in SI units all the same.
+    /// Units that the file names for its signals, which are in SI units nevertheless.
     pub units: Vec<(String, Unit)>,
 }
 

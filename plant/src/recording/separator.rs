@@ -6,8 +6,8 @@ use std::io::BufRead;
 /// have them in their names, too.
 const SEPARATORS: [u8; 4] = [b'\t', b';', b',', b' '];
 
-/// What stands between the cells of a text: a tab, a semicolon, a comma or a space; the first of these that its heading and its first row have equally often,
-/// what stands in quotes left aside. A comma where none does: the reader of the whole text reports the error.
+/// The separator between the cells of a text: a tab, a semicolon, a comma or a space. It is the first of these that its heading and its first row have
+/// equally often; quoted text is ignored. A comma where none does: the reader of the whole text reports the error.
 pub(super) fn separator_in(text: impl BufRead) -> u8 {
     let mut lines = text.lines().map_while(Result::ok).filter(|line| !line.starts_with('#') && !line.trim().is_empty());
     let (Some(heading), Some(first)) = (lines.next(), lines.next()) else { return b',' };

@@ -1,7 +1,7 @@
 //! Units that recordings come in, as they stand in a heading (`x [mm]`) or in `[columns]` (`unit = "mm"`).
 //!
-//! A table of its own and no crate: the crates for units check them when a program is compiled, and those that read text know either far more
-//! (parsing whole expressions) or not the kinds that a model's signals have.
+//! A table of its own and no crate: the crates for units check them when a program is compiled. Those that read text know either far more (parsing
+//! whole expressions) or not the kinds that a model's signals have.
 
 use crate::model::{InputKind, Model, Motion, OutputKind};
 

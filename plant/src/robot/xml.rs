@@ -116,7 +116,7 @@ impl<'a> Element<'a> {
         text.split_whitespace().map(|word| self.as_number(name, word, Range::Any)).collect()
     }
 
-    /// A text as so many numbers.
+    /// A text as this number of values.
     pub(super) fn as_array<const N: usize>(&self, name: &str, text: &str) -> Result<[f64; N], FileError> {
         let numbers = self.as_numbers(name, text)?;
         let count = numbers.len();

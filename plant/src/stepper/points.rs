@@ -21,7 +21,7 @@ pub(super) struct Points {
 }
 
 impl Points {
-    /// So many points, from this place on, and so many bodies on motion inputs.
+    /// This number of points, from this place on, and of bodies on motion inputs.
     pub(super) fn new(first: usize, count: usize, prescribed: usize) -> Points {
         Points { first, moved: GROUND - prescribed, rows: vec![[0.0; SLOTS]; count], drift: vec![0.0; count] }
     }

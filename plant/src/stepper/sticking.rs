@@ -32,7 +32,7 @@ pub(super) struct Sticking {
 }
 
 impl Sticking {
-    /// Space for so many contacts.
+    /// Space for this number of contacts.
     pub(super) fn new(contacts: usize) -> Sticking {
         Sticking {
             set: vec![0; contacts],

@@ -100,7 +100,7 @@ pub fn patch(original: &str, edits: &[Edit]) -> Result<String, PatchError> {
     Ok(document.to_string())
 }
 
-/// A number rounded to so many significant digits, for files that people read.
+/// A number rounded to this number of significant digits, for files that people read.
 pub fn round_significant(value: f64, digits: usize) -> f64 {
     format!("{value:.*e}", digits.saturating_sub(1)).parse().unwrap_or(value)
 }

@@ -36,8 +36,8 @@ enum Wide {
 impl Tangents {
     /// Follows `plant`, which was compiled from `model` for samples `period` seconds apart and has not moved yet. Each parameter is given by a model that
     /// differs from `model` in it alone, and by how much it differs: small enough for a straight line. `None` where a model differs in more than its bodies
-    /// and elements, where there are more than [`LANES`], for a linear model, whose exact solution has no substeps to follow, and for a robot, whose inertia
-    /// changes on the way.
+    /// and elements, or where there are more than [`LANES`]. Also for a linear model, whose exact solution has no substeps to follow, and for a robot, whose
+    /// inertia changes on the way.
     pub fn new(plant: &Plant, model: &Model, moved: &[(Model, f64)], period: f64) -> Option<Tangents> {
         let options = Options { substeps: Some(plant.substeps), ..Options::default() };
         let alike = |m: &Model| m.inputs == model.inputs && m.outputs == model.outputs && m.elements.len() == model.elements.len();
