@@ -34,7 +34,7 @@ pub enum DeviceError {
     /// What a node's controller knows or needs is not there.
     #[error(transparent)]
     Controller(#[from] crate::controller::ControllerError),
-    /// A force input is needed and a motion input is there, or the other way round.
+    /// A force input is needed and a motion input is there, or vice versa.
     #[error("model \"{model}\", axis \"{axis}\": as a {role} its feedback must be a {needed} input")]
     WrongFeedback {
         /// The model.

@@ -1,8 +1,8 @@
 //! The guard: reduces the force gain when the loop is, or is about to be, above its stability limit.
 //!
-//! It watches the reflected force and the master's motion; what they do must be the loop's doing and not the hand's. The
-//! measure of that is the net energy which the force channel puts into the master's port, `W = sum F_f(k) (x_m(k+1) -
-//! x_m(k))`: a hand that pushes against a passive wall takes energy out of that port, so `W > 0` is needed for a trip.
+//! It watches the reflected force and the master's motion; what they do must be the loop's doing and not the hand's. The measure is the net energy
+//! that the force channel puts into the master's port, `W = sum F_f(k) (x_m(k+1) - x_m(k))`. A hand that pushes against a passive wall extracts
+//! energy from that port, so a trip requires `W > 0`.
 //!
 //! - **Growing**: in windows of 50 ms the part of the force above 8 Hz grows by half over four windows, with `W > 0`.
 //! - **Persistent**: that part stays large, with `W > 0`, over six windows.
@@ -23,7 +23,7 @@ use backdrive_msgs::{MAX_AXES, Sample};
 const WINDOW_S: f64 = 0.05;
 /// Growth of the oscillating part over three windows that counts as growing.
 const GROWTH: f64 = 1.5;
-/// Growth over three windows beyond which more is taken back at once.
+/// Growth over three windows beyond which the gain is reduced by more at once.
 const FAST_GROWTH: f64 = 3.0;
 /// Windows in which a large oscillation must persist.
 const PERSISTENT: u32 = 6;
@@ -33,7 +33,7 @@ const STILL_PERSISTENT: u32 = 4;
 const CROSSINGS: u32 = 3;
 /// Time after a back-off within which the next one takes more, s.
 const AGAIN_S: f64 = 1.0;
-/// What is left of the gain after a back-off.
+/// Remaining share of the gain after a back-off.
 const BACK_OFF: f64 = 0.8;
 /// The same where it grows fast, runs away, or has next to no margin.
 const FAST_BACK_OFF: f64 = 0.6;

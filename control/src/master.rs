@@ -29,7 +29,7 @@ pub struct Master {
 }
 
 impl Master {
-    /// A master that lets go of the force `stale_after_s` after its last sample.
+    /// A master that removes the force `stale_after_s` after its last sample.
     pub fn new(device: Box<dyn Mechanism>, stale_after_s: f64, period_s: f64) -> Master {
         Master {
             device,

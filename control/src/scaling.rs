@@ -138,8 +138,8 @@ impl Core for Forward {
 /// Inputs `contact` (effort F_s), `measured` (the master's, one step late: what the guard watches); outputs
 /// `force` (effort F_f = lambda F_s + dither), `dither` (effort: the added excitation alone).
 ///
-/// When contact forces stop coming the output is not measured: the master then lets go. It does so too where the contact
-/// force is that of a slave that holds because no command reaches it.
+/// When contact forces stop coming the output is not measured: the master then removes its force. It does so too where the contact force is that of a
+/// slave that holds because no command reaches it.
 pub struct Backward {
     gains: GainsInForce,
     contact: Freshness,

@@ -2,8 +2,8 @@
 
 use super::filter::Steep;
 
-/// Corners of the high-passes through which positions are looked at, Hz. The hand moves on its own accord, which nobody measures, and the more the
-/// slower; a loop that runs away is slow as well.
+/// Corners of the high-passes through which positions are looked at, Hz. The hand also moves by itself, which is not measured, and more at lower
+/// frequencies; a loop that runs away is slow as well.
 const BANDS_HZ: [f64; 2] = [8.0, 25.0];
 /// How the hand moves on its own accord, m/s^3 or rad/s^3: the jerk of a move of 4 mm in 0.15 s or of 10 cm in 0.5 s (Flash & Hogan 1985).
 const INTENT_JERK: f64 = 50.0;
@@ -15,7 +15,7 @@ const MODEL_ERROR: f64 = 0.03;
 const LEAST_NOISE: f64 = 1e-6;
 /// Over which time the motion's power is taken, s.
 const POWER_S: f64 = 0.01;
-/// Errors of a model are alike over this time, s: so many samples count as one.
+/// Correlation time of the errors of a model, s: the samples within it count as one.
 const ALIKE_S: f64 = 0.01;
 /// How long a memory is, s: the short one sees a change soon, the long one is sure.
 const MEMORIES_S: [f64; 2] = [0.03, 0.5];

@@ -34,7 +34,7 @@ const TELLS_AFTER: f64 = 0.2;
 /// One axis.
 pub(super) struct Axis {
     estimator: HandEstimator,
-    /// What the bank said at the step before.
+    /// Output of the bank at the step before.
     before: Vec<f64>,
     /// Least relative deviation of the estimate since the hand was last seen to have changed.
     surest: f64,
@@ -55,7 +55,7 @@ impl Axis {
         if !self.surest.is_finite() {
             return 0.0;
         }
-        // Where too little moved to tell the hand, a firm one is cancelled: too much is fatal, too little is as without a canceller.
+        // Where too little moved to identify the hand, a firm one is cancelled: too much is fatal, too little is as without a canceller.
         estimate.softness * (1.0 - GUESS_COSTS * (self.surest - GUESS_AT).max(0.0))
     }
 }
@@ -75,8 +75,8 @@ pub struct Scheduled {
 }
 
 impl Scheduled {
-    /// Around a bank. `edge_without` is the gain product from which on the loop shakes without a canceller, in the softest and the firmest hand; where it is
-    /// not known as much is cancelled at any gain as a high one needs.
+    /// Around a bank. `edge_without` is the lowest gain product at which the loop oscillates without a canceller, in the softest and the firmest hand. Where
+    /// it is not known, the share that a high gain needs is cancelled at any gain.
     pub fn new(bank: HandBank, edge_without: Option<f64>, period_s: f64) -> Scheduled {
         let hands = bank.softness().len();
         let axis = |axis: usize| Axis {
@@ -94,8 +94,8 @@ impl Scheduled {
         Scheduled { bank, axes, started: false, force_keep, let_go, slow_gain, share: MOST, edge_without }
     }
 
-    /// The gain product now in force, NaN where it is not known. No more is cancelled than it needs: what is left of the motion acts as the whole would at a
-    /// lower gain.
+    /// The gain product now in force, NaN where it is not known. No more is cancelled than it needs: the remaining motion acts as the whole would at a lower
+    /// gain.
     pub fn set_gain(&mut self, gain: f64) {
         if let Some(edge) = self.edge_without.filter(|_| !gain.is_nan()) {
             self.share = (1.0 - LEFT * edge / gain.max(f64::MIN_POSITIVE)).clamp(0.0, MOST);
