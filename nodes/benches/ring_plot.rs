@@ -231,12 +231,12 @@ fn member(name: &str, location: &Location, steps: u64, nodes: &str) -> Result<Ex
     Ok(code)
 }
 
-/// Steps for so many loops that count: as many looks at the clock as there are steps.
+/// Steps for this number of loops that count: as many clock readings as there are steps.
 fn steps(loops: u64) -> u64 {
     warm_up(loops) + loops + 1
 }
 
-/// The other way round.
+/// The inverse.
 fn counted(of: u64) -> u64 {
     (1..of).rev().find(|loops| steps(*loops) <= of).unwrap_or(1)
 }

@@ -258,7 +258,7 @@ fn cores(graph: &Graph, node: &Node) -> Result<Vec<Box<dyn Core>>, DeviceError> 
             _ => Canceller::new(simulated(files, DeviceRole::Master)?, *high_pass_hz, period_s),
         })],
         Settings::Scaling { dither, guard } => {
-            // What a dither shakes is no oscillation of the loop's own.
+            // The effect of a dither is no oscillation of the loop's own.
             let peak = dither.iter().flatten().fold(0.0_f64, |peak, d| peak.max(d.abs()));
             let guard = guard.then(|| Guard::new(node.axes, GUARD_LEAST_FORCE.max(peak), period_s));
             vec![

@@ -43,8 +43,8 @@ pub fn run_process(plan: NodePlan, timing: &Timing, transport: Box<dyn Transport
     run_processes(vec![plan], timing, transport, options)
 }
 
-/// The same for nodes that share this process and its thread. What is said of the first is said as of a process of its own, and of
-/// the others by their names ([`FromNode::Of`]).
+/// The same for nodes that share this process and its thread. Lines about the first have the form of a process of its own, and those about the others
+/// carry their names ([`FromNode::Of`]).
 pub fn run_processes(plans: Vec<NodePlan>, timing: &Timing, transport: Box<dyn Transport>, options: ProcessOptions) -> ExitCode {
     let others: Vec<String> = plans.iter().skip(1).map(|p| p.name.clone()).collect();
     let line = Line::open(ORPHANED, others.clone());
@@ -177,7 +177,7 @@ impl Line {
     }
 }
 
-/// Writes one line per message; ends after the last one, or when nobody reads any more.
+/// Writes one line per message; ends after the last one, or when the reader is gone.
 fn write_lines(said: &Receiver<Out>, others: &[String]) {
     let others: Vec<(u32, &String)> = others.iter().map(|name| (source_id(name), name)).collect();
     let mut stdout = std::io::stdout().lock();

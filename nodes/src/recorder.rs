@@ -1,4 +1,4 @@
-//! The recorder: hears every topic, takes everything over in time, and slows nobody down.
+//! The recorder: hears every topic, takes everything over in time, and delays no other node.
 //!
 //! It polls rather than wakes, so a publisher never pays for it. When a message arrived does not depend on when the recorder looked: the transport
 //! knows it ([`Subscriber::arrived_ns`]), and messages go to the sink in that order. In lockstep it reports on its credit topic up to which step it
@@ -25,7 +25,7 @@ const POLL: Duration = Duration::from_millis(5);
 /// Messages of one topic that it takes before it looks at the next.
 const AT_ONCE: usize = 512;
 
-/// After a stop, or when nobody speaks any more, how long it still listens.
+/// After a stop, or when all publishers are silent, how long it still listens.
 const LINGER: Duration = Duration::from_millis(50);
 
 /// How long it still listens after a stop while others speak on: it was asked to end alone, and has a bag to close.

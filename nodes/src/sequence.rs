@@ -16,7 +16,7 @@ use std::ops::Range;
 /// Why a graph cannot run in one thread.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum SequenceError {
-    /// Nobody speaks on an input's topic.
+    /// An input's topic has no publisher.
     #[error("node `{node}`: nobody publishes {topic}")]
     NoPublisher {
         /// Who listens.
@@ -128,7 +128,7 @@ impl Sequence {
         }
         let slot_of = |topic: &Topic| topics[..axes.len()].iter().position(|t| t.name == topic.name);
 
-        // How far back anyone looks at each output.
+        // How far back any reader looks at each output.
         let mut depth = vec![0; axes.len()];
         let (mut wired, mut first_slot) = (Vec::new(), 0);
         for place in &order {

@@ -43,7 +43,7 @@ fn what_is_wrong_is_said_with_what_there_is() {
     assert!(key.contains("impedence") && key.contains("impedance"), "{key}");
     let range = error("impedance = 20.0", "impedance = -1.0");
     assert!(range.contains("impedance"), "{range}");
-    // Tables of laws that are not in force are read all the same.
+    // Tables of laws that are not in force are read nevertheless.
     let other = error("impedance = 20.0", "impedance = 20.0\n[nodes.four_channel]\ncompensation = 1.0");
     assert!(other.contains("compensation") && other.contains("below 1"), "{other}");
     let hand = changed("law = \"wave\"", "law = \"four_channel\"").and_then(|_| {

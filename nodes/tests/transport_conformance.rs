@@ -475,7 +475,7 @@ fn two_listeners_get_everything(world: &dyn World, _: &dyn World) {
     assert!(eventually(world, || first.has_publisher() && second.has_publisher() && sender.listeners() == 2));
     (0..64).for_each(|i| sender.send(&sample(i)).unwrap());
     assert_eq!(sequences(world, &mut first, 64), (0..64).collect::<Vec<_>>());
-    // One that is not awaited is kept all the same.
+    // One that is not awaited is kept nevertheless.
     second.set_awaited(false);
     assert_eq!(sequences(world, &mut second, 64), (0..64).collect::<Vec<_>>());
 }
@@ -558,7 +558,7 @@ mod killed {
             let mut child = start("publisher", &world.0);
             let mut heard = Vec::new();
             until_ready(&mut child, || heard.extend(sequences(&world, &mut receiver, 0)));
-            // Nothing is promised of a publisher that nobody has met alive.
+            // Nothing is guaranteed for a publisher that no receiver has met alive.
             assert!(receiver.has_publisher(), "the publisher has died of itself");
             child.kill().unwrap();
             child.wait().unwrap();

@@ -253,7 +253,7 @@ kinds!(
     Controller "controller" CONTROLLER,
     /// Plays an excitation on a force channel.
     Exciter "exciter" EXCITER,
-    /// Estimates the force that nobody measures.
+    /// Estimates a force that is not measured.
     Observer "observer" OBSERVER,
     /// The operator of a test bench: pedal and speed over time.
     Cycle "cycle" CYCLE,

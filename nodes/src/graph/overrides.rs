@@ -27,7 +27,7 @@ pub struct Overrides {
     pub high_pass_hz: Option<f64>,
     /// Whether the canceller uses the hand of its grip file (`as_modelled`) or estimates it (`estimated`).
     pub hand: Option<String>,
-    /// Of a canceller that estimates the hand: the gain product from which on the loop shakes without a canceller.
+    /// Of a canceller that estimates the hand: the lowest gain product at which the loop oscillates without a canceller.
     pub edge_without: Option<f64>,
     /// Position scale.
     pub mu: Option<f64>,

@@ -1,9 +1,9 @@
 //! Drives the stages of one node, or of several that share a process, over a transport in either clock.
 //!
-//! One rule for both: at step k a stage waits until all its inputs for k are there, or, in real time, until one period has passed since it could have
-//! begun; then it steps with what it has. In real time it does not begin step k before `t0 + k * period`. A stage that is late (the machine was busy)
-//! does its late steps one after the other, each with its own inputs, so a hold-up of the whole machine costs no sample. Only beyond
-//! [`Options::horizon_s`] does it go on at the step now due, and reports this.
+//! One rule for both: at step k a stage waits until all its inputs for k are there. In real time it waits at most until one period has passed since
+//! it could have begun; then it steps with what it has. In real time it does not begin step k before `t0 + k * period`. A stage that is late (the
+//! machine was busy) does its late steps one after the other, each with its own inputs, so a hold-up of the whole machine costs no sample. Only
+//! beyond [`Options::horizon_s`] does it go on at the step now due, and reports this.
 
 mod control;
 mod error;

@@ -1,8 +1,8 @@
 //! The doorbell of one receiving node: a futex word that its publishers count up.
 //!
-//! A publisher pays for a system call only while the receiver sleeps, and only if the receiver waits
-//! for what it sends: a stage with several inputs would otherwise be woken for each, and look in vain. iceoryx2's own event costs
-//! two system calls on each side (a datagram), about twice the latency of a pipe.
+//! A publisher pays for a system call only while the receiver sleeps, and only if the receiver waits for what it sends. A stage with several inputs
+//! would otherwise be woken for each, and look in vain. iceoryx2's own event costs two system calls on each side (a datagram), about twice the
+//! latency of a pipe.
 
 use nix::libc;
 use std::cell::{Cell, RefCell};

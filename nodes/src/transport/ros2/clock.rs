@@ -70,7 +70,7 @@ impl ClockWatch {
         }
     }
 
-    /// Lets go of a participant that is no longer used; its threads end in the background.
+    /// Releases a participant that is no longer used; its threads end in the background.
     pub fn retire(&self, old: Arc<Participant>) {
         std::thread::spawn(move || {
             // Its ports are recreated one by one, and wait for theirs.

@@ -34,7 +34,7 @@ fn port(domain: u16, slot: u16) -> u16 {
 }
 
 impl Courier {
-    /// Starts to tell `network.peers`; `None` when there are none.
+    /// Starts to inform `network.peers`; `None` when there are none.
     ///
     /// # Errors
     /// No port of the domain is free on this host.

@@ -85,7 +85,7 @@ pub(super) struct Inbox {
 /// The inboxes of a node.
 pub(super) type Inboxes = Mutex<Vec<Weak<Mutex<Inbox>>>>;
 
-/// How often what has arrived is taken over where nobody asks: what is unread when its reliable writer ends is gone with it.
+/// How often arrived messages are taken over without a request: unread messages are lost when their reliable writer ends.
 const TAKE_OVER_EVERY: Duration = Duration::from_millis(2);
 
 /// Nothing stays in the middleware for this long; a larger age means that the wall clock was set, ns.

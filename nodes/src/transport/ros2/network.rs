@@ -23,7 +23,7 @@ pub enum NetworkError {
     /// No such domain.
     #[error("{from} = `{given}` is no domain: expected a whole number from 0 to {MAX_DOMAIN}")]
     Domain {
-        /// Who said so, such as `ROS_DOMAIN_ID`.
+        /// Its source, such as `ROS_DOMAIN_ID`.
         from: &'static str,
         /// What.
         given: String,

@@ -74,7 +74,7 @@ impl Shared {
         }
     }
 
-    /// What is left of the time to wait for acknowledgements.
+    /// Remaining time to wait for acknowledgements.
     pub(super) fn linger(&self) -> Duration {
         let until = self.linger_until.get().unwrap_or_else(|| Instant::now() + LINGER);
         self.linger_until.set(Some(until));
