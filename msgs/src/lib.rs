@@ -17,8 +17,7 @@ pub const LAYOUT: u32 = 1;
 /// Most axes a device may have.
 pub const MAX_AXES: usize = 8;
 
-/// The value of a quantity that nobody measured. It is a NaN, never to be confused with 0; use
-/// [`measured`] to read a quantity.
+/// The value of a quantity that was not measured. It is a NaN, never to be confused with 0; use [`measured`] to read a quantity.
 pub const NOT_MEASURED: f64 = f64::NAN;
 
 /// `Some(value)` if the quantity was measured.
@@ -177,8 +176,8 @@ pub struct Status {
     pub missed_deadlines: u64,
     /// Samples found missing by sequence number, over all inputs.
     pub lost: u64,
-    /// Time from the start of a step's inputs being waited for to its outputs being sent, s: median since
-    /// the last status; in lockstep 0, for a lockstep bag holds nothing that the machine decides.
+    /// Time from the start of a step's inputs being waited for to its outputs being sent, s: median since the last status. In lockstep it is 0,
+    /// because a lockstep bag holds nothing that depends on the machine.
     pub loop_p50_s: f64,
     /// The same, 99th percentile, s.
     pub loop_p99_s: f64,
@@ -220,7 +219,7 @@ pub struct Margin {
 
 /// Values of [`Margin::known`].
 pub mod margin {
-    /// Nothing: there is no dither to tell it from.
+    /// Nothing: there is no dither to identify it with.
     pub const NO_DITHER: u32 = 0;
     /// Nothing: the slave touches nothing, or not for the 0.6 s of a window.
     pub const FREE: u32 = 1;

@@ -27,7 +27,7 @@ pub(super) struct JointState<'a> {
 /// What a JointState is written for.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Form<'a> {
-    /// A bag: no frame, and what else is to be said stands beside it.
+    /// A bag: no frame, and the other facts stand beside it.
     Bag,
     /// The wire: everything in one message, in the frame id.
     Wire(Option<&'a Mark<'a>>),
