@@ -81,7 +81,7 @@ fn lost(account: &Account, reader: &Reader) -> Option<Unjudged> {
 pub fn held_back(reader: &Reader, graph: &Graph, exchanged: bool) -> Result<(Option<Unjudged>, Vec<String>), SessionError> {
     let session = match Session::from_bag(reader, graph) {
         Ok(session) => session,
-        // Without a loop nothing is judged, and what is missing is missing all the same.
+        // Without a loop nothing is judged, and what is missing is missing nevertheless.
         Err(SessionError::Missing { .. }) => {
             let Gate { kept_back, notes, .. } = gate(reader, graph)?;
             return Ok((kept_back, notes));

@@ -166,7 +166,7 @@ impl Collector {
         }
     }
 
-    /// Room for so many rows.
+    /// Room for this number of rows.
     pub fn reserve(&mut self, rows: usize) {
         self.flags.reserve(rows);
         for columns in &mut self.axes {
@@ -244,8 +244,8 @@ impl Collector {
 
     /// What a verdict is drawn from, per axis. A row whose message is missing keeps the value before it.
     ///
-    /// On several axes the hand holds still when it does so on all of them, for one moves the others: the intent is then
-    /// the way that the hand has come, summed over its axes.
+    /// On several axes the hand holds still when it does so on all of them, because one moves the others. The intent is then the path length of the
+    /// hand, summed over its axes.
     pub fn traces(&self) -> Vec<Trace> {
         let rows = self.rows();
         let clamped: Vec<bool> = self.flags.iter().take(rows).map(|f| f & flag::LIMITED != 0).collect();
@@ -300,12 +300,12 @@ impl Collector {
         }
     }
 
-    /// The verdict on what went by: the worst of the axes. `None` where there is no loop and nothing shakes.
+    /// The verdict on what was collected: the worst of the axes. `None` where there is no loop and nothing oscillates.
     pub fn outcome(&self) -> Option<Outcome> {
         let judged = || Outcome::worst(self.traces().iter().map(judge)).unwrap_or(Outcome::NotJudged { why: Unjudged::Empty });
         match self.no_loop() {
             None => Some(judged()),
-            // A slave that shakes by itself shakes whether its force comes back or not.
+            // A slave that oscillates by itself does so whether its force comes back or not.
             Some(_) if self.has != HasLoop::No => Some(judged()).filter(Outcome::is_unstable),
             Some(_) => None,
         }

@@ -1,9 +1,8 @@
 //! Do the models in the graph do what the recording shows? Each device is run alone, open loop, on what it was given in
 //! the recording, and what it puts out is compared with what was recorded.
 //!
-//! Open loop, because a closed loop that is stable hides what its parts do wrong, and one that is not multiplies it. A
-//! device that does something else than its model is the first sign of missing physics; which device it is, is the first
-//! step of finding it.
+//! Open loop, because a closed loop that is stable hides what its parts do wrong, and one that is not multiplies it. A device that differs from its
+//! model is the first sign of missing effects; which device it is, is the first step of finding it.
 
 use crate::part_check::{AGREES_WITHIN, PartCheck};
 use crate::session::Session;

@@ -70,13 +70,13 @@ pub enum Closes {
 pub struct Trace {
     /// Time of one step, s.
     pub period_s: f64,
-    /// What the hand wanted, m or rad; empty where nobody recorded it.
+    /// The hand's intended motion, m or rad; empty where it was not recorded.
     pub intent: Vec<f64>,
     /// The master's measured position, m or rad.
     pub position: Vec<f64>,
     /// Force of the environment on the slave, N or N m.
     pub contact: Vec<f64>,
-    /// The slave's position, m or rad; empty where nobody recorded it.
+    /// The slave's position, m or rad; empty where it was not recorded.
     pub slave: Vec<f64>,
     /// Position scale, master to slave.
     pub mu: f64,
@@ -212,5 +212,5 @@ pub(crate) const LEAST_AMPLITUDE: f64 = 2e-6;
 /// Half the span of thousands of samples of noise stays below this, standard deviations.
 pub(crate) const NOISE: f64 = 5.0;
 
-/// Slower than this the hand moves too: where nobody recorded what it wants, only what is faster is the loop's, Hz.
+/// Slower than this the hand moves too: where its intent was not recorded, only faster motion is the loop's, Hz.
 pub(crate) const LOWEST_HZ: f64 = 8.0;

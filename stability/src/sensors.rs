@@ -1,6 +1,6 @@
 //! Signals that say nothing: dead, at their rail, clipped, or not moving with the sensor that measures the same.
 //!
-//! Nothing here knows a model, so it serves for any recording, and for columns that nobody asked for. What it goes by:
+//! Nothing here knows a model, so it serves for any recording, and for columns that were not requested. What it goes by:
 //!
 //! | fault | rule | reason |
 //! |---|---|---|
@@ -19,7 +19,7 @@ pub struct Column<'a> {
     pub name: String,
     /// Its samples, in any unit; NaN where there is none.
     pub values: &'a [f64],
-    /// Whether it is a position: then it may come to rest at a stop, and nothing is said of its extremes.
+    /// Whether it is a position: then it may come to rest at a stop, and its extremes are not judged.
     pub position: bool,
     /// The signal that it measures too, sample by sample; `None` where there is none or none is stated.
     pub twin: Option<Twin<'a>>,
@@ -103,7 +103,7 @@ impl std::fmt::Display for SensorFault {
     }
 }
 
-/// A converter that flickers takes so many values at most.
+/// A converter that flickers takes at most this number of values.
 const FLICKER_VALUES: usize = 3;
 /// And these lie within this share of the largest.
 const FLICKER_SHARE: f64 = 1e-3;
@@ -111,7 +111,7 @@ const FLICKER_SHARE: f64 = 1e-3;
 const LEAST_CLIPPED: f64 = 0.01;
 /// And comes there at least so often.
 const LEAST_ARRIVALS: usize = 3;
-/// And stays for at least so many samples each time.
+/// And stays for at least this number of samples each time.
 const LEAST_STAY: usize = 3;
 /// Two sensors of the same quantity share at least so much of their variance.
 const LEAST_EXPLAINED: f64 = 0.1;

@@ -220,7 +220,7 @@ fn impedance(session: &Session, axis: &AxisSignals) -> Result<Impedance, String>
     let pieces = whole_pieces(&pieces, &columns, &gains().collect::<Vec<f64>>());
     let longest = pieces.iter().map(|p| p.end - p.start).max().unwrap_or(0);
     let most = ((1.0 / period_s) as usize).max(16);
-    // As long as possible up to 1 s, but enough of them to tell what coheres.
+    // As long as possible up to 1 s, but enough of them to estimate the coherence.
     let count = |length: usize| pieces.iter().map(|p| (p.end - p.start).saturating_sub(length / 2) / (length / 2).max(1)).sum::<usize>();
     let mut length = longest.min(most);
     while length >= 16 && count(length) < LEAST_SEGMENTS * 2 {

@@ -22,14 +22,14 @@ pub enum Unjudged {
     Gaps {
         /// Steps without a fresh sample of every signal of the loop.
         steps: usize,
-        /// Of so many.
+        /// Of this number.
         of: usize,
     },
     /// It ends before the graph's `duration_s`.
     CutShort {
         /// Steps that are there.
         steps: usize,
-        /// Of so many.
+        /// Of this number.
         of: usize,
     },
     /// The bag was never closed, and its graph has no duration: how much is missing behind its end is not known.
@@ -80,8 +80,8 @@ impl Unjudged {
         }
     }
 
-    /// Whether something is missing that there should be: then what is left may look stable and prove nothing. Without contact or a hold
-    /// nothing is missing, but nothing was shown either.
+    /// Whether something is missing that there should be: then the rest may look stable and prove nothing. Without contact or a hold nothing is
+    /// missing, but nothing was shown either.
     pub fn is_loss(&self) -> bool {
         !matches!(self, Unjudged::NoFeedback | Unjudged::NoContact | Unjudged::NoHold | Unjudged::NotShaken | Unjudged::NoDecay)
     }

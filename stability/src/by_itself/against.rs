@@ -19,7 +19,7 @@ use backdrive_nodes::stage::Clock;
 pub struct Against {
     /// Contradictions: topic, factor and time, a sentence each.
     pub contradictions: Vec<String>,
-    /// Devices beside their models, where the rows in contact do not tell.
+    /// Devices beside their models, where the rows in contact do not decide.
     pub parts: Vec<PartCheck>,
     /// What was recorded and not looked at, and why.
     pub notes: Vec<String>,

@@ -3,7 +3,7 @@
 use backdrive_bags::{BagError, Reader};
 use backdrive_msgs::{Gains, Message, Sample};
 
-/// A loop is looked at over at most so many steps, the first of its bag: 200 s at 5 kHz.
+/// A loop is examined over at most this number of steps, the first of its bag: 200 s at 5 kHz.
 const MOST_STEPS: u64 = 1_000_000;
 
 /// Samples and events of a bag, one row per step.

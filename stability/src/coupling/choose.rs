@@ -12,8 +12,8 @@ use std::ops::Range;
 const FOLDS: usize = 4;
 /// A law whose residual on held-out time is larger by this factor is worse, even if there are few blocks.
 const SURELY_WORSE: f64 = 2.0;
-/// A term is worth a word only where it takes away at least this share of what is left: what a recording does not tell of filters and rounding is of
-/// that size.
+/// A term is reported only where it explains at least this share of the residual: the effect of filters and rounding that a recording does not
+/// determine is of that size.
 const WORTH: f64 = 0.05;
 /// What leaves less of the variance is exact: the rest is rounding of the computation.
 const EXACT: f64 = 1e-10;
@@ -72,12 +72,12 @@ pub(super) fn choose(side: &Side) -> Option<SideLaw> {
     roughly.truncate(near + HOPELESS_TOLD);
     let mut tried: Vec<Tried> = roughly.into_par_iter().filter_map(|fit| attempt(side, &ready, fit)).collect();
     tried.sort_by(|a, b| a.total.total_cmp(&b.total));
-    // Where every law has a term that nobody would miss, the best of them all.
+    // Where every law has an unnecessary term, the best of them all.
     let best = tried.iter().find(|t| t.stands_out).or(tried.first())?;
     let worse = |law: &Tried, best: &Tried| worse(law, best, EXACT * variance);
     let as_good = |t: &&Tried| (t.stands_out || std::ptr::eq(*t, best)) && !worse(t, best);
     let chosen = tried.iter().filter(as_good).min_by(|a, b| a.fit.terms.len().cmp(&b.fit.terms.len()).then(a.total.total_cmp(&b.total)))?;
-    // The same law with a term more that nobody would miss is no rival.
+    // The same law with an additional unnecessary term is no rival.
     let same = |t: &Tried| {
         chosen.fit.terms.iter().all(|term| t.fit.terms.contains(term)) && (t.fit.terms == chosen.fit.terms || !worse(chosen, t))
     };

@@ -45,7 +45,7 @@ pub(super) struct Fit {
     pub(super) shape: Shape,
     /// One per term, then the offset.
     pub(super) coefficients: Vec<f64>,
-    /// Mean square of what is left, of the rows that were fitted.
+    /// Mean square of the residual, of the rows that were fitted.
     pub(super) loss: f64,
 }
 
@@ -107,7 +107,7 @@ impl<'a> Ready<'a> {
         columns
     }
 
-    /// Coefficients for a shape by least squares over some rows, and the mean square of what is left there.
+    /// Coefficients for a shape by least squares over some rows, and the mean square of the residual there.
     fn linear(&self, columns: &[Vec<f64>], rows: &[Range<usize>]) -> Option<(Vec<f64>, f64)> {
         let n = columns.len();
         let all: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
@@ -124,7 +124,7 @@ impl<'a> Ready<'a> {
         loss.is_finite().then_some((coefficients, loss))
     }
 
-    /// What is left of the force.
+    /// The residual of the force.
     fn left(&self, columns: &[Vec<f64>], coefficients: &[f64]) -> Vec<f64> {
         let mut left = self.force.clone();
         for (column, c) in columns.iter().zip(coefficients) {

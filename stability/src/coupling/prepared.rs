@@ -17,7 +17,7 @@ const LEAST_S: f64 = 1.0;
 const COHERENT: f64 = 0.9;
 /// No band ends below this, Hz.
 const LEAST_BAND_HZ: f64 = 5.0;
-/// A force counts as clamped where so many of its samples are at its largest size.
+/// A force counts as clamped where this share of its samples is at its largest size.
 const CLAMPED_SHARE: f64 = 0.005;
 
 /// One side of the pair.

@@ -23,7 +23,7 @@ pub struct Signals<'a> {
     pub contact: Option<&'a [f64]>,
     /// F_h, force of the hand on the master, N or N m.
     pub hand: Option<&'a [f64]>,
-    /// Step of the position sensors, m or rad; 0 where there is none or nobody knows.
+    /// Step of the position sensors, m or rad; 0 where there is none or it is not known.
     pub resolution: f64,
 }
 

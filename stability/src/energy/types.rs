@@ -34,7 +34,7 @@ pub struct AxisEnergy {
     pub verdict: EnergyVerdict,
     /// Why.
     pub reason: String,
-    /// Times of every series below, s; every so many rows, and the last.
+    /// Times of every series below, s; one in several rows, and the last.
     pub time_s: Vec<f64>,
     /// The master's port: what the displayed environment took, without the dither's work.
     pub master: PortEnergy,

@@ -14,7 +14,7 @@ pub enum Verdict {
     Stable,
     /// It is not.
     Unstable,
-    /// The record does not tell.
+    /// The record gives no answer.
     CannotTell,
 }
 

@@ -19,7 +19,7 @@ const DISC: f64 = 2.448;
 const LARGEST: f64 = 1e4;
 /// Half-width that stays where there is no noise: lines are interpolated, records rounded.
 const FLOOR: f64 = 0.003;
-/// Below this the lowest line is near enough to DC to tell which way the loop runs away, Hz.
+/// Below this the lowest line is near enough to DC to decide in which direction the loop runs away, Hz.
 const NEAR_DC_HZ: f64 = 8.0;
 
 /// The gain at which a loop is at its stability limit.
@@ -198,7 +198,7 @@ fn student(freedom: f64) -> f64 {
     StudentsT::new(0.0, 1.0, freedom.max(1.0)).map_or(6.5, |t| t.inverse_cdf(0.975) / 1.959_964)
 }
 
-/// The smallest factor at which an eigenvalue of the loop passes through +1, over the lines that tell something.
+/// The smallest factor at which an eigenvalue of the loop passes through +1, over the lines with information.
 pub(crate) fn crossing(hz: &[f64], l: &[Matrix], told: &[bool]) -> Option<Crossing> {
     let mut best: Option<Crossing> = None;
     let mut keep = |c: Option<Crossing>| {
@@ -230,7 +230,7 @@ pub(crate) fn crossing(hz: &[f64], l: &[Matrix], told: &[bool]) -> Option<Crossi
     best
 }
 
-/// The loci of the eigenvalues over the lines that tell something.
+/// The loci of the eigenvalues over the lines with information.
 pub(super) fn loci(l: &[Matrix], told: &[bool]) -> Vec<Vec<Complex<f64>>> {
     let mut loci: Vec<Vec<Complex<f64>>> = Vec::new();
     let mut before: Option<Vec<Complex<f64>>> = None;

@@ -1,11 +1,10 @@
 //! Transfer functions against an instrument, smooth over neighbouring lines.
 //!
-//! `y = R u + e`, where `u` and `e` are correlated (the loop is closed) and the instrument `d` and `e` are not:
-//! `S_yd = R S_ud`. About each line `R` is taken as a quadratic in frequency over a window of lines (also mirrored ones, of
-//! negative frequency, where `R` is conjugate), and solved for by least squares over the window. With as many inputs as
-//! instruments this also separates inputs whose excitations are coherent at each line but not over several.
-//! What is left, `e = y - R u`, gives the noise: its scatter over averages, or, where that is larger, what the smooth `R`
-//! leaves in the averages themselves (nonlinear distortion repeats with the excitation and does not scatter).
+//! `y = R u + e`, where `u` and `e` are correlated (the loop is closed) and the instrument `d` and `e` are not: `S_yd = R S_ud`. About each line `R`
+//! is a quadratic in frequency over a window of lines, and is solved for by least squares over the window. The window also has mirrored lines, of
+//! negative frequency, where `R` is conjugate. With as many inputs as instruments this also separates inputs whose excitations are coherent at each
+//! line but not over several. The residual `e = y - R u` gives the noise: its scatter over averages, or, where that is larger, the residual of the
+//! smooth `R` in the averages themselves (nonlinear distortion repeats with the excitation and does not scatter).
 
 use crate::spectra::{CrossSpectra, Window};
 use nalgebra::{Complex, DMatrix, DVector, SymmetricEigen};

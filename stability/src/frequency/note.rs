@@ -20,7 +20,7 @@ pub enum Note {
         /// x_c follows x_m by this number of rows.
         lag: usize,
     },
-    /// Neither was recorded, and the signals do not tell them.
+    /// Neither was recorded, and the signals do not determine them.
     GainsUnknown,
     /// The hand moves throughout the contact.
     HandNeverRests,

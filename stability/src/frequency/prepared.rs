@@ -1,4 +1,4 @@
-//! A session made ready: gains that nobody recorded, the columns of all axes, and what to record with.
+//! A session made ready: gains that were not recorded, the columns of all axes, and what to record with.
 
 use super::FrequencyError;
 use super::note::Note;

@@ -381,7 +381,7 @@ fn operator_motion_alone_cannot_tell() {
     s.wall_from = rows / 2;
     let smooth = Setup { hand: Some(hand(rows, false)), ..s.clone() };
     assert_eq!(smooth.answer().at(0.5 * truth).verdict, Verdict::CannotTell);
-    // Nobody recorded the intent.
+    // The intent was not recorded.
     let mut session = s.record();
     session.axes[0].intent = None;
     let unknown = analyse(&session, &Options::default()).unwrap().at(0.5 * truth);

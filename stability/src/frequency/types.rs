@@ -38,7 +38,7 @@ pub struct Frequency {
     pub amplitude_dependent: bool,
     /// Stability limits from different recorded gains differ by more than their uncertainty.
     pub gains_disagree: bool,
-    /// Gains are multiples of the recorded one, for nobody recorded it and the signals do not tell.
+    /// Gains are multiples of the recorded one, because it was not recorded and the signals do not determine it.
     pub relative: bool,
     /// What delays the loop beside its devices.
     pub delays: Delays,
@@ -56,7 +56,7 @@ pub struct Frequency {
     pub advice: String,
 }
 
-/// Why the record does not tell.
+/// Why the record gives no answer.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct CannotTell {
     /// In a sentence.
@@ -91,7 +91,7 @@ pub struct LevelEstimate {
     pub hz: Vec<f64>,
     /// Each axis, the loops of the others open.
     pub axes: Vec<AxisEstimate>,
-    /// Loci of the eigenvalues of the loop per unit gain at the lines that tell something; of one axis its `l`. `[re, im]`.
+    /// Loci of the eigenvalues of the loop per unit gain at the lines with information; of one axis its `l`. `[re, im]`.
     pub loci: Vec<Vec<[f64; 2]>>,
     /// The lines of the loci, Hz.
     pub loci_hz: Vec<f64>,

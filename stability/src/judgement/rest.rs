@@ -28,7 +28,7 @@ pub(super) fn judge_hold(trace: &Trace, from: usize, to: usize) -> Option<Outcom
     }
     let found = oscillation(&trace.position[from..to], trace.period_s, LOWEST_HZ);
     let fast = found.as_ref().map_or(Outcome::Stable, |found| judge_fast(found, trace));
-    // Where nobody recorded what the hand wants, what is slow is the hand's own, and a quick hand has lines at the lowest frequency looked at.
+    // Where the hand's intent was not recorded, slow motion is the hand's own, and a quick hand has lines at the lowest frequency of interest.
     if trace.intent.is_empty() {
         let by_hand = found?.frequency_hz < BEYOND_THE_HAND * LOWEST_HZ;
         let by_position = if by_hand { Outcome::Stable } else { fast };

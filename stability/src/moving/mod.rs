@@ -172,8 +172,8 @@ fn decimated(signal: &[f64], every: usize) -> Vec<f64> {
     kept.windows(2).filter_map(|w| Some(w.get(1)? - w.first()?)).collect()
 }
 
-/// A low-pass by a windowed sinc (Blackman), its corner as a share of the sample rate; twelve of its periods long to either side, so that it is flat
-/// up to four fifths of its corner.
+/// A low-pass by a windowed sinc (Blackman), its corner as a share of the sample rate. It is twelve of its periods long to either side, so that it is
+/// flat up to four fifths of its corner.
 fn low_pass(signal: &[f64], corner: f64) -> Vec<f64> {
     use std::f64::consts::PI;
     let half = (12.0 / corner).ceil() as i64;

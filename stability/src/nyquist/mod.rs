@@ -51,7 +51,7 @@ pub struct CoupledLoops {
     pub together: Limit,
     /// Each closed alone, the others open: name of the axis and its limit.
     pub alone: Vec<(String, Limit)>,
-    /// How often the eigenloci encircle +1 clockwise at the gain asked: so many poles are unstable. 0 where it is stable.
+    /// How often the eigenloci encircle +1 clockwise at the gain asked: the number of unstable poles. 0 where it is stable.
     pub encirclements: i64,
     /// Axes that touched something in the recording; the models are those of that contact.
     pub touched: Vec<String>,
@@ -83,7 +83,7 @@ impl CoupledLoops {
 /// The loops of a graph in the contact of a session of it, at `gain` = mu*lambda. `None` of a single axis.
 ///
 /// # Errors
-/// In a sentence, why the models do not tell it.
+/// In a sentence, why the models give no answer.
 pub fn coupled_loops(graph: &Graph, session: &Session, gain: f64) -> Result<Option<CoupledLoops>, String> {
     if session.axes.len() < 2 {
         return Ok(None);

@@ -144,8 +144,8 @@ pub fn edge(
     })
 }
 
-/// Runs at the gains of the grid, up to where they are not stable any more unless all of it is wanted, and below it where its lowest gain is
-/// not stable; in the order of the gains.
+/// Runs at the gains of the grid, up to where they are not stable any more unless all of it is wanted. Where its lowest gain is not stable it also
+/// runs below the grid; in the order of the gains.
 fn grid(
     scenario: &Scenario,
     search: &Search,

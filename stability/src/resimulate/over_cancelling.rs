@@ -1,4 +1,4 @@
-//! Whether the canceller takes out more at rest than the force puts in: then the loop runs away without oscillating.
+//! Whether the canceller subtracts more at rest than the force puts in: then the loop runs away without oscillating.
 //!
 //! Kuchenbecker & Niemeyer's canceller subtracts Ghat_f F_f. Where the real grip is firmer than its model assumes,
 //! |Ghat(0)| > |G(0)|, the loop becomes positive feedback at DC, and its limit is
@@ -33,15 +33,15 @@ pub struct StaticBalance {
     pub master: f64,
     /// |Ghat(0)| of the canceller's model with the grip it assumes.
     pub model: f64,
-    /// The mu*lambda beyond which the loop runs away; `None` where the canceller does not take out too much.
+    /// The mu*lambda beyond which the loop runs away; `None` where the canceller does not subtract too much.
     pub dc_limit: Option<f64>,
 }
 
 /// What the canceller does at rest, over the grips.
 #[derive(Debug, Clone)]
 pub struct OverCancelling {
-    /// K_e, static stiffness from the slave's command to the force of what it touches, per axis, N/m or N m/rad, at the depth
-    /// of the scenario's own push; 0 on an axis that touches nothing.
+    /// K_e, static stiffness from the slave's command to the contact force, per axis, N/m or N m/rad, at the depth of the scenario's own push; 0 on
+    /// an axis that touches nothing.
     pub environment_stiffness: Vec<f64>,
     /// Every grip at a small and a large amplitude; empty without a canceller, and with a high-pass, which takes nothing out at rest.
     pub balances: Vec<StaticBalance>,

@@ -73,7 +73,7 @@ fn the_linear_loop_ends_where_its_frequency_response_says() {
     let run = linear(None).run(Gain { mu: 1.0, lambda: 1.02 * critical }, &RunOptions::default(), &NEVER).unwrap();
     let frequency = match run.outcome {
         Outcome::LimitCycle { frequency_hz, .. } => frequency_hz,
-        // A growing oscillation has the frequency of its line all the same.
+        // A growing oscillation has the frequency of its line nevertheless.
         _ => {
             let run =
                 linear(None).run(Gain { mu: 1.0, lambda: critical }, &RunOptions { keep_signals: true, ..Default::default() }, &NEVER);

@@ -5,7 +5,7 @@ use crate::session::Session;
 use backdrive_nodes::build::BuildError;
 use backdrive_nodes::sequence::SequenceError;
 
-/// Why a loop cannot be run again.
+/// Why a loop cannot be re-simulated.
 #[derive(Debug, thiserror::Error)]
 pub enum ResimulateError {
     /// A part of the loop is missing.

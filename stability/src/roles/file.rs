@@ -100,7 +100,7 @@ impl Roles {
         let mut signals = top.table("signals")?.ok_or_else(|| top.missing("signals"))?;
         let mut axes: Vec<AxisRoles> = Vec::new();
         let mut first_key = "";
-        // A slave with a motor of its own may follow the master itself, with nobody to command it a position.
+        // A slave with a motor of its own may follow the master itself, without a position command.
         let commanded = !(signals.contains("tau_s") && signals.contains("x_s"));
         for (key, role, required, hold) in KEYS {
             let found = read_signals(&mut signals, key, hold)?;

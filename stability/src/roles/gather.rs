@@ -62,7 +62,7 @@ pub(super) fn gather(path: &Path, roles: &Roles, wanted: &[(SignalRole, &Located
             let read = |field: &FieldPath| plan.schema.read(field, &entry.payload).map_err(&damaged);
             let logged = entry.log_time_ns as i64;
             let stamp = plan.stamp.as_ref().map(|path| plan.schema.read_time_ns(path, &entry.payload)).transpose().map_err(&damaged)?;
-            // A stamp that nobody filled in is 0.
+            // A stamp that was not filled in is 0.
             let stamp = stamp.flatten().filter(|ns| *ns != 0);
             for (place, field) in &plan.fields {
                 // A message without the named joint has no value for it.

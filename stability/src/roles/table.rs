@@ -36,7 +36,7 @@ pub(super) fn gather(path: &Path, roles: &Roles, wanted: &[(SignalRole, &Located
         "t" => Vec::new(),
         time => vec![("t".to_owned(), ColumnRule::of(Source::Column(time.to_owned())))],
     };
-    // A column of words is in nobody's way that did not ask for it.
+    // A column of words disturbs no reader that did not request it.
     let read = |only: Option<&[&str]>| read_csv(path, only, &rules, &Piece::default());
     let mut asked = columns.clone();
     asked.sort_unstable();

@@ -132,7 +132,7 @@ impl Answer {
         }
         self.by_the_recording();
         self.hold_back();
-        // Where the loop was not measured at all, how to measure it is worth saying even beside a verdict.
+        // Where the loop was not measured at all, the answer explains how to measure it even beside a verdict.
         if told || (measured && self.verdict != Word::CannotTell) {
             self.advice = None;
         }

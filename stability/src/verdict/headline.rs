@@ -1,7 +1,7 @@
 //! The headline: the least favourable of what is known, in one verdict with one stability limit and one frequency.
 //!
 //! `decide.rs` selects the method that leads. Its result is then compared with everything else that is known and counts (a [`Witness`]):
-//! - with the models leading: the re-simulation with every grip of the requested range, because no grip is known exactly; and the measured frequency
+//! - with the models leading: the re-simulation with every grip of the requested range, because no grip is known exactly. Also the measured frequency
 //!   response, where its limit is below the others' by more than the uncertainty of both. Delays that the models lack are in the measured loop, so
 //!   they count by it;
 //! - with the frequency response leading: it alone, for then the models have been seen to do something else than was recorded.
@@ -95,7 +95,7 @@ impl Answer {
             let (a_word, b_word) = (a.word_at(asked), b.word_at(asked));
             rank(a_word).min(2).cmp(&rank(b_word).min(2)).then(end(b).total_cmp(&end(a)))
         });
-        // All that is not stable is equally negative: where the one that leads is, it is the one to tell.
+        // All that is not stable is equally negative: where the one that leads is, it is the one to report.
         let negative = |word: Word| rank(word).min(2);
         let worse = worst.filter(|w| negative(w.word_at(asked)) > negative(leads.word_at(asked))).unwrap_or(leads);
         let word = worse.word_at(asked);

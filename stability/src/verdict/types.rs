@@ -63,7 +63,7 @@ pub struct Resimulated {
     pub edge: Edge,
     /// The same for other grips.
     pub grips: Vec<GripEdge>,
-    /// Whether the canceller takes out too much at rest.
+    /// Whether the canceller subtracts too much at rest.
     pub over_cancelling: Option<OverCancelling>,
     /// Energy at the gain asked.
     pub energy: EnergyAnswer,
@@ -114,7 +114,7 @@ pub struct Answer {
     pub transparency: Vec<Transparency>,
     /// How well each device's model predicts the device.
     pub checks: Vec<PartCheck>,
-    /// How well the models tell the loop.
+    /// How well the models predict the loop.
     pub loop_check: Option<LoopCheck>,
     /// Where answers and models part.
     pub disagreements: Vec<Disagreement>,
@@ -130,7 +130,7 @@ pub struct Answer {
     pub decided_by: Option<String>,
     /// What couples the motors of each axis whose motors were both recorded; empty where none was.
     pub coupled: Vec<CoupledAxis>,
-    /// The loops of several axes together, by the models; why they do not tell it; `None` of one axis, and where there are no models.
+    /// The loops of several axes together, by the models, or why they give no answer; `None` of one axis, and where there are no models.
     pub loops: Option<Result<CoupledLoops, String>>,
     /// Signals that say nothing, or not always.
     pub sensors: Vec<SensorFault>,
@@ -159,7 +159,7 @@ pub enum AnswerError {
     /// Of the session.
     #[error(transparent)]
     Frequency(#[from] FrequencyError),
-    /// Of the loop that is run again.
+    /// Of the re-simulation.
     #[error(transparent)]
     Resimulate(#[from] ResimulateError),
     /// Of a device.

@@ -15,7 +15,7 @@ pub enum Warning {
     Sensor(SensorFault),
     /// Of the measured frequency response.
     Frequency(Note),
-    /// Nobody recorded the gains, and the signals do not tell them.
+    /// The gains were not recorded, and the signals do not determine them.
     GainsAreRelative,
     /// The recording itself runs away.
     RecordingGrows {
@@ -31,7 +31,7 @@ pub enum Warning {
         /// Factors on the grip, with what happens.
         fails: Vec<(f64, Outcome)>,
     },
-    /// The canceller takes out too much at rest, in words.
+    /// The canceller subtracts too much at rest, in words.
     OverCancelling(String),
     /// The verdict changes with the gain more than once between these mu*lambda.
     Flickers {

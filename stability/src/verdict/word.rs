@@ -15,7 +15,7 @@ pub enum Word {
     Unstable,
     /// A clamp or the travel decides, not the loop.
     Limited,
-    /// The recording does not tell.
+    /// The recording gives no answer.
     CannotTell,
 }
 
