@@ -146,7 +146,7 @@ const RATE_OF_REALTIME: f64 = 0.2;
 const RATE_OF_LOCKSTEP: f64 = 1e-3;
 /// Steps beyond this are not marked one by one.
 const MOST_MARKED: u64 = 1 << 27;
-/// As many of a topic's last messages are remembered, to tell a repetition from another message of the same number.
+/// Number of a topic's last messages that are remembered, to distinguish a repetition from another message of the same number.
 const REMEMBERED: usize = 64;
 
 /// What is known of a topic while its messages go by.

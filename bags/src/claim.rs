@@ -1,4 +1,4 @@
-//! A file that is about to be written: nobody else's, and nothing in it that was not given up.
+//! A file that is about to be written: no other writer has it, and it holds nothing that was not given up.
 
 use crate::BagError;
 use std::fs::{File, OpenOptions, TryLockError};
@@ -80,7 +80,7 @@ pub(crate) fn folder_of(path: &Path) -> PathBuf {
     path.parent().filter(|f| !f.as_os_str().is_empty()).map_or_else(|| PathBuf::from("."), Path::to_path_buf)
 }
 
-/// The same error without the name of a temporary file, which nobody knows.
+/// The same error without the name of a temporary file, which means nothing to a user.
 pub(crate) fn nameless(error: &std::io::Error) -> std::io::Error {
     error.raw_os_error().map_or_else(|| std::io::Error::from(error.kind()), std::io::Error::from_raw_os_error)
 }

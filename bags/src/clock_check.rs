@@ -1,4 +1,4 @@
-//! What is wrong with the times of a recording that can be used all the same.
+//! What is wrong with the times of a recording that can be used nevertheless.
 
 /// A step that is longer than this many usual ones is a jump: samples are missing. The Python package has the same limits.
 const MISSING: f64 = 1.5;

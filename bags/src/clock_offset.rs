@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-/// Kind of the events that tell it; their text is a [`ClockOffset`].
+/// Kind of the events that hold it; their text is a [`ClockOffset`].
 pub const CLOCK_OFFSET: &str = "clock_offset";
 
 /// Wall clock of one host against another's.

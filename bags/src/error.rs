@@ -13,7 +13,7 @@ pub enum BagError {
     Io {
         /// The file.
         path: PathBuf,
-        /// What it said.
+        /// Its message.
         source: std::io::Error,
     },
     /// It cannot be written, or not created.
@@ -21,7 +21,7 @@ pub enum BagError {
     Create {
         /// The file.
         path: PathBuf,
-        /// What the operating system said.
+        /// The operating system's message.
         source: std::io::Error,
     },
     /// What is there already was not given up.

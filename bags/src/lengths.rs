@@ -4,9 +4,9 @@ use mcap::records::op;
 
 /// What stands in a record up to its last counted part, field by field.
 enum Field {
-    /// So many bytes.
+    /// This number of bytes.
     Fixed(usize),
-    /// A length of four bytes, and so many bytes.
+    /// A length of four bytes, and that number of bytes.
     Counted,
     /// The same, and in it pairs of counted strings.
     Pairs,

@@ -1,6 +1,6 @@
 //! One bag from those that several hosts recorded of the same run.
 //!
-//! Every host records every topic, so most messages are in both bags: one copy is kept, the one that was recorded first by a common clock, which is
+//! Every host records every topic, so most messages are in both bags. One copy is kept, the one that was recorded first by a common clock, which is
 //! that of the host that sent it. What only one of them heard is kept too, so that the merged bag is as complete as all of them together. Log times
 //! are in the first bag's clock: the clock records of the bags (events of kind [`CLOCK_OFFSET`]) are applied at the time nearest to each message.
 
@@ -44,8 +44,8 @@ type Key = (usize, u32, u64, i64);
 /// `offset_s` is by how much the second bag's clock is ahead, in place of what the bags say.
 ///
 /// # Errors
-/// A bag cannot be read or is none of a run, they are of different graphs, or in real time neither has records of the clocks and `offset_s` is not
-/// given; `to` exists or cannot be written.
+/// A bag cannot be read or is none of a run, or they are of different graphs. In real time neither has records of the clocks and `offset_s` is not
+/// given. `to` exists or cannot be written.
 pub fn merge(first: &Path, second: &Path, to: &Path, offset_s: Option<f64>, overwrite: bool) -> Result<MergeReport, BagError> {
     not_itself(first, to)?;
     not_itself(second, to)?;

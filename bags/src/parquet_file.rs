@@ -38,7 +38,7 @@ pub(crate) enum Values {
     Other(&'static str),
 }
 
-/// The stored values of a column, one after the other, with the levels that tell which rows they are of.
+/// The stored values of a column, one after the other, with the levels that assign them to rows.
 #[derive(Default)]
 struct Stored {
     numbers: Numbers,

@@ -99,7 +99,7 @@ pub fn play(reader: &Reader, options: &PlayOptions, sink: &mut dyn Sink) -> Resu
     Ok(report)
 }
 
-/// When a message is due that lies so many seconds after the beginning.
+/// When a message is due that lies this number of seconds after the beginning.
 fn due(after_s: f64, rate: f64) -> Duration {
     Duration::try_from_secs_f64(after_s / rate).unwrap_or(Duration::MAX)
 }

@@ -115,7 +115,7 @@ fn object(message: &DynamicMessage, nested: usize) -> Json {
     if nested > MOST_NESTED {
         return Json::Null;
     }
-    // What has its default value is not in the bytes of a message, and is there all the same.
+    // A field with its default value is not in the bytes of a message, and is there nevertheless.
     let is_there = |field: &FieldDescriptor| !field.supports_presence() || message.has_field(field);
     let fields = message.descriptor();
     let there = fields.fields().filter(is_there).map(|field| (field.name().to_owned(), json(&message.get_field(&field), nested)));

@@ -80,7 +80,7 @@ pub struct Health {
 
 /// Writes a bag on a thread of its own.
 ///
-/// Dropping it finishes the bag too, but then nobody hears what was lost; one that is to be whole is removed.
+/// Dropping it finishes the bag too, but then losses are not reported; one that is to be whole is removed.
 pub struct Recorder {
     name: String,
     queue: Option<SyncSender<Item>>,
@@ -90,7 +90,7 @@ pub struct Recorder {
     refused: Vec<u64>,
     /// Messages per topic that are known to have been sent.
     due: Vec<u64>,
-    /// Whether nobody knows what is missing behind the last message.
+    /// Whether it is unknown what is missing behind the last message.
     open_end: bool,
     when_full: WhenFull,
     /// Where the file is put once it is whole.
@@ -197,14 +197,14 @@ impl Recorder {
         }
     }
 
-    /// That at least so many messages of a topic were sent, as somebody else knows: those that do not come are counted as lost.
+    /// Sets that at least this number of messages of a topic were sent, from another source: those that do not come are counted as lost.
     pub(crate) fn expect(&mut self, topic: usize, messages: u64) {
         if let Some(due) = self.due.get_mut(topic) {
             *due = messages.max(*due);
         }
     }
 
-    /// That nobody knows what is missing behind the last message, as of a bag that was recovered.
+    /// Marks that it is unknown what is missing behind the last message, as for a bag that was recovered.
     pub(crate) fn leave_end_open(&mut self) {
         self.open_end = true;
     }
@@ -221,8 +221,8 @@ impl Recorder {
 
     /// Writes what is queued, the verdict and the summary.
     ///
-    /// Errors: the bag could not be written to its end; it then holds what had been written before, or is not there if it was to be
-    /// whole, and [`Recorder::health`], asked before, has the counts.
+    /// Errors: the bag could not be written to its end. It then holds what had been written before, or is not there if it was to be whole.
+    /// [`Recorder::health`], asked before, has the counts.
     pub fn finish(mut self) -> Result<Completeness, BagError> {
         self.close()
     }

@@ -50,9 +50,9 @@ pub struct RecoverReport {
     pub damaged: Vec<String>,
     /// Messages in the copy from a damaged chunk: they are at the place in its index and decode by their type, but no checksum confirms their values.
     pub unconfirmed: u64,
-    /// Messages that the file held when it was whole, where its statistics or the indices of its chunks tell.
+    /// Messages that the file held when it was whole, where its statistics or the indices of its chunks contain this.
     pub expected: Option<u64>,
-    /// Messages of damaged chunks that could not be saved, per topic, as far as the chunks' indices tell.
+    /// Messages of damaged chunks that could not be saved, per topic, where the chunks' indices contain them.
     pub missing: BTreeMap<String, u64>,
     /// The verdict in the copy, for bags of ours.
     pub completeness: Option<Completeness>,
@@ -129,7 +129,7 @@ fn copy(from: &Path, frames: &mut Frames, to: &Path, file: File) -> Result<Recov
     }
     // Only a walk to the very end shows whether the file was closed.
     while frames.next()?.is_some() {}
-    // Topics on which nothing was said are topics of the bag too.
+    // Topics without messages are topics of the bag too.
     for id in copy.found.channels.keys().copied().collect::<Vec<_>>() {
         copy.channel(id).map_err(failed)?;
     }
@@ -146,10 +146,10 @@ fn copy(from: &Path, frames: &mut Frames, to: &Path, file: File) -> Result<Recov
     report.expected = statistics.filter(|_| report.was_clean).map(counted).or((known > 0).then_some(report.messages + known));
     let out = begun.writer("", "").map_err(failed)?;
     if run {
-        // A verdict of the recorder knows more than the sequence numbers tell, if the bag got as far.
+        // A verdict of the recorder contains more than the sequence numbers, if the bag got as far.
         let original = Reader::open(from).ok();
         let told = original.as_ref().and_then(|reader| reader.completeness().cloned());
-        // Of a bag that another program wrote again without the record, the topics tell by each other what is missing at their ends.
+        // Of a bag that another program rewrote without the record, a comparison of the topics shows what is missing at their ends.
         let uncounted = original.filter(|_| told.is_none() && report.was_clean && report.damaged.is_empty());
         let faults = uncounted.and_then(|reader| Account::of(&reader).ok()).map(|account| account.faults).unwrap_or_default();
         let verdict = match told {
@@ -305,7 +305,7 @@ impl Copy<'_> {
         schema.and_then(|schema| ros::kind_of(&schema.0)).map_or(Carries::Foreign, Carries::Ours)
     }
 
-    /// The message of a topic of ours, with what was said of it.
+    /// The message of a topic of ours, with its facts.
     fn decode(&self, said: &Said, kind: Kind, header: &MessageHeader, data: &[u8]) -> Result<Message, ros::RosError> {
         let topic = self.found.channels.get(&header.channel_id).map_or("", |channel| &channel.topic);
         decode(kind, said.of(topic, header.sequence).as_ref(), data)
@@ -317,7 +317,7 @@ impl Copy<'_> {
         let mut due: BTreeMap<u16, Due> =
             index.into_iter().map(|(channel, times)| (channel, Due { times: times.into(), ..Due::default() })).collect();
         let (mut kept, mut said) = (Vec::new(), Said::default());
-        // Of a topic's channel: the place in the index of the sample of which it was said last what it is, and its sequence number.
+        // Of a topic's channel: the place in the index of the last sample with facts, and its sequence number.
         let mut first: HashMap<u16, (u64, u64)> = HashMap::new();
         for record in read {
             let Record::Message { header, data } = &record else {
@@ -398,7 +398,7 @@ impl Copy<'_> {
                 self.begun.writer("", "")?.attach(&mcap::Attachment { log_time, create_time, name, media_type, data })?;
                 self.report.attachments += 1;
             }
-            // The copy has indices, which tell the times.
+            // The copy has indices, which contain the times.
             Record::Metadata(metadata) if metadata.name == COMPLETENESS || metadata.name == SPANS => {}
             Record::Metadata(metadata) => {
                 if metadata.name == RUN {

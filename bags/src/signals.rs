@@ -170,7 +170,7 @@ pub(crate) fn series_of(reader: &Reader, wanted: &[Signal], most: usize) -> Resu
             Some(path) => plan.schema.read_time_ns(path, &entry.payload).map_err(|what| wrong(path, what))?,
             None => None,
         };
-        // A stamp that nobody filled in is 0.
+        // A stamp that was not filled in is 0.
         let ns = stamp.filter(|stamp| *stamp != 0 || step.is_some()).unwrap_or(entry.log_time_ns as i64);
         // Seconds since 1970 would leave only 0.2 µs of a double; seconds since the first message are exact to the ns.
         let begin = *begin.get_or_insert(ns);

@@ -1,4 +1,4 @@
-//! A bag without some of its topics: what nobody measured, or nobody is to see.
+//! A bag without some of its topics: those that were not measured, or are to be hidden.
 
 use crate::{BagError, BagHeader, Reader, Recorder, RecorderOptions, WhenFull};
 use std::path::Path;

@@ -117,8 +117,8 @@ impl BagWriter {
     /// Writes everything that comes before the first message, so that a bag that is cut off later has it.
     pub(crate) fn new(store: Box<dyn Store>, header: &BagHeader, chunk_bytes: u64, size: Arc<AtomicU64>) -> Result<BagWriter, WriteError> {
         let sink = BufWriter::with_capacity(1 << 17, Counted { store, position: 0, size: size.clone() });
-        // A chunk index without message indices would be worse than none: `@mcap/core`, which Foxglove reads with, then finds no message,
-        // where without both it reads the file from its beginning, as the other readers do.
+        // A chunk index without message indices would be worse than none: `@mcap/core`, which Foxglove reads with, then finds no message. Without
+        // both it reads the file from its beginning, as the other readers do.
         let mut mcap = options().emit_message_indexes(false).emit_chunk_indexes(false).create(sink)?;
         let mut channels = Vec::with_capacity(header.topics.len());
         for info in &header.topics {

@@ -123,7 +123,7 @@ pub(crate) fn episode_tables(folder: &Path, options: &LerobotOptions) -> Result<
             }
         }
         if there.contains(&Role::Command) && contract.commanded_at == CommandedAt::Next {
-            // Nobody knows what was sent at the first row.
+            // The command sent at the first row is not known.
             table.drop_first_row();
         }
         tables.push((name, table));

@@ -53,7 +53,8 @@ impl Feature<'_> {
         Value::Object(figures.collect::<Map<_, _>>())
     }
 
-    /// Of each episode, which has so many rows: columns `stats/FEATURE/FIGURE` by name, their type, the length of a row's list, and the rows one after the other.
+    /// Of each episode, with its number of rows: columns `stats/FEATURE/FIGURE` by name, their type, the length of a row's list, and the rows one after the
+    /// other.
     pub(super) fn of_episodes(&self, rows: &[usize]) -> Vec<(String, NumberType, usize, Vec<f64>)> {
         let mut columns: Vec<(String, NumberType, usize, Vec<f64>)> = Vec::new();
         let mut from = 0;

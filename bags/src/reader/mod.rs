@@ -33,7 +33,7 @@ pub struct Reader {
     profile: String,
     library: String,
     topics: Vec<Arc<TopicRef>>,
-    /// Channels on which it is said which step samples are of.
+    /// Channels with the steps of samples.
     steps: Vec<u16>,
     counts: Vec<u64>,
     header: Option<BagHeader>,

@@ -25,7 +25,7 @@ pub(crate) struct Summary {
     pub(crate) metadata: Vec<Metadata>,
     pub(crate) attachments: Attachments,
     pub(crate) statistics: Option<Statistics>,
-    /// `None` where neither the recorder nor MCAP's indices tell.
+    /// `None` where neither the recorder nor MCAP's indices have them.
     pub(crate) spans: Option<Spans>,
 }
 
@@ -180,7 +180,7 @@ mod tests {
         }
     }
 
-    /// A bag of ours, or one with MCAP's indices, with so many steps.
+    /// A bag of ours, or one with MCAP's indices, with this number of steps.
     fn bag(steps: u64, indexed: bool) -> Vec<u8> {
         use crate::{BagHeader, Recorder, RecorderOptions, TopicInfo};
         use backdrive_msgs::topic::{Kind, Topic};

@@ -1,4 +1,4 @@
-//! The MCAP file that messages of others go into, and what is to be said of them.
+//! The MCAP file for other people's messages, and the information on them.
 
 use crate::cdr::{FieldPath, Schema};
 use crate::whole::Whole;

@@ -72,7 +72,7 @@ struct Foreign {
     changes: bool,
 }
 
-/// Messages of so many sizes are looked at; text in them makes every one of another size.
+/// Messages of this number of sizes are examined; text in them makes every one of another size.
 const MOST_SIZES: usize = 64;
 
 impl Foreign {
