@@ -16,7 +16,7 @@ pub(super) struct Integration {
 
 impl Integration {
     /// Attributes that hold dry friction as close to set-valued as MuJoCo's constraints allow. A sticking joint of mass m that holds a force f creeps with
-    /// about f (1 - d)/d T/(2 m), with the impedance d at most 0.9999 and the time constant T at least two steps.
+    /// about f (1 - d)/d T/(2 m). The impedance d is at most 0.9999, and the time constant T at least two steps.
     pub(super) fn friction(self) -> [(&'static str, String); 2] {
         [("solreffriction", format!("{} 1", number(2.0 * self.step))), ("solimpfriction", "0.9999 0.9999 0.001 0.5 2".to_owned())]
     }
