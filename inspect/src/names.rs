@@ -10,7 +10,7 @@ pub struct Named {
     pub quantity: Option<Quantity>,
     /// Which device of a pair.
     pub side: Option<Side>,
-    /// What is left of the name when all known words are taken away: the joint. Empty where nothing is left.
+    /// The rest of the name without all known words: the joint. Empty where nothing is left.
     pub joint: String,
     /// The unit that the name hints at, as in `pos_deg_1`.
     pub hint: Option<Unit>,

@@ -21,7 +21,7 @@ pub fn limited(recording: &Recording, response: &Response, limit: &RateLimit) ->
     finding.todo("command slower motion, or state the limit in the drive: a linear model does not hold there").sure(0.9)
 }
 
-/// Takes out what another finding explains.
+/// Removes what another finding explains.
 pub fn settled(mut findings: Vec<Finding>) -> Vec<Finding> {
     let is = |finding: &Finding, kind: FindingKind| finding.kind == kind && finding.weight == Weight::Wrong;
     let exchanged: Vec<String> = findings.iter().filter(|f| is(f, FindingKind::JointsExchanged)).flat_map(|f| f.signals.clone()).collect();

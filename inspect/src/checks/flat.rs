@@ -17,7 +17,7 @@ const JUMP: f64 = 5.0;
 const PARTNER_MOVES: f64 = 0.2;
 /// Share of its range by which a partner has to move in the stretch.
 const MOVES: f64 = 0.005;
-/// Share of equal neighbours above which a signal stands still as a rule, and nothing is said of stretches.
+/// Share of equal neighbours above which a signal stands still as a rule, and stretches are not reported.
 const OFTEN_EQUAL: f64 = 0.25;
 
 /// Finds them.

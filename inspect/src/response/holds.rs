@@ -7,7 +7,7 @@ use crate::recording::Recording;
 use backdrive_diagnosis::follow::student;
 use backdrive_diagnosis::noise;
 
-/// A command is held where it stays within this share of its range, for at least so many seconds and lags.
+/// A command is held where it stays within this share of its range, for at least this number of seconds and lags.
 const STILL: f64 = 2e-3;
 const LEAST_S: f64 = 0.5;
 const LEAST_LAGS: f64 = 3.0;
@@ -15,7 +15,7 @@ const LEAST_LAGS: f64 = 3.0;
 const TAIL: f64 = 0.3;
 /// A position has settled where it varies by less than this share of the command's range in the tail.
 const SETTLED: f64 = 0.01;
-/// A step is at least this share of the range, within so many samples.
+/// A step is at least this share of the range, within this number of samples.
 const STEP: f64 = 0.1;
 /// Fewest holds from either side for a dead band, and fewest steps for an overshoot.
 const LEAST_HOLDS: usize = 3;
