@@ -64,7 +64,7 @@ pub enum LaunchError {
         /// Its last lines on standard error.
         stderr: Vec<String>,
     },
-    /// A node said before the run began that it cannot do its work.
+    /// A node reported before the run began that it cannot do its work.
     #[error("node `{node}`: {error}")]
     NodeFailed {
         /// Name of the node.

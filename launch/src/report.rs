@@ -74,14 +74,14 @@ pub struct NodeReport {
     pub name: String,
     /// Its kind.
     pub kind: String,
-    /// The last it said; missed deadlines and losses are summed over its lives, and the peak effort is that of the whole run.
-    /// `None` if it never said anything.
+    /// Its last report; missed deadlines and losses are summed over its lives, and the peak effort is that of the whole run. `None` if it never
+    /// reported anything.
     pub status: Option<NodeStatus>,
     /// How often it was started again.
     pub restarts: u32,
     /// How its last life ended, such as `done`.
     pub end: String,
-    /// Nodes that shared its process: what restarts and how it ended is said of is that process.
+    /// Nodes that shared its process: restarts and the cause of the end refer to that process.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub with: Vec<String>,
 }
@@ -158,7 +158,7 @@ pub enum Cause {
         /// Who it is, if known, and where.
         text: String,
     },
-    /// A node said that it cannot go on.
+    /// A node reported that it cannot go on.
     NodeFailed {
         /// Name of the node.
         node: String,

@@ -14,7 +14,7 @@ pub(crate) struct Session {
     pub path: PathBuf,
     /// Differs from one start to the next, whatever the clock and the process ids say: what an earlier run has sent is worth nothing.
     pub nonce: String,
-    /// Shared by the hosts; on one host nobody's.
+    /// Shared by the hosts; unused on one host.
     pub secret: Key,
 }
 

@@ -48,7 +48,7 @@ pub(crate) struct Slot {
     pub created: bool,
     pub missing: Vec<String>,
     pub done: bool,
-    /// What it said when it failed, and the exit code it asks for.
+    /// Its message when it failed, and the exit code it asks for.
     pub failed: Option<(String, u8)>,
     pub asked: Asked,
     pub asked_at: Instant,
@@ -59,7 +59,7 @@ pub(crate) struct Slot {
     /// When it was last heard.
     pub heard: Instant,
     pub silent: bool,
-    /// What the system said of the process last, while the run ends, and when it was last seen to work.
+    /// The system's last information on the process, while the run ends, and when it was last seen to work.
     pub stat: Option<ProcStat>,
     pub worked: Instant,
     /// When it was continued, because it had been stopped.

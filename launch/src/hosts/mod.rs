@@ -1,6 +1,6 @@
-//! A run on several hosts: the supervisors find each other, start together, and tell what becomes of the others.
+//! A run on several hosts: the supervisors find each other, start together, and report the state of the others.
 //!
-//! They know each other by a secret that they share, and tell their nodes whose messages to take. They talk on one topic, each reports its state twice a
+//! They know each other by a secret that they share, and inform their nodes whose messages to take. They talk on one topic, each reports its state twice a
 //! second, and each measures the others' clocks. The first host of the graph announces when step 0 is due, in each host's own clock. A host that is restarted,
 //! or late, learns from a running one when step 0 was, and joins at the step that is due.
 
@@ -75,7 +75,7 @@ pub(crate) struct Here {
 pub(crate) enum There {
     /// Step 0 is due.
     Start(Begun),
-    /// Who is missing, and why; empty when nobody is.
+    /// Who is missing, and why; empty when all are there.
     Missing(Vec<String>),
     /// Something that a person should know.
     Event(u32, &'static str, String),
@@ -284,7 +284,7 @@ impl Round {
         });
     }
 
-    /// Said so that a person knows; nothing of it is heard.
+    /// Reported so that a person knows; nothing of it is accepted.
     fn hear_foreign(&mut self) {
         if !std::mem::replace(&mut self.foreign, true) {
             self.event(1, "host_secret", "somebody who does not have this run's secret speaks as a host; it is not heard");

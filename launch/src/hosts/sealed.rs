@@ -24,7 +24,7 @@ struct Envelope {
     tag: String,
 }
 
-/// Who said something.
+/// The sender of a message.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Speaker {
     pub run: String,
@@ -40,7 +40,7 @@ struct Heard {
 /// What a word is worth.
 #[derive(Debug, PartialEq)]
 pub(super) enum Opened {
-    /// Said now, by who has the secret.
+    /// A current message, from a sender with the secret.
     Said(Speaker, Say),
     /// By who has the secret, but perhaps long ago; with whether it is the first of this speaker.
     Unproven { first: bool },

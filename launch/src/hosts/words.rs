@@ -31,7 +31,7 @@ pub(super) enum Say {
         begun: Option<Begun>,
         /// It ends.
         leaving: bool,
-        /// Nonces of the others that it has heard: who reads its own there knows that this was said after it began.
+        /// Nonces of the others that it has heard: a receiver that reads its own there knows that this was sent after it began.
         heard: Vec<String>,
     },
     /// What is your clock?

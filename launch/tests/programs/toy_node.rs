@@ -151,7 +151,7 @@ fn end(toy: &Toy, name: &str, begun: Option<Instant>) -> Outcome {
     if let Some(bag) = toy.value("bag") {
         std::fs::write(bag, format!("{name} finished"))?;
     }
-    // Nobody may be left to hear it.
+    // There may be no listener any more.
     let _ = say(&FromNode::Done(status(toy, begun)));
     Ok(())
 }
