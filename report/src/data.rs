@@ -1,7 +1,7 @@
 //! What the script in the page is given of a figure: each stack of plots as JSON, in the units that its axes show.
 //!
-//! Numbers are rounded to less than a ten-thousandth of their axis and long series are thinned for the widest drawing: a page stays small, and
-//! what is read off it is right to more digits than can be seen.
+//! Numbers are rounded to less than a ten-thousandth of their axis and long series are thinned for the widest drawing. A page stays small, and its
+//! values are right to more digits than can be seen.
 
 use crate::limits::{self, Scale, drawable};
 use crate::number::{axis_scale, number, power_of_ten};

@@ -1,8 +1,8 @@
 //! Self-contained reports: one HTML file with figures that opens offline. Knows data only, nothing of robots.
 //!
-//! A [`Page`] holds a lead sentence, sections, [`Table`]s and [`Figure`]s of [`Plot`]s, and becomes one file: nothing is
-//! fetched, the same data give the same bytes. It reads in light and dark, on a narrow screen and in print. Figures tell their values
-//! where one points, show and hide curves by their legend, and zoom; a reader without scripts gets their numbers in a table.
+//! A [`Page`] holds a lead sentence, sections, [`Table`]s and [`Figure`]s of [`Plot`]s, and becomes one file: nothing is fetched, the same data give
+//! the same bytes. It reads in light and dark, on a narrow screen and in print. Figures show their values at the pointer, show and hide curves by
+//! their legend, and zoom; a reader without scripts gets their numbers in a table.
 //!
 //! ```
 //! use backdrive_report::{Page, Plot, Tone};

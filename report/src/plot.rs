@@ -5,7 +5,7 @@ use crate::style::Tone;
 /// A colour by its role; the page's style sheet defines its look in a light and in a dark scheme.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum Colour {
-    /// The next one of the palette (Okabe and Ito's, which colour-blind readers can tell apart).
+    /// The next one of the palette (Okabe and Ito's, which colour-blind readers can distinguish).
     #[default]
     Auto,
     /// The one of the palette with this number, to pair a band with its line.
