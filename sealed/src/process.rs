@@ -86,7 +86,7 @@ pub enum RemoteError {
         /// The system's message.
         error: io::Error,
     },
-    /// It said something else first. Why it ended stands in its own error output.
+    /// Its first output was something else. Why it ended stands in its own error output.
     #[error("the hidden plant did not begin as it should but with \"{0}\"; its error output says why")]
     Greeting(String),
     /// It ended or a pipe broke.
@@ -173,7 +173,7 @@ impl Drop for RemoteMaster {
     /// Ends the process and waits for it.
     fn drop(&mut self) {
         drop(self.input.take());
-        // Its input has ended, so it ends; there is nobody to tell how.
+        // Its input has ended, so it ends; there is no receiver for its status.
         let _ = self.child.wait();
     }
 }

@@ -319,7 +319,7 @@ fn a_constant_force_whose_reaction_the_held_body_takes_is_a_hand_elsewhere() {
         truth.effects[0].accept.iter().filter(same).count()
     };
     assert_eq!((hidden(&truths[0], ["drum", "handle"]), hidden(&truths[1], ["drum", "ground"])), (1, 1));
-    // What the second pulls at the handle, the hand's spring gives back where the hand stands off by force/stiffness.
+    // The hand's spring balances the pull of the second at the handle, where the hand stands off by force/stiffness.
     let spring = network.elements.iter().find_map(|e| match &e.law {
         Law::Spring(spring) if e.of_grip => Some(spring.stiffness),
         _ => None,

@@ -1,4 +1,4 @@
-//! No law that takes energy gives any, and a spring gives back no more than it took.
+//! No law that takes energy gives any, and a spring returns no more than it took.
 
 mod common;
 

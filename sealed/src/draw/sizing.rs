@@ -29,7 +29,7 @@ pub(crate) fn share(of: [f64; 2], random: &mut ChaCha8Rng) -> f64 {
     between(of[0], of[1], random)
 }
 
-/// m, the way within which friction lets go: 1 to 15 % of the travel, which reversals show.
+/// m, the presliding displacement within which friction reaches its level: 1 to 15 % of the travel, which reversals show.
 pub(crate) fn presliding(travel: f64, random: &mut ChaCha8Rng) -> f64 {
     travel * between(0.01, 0.15, random)
 }

@@ -1,4 +1,4 @@
-//! Hidden effects: physics at a place, how it changes a device, and which names for it are right.
+//! Hidden effects: a law at a place, how it changes a device, and which names for it are right.
 
 pub(crate) mod answer;
 mod answers;
@@ -32,7 +32,7 @@ pub struct Effect {
     pub in_formats: bool,
     /// What counts as finding it.
     pub accept: Vec<Answer>,
-    /// Names of physics that count as the right family, in the vocabulary of verdicts.
+    /// Names of effects that count as the right family, in the vocabulary of verdicts.
     pub family: Vec<String>,
 }
 

@@ -17,10 +17,10 @@ const BRISTLES_AT_MOST: usize = 1024;
 
 /// A field of bristles whose stiffness and break-away force are spread widely and independently of each other.
 ///
-/// Both are log-logistic over the field, in proportions that [`BristleField::bristles`] fixes, so that a few numbers say it all:
-/// the first slope of the virgin curve is `stiffness`, the force of steady sliding is `force`. Break-away forces may be higher
-/// near rest: all of them are then multiplied by `1 + (static_ratio - 1) exp(-(v/velocity)^2)`. No LuGre or Dahl law has this
-/// virgin curve, nor their loops its non-local memory; a handful of spring-sliders comes near it but never meets it.
+/// Both are log-logistic over the field, in proportions that [`BristleField::bristles`] fixes, so that a few parameters define it: the first slope of
+/// the virgin curve is `stiffness`, the force of steady sliding is `force`. Break-away forces may be higher near rest: all of them are then
+/// multiplied by `1 + (static_ratio - 1) exp(-(v/velocity)^2)`. No LuGre or Dahl law has this virgin curve, nor their loops its non-local memory; a
+/// handful of spring-sliders comes near it but never meets it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct BristleField {

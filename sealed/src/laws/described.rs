@@ -23,7 +23,7 @@ pub(crate) struct Facts {
     pub is_friction: bool,
     /// Whether a linear model can imitate it exactly, from wherever it rests.
     pub is_linear: bool,
-    /// Names of physics of the same family, in the vocabulary of verdicts, in lists.
+    /// Names of effects of the same family, in the vocabulary of verdicts, in lists.
     pub family: &'static [&'static [&'static str]],
 }
 

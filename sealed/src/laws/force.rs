@@ -21,8 +21,8 @@ pub enum Load<'a> {
     /// The force of the element of this name, whichever way round it lies.
     Element(&'a str),
     /// The transmitted force. For friction between two bodies it is that of the other elements between them. For a body's friction against ground it
-    /// is that of the springs between it and the first other body that elements join it with; where they join it with none, that of its springs to
-    /// ground.
+    /// is that of the springs between it and the first other body that elements join it with. Where they join it with none, it is that of its springs
+    /// to ground.
     Joint,
 }
 

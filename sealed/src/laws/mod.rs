@@ -1,7 +1,7 @@
 //! The laws of force between two bodies: those that model files name and those that only a hidden plant has.
 //!
-//! A law is one file, which holds everything that is said of it (`described::Described`), and one line here. The modules are declared by
-//! that line, where `cargo fmt` does not see them: format a law's file with `rustfmt --edition 2024 --config-path . sealed/src/laws/LAW.rs`.
+//! A law is one file, which holds its whole description (`described::Described`), and one line here. The modules are declared by that line, where
+//! `cargo fmt` does not see them: format a law's file with `rustfmt --edition 2024 --config-path . sealed/src/laws/LAW.rs`.
 
 pub(crate) mod around;
 mod bristle;

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 /// Index of a body; `None` is ground.
 pub type Place = Option<usize>;
 
-/// What a device is said to be: bodies, what joins them, and the signals that drive it and are read.
+/// The description of a device: bodies, what joins them, and the signals that drive it and are read.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Network {
     /// The model file that states this.

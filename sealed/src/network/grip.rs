@@ -17,9 +17,9 @@ impl Grip {
 }
 
 impl Network {
-    /// The device with a hand on every axis that takes one: a body `hand` that the new input `intent` moves (m, straight from sample to sample), and
-    /// the grip's elements between it and the axis's user. From the second axis on all are called after it, `side_hand` and `side_intent`. A device
-    /// whose own parameters hold the hand stays unchanged.
+    /// The device with a hand on every axis that takes one. It adds a body `hand` that the new input `intent` moves (m, straight from sample to
+    /// sample), and the grip's elements between it and the axis's user. From the second axis on all are called after it, `side_hand` and
+    /// `side_intent`. A device whose own parameters hold the hand stays unchanged.
     pub fn held(&self, grip: &Grip) -> Network {
         let mut held = self.clone();
         for axis in 0..self.axes.len() {

@@ -163,7 +163,7 @@ impl<'a> Section<'a> {
         Ok(found)
     }
 
-    /// Refuses keys that nobody took.
+    /// Refuses keys that were not read.
     pub fn finish(self) -> Result<(), NetworkError> {
         match self.table.iter().map(|(key, _)| key).find(|key| !self.taken.contains(*key)) {
             None => Ok(()),
