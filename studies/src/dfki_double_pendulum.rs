@@ -1,4 +1,4 @@
-//! A two-joint arm under gravity, joint by joint: the rigid arm's torque is computed here from the published model and handed over as a known load, and
+//! A two-joint arm under gravity, joint by joint. The rigid arm's torque is computed here from the published model and handed over as a known load, and
 //! the diagnosis reports what the joint has besides.
 //!
 //! The library's models are chains of one axis whose inertia does not depend on where they stand, so a joint cannot have the arm in its model.

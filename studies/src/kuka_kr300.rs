@@ -25,7 +25,7 @@ const RATE: f64 = 250.0;
 const CORNER: f64 = 12.0;
 /// See [`RATE`].
 const KEPT: usize = 2;
-/// Physics that would be flexibility of the joint.
+/// Effects that would be flexibility of the joint.
 const FLEXIBLE: [&str; 7] = ["series_compliance", "cubic_spring", "hysteretic_spring", "bouc_wen", "backlash", "contact", "hunt_crossley"];
 
 fn run(context: &Context) -> Result<Report, StudyError> {

@@ -26,9 +26,9 @@ pub struct Ask<'a> {
     pub set: &'a str,
     /// The nominal model, a file in the study's folder.
     pub model: &'a str,
-    /// Physics that are withheld.
+    /// Effects that are withheld.
     pub without: &'a [&'a str],
-    /// How many physics may be missing at once, at most.
+    /// How many effects may be missing at once, at most.
     pub effects: usize,
     /// How much the search may compute, as a multiple of what it does by default.
     pub effort: f64,
@@ -135,7 +135,7 @@ fn resolve(text: &str, folders: &[&Path]) -> Result<String, String> {
     Ok(document.to_string())
 }
 
-/// Names of the physics of a verdict's findings, most important first, each with its place.
+/// Names of the effects of a verdict's findings, most important first, each with its place.
 pub fn findings(verdict: &Verdict) -> Vec<(String, String)> {
     verdict.findings.iter().map(|finding| (finding.physics.clone(), finding.place.to_string())).collect()
 }

@@ -19,7 +19,7 @@ fn long() -> bool {
     std::env::var_os("BACKDRIVE_STUDIES").is_some_and(|v| v == "1")
 }
 
-/// The report of a study whose short part takes half a minute; `None` with a message where nobody asks for it, or as [`report`].
+/// The report of a study whose short part takes half a minute; `None` with a message where it was not requested, or as [`report`].
 fn report_of_a_search(name: &str) -> Option<Report> {
     if !long() && std::env::var("BACKDRIVE_LONG").as_deref() != Ok("1") {
         skipped("a search of half a minute; BACKDRIVE_LONG=1 runs it");
@@ -152,7 +152,7 @@ fn the_damper_s_joint_is_slack_about_its_middle() {
     assert!(["backlash at rod-drum", "cubic_spring at rod-drum"].iter().any(|p| verdict.contains(p)), "{verdict}");
     let [before, after] = ["held out before", "held out after"].map(|name| report.figure_named(name));
     assert!(after < 0.7 * before, "{after} {before}");
-    // The play that is known to be there, fitted in its place: its gap lies between the asymptotes of its round ends, and is wider than the dead zone
+    // The play that is known to be there, fitted in its place. Its gap lies between the asymptotes of its round ends, and is wider than the dead zone
     // of 4.3 mm that is read off.
     assert!((4.0e-3..7.0e-3).contains(&report.figure_named("rival gap")), "{}", report.figure_named("rival gap"));
     let [forward, backward] = ["forward", "backward"].map(|side| report.figure_named(&format!("rival {side}")));

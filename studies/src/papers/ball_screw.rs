@@ -59,7 +59,7 @@ fn run(context: &Context) -> Result<Report, StudyError> {
         // N m: the torque meter's 5 N m to 0.1 %.
         output.noise = 5e-3;
     }
-    // Motions that turn within turns, as the paper's Fig. 6, below and beyond the way within which friction lets go; its 0.2 Hz tail.
+    // Motions that turn within turns, as the paper's Fig. 6, below and beyond the presliding displacement; its 0.2 Hz tail.
     let drives = [
         Drive {
             name: "small",

@@ -116,7 +116,7 @@ fn run(context: &Context) -> Result<Report, StudyError> {
     let mut first = Model::load(&device(FILE))?;
     first.axes.clear();
     let mut report = Report::new("Paper 003, told blind: a linear shaft");
-    // The two machines against each other about standstill, below and above the torsional mode of 36 Hz; unseen: another draw of phases, and slow.
+    // The two machines against each other about standstill, below and above the torsional mode of 36 Hz; held out: another draw of phases, and slow.
     let drives = [
         Drive {
             name: "broad",

@@ -27,11 +27,11 @@ const TRUTH: &str = "truth.json";
 /// Samples of the true device for each that is recorded.
 const FINER: usize = 8;
 
-/// A step of a paper's path: physics that its last model has and its first one has not.
+/// A step of a paper's path: effects that its last model has and its first one has not.
 pub(super) struct Step {
     /// The paper's value.
     pub paper: &'static str,
-    /// Names of physics that are this one, or that this one is a case of.
+    /// Names of effects that are this one, or that this one is a case of.
     pub accept: &'static [&'static str],
     /// The place, and others at which it is the same device for whoever drives and measures this one.
     pub places: &'static [[&'static str; 2]],
@@ -123,7 +123,7 @@ impl Story<'_> {
 
 /// How far a walk goes.
 pub(super) struct Walk<'a> {
-    /// How many physics the diagnoses from the first model may add at once: one diagnosis for each of these numbers.
+    /// How many effects the diagnoses from the first model may add at once: one diagnosis for each of these numbers.
     pub effects: &'a [usize],
     /// How often the found model replaces the one before, at most.
     pub again: usize,
@@ -133,7 +133,7 @@ pub(super) struct Walk<'a> {
 
 /// What a diagnosis named.
 pub(super) struct Named {
-    /// The physics.
+    /// The effect.
     pub physics: String,
     /// The place.
     pub place: String,
@@ -154,11 +154,11 @@ impl Named {
 pub(super) struct Walked {
     /// What was named on the way to the last model.
     pub named: Vec<Named>,
-    /// Folder of the diagnosis from the first model that predicted the unseen records best.
+    /// Folder of the diagnosis from the first model that predicted the held-out records best.
     pub best: String,
 }
 
-/// The set of `out` diagnosed from the first model; then from the found one that predicts the unseen records best, and so on until nothing is
+/// The set of `out` diagnosed from the first model; then from the found one that predicts the held-out records best, and so on until nothing is
 /// missing.
 pub(super) fn walk(report: &mut Report, outer: &Context, walk: &Walk) -> Result<Walked, StudyError> {
     let out = outer.out;

@@ -53,7 +53,7 @@ fn run(context: &Context) -> Result<Report, StudyError> {
         // N, a load cell of some kN.
         output.noise = 1.0;
     }
-    // The rig's band, 0.1 to 35 Hz, at strokes that are chosen; unseen are the frequencies whose time plots the paper shows.
+    // The rig's band, 0.1 to 35 Hz, at strokes that are chosen; held out are the frequencies whose time plots the paper shows.
     let drives = |[large, middle, small]: [&str; 3], [slow, fast, faster]: [&str; 3]| {
         let sweep =
             |name, stroke: &str, rest: &str| Drive { name, held_out: false, inputs: vec![format!("sweep:amplitude={stroke},{rest}")] };

@@ -21,7 +21,7 @@ const ARM: f64 = 0.075;
 /// Share of the variance that is wanted.
 const WANTED: f64 = 0.9;
 
-/// The diagnosed levers: moved as they were measured, they tell the torque that was needed.
+/// The diagnosed levers: moved along their measured motion, they give the torque that was needed.
 pub(super) struct Levers {
     pub(super) master: Model,
     pub(super) slave: Model,
@@ -118,7 +118,7 @@ fn followed(simulated: &[f64], recorded: &[f64]) -> f64 {
     1.0 - variance(&left) / variance(recorded)
 }
 
-/// The unseen records run again, three ways.
+/// Re-simulation of the held-out records, three ways.
 pub(super) fn again(report: &mut Report, records: &[Record], judged: &[Judged], levers: &Levers, hand_gain: f64) -> Result<(), StudyError> {
     let of_kind = |kind: &str| records.iter().filter(|r| r.name.starts_with("a_") && r.name.contains(kind)).collect::<Vec<&Record>>();
     let environments: Vec<(&str, Option<Environment>)> =

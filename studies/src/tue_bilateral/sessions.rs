@@ -13,7 +13,7 @@ use statrs::distribution::{ContinuousCDF, StudentsT};
 use std::collections::BTreeMap;
 use std::sync::atomic::AtomicBool;
 
-/// Where the gains stand that nobody published.
+/// Place of the gains that were not published.
 const UNPUBLISHED: &str = "unpublished";
 /// Records of the short part: one of each gains.
 const SHORT: [&str; 3] = ["m2_a_spring.csv", "m2_b_foam.csv", "m2_c_rigid.csv"];
