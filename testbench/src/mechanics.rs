@@ -34,8 +34,8 @@ pub fn inertia_of_dynamometer(record: &Record) -> Result<f64, BenchError> {
     }
 }
 
-/// The response of the engine's speed to the dynamometer's torque, (Hz, complex rad/s per N m): what is common with the added torque, which is
-/// nobody's noise, so that the speed control does not bias it. Hann windows of four seconds, half of each shared.
+/// The response of the engine's speed to the dynamometer's torque, (Hz, complex rad/s per N m). It uses what is common with the added torque, which
+/// is independent of all noise, so that the speed control does not bias it. Hann windows of four seconds, half of each shared.
 pub fn response(record: &Record, from_hz: f64, to_hz: f64) -> Vec<(f64, Complex<f64>)> {
     let length = (4.0 / record.period_s).round() as usize;
     if record.len() < length {
