@@ -1,4 +1,5 @@
-//! What logs of an arm say of themselves before any physics: units, signs, swapped columns and joints, rates that are none, joints that do not move.
+//! Faults that logs of an arm show before any effect is fitted: units, signs, swapped columns and joints, rates that are none, joints that do not
+//! move.
 
 use crate::log::Log;
 use crate::physics::{range, rms};

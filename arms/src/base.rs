@@ -1,7 +1,7 @@
 //! Base parameters: the combinations of inertial parameters that an arm's torque can show.
 //!
 //! By a QR decomposition of the regressor over random states (Gautier, Numerical calculation of the base inertial parameters of robots, J. Robotic Systems
-//! 8(4), 1991): a parameter whose column depends on those before it is identifiable only together with them.
+//! 8(4), 1991). A parameter whose column depends on those before it is identifiable only together with them.
 
 use crate::error::ArmError;
 use crate::fit::Fit;

@@ -28,9 +28,9 @@ pub const EXPERIMENT_FILE: &str = "next-motion.csv";
 /// What may be asked.
 #[derive(Debug, Clone)]
 pub struct Settings {
-    /// Physics that are not considered, by name.
+    /// Effects that are not considered, by name.
     pub without: Vec<String>,
-    /// How many physics may be missing at once, at most.
+    /// How many effects may be missing at once, at most.
     pub effects: usize,
     /// Corner of the regression's filter, Hz, where the motion shall not say it.
     pub corner_hz: Option<f64>,

@@ -60,8 +60,8 @@ pub struct Plan {
     pub payload: Option<(usize, Payload)>,
 }
 
-/// Of each joint with friction that is of one level, or in proportion to the load, but not both: the question whether it is the other one, where the logs
-/// do not tell.
+/// For each joint with friction that is of one level, or in proportion to the load, but not both: the question whether it is the other one, where the
+/// logs do not decide it.
 fn of_load(data: &Data, search: &Search) -> Vec<(usize, Question)> {
     let best = &search.best;
     let of_joint = |j: usize| {
@@ -81,7 +81,7 @@ fn of_load(data: &Data, search: &Search) -> Vec<(usize, Question)> {
     (0..data.problem.joints.len()).filter_map(of_joint).collect()
 }
 
-/// Joints at which the logs do not tell friction that grows with the load from friction of one level.
+/// Joints at which the logs do not distinguish load-dependent friction from friction of one level.
 pub fn same_load(data: &Data, search: &Search) -> Vec<usize> {
     of_load(data, search).into_iter().map(|(joint, _)| joint).collect()
 }

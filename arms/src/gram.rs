@@ -1,4 +1,4 @@
-//! What a structure's numbers can make up for: weighted inner products of its columns, and of a torque that it is held against.
+//! The torque that a structure's parameters can explain: weighted inner products of its columns, and of a torque that it is compared with.
 
 use crate::fit::{Fit, Structure, TOLERANCES, Weights};
 use crate::physics::{Physics, Term};
@@ -30,7 +30,7 @@ impl Gram {
         }
     }
 
-    /// The weighted square that the columns cannot make up for.
+    /// The weighted square that the columns cannot explain.
     pub fn left(&self) -> f64 {
         let n = self.cross.len();
         let whole =

@@ -24,7 +24,7 @@ impl Layout {
         Layout { motions: Vec::new(), joints, rows: 0 }
     }
 
-    /// Adds a motion with so many rows for each joint.
+    /// Adds a motion with this number of rows for each joint.
     pub fn push(&mut self, count: usize) {
         self.motions.push((self.rows, count));
         self.rows += count * self.joints;

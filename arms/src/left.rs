@@ -54,8 +54,8 @@ pub fn left(data: &Data, fit: &Fit) -> Vec<Left> {
 
 /// Standard deviation of what the sensors' noise leaves in the rows of each joint, N m or N.
 ///
-/// The torque's own is taken from differences of its samples, the positions' from their steps; both as white noise through the filters of the regression,
-/// positions twice differentiated and times the inertia that the joint feels.
+/// The torque's own is taken from differences of its samples, the positions' from their steps. Both are propagated as white noise through the filters of
+/// the regression, positions twice differentiated and times the inertia that the joint feels.
 fn noise(data: &Data, motions: Range<usize>) -> Vec<f64> {
     let joints = data.problem.joints.len();
     let logs: Vec<&Log> = data.problem.fit.iter().chain(&data.problem.held_out).collect();

@@ -189,7 +189,7 @@ fn frequency_below(samples: &[f64], rate: f64) -> f64 {
     power_below(samples, rate, SHARE)
 }
 
-/// The frequency below which a share of the power about the mean lies, Hz; 0 of what is too short to tell.
+/// The frequency below which a share of the power about the mean lies, Hz; 0 for a signal that is too short.
 pub(crate) fn power_below(samples: &[f64], rate: f64, share: f64) -> f64 {
     if samples.len() < 16 {
         return 0.0;

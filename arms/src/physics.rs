@@ -1,4 +1,4 @@
-//! The physics that a joint may have, each as columns of the regression.
+//! The effects that a joint may have, each as columns of the regression.
 
 use crate::motion::{Motion, Rates};
 use crate::problem::Problem;
@@ -162,7 +162,7 @@ impl Term {
         Term { physics, at, shape, given: None }
     }
 
-    /// Whether another one is the same physics at the same place.
+    /// Whether another one is the same effect at the same place.
     pub fn is_like(&self, other: &Term) -> bool {
         self.physics == other.physics && self.at == other.at
     }
@@ -197,8 +197,8 @@ pub struct Sight<'a> {
     pub slip: &'a [f64],
 }
 
-/// Direction of dry friction that a motion has, -1 to 1: it turns over a displacement, and stays while the joint rests (an elasto-plastic spring whose
-/// deflection ends at `displacement`; of one Maxwell element as in Lampaert, Swevers & Al-Bender 2002).
+/// Direction of dry friction along a motion, -1 to 1: it turns over a displacement, and stays while the joint rests. It is an elasto-plastic spring
+/// whose deflection ends at `displacement`, with one Maxwell element as in Lampaert, Swevers & Al-Bender 2002.
 pub fn direction(position: impl Iterator<Item = f64>, displacement: f64) -> Vec<f64> {
     let (mut state, mut before): (f64, Option<f64>) = (0.0, None);
     position
@@ -311,7 +311,7 @@ pub fn several_payloads(motions: &[Motion]) -> bool {
     motions.windows(2).any(|pair| pair[0].payload != pair[1].payload)
 }
 
-/// Every physics at every place, with the shapes that a search tries first.
+/// Every effect at every place, with the shapes that a search tries first.
 pub fn candidates(problem: &Problem, motions: &[Motion]) -> Vec<Term> {
     let joints = problem.joints.len();
     let mut out = Vec::new();

@@ -397,8 +397,8 @@ impl Data<'_> {
         (rows as f64 / weights.time[joint]).max(4.0)
     }
 
-    /// Twice the negative log evidence, but for a constant: `Σ n_j ln(mean square_j)` with independent rows `n_j`; of the inertial parameters, whose prior
-    /// is known, the exact Gaussian factor `δᵀ P δ + ln det(H) - ln det(P)`; of all other numbers `ln(Σ n_j)` each (Schwarz 1978).
+    /// Twice the negative log evidence, except for a constant: `Σ n_j ln(mean square_j)` with independent rows `n_j`. The inertial parameters, whose prior
+    /// is known, add the exact Gaussian factor `δᵀ P δ + ln det(H) - ln det(P)`; all other parameters add `ln(Σ n_j)` each (Schwarz 1978).
     fn score(&self, fit: &Fit, weights: &Weights) -> f64 {
         let joints = 0..self.layout.joints;
         let total: f64 = joints.clone().map(|j| self.independent(weights, j)).sum();

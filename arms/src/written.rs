@@ -129,7 +129,7 @@ fn is_urdf(xml: &str) -> bool {
     backdrive_plant::robot::RobotFile::is_urdf(xml)
 }
 
-/// Numbers of terms at a joint: the sum of the first value of each of this physics, in torques of the joint.
+/// Parameters of terms at a joint: the sum of the first value of each of this effect, in torques of the joint.
 fn at_joint(fit: &Fit, reading: &Reading, joint: usize, physics: Physics) -> Option<(f64, Term, usize)> {
     let (index, term) = fit.structure.terms.iter().enumerate().find(|(_, t)| t.physics == physics && t.at == At::Joint(joint))?;
     Some((fit.values[fit.places[index].start] / reading.gain[joint], term.clone(), index))

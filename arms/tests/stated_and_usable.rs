@@ -31,7 +31,7 @@ fn found(folder: &Path) -> Found {
     diagnose(&problem(folder), &Settings::default()).unwrap()
 }
 
-/// Findings as physics and place.
+/// Findings as effect and place.
 fn claims(found: &Found) -> Vec<(String, Place)> {
     found.verdict.findings.iter().map(|f| (f.physics.clone(), f.place.clone())).collect()
 }
