@@ -140,7 +140,7 @@ fn answer(index: usize, joint: &Joint, found: Searched) -> Answer {
     Answer { joint: index, found, judged, is_held_out }
 }
 
-/// Held-out recordings run again with all joints where their own free runs bring them, not where they were recorded.
+/// Re-simulation of held-out recordings with all joints where their own free runs bring them, not where they were recorded.
 fn from_commands_alone(problem: &Problem, mut answers: Vec<Answer>) -> Result<Vec<Answer>, ServoError> {
     let numbers = |of: &dyn Fn(&Searched) -> Numbers| -> Vec<Option<Numbers>> {
         (0..problem.joints.len()).map(|j| answers.iter().find(|a| a.joint == j).map(|a| of(&a.found))).collect()

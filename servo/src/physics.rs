@@ -1,4 +1,4 @@
-//! What may be missing at a servo joint: the numbers of each physics, where its fit starts, and what it is easily taken for.
+//! What may be missing at a servo joint: the parameters of each effect, where its fit starts, and what it is easily taken for.
 
 use backdrive_plant::servo::{Number, Numbers};
 
@@ -11,7 +11,7 @@ pub struct Physics {
     pub words: &'static str,
     /// The numbers that it frees, its size first.
     pub numbers: &'static [Number],
-    /// Another physics that it needs.
+    /// Another effect that it needs.
     pub needs: &'static [&'static str],
     /// Those that do nearly the same.
     pub rivals: &'static [&'static str],
@@ -60,8 +60,8 @@ pub fn named(name: &str) -> Option<&'static Physics> {
 }
 
 impl Physics {
-    /// Where a fit of it may start, from that of the structure before: `typical` is the usual size of command less position, rad, `fastest` the largest speed of the position,
-    /// rad/s, `quickest` its largest acceleration, rad/s².
+    /// Where a fit of it may start, from that of the structure before. `typical` is the usual size of command less position, rad; `fastest` is the largest
+    /// speed of the position, rad/s; `quickest` is its largest acceleration, rad/s².
     pub fn starts(&self, from: &Numbers, size: &Sizes) -> Vec<Numbers> {
         let with = |changes: &[(Number, f64)]| {
             let mut numbers = *from;

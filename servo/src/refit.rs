@@ -1,4 +1,4 @@
-//! The numbers of a model's servo joints fitted again, their physics as they are.
+//! The parameters of a model's servo joints refitted, their effects unchanged.
 
 use crate::diagnose::{floor, median, numbers_of};
 use crate::error::ServoError;

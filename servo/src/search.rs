@@ -1,4 +1,4 @@
-//! Which physics a servo joint needs: one after another, each taken up only where it predicts what its fit has not seen better than without it.
+//! Which effects a servo joint needs: one after another, each added only where it predicts held-out data better than without it.
 
 use crate::fit::{BLOCKS, Fit, Problem, spread};
 use crate::physics::{ALL, BASE, Physics, Sizes, named};
@@ -11,7 +11,7 @@ use std::collections::BTreeSet;
 /// Steps of a fit that only screens, and of one that counts.
 const SCREEN: usize = 4;
 const FULL: usize = 15;
-/// Physics of a round that are looked at on unseen recordings.
+/// Effects of a round that are evaluated on held-out recordings.
 const FINALISTS: usize = 3;
 /// An effect has to lower the mean loss on held-out recordings by this share.
 const LEAST: f64 = 0.02;
@@ -20,7 +20,7 @@ const MUCH: f64 = 0.05;
 const FEW: f64 = 0.25;
 /// Errors up to this many resolutions of the position sensor are the sensor's own.
 const NOISE: f64 = 1.4;
-/// Physics that are also tried two at a time: neither alone need show.
+/// Effects that are also tried two at a time: neither alone need show.
 const PAIRS: [[&str; 2]; 5] = [
     ["speed_limit", "acceleration_limit"],
     ["gravity", "load_friction"],
@@ -51,7 +51,7 @@ pub struct Tried {
     pub drops: Option<&'static str>,
     /// Better than without it?
     pub gain: Option<Gain>,
-    /// By which share it lowers the mean loss on unseen recordings.
+    /// By which share it lowers the mean loss on held-out recordings.
     pub lowers: f64,
     /// Whether it was taken up.
     pub taken: bool,
@@ -72,7 +72,7 @@ pub struct Found {
     pub folds: Vec<usize>,
 }
 
-/// How sure one physics is.
+/// Confidence in one effect.
 #[derive(Debug, Clone)]
 pub struct Claim {
     /// Its name.
@@ -115,8 +115,8 @@ fn begin<'a>(records: &[&'a Record], floor: f64, without: &'a [String]) -> (Sear
     (searcher, base, best)
 }
 
-/// Looks at each joint again from what the others have: joints of one arm often have the same servos. What a joint takes over it has to predict its own unseen
-/// recordings with.
+/// Examines each joint again with the effects of the others: joints of one arm often have the same servos. An effect that a joint takes over has to predict
+/// its own held-out recordings.
 pub fn search_all(joints: &[(Vec<&Record>, f64)], without: &[String]) -> Vec<Found> {
     let mut all: Vec<(Searcher, Candidate, Candidate)> =
         joints.par_iter().map(|(records, floor)| begin(records, *floor, without)).collect();
@@ -177,7 +177,7 @@ struct Searcher<'a> {
     size: Sizes,
     floor: f64,
     tried: Vec<Tried>,
-    /// Physics that are not considered.
+    /// Effects that are not considered.
     excluded: &'a [String],
 }
 
@@ -213,7 +213,7 @@ impl Searcher<'_> {
         for n in [Number::Offset, Number::Gain, Number::MomentCos, Number::MomentSin] {
             start[n] = best.fit.numbers[n];
         }
-        // Every physics that both have together, those it needs first.
+        // Every effect that both have together, those it needs first.
         let order = |name: &&str| ALL.iter().position(|p| p.name == *name);
         added.sort_by_key(order);
         let mut kept: Vec<&'static str> = Vec::new();
@@ -259,7 +259,8 @@ impl Searcher<'_> {
         !is_there && fulfilled && !is_early && !weightless && !self.excluded.iter().any(|name| name == physics.name)
     }
 
-    /// Whether one predicts unseen recordings better than another beyond chance: in most stretches, or by much in some recordings and by little worse in none.
+    /// Whether one predicts held-out recordings better than another beyond chance: in most segments, or by much in some recordings and by little worse in
+    /// none.
     fn is_better(&self, base: &Candidate, better: &Candidate) -> bool {
         let lowers = 1.0 - total(better) / total(base);
         // Below what the sensor resolves there is nothing to explain.
