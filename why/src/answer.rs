@@ -24,7 +24,7 @@ use serde::Serialize;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
-/// The loop is run again for so many steps of a bag at most: many runs have to fit into half a minute.
+/// The re-simulation covers at most this number of steps of a bag: many runs have to fit into half a minute.
 const MOST_STEPS: usize = 60_000;
 
 /// A bag of ours.
@@ -52,7 +52,7 @@ pub enum WhyError {
     /// A node cannot be run by itself.
     #[error(transparent)]
     Alone(#[from] AloneError),
-    /// The loop cannot be run again.
+    /// The loop cannot be re-simulated.
     #[error(transparent)]
     Loop(#[from] ResimulateError),
 }
@@ -90,7 +90,7 @@ pub struct Answer {
     pub master: Option<String>,
     /// The critical mu*lambda of the recorded loop; `None` where there is none within a factor of 20.
     pub edge: Option<f64>,
-    /// Why the loop was not run again, where it was not.
+    /// Why the loop was not re-simulated, where it was not.
     pub not_again: Option<String>,
     /// Events that nodes reported while it ran, kinds with their counts.
     pub events: Vec<(String, usize)>,
@@ -141,7 +141,7 @@ pub fn why(question: &Question, hear: &(dyn Fn(&str) + Sync), cancel: &AtomicBoo
         Err(ResimulateError::Cancelled) => return Err(ResimulateError::Cancelled.into()),
         Err(e) => answer.not_again = Some(e.to_string()),
     }
-    // What shakes and does not when it is run again has a difference that is small beside its signal.
+    // A loop that oscillates in the recording but not in its re-simulation has a difference that is small beside its signal.
     if answer.happening.is_trouble() && !answer.reproduced && answer.not_again.is_none() {
         closer(question, recorded, &mut answer, hear, cancel)?;
     }
@@ -149,7 +149,7 @@ pub fn why(question: &Question, hear: &(dyn Fn(&str) + Sync), cancel: &AtomicBoo
     let named = Named::of(&was.graph, graph, answer.master.is_none());
     answer.remedies.iter_mut().for_each(|remedy| remedy.options = options(&remedy.changes, &named));
     of_events(&mut answer, recorded);
-    // Nothing shakes in what was recorded, and the graph that it is a recording of is that of another loop.
+    // Nothing oscillates in the recording, and the graph that it is a recording of is that of another loop.
     if let (Happening::Nothing, Some(why)) = (answer.happening, models_apart(graph, session)) {
         answer.happening = Happening::NotJudged { why };
         answer.happens = answer.happening.to_string();

@@ -76,7 +76,7 @@ const FURTHER: f64 = 4.0;
 /// Weight of a thing without which the loop does as before.
 const NO_EVIDENCE: f64 = 0.05;
 
-/// A thing that takes along this share of the amplitude explains the shaking, though what is left of it goes on.
+/// A thing whose removal removes this share of the amplitude explains the oscillation, even if the rest of it goes on.
 const MOST_OF_IT: f64 = 0.5;
 
 /// Weight of the gain where something else explains the shaking.
@@ -159,7 +159,7 @@ fn unknown(asked: &Asked) -> Vec<(Cause, f64)> {
     all
 }
 
-/// Shares of the weights, with the gain itself as what is left where nothing else explains it.
+/// Shares of the weights, with the gain itself as the rest where nothing else explains it.
 fn weighed(asked: &Asked, mut judged: Vec<(Cause, f64)>) -> Vec<Cause> {
     if !asked.happening.is_trouble() {
         return Vec::new();

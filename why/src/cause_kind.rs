@@ -14,7 +14,7 @@ pub enum CauseKind {
     Loss,
     /// The hand grips otherwise than the canceller assumes.
     Grip,
-    /// The canceller takes out more at rest than the force puts in.
+    /// The canceller subtracts more at rest than the force puts in.
     OverCancelling,
     /// A mass that the canceller does not know.
     Inertia,
@@ -26,7 +26,7 @@ pub enum CauseKind {
     Backlash,
     /// Hysteresis that was left out.
     Hysteresis,
-    /// Other physics, or other numbers, than the canceller's model has.
+    /// Other effects, or other parameters, than the canceller's model has.
     OtherPhysics,
     /// A filter's lag.
     FilterLag,

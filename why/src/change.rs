@@ -70,7 +70,7 @@ pub enum Change {
     FinerSensors,
     /// The motor compensates dry friction between the master's bodies and ground, where it is known.
     FrictionCompensated {
-        /// Share of the friction that is made up for, 0 to 1.
+        /// Share of the friction that is compensated, 0 to 1.
         share: f64,
     },
     /// Damping at the handle, played by the motor.
@@ -243,7 +243,7 @@ fn masters(graph: &mut Graph) -> impl Iterator<Item = &mut Model> {
     })
 }
 
-/// Dry friction of a body against ground: what a motor can make up for.
+/// Dry friction of a body against ground: a motor can compensate it.
 pub(crate) fn is_friction_to_ground(element: &Element) -> bool {
     let is_friction = physics_named(element.law.kind().name).is_some_and(|physics| physics.family == Family::Friction);
     is_friction && element.between.contains(&None)

@@ -16,7 +16,7 @@ use std::time::Duration;
 /// Of what a diagnosis computes by default: a bag is to be answered within half a minute, and there is one record.
 const EFFORT: f64 = 0.2;
 
-/// Rows that are looked at, up to this time after the first touch, s: what shakes then shows all it can show within it.
+/// Rows that are evaluated, up to this time after the first touch, s: an oscillation is fully visible within it.
 const ROWS: usize = 10_000;
 const AFTER_TOUCH_S: f64 = 0.4;
 
@@ -27,7 +27,7 @@ pub struct DeviceFound {
     pub word: String,
     /// And its sentence.
     pub sentence: String,
-    /// Physics that the model leaves out, most important first.
+    /// Effects that the model leaves out, most important first.
     pub physics: Vec<PhysicsFound>,
     /// Parameters of the model that differ: path, value in the model, true value.
     pub numbers: Vec<NumberFound>,
@@ -47,7 +47,7 @@ pub struct PhysicsFound {
     pub family: Option<Family>,
     /// How sure it is that something of the kind acts there, 0 to 1.
     pub confidence: f64,
-    /// Its most telling number, with unit.
+    /// Its most informative parameter, with unit.
     pub size: Option<(String, f64, String)>,
     /// Whether it acts on the way of a signal.
     pub of_signal: bool,

@@ -20,7 +20,7 @@ pub struct Differences {
     pub notes: Vec<String>,
 }
 
-/// Outputs whose samples tell something, by node kind: port, quantity, and the input whose way carries it.
+/// Outputs whose samples have information, by node kind: port, quantity, and the input whose way carries it.
 const TOLD: &[(NodeKind, &str, Quantity, &str, bool)] = &[
     (NodeKind::Canceller, "motion", Quantity::Position, "measured", true),
     (NodeKind::Scaling, "command", Quantity::Position, "motion", true),
@@ -39,7 +39,7 @@ const TOLD: &[(NodeKind, &str, Quantity, &str, bool)] = &[
 pub struct Look {
     /// A difference below this share of a signal counts as none.
     pub small: f64,
-    /// How long a search for physics of the master may take on the clock.
+    /// How long a search for effects in the master may take on the clock.
     pub patience: Duration,
 }
 

@@ -17,7 +17,7 @@ use std::sync::atomic::AtomicBool;
 /// A lower gain is this share of the measured critical gain.
 const BELOW: f64 = 0.8;
 
-/// A delay is a suspect from so many rows on; less is the one step that every sampled loop has.
+/// A delay is a suspect from this number of rows on; less is the one step that every sampled loop has.
 const LEAST_LATE: usize = 3;
 
 /// Answers for a session that was read by a roles file: what happens, how late and how large each way is, and the critical gain of the measured loop.
@@ -93,7 +93,7 @@ fn happening_of(session: &Session, gain: Gain) -> Happening {
     }
 }
 
-/// What was not run again is not sure.
+/// A result without a re-simulation is not certain.
 const SURE: f64 = 0.7;
 
 /// The stability limit of the measured loop.

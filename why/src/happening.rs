@@ -112,7 +112,7 @@ impl Happening {
         }
     }
 
-    /// Of a loop that was run again.
+    /// Of a loop that was re-simulated.
     pub fn of_run(run: &Run) -> Happening {
         let hz = run.frequency_hz.unwrap_or(0.0);
         match Happening::of_outcome(run.outcome, &[]) {
@@ -121,7 +121,7 @@ impl Happening {
         }
     }
 
-    /// Whether something happens that nobody wants.
+    /// Whether something undesired happens.
     pub fn is_trouble(&self) -> bool {
         !matches!(self, Happening::Nothing | Happening::NotJudged { .. })
     }

@@ -1,5 +1,5 @@
-//! Whether one wrong number makes a master do what was recorded: a firmer or softer hand, more or less mass. Tried before any physics is, for
-//! one number that explains everything is the simplest answer.
+//! Whether one wrong parameter makes a master do what was recorded: a firmer or softer hand, more or less mass. Tried before any effect, because one
+//! parameter that explains everything is the simplest answer.
 
 use crate::device::{DeviceFound, NumberFound};
 use backdrive_nodes::graph::{DeviceFiles, Graph, Settings};

@@ -26,7 +26,7 @@ const BELOW: f64 = 0.8;
 /// Damping that is tried, N s/m, or as many thousandths of N m s/rad.
 const DAMPING: [f64; 5] = [2.0, 5.0, 10.0, 20.0, 50.0];
 
-/// Share of dry friction that a compensation makes up for: with more a friction that is less than it was taken for would be driven.
+/// Share of dry friction that a compensation covers: with more, a friction that is lower than assumed would be driven.
 const COMPENSATED: f64 = 0.8;
 
 /// Laws that are tried instead of scaling.
@@ -65,7 +65,7 @@ pub struct Remedy {
 }
 
 impl Remedy {
-    /// What is left of force and motion together, 0 to 1.
+    /// Remaining share of force and motion together, 0 to 1.
     pub fn kept(&self) -> f64 {
         self.force_kept * self.motion_kept
     }
@@ -293,7 +293,7 @@ fn holds(trial: &Trial, hand: &Hand, gain: Gain, cancel: &AtomicBool) -> Result<
     is_fine(trial, hand, gain, &trial.run(hand, gain, &RunOptions::default(), cancel)?, cancel)
 }
 
-/// Whether nothing shakes: a limit may act, where nothing would happen without it.
+/// Whether nothing oscillates: a limit may act, where nothing would happen without it.
 ///
 /// # Errors
 /// As a run.

@@ -1,4 +1,4 @@
-//! A loop that is run again: a graph, and what its sensors do besides.
+//! A loop that is re-simulated: a graph, and what its sensors do besides.
 
 use crate::faulty::{Distortion, Faulty};
 use backdrive_control::core::Core;
@@ -37,7 +37,7 @@ impl std::fmt::Debug for Trial {
 pub struct Hand {
     /// Per axis, one row per step of the bag; the graph's own operator where `None`.
     pub intents: Option<Vec<Intent>>,
-    /// Steps of the bag that are run again.
+    /// Steps of the bag that are re-simulated.
     pub steps: u64,
     /// The bag's rate, Hz.
     pub rate_hz: f64,
