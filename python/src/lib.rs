@@ -32,7 +32,7 @@ fn run(py: Python<'_>, arguments: Vec<String>, progress: Option<Py<PyAny>>) -> P
     let result = Mutex::new(result);
     let theirs = caller.clone();
     std::thread::Builder::new().name("backdrive".to_string()).spawn(move || {
-        // Nobody listens any more where the call was interrupted.
+        // There is no listener any more where the call was interrupted.
         let _ = done.send(call(&arguments, &theirs));
     })?;
     let gone = || PyRuntimeError::new_err("the work ended with a fault of backdrive's own; what it said of it stands on standard error");
