@@ -76,7 +76,7 @@ fn friction_that_was_left_out_is_told_in_text_and_page_and_from_bags_too() {
 #[test]
 fn what_nothing_explains_is_not_called_fine() {
     let place = Place::new();
-    // A torque on the elbow that nobody knows of: two slow waves that have nothing to do with the motion, in another phase in each log.
+    // An unknown torque on the elbow: two slow waves that are independent of the motion, in another phase in each log.
     set(&place.path(""), &AS_STATED, "", |columns| {
         let phase = 40.0 * columns[2][0];
         let time = columns[0].clone();

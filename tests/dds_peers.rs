@@ -270,7 +270,7 @@ fn contact(hosts: &Hosts, host: usize, folder: &Path, bag: &str, more: &[&str]) 
     run.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap()
 }
 
-/// How a run ended: its exit code, what it said, and its result.
+/// How a run ended: its exit code, its output, and its result.
 fn ended(run: Child) -> (Option<i32>, String, Value) {
     let output = run.wait_with_output().unwrap();
     let text = String::from_utf8_lossy(&output.stdout).into_owned();

@@ -27,7 +27,7 @@ struct Loop {
     duration_s: f64,
 }
 
-/// The pulse lasts so many steps.
+/// The pulse lasts this number of steps.
 const PULSE_STEPS: usize = 100;
 
 impl Loop {
@@ -184,8 +184,8 @@ fn relay(delay: u64) {
     assert_close("relay, amplitude", amplitude, known_amplitude, 0.03);
     assert_close("relay, frequency", frequency, known_frequency, 0.03);
 
-    // Hamel's condition in continuous time: a square wave of half-period h from sample to sample on average a step late, so that
-    // tau = (delay + 1) T; x(h) = -x(0), v(h) = -v(0), and the velocity is 0 at tau before each switch.
+    // Hamel's condition in continuous time: a square wave of half-period h, held from sample to sample, is on average a step late, so that tau =
+    // (delay + 1) T. Then x(h) = -x(0), v(h) = -v(0), and the velocity is 0 at tau before each switch.
     let tau = (delay + 1) as f64 * T;
     let switch_velocity = |half: f64| {
         let start = antiperiodic(&master, lambda * level, half);
@@ -329,8 +329,9 @@ fn backlash_in_the_slave_s_drive() {
     assert_close("backlash, amplitude", amplitude, known_amplitude, 0.03);
     assert_close("backlash, frequency", frequency, known_frequency, 0.03);
 
-    // The describing function of play (Gelb & Vander Velde 1968): the loop feeds in 4 K g (A - g) per cycle and the damper takes pi b w A^2, with g
-    // half the gap and K g' for the delay. The larger root is the stable cycle. Near, not within 3 %: the force of play is far from a sine.
+    // The describing function of play (Gelb & Vander Velde 1968): the loop feeds in 4 K g (A - g) per cycle and the damper takes pi b w A^2. Here g
+    // is half the gap, and K g' stands for the delay. The larger root is the stable cycle. Near, not within 3 %: the force of play is far from a
+    // sine.
     let k = lambda * wall * ratio;
     let g = 0.5 * gap + tip_friction / shaft;
     let omega = 2.0 * PI * known_frequency;

@@ -214,7 +214,7 @@ rows = [155, 1900]
     assert!(of("nrmse_after") < 0.2 * of("nrmse_refit"), "{verdict:#}");
     assert!(read(&place, "out/report.html").contains("at the motor: force against"));
 
-    // A bag that was cut off is used as far as it goes, and that is said.
+    // A bag that was cut off is used as far as it goes, and this is reported.
     let whole = std::fs::read(place.path("bags/sweep.mcap")).unwrap();
     std::fs::write(place.path("cut.mcap"), &whole[..whole.len() / 2]).unwrap();
     let done = place.backdrive(&["fit", "model.toml", "cut.mcap"]);

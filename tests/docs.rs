@@ -13,7 +13,7 @@ use system::{Place, file};
 /// Commands that a reader is to type, and what the page shows for them.
 struct Block {
     commands: String,
-    /// Lines that are said, in any order; `...` stands for anything.
+    /// Lines of the output, in any order; `...` stands for anything.
     says: Vec<String>,
     /// How the last command ends.
     code: i32,
@@ -210,7 +210,7 @@ fn every_command_of_the_guide_s_list_works_in_its_order_in_one_folder() {
     let codes = run_in_order(thirteen());
     assert!(codes.len() >= 7, "{codes:?}");
     let code = |begin: &str| codes.iter().find(|(command, _)| command.starts_with(begin)).unwrap_or_else(|| panic!("{begin}: {codes:?}")).1;
-    // The question why is about the run that shakes, not about an earlier one.
+    // The question why concerns the run that oscillates, not an earlier one.
     assert_eq!((code("backdrive run launch/contact.toml --lambda 6"), code("backdrive why shaking.mcap")), (1, 1));
     assert_eq!(code("backdrive run shaking.mcap --lambda 1"), 0);
 }

@@ -327,7 +327,7 @@ impl Truth {
 struct Dress {
     /// Added to the sensor's stamps only: another clock, ns.
     sensor_clock: i64,
-    /// The sensor sends every so many steps.
+    /// Number of steps between messages of the sensor.
     sensor_every: usize,
     /// Deviation of stamps, ns.
     jitter: i64,

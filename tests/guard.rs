@@ -139,7 +139,7 @@ fn a_stable_loop_is_left_alone() {
             assert!(done.trace.contact.iter().any(|f| *f < -0.05), "nothing was touched");
         }
     }
-    // Also with a dither, which itself shakes; above half of the critical gain the margin may be thin.
+    // Also with a dither, which itself makes the force oscillate; above half of the critical gain the margin may be thin.
     for case in [UNCANCELLED, LINEAR_LOOP, SIXTH, OVER] {
         for share in [0.3, 0.6] {
             let done = run(&case.graph(share, true));
@@ -159,7 +159,7 @@ fn a_loop_far_below_the_edge_of_a_good_canceller_is_left_alone() {
 
 #[test]
 fn beyond_the_edge_the_motion_is_bounded_and_ends_stable() {
-    // Bounds of the master's motion: without the guard it shakes by up to 1 mm (uncancelled) or leaves all bounds (over-cancelled).
+    // Bounds of the master's motion: without the guard it oscillates by up to 1 mm (uncancelled) or leaves all bounds (over-cancelled).
     for (case, bound) in [(UNCANCELLED, 0.007), (LINEAR_LOOP, 0.007), (OVER, 0.03), (OVER_LINEAR, 0.03)] {
         for share in [1.2, 2.0, 5.0] {
             let graph = case.graph(share, false);
@@ -177,7 +177,7 @@ fn beyond_the_edge_the_motion_is_bounded_and_ends_stable() {
             let is_over = case.grip == FIRM;
             assert!(!is_over || done.acts.iter().any(|(_, kind, _)| kind == "guard_runaway"), "{} at {share}: {acts:?}", case.what);
             assert!(share < 2.0 || !done.acts.is_empty(), "{} at {share}: it did nothing", case.what);
-            // It never gives back by itself.
+            // It never raises the gain by itself.
             assert!(done.acts.windows(2).all(|w| w[1].2 < w[0].2), "{acts:?}");
             assert!(done.acts.last().is_none_or(|(_, _, told)| (done.lambda / told - 1.0).abs() < 1e-3), "{} {acts:?}", done.lambda);
         }

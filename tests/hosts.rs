@@ -98,10 +98,10 @@ fn spawn(mut command: Command) -> Running {
     Running(command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap())
 }
 
-/// Standard output as JSON, the end, and what it said on standard error.
+/// Standard output as JSON, the end, and its standard error.
 fn end(mut child: Running, limit: Duration) -> (Value, Option<i32>, String) {
     let begun = Instant::now();
-    // Both at once: a pipe that nobody reads stops its writer.
+    // Both at once: a pipe without a reader stops its writer.
     fn all(mut from: impl Read + Send + 'static) -> std::thread::JoinHandle<String> {
         std::thread::spawn(move || {
             let mut text = String::new();

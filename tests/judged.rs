@@ -1,5 +1,5 @@
-//! How a loop is judged: one judgement by every verb; in free motion where the law reflects motion, at low rates, under a coarse sensor. What shakes
-//! is measured here by the handle's true motion and the force at the hand, which no verb looks at.
+//! How a loop is judged: one judgement by every verb; in free motion where the law reflects motion, at low rates, under a coarse sensor. The
+//! oscillation is measured here by the handle's true motion and the force at the hand, which no verb uses.
 
 mod system;
 

@@ -1,4 +1,4 @@
-//! A process of a running graph is killed: what the hand feels, what is left behind, and what the bag still holds.
+//! A process of a running graph is killed: what the hand feels, what remains, and what the bag still holds.
 
 mod system;
 
@@ -287,7 +287,7 @@ fn nodes_together_in_a_process_come_back_together() {
     place.assert_clean(&runs);
 }
 
-/// Nobody dies, but next to nothing comes through: staleness travels along the loop in lockstep too.
+/// No node dies, but next to nothing comes through: staleness travels along the loop in lockstep too.
 #[test]
 fn a_connection_that_fails_lets_the_force_go() {
     let place = Place::new();

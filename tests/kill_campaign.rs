@@ -142,7 +142,7 @@ fn strike(what: &Strike) -> Came {
     let endless = matches!(what.way, Way::Here | Way::Lockstep);
     let continues = what.whom == "supervisor" && what.signal == Signal::SIGSTOP;
     if struck && continues {
-        // Nobody watches: whoever stopped it continues it.
+        // There is no watcher: whoever stopped it continues it.
         std::thread::sleep(Duration::from_millis(700));
         let _ = nix::sys::signal::kill(Pid::from_raw(run.pid()), Signal::SIGCONT);
     }

@@ -46,7 +46,7 @@ fn graph_of(reader: &Reader) -> Graph {
 #[test]
 fn a_long_bag_is_judged_in_all_its_pieces_and_its_rows_are_those_of_the_worst() {
     let place = Place::new();
-    // 20000 steps. What shakes does so near the end only, and not in the first pieces.
+    // 20000 steps. The oscillation is near the end only, and not in the first pieces.
     let calm = record(&place, "calm.mcap", |_, _| {});
     let shaken = record(&place, "shaken.mcap", |topic, sample| {
         if topic == "/master/measured_js" && sample.step >= 12_000 {

@@ -89,7 +89,7 @@ fn a_full_standard_error_changes_no_answer() {
         }
         assert_eq!(closed.code(), open.code(), "{verb:?}");
     }
-    // A failure has its exit code where nobody can read its message.
+    // A failure has its exit code even where its message cannot be written.
     let wrong = ["bag".to_string(), "info".to_string(), "absent.mcap".to_string()];
     assert_eq!(program(&place, &wrong).stderr(full()).status().unwrap().code(), Some(3));
     assert_eq!(program(&place, &["no-verb".to_string()]).stderr(full()).status().unwrap().code(), Some(2));

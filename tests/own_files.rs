@@ -97,7 +97,7 @@ fn without_units_degrees_are_no_radians_and_milliseconds_no_seconds() {
     is_right(&place, &init(&place, &[&of[..], &["--position-unit", "deg"]].concat()));
     recorded(&place, "t,tau,q", 1000.0, 1.0);
     is_refused(&init(&place, &of), 2, &["nothing states the unit of t", "2.00 s apart", "--time-unit ms"]);
-    // What is assumed is said, and nothing is called fine.
+    // An assumption is reported, and nothing is called fine.
     recorded(&place, "t,tau,q", 1.0, 1.0);
     let done = init(&place, &of);
     is_right(&place, &done);

@@ -1,4 +1,4 @@
-//! `backdrive prove`: the seal, what the bags do not tell, and that the diagnosis does not need the truth.
+//! `backdrive prove`: the seal, what the bags do not contain, and that the diagnosis does not need the truth.
 
 #[path = "common/skipped.rs"]
 mod skipped;
@@ -55,7 +55,7 @@ fn a_sealed_effect_is_diagnosed_without_its_truth() {
     assert!([Some(0), Some(1)].contains(&ended.code), "{ended:?}");
     let case = place.path("proof/case-001");
 
-    // The digest was said first, and is the truth's.
+    // The digest was printed first, and is the truth's.
     let truth = std::fs::read(case.join("sealed/truth.json")).unwrap();
     let digest: String = Sha256::digest(&truth).iter().map(|byte| format!("{byte:02x}")).collect();
     assert!(ended.stdout.lines().next().unwrap().contains(&digest), "{}", ended.stdout);
@@ -110,7 +110,7 @@ fn a_sealed_effect_is_diagnosed_without_its_truth() {
     assert_ne!(of_none(false)["outcome"], "stable");
     assert!(case.join("live/none-below.mcap").is_file());
 
-    // Once more where nobody could look: the truth is gone, and the diagnosis does as before.
+    // Once more where no process could look: the truth is gone, and the diagnosis does as before.
     std::fs::rename(case.join("sealed"), place.path("elsewhere")).unwrap();
     let (session, out) = (case.join("session"), place.path("again"));
     let (session, out) = (session.display().to_string(), out.display().to_string());
@@ -139,7 +139,7 @@ fn what_cannot_be_proven_is_told_in_one_line() {
     assert_eq!(ended.code, Some(3), "{ended:?}");
     assert!(ended.stderr.contains("no-task.toml") && ended.stderr.contains("--contact"), "{}", ended.stderr);
     assert!(!place.path("third").exists());
-    // A pipe that nobody writes, and a device that never ends, are no files, whichever of them it is.
+    // A pipe without a writer, and a device that never ends, are no files, whichever of them it is.
     let pipe = place.path("pipe");
     assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
     for option in ["--model", "--grip", "--second-order", "--session", "--contact", "--regrip"] {

@@ -152,7 +152,7 @@ fn a_bag_without_excitation() {
     assert_eq!(found["methods"]["frequency"]["verdict"], "cannot_tell", "{found}");
     assert!(found["methods"]["frequency"]["critical_gain"].is_null());
     assert!(texts(&found, "advice").contains("--dither"), "{found}");
-    // The models are all there and do what was recorded: they are asked, and it is said that only they were.
+    // The models are all there and do what was recorded: they are used, and the output states that only they were.
     assert_eq!((code, found["from"].as_str()), (Some(0), Some("resimulation")));
     assert!(texts(&found, "warnings").contains("not measured"), "{}", found["warnings"]);
     // Without models that do what was recorded there is no evidence.

@@ -46,7 +46,7 @@ fn a_gain_beyond_the_edge_is_named_and_the_lower_one_stops_it() {
     let remedies = said["remedies"].as_array().unwrap();
     let gain = remedies.iter().find(|r| r["changes"][0]["change"] == "gain" && r["stops"] == true).unwrap();
     let lambda = gain["changes"][0]["lambda"].as_f64().unwrap();
-    // What is said to stop it does so by the commands beside it, as they stand. Where a clamp acts the run reports this, and is not called stable.
+    // A proposed remedy works by the commands beside it, as they stand. Where a clamp acts the run reports this, and is not called stable.
     let steps = said["next"].as_array().unwrap();
     let program = Path::new(env!("CARGO_BIN_EXE_backdrive")).parent().unwrap().display().to_string();
     let search = format!("{program}:{}", std::env::var("PATH").unwrap_or_default());

@@ -102,7 +102,7 @@ impl Bag {
         &mut self.metadata.iter_mut().find(|m| m.name == name).unwrap().metadata
     }
 
-    /// Takes out the record of its recorder.
+    /// Removes the record of its recorder.
     pub fn forget_completeness(&mut self) {
         self.metadata.retain(|m| m.name != "backdrive.completeness");
     }
@@ -151,7 +151,7 @@ impl Bag {
         });
     }
 
-    /// Topics of samples on which something is said.
+    /// Topics of samples with messages.
     pub fn samples(&self) -> Vec<String> {
         let mut topics: Vec<String> = Vec::new();
         for message in self.messages.iter().filter(|m| m.topic.ends_with("_js") || m.topic.ends_with("_jp") || m.topic.ends_with("_jf")) {
