@@ -13,7 +13,7 @@ use crate::rigid::regressor;
 use backdrive_diagnosis::verdict::BaseParameter;
 use nalgebra::{DMatrix, DVector};
 
-/// States that the regressor is looked at in.
+/// States at which the regressor is evaluated.
 const STATES: usize = 60;
 /// Share of a column that counts as nothing.
 const NOTHING: f64 = 1e-8;

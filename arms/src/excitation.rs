@@ -18,7 +18,7 @@ const HARMONICS: usize = 5;
 const PERIODS: [f64; 3] = [12.0, 8.0, 24.0];
 /// Series that are drawn.
 const DRAWN: usize = 60;
-/// Samples of a period at which they are looked at first.
+/// Samples of a period at which they are evaluated first.
 const LOOKED_AT: usize = 60;
 /// Rate of the file, Hz.
 pub const RATE: f64 = 100.0;

@@ -20,9 +20,9 @@ use backdrive_diagnosis::words as said;
 use backdrive_plant::robot::Payload;
 use nalgebra::Vector3;
 
-/// Motions that are looked at closely, those that show the inertial parameters best.
+/// Motions that are evaluated in detail, those that show the inertial parameters best.
 const CLOSELY: usize = 12;
-/// Rate at which they are looked at, Hz.
+/// Rate at which they are evaluated, Hz.
 const RATE: f64 = 50.0;
 /// Times that the motion is to be recorded; one of them is held out.
 pub const REPEATS: u32 = 3;
@@ -37,7 +37,7 @@ const ABOVE_LOGS: f64 = 1.5;
 /// What logs leave open.
 #[derive(Debug, Clone)]
 struct Question {
-    /// The terms of the answer that the rival does without, with their numbers.
+    /// The terms of the answer that the rival does without, with their parameters.
     terms: Vec<(Term, Vec<f64>)>,
     /// The rival.
     rival: Structure,

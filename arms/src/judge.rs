@@ -116,7 +116,7 @@ pub const AGAINST: f64 = 1.05;
 /// What the loop adds with and without a term that a search has added, as shares of the rms torque, by joint.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Judged {
-    /// Without it, all other numbers fitted again.
+    /// Without it, all other parameters refitted.
     pub without: Vec<f64>,
     /// With it.
     pub with: Vec<f64>,

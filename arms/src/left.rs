@@ -21,7 +21,7 @@ const SLOW: f64 = 2.0;
 const FOLLOWS: f64 = 0.4;
 /// Classes of a state, within each of which the mean is taken.
 const CLASSES: usize = 6;
-/// Poses in which the inertia is looked at.
+/// Poses in which the inertia is evaluated.
 const POSES: usize = 10;
 
 /// What remains at one joint.

@@ -62,7 +62,7 @@ pub struct Facts {
     pub family: Family,
     /// Whether its first number may not be below 0.
     pub positive: bool,
-    /// Numbers that it adds to a fit, those of its shape too.
+    /// Parameters that it adds to a fit, those of its shape too.
     pub numbers: usize,
 }
 

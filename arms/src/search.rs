@@ -345,7 +345,7 @@ fn exchange(data: &Data, pool: &[Term], best: &mut Fit, weights: &Weights) {
                 *best = offer;
                 changed = true;
             }
-            // One exchange a place and round: two that are as good as each other would take turns for ever.
+            // One exchange a place and round: two that are equally good would alternate for ever.
             index += 1;
             if index >= best.structure.terms.len() {
                 break;

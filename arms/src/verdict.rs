@@ -349,7 +349,7 @@ fn numbers(data: &Data, fit: &Fit, index: usize) -> BTreeMap<String, Parameter> 
     }
 }
 
-/// Numbers of the nominal model that moved beyond their interval: elements, armatures, base parameters stay in the arm's own part.
+/// Parameters of the nominal model that moved beyond their interval: elements, armatures, base parameters stay in the arm's own part.
 fn moved(data: &Data, search: &Search) -> BTreeMap<String, Moved> {
     let best = &search.best;
     let mut out = BTreeMap::new();

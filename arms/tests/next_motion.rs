@@ -111,7 +111,7 @@ fn a_payload_that_is_said_tells_torque_constants_from_masses() {
     assert_eq!((gain.physics.as_str(), &gain.place), ("gain", &Place::Signal("torque of all joints".to_string())));
     let Parameter::One(e) = &gain.parameters["gain"] else { panic!("{gain:?}") };
     assert!((e.value - 1.15).abs() < 0.02, "{gain:?}");
-    // With the payload passed over in silence masses and torque constants are one, and no file's numbers are right.
+    // If the payload is not stated, masses and torque constants have one common factor, and no file's parameters are right.
     std::fs::write(folder.path().join("set.toml"), "model = \"arm.toml\"\nfit = [\"d.csv\", \"e.csv\"]\nheld_out = [\"f.csv\"]\n").unwrap();
     let silent = diagnose(&Problem::open(&RecordingSet::open(folder.path()).unwrap(), None).unwrap(), &Settings::default()).unwrap();
     assert_ne!(silent.verdict.word, Word::NothingMissing);
