@@ -35,7 +35,7 @@ impl Ramp {
 /// A contact force below this RMS is none, N or N m.
 const LEAST_FORCE: f64 = 0.01;
 
-/// A ring-down below this RMS is not looked at, N or N m.
+/// A ring-down below this RMS is not evaluated, N or N m.
 const LEAST_RING: f64 = 0.004;
 
 /// A change of gains that the graph file asks for.

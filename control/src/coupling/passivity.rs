@@ -1,4 +1,4 @@
-//! Time-domain passivity: energy is observed at both ports, and what comes out is cut to what went in at the other.
+//! Time-domain passivity: energy is observed at both ports, and the output is limited to what went in at the other.
 //!
 //! Hannaford & Ryu, "Time-domain passivity control of haptic interfaces", IEEE Trans. Robotics and Automation 18, 2002; with a
 //! delay, Ryu, Artigas & Preusche, "A passive bilateral control scheme for a teleoperator with time-varying communication delay",

@@ -2,8 +2,8 @@
 
 use super::filter::Steep;
 
-/// Corners of the high-passes through which positions are looked at, Hz. The hand also moves by itself, which is not measured, and more at lower
-/// frequencies; a loop that runs away is slow as well.
+/// Corners of the high-passes that filter positions, Hz. The hand also moves by itself, which is not measured, and more at lower frequencies; a loop
+/// that runs away is slow as well.
 const BANDS_HZ: [f64; 2] = [8.0, 25.0];
 /// How the hand moves on its own accord, m/s^3 or rad/s^3: the jerk of a move of 4 mm in 0.15 s or of 10 cm in 0.5 s (Flash & Hogan 1985).
 const INTENT_JERK: f64 = 50.0;

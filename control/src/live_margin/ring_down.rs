@@ -29,7 +29,7 @@ pub struct RingDown {
 }
 
 impl RingDown {
-    /// What is below `least_force` RMS, N or N m, is not looked at.
+    /// A force below `least_force` RMS, N or N m, is not evaluated.
     pub fn new(least_force: f64, period_s: f64) -> RingDown {
         let window = ((RING_WINDOW_S / period_s).round() as u32).max(4);
         RingDown {

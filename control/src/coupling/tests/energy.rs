@@ -114,7 +114,7 @@ fn a_slave_with_energy_to_spare_is_where_it_shall_be() {
     assert!((come - motion[599]).abs() < 1e-9, "{come} of {}", motion[599]);
 }
 
-/// A hand (mass, damper, spring to a place that it wants) and a wall on both ends of a law; the energy of its motion after `steps`.
+/// A hand (mass, damper, spring to its intended place) and a wall on both ends of a law; the energy of its motion after `steps`.
 fn swings(settings: &position_position::Settings, delay: u64, steps: u64) -> (f64, f64) {
     let conditions = Conditions { period_s: PERIOD, round_trip_s: (2 * delay + 1) as f64 * PERIOD, held_steps: 1 };
     let mut near = position_position::NearSide::new(settings, &conditions);

@@ -1,4 +1,4 @@
-//! The laws held against what they promise: energy, closed forms, bounds.
+//! Tests of what the laws guarantee: energy, closed forms, bounds.
 
 mod energy;
 mod line;
