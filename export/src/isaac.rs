@@ -3,7 +3,7 @@
 //! `isaaclab.actuators.ActuatorBaseCfg` (<https://isaac-sim.github.io/IsaacLab/v2.3.2/source/api/lab/isaaclab.actuators.html>) gives, by joint and in rad:
 //! - `armature`, added to the inertia in joint space, kg m² or kg;
 //! - `friction` and `dynamic_friction`, dry friction at rest and in motion. From Isaac Sim 5.0 on they are efforts, N m or N (PhysX 5.6
-//!   `PxJointFrictionParams`); in 4.5 they were shares of the force that the joint passes on, so these numbers are wrong there;
+//!   `PxJointFrictionParams`); in 4.5 they were shares of the force that the joint transmits, so these values are wrong there;
 //! - `viscous_friction`, N m s/rad or N s/m. In USD itself (`physxJointAxis:angular:viscousFrictionCoefficient`) it is per degree: Isaac Lab converts;
 //! - `effort_limit_sim` and `velocity_limit_sim`, of the solver.
 //!
