@@ -32,7 +32,7 @@ pub struct Steady {
     pub dead_band: Option<Interval>,
 }
 
-/// Looks at every hold of the command; `lag` in samples.
+/// Evaluates every hold of the command; `lag` in samples.
 pub fn steady(recording: &Recording, joint: &Joint, u: &[f64], y: &[f64], lag: f64) -> Steady {
     let (range, period) = (span(u), recording.period);
     let least = ((LEAST_S / period).max(LEAST_LAGS * lag) as usize).max(8);
