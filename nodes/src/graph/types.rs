@@ -190,7 +190,7 @@ pub struct ObserverFiles {
     pub weights: Weights,
     /// How far m is kept above the least one, above 1.
     pub back_off: f64,
-    /// Amplitude of displacement at which elements that are not linear are looked at, m or rad.
+    /// Amplitude of displacement at which elements that are not linear are evaluated, m or rad.
     pub amplitude: f64,
     /// Order and corner (Hz, 0 for none) of the Butterworth filter.
     pub filter: (usize, f64),
