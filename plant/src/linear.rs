@@ -14,7 +14,7 @@ use std::f64::consts::TAU;
 /// Below this a force at a point has no lever on a joint, m or 1: rounding leaves that much.
 const NO_LEVER: f64 = 1e-9;
 
-/// The sine at which elements that are not linear are looked at.
+/// The sine at which elements that are not linear are evaluated.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Operating {
     /// Amplitude of the displacement across each such element, m or rad, above 0.
@@ -24,8 +24,8 @@ pub struct Operating {
     pub frequency_hz: f64,
     /// How dry friction enters.
     pub friction: Friction,
-    /// Displacement about which an element is looked at, by index, m or rad; 0 where none is given. A wall that is
-    /// 5 mm away is free space unless its displacement is put beyond 5 mm here.
+    /// Displacement about which an element is evaluated, by index, m or rad; 0 where none is given. A wall that is 5 mm away is free space unless its
+    /// displacement is put beyond 5 mm here.
     pub about: Vec<(usize, f64)>,
 }
 
@@ -41,7 +41,7 @@ impl Operating {
     }
 }
 
-/// Why a model cannot be looked at as a linear system.
+/// Why a model cannot be treated as a linear system.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum LinearError {
     /// Amplitude or frequency of the operating sine is not above 0.

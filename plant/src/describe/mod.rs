@@ -43,7 +43,7 @@ pub struct Description {
     pub responses: Vec<Response>,
     /// Why modes, poles and responses are missing, where they are.
     pub not_linear: Option<String>,
-    /// Amplitude at which hysteresis and the like were looked at, m or rad.
+    /// Amplitude at which hysteresis and the like were evaluated, m or rad.
     pub amplitude: f64,
     /// What is odd.
     pub remarks: Vec<Remark>,

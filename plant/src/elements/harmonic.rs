@@ -9,8 +9,8 @@ const STEPS: usize = 512;
 /// Most cycles before the one that is measured, for hysteresis to close its loop.
 const SETTLE: usize = 100;
 
-/// Dry friction: nothing where it is ignored, else the damping that takes as much energy per cycle, `4 c/(pi A w)` for Coulomb friction.
-/// It is looked at without load and with the memory of rest.
+/// Dry friction: nothing where it is ignored, else the damping that takes as much energy per cycle, `4 c/(pi A w)` for Coulomb friction. It is
+/// evaluated without load and with the memory of rest.
 pub fn of_friction(law: &impl FrictionLaw, at: &Sine) -> Linear {
     if at.friction == DryFriction::Ignored {
         return Linear::default();

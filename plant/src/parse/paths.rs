@@ -1,4 +1,4 @@
-//! Numbers of a model by their path: `bodies.drum`, `elements.cable.stiffness`, `inputs.feedback_force.delay`.
+//! Parameters of a model by their path: `bodies.drum`, `elements.cable.stiffness`, `inputs.feedback_force.delay`.
 
 use super::signals::delay_range;
 use crate::describe::unit_for;

@@ -8,7 +8,7 @@ use super::spatial::Twist;
 use super::tree::{Tree, Workspace};
 use nalgebra::DMatrix;
 
-/// Poses that an arm is looked at in, where a bound over all of them is wanted.
+/// Poses at which an arm is evaluated, where a bound over all of them is wanted.
 const POSES: usize = 24;
 /// How far a prismatic joint without limits is taken to move, m.
 const REACH: f64 = 1.0;

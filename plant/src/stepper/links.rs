@@ -31,7 +31,7 @@ pub(super) struct Links {
     gravity: Vec<f64>,
     mass: DMatrix<f64>,
     coriolis: DMatrix<f64>,
-    /// Coriolis forces and gravity by place, at the last instant that was looked at, N m or N.
+    /// Coriolis forces and gravity by place, at the last instant that was evaluated, N m or N.
     pub(super) bias: Slots,
     /// Energy in gravity there, less that at the pose, J.
     pub(super) potential: f64,

@@ -16,7 +16,7 @@ pub(super) struct Points {
     moved: usize,
     /// J, a row for each: m/rad or 1, by place of the joints.
     pub(super) rows: Vec<Slots>,
-    /// `J̇ v` at the instant that was looked at last, m/s².
+    /// `J̇ v` at the instant that was evaluated last, m/s².
     pub(super) drift: Vec<f64>,
 }
 
