@@ -116,8 +116,8 @@ fn at(network: &Network, between: [Place; 2]) -> impl Iterator<Item = (usize, &E
     network.elements.iter().enumerate().filter(move |(_, element)| matches(element))
 }
 
-/// Dry friction of a body against ground. It takes the place of Coulomb friction that the model states; beside another law it would be that law
-/// with other numbers.
+/// Dry friction of a body against ground. It takes the place of Coulomb friction that the model states; beside another law it would be that law with
+/// other parameters.
 fn friction(kind: &'static Kind, loaded: bool, body: usize, network: &Network) -> Option<Candidate> {
     let stated: Vec<&Element> =
         at(network, [Some(body), None]).map(|(_, element)| element).filter(|element| element.law.is_friction()).collect();
