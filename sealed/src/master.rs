@@ -1,4 +1,4 @@
-//! The hidden plant as the master of a graph: what goes in and comes out at a sample, and nothing else.
+//! The hidden plant as the master of a graph: its inputs and outputs at a sample, and nothing else.
 
 use crate::network::{InputKind, Network};
 use crate::plant::{PlantError, SealedPlant, StepError};

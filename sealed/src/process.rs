@@ -94,7 +94,7 @@ pub enum RemoteError {
     Pipe(#[from] io::Error),
 }
 
-/// The hidden plant of another process, as whoever drives it sees it.
+/// The hidden plant of another process, as its driver sees it.
 pub struct RemoteMaster {
     child: Child,
     /// `None` once the process has been asked to end.

@@ -22,7 +22,7 @@ pub struct Truth {
     pub seed: u64,
     /// What is hidden.
     pub effects: Vec<Effect>,
-    /// Numbers of the nominal model that are wrong, by path (`elements.cable.stiffness`): the true value over the nominal one.
+    /// Parameters of the nominal model that are wrong, by path (`elements.cable.stiffness`): the true value over the nominal one.
     pub numbers: BTreeMap<String, f64>,
     /// The hand that holds it, against the nominal grip.
     pub hand: Hand,
@@ -118,7 +118,7 @@ impl Truth {
         Ok(truth)
     }
 
-    /// The true device: the nominal one with true numbers, the true hand, true sensors' steps and what is hidden.
+    /// The true device: the nominal one with true parameters, the true hand, true sensors' steps and the hidden effects.
     ///
     /// # Errors
     ///

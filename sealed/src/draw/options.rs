@@ -7,8 +7,8 @@ pub struct DrawOptions {
     pub effects: usize,
     /// Whether only effects that no linear model can imitate are drawn.
     pub nonlinear_only: bool,
-    /// Per cent, 0 to 50, by which nominal numbers are wrong at most. With effects, those near one are wrong in the direction in
-    /// which a fit without it would have moved them; without effects, any of them in any direction.
+    /// Per cent, 0 to 50, by which nominal parameters are wrong at most. With effects, those near one are wrong in the direction in which a fit
+    /// without it would have moved them; without effects, any of them in any direction.
     pub masked_percent: f64,
     /// Per cent, 0 to 50, by which the grip's stiffness and damping differ from the nominal ones at most.
     pub grip_percent: f64,

@@ -1,4 +1,4 @@
-//! The numbers of a drawn effect.
+//! The parameters of a drawn effect.
 
 use super::candidates::{Candidate, What};
 use super::options::DrawOptions;

@@ -18,7 +18,7 @@ use serde::{Deserialize, Serialize};
 /// A hidden effect.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Effect {
-    /// What it is, with its true numbers.
+    /// What it is, with its true parameters.
     #[serde(flatten)]
     pub physics: Physics,
     /// Where it sits, as `between` or `signal`. `between` runs as in the joint that it sits in.
@@ -48,7 +48,7 @@ impl Effect {
     ///
     /// # Errors
     ///
-    /// [`EffectError`] where the device has no such place or the effect's numbers are out of range. The device is then half changed.
+    /// [`EffectError`] where the device has no such place or the effect's parameters are out of range. The device is then half changed.
     pub fn apply(&self, network: &mut Network, number: usize) -> Result<(), EffectError> {
         let effect = self.physics.name();
         if let Some((key, value, expected)) = self.physics.unsound() {

@@ -4,7 +4,7 @@ use crate::laws::Law;
 use crate::network::allowed::Allowed::{NotNegative, Positive};
 use serde::{Deserialize, Serialize};
 
-/// A hidden effect. In a truth file it is `physics`, its name, and `parameters`, its true numbers.
+/// A hidden effect. In a truth file it is `physics`, its name, and `parameters`, its true values.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "physics", content = "parameters", rename_all = "snake_case")]
 pub enum Physics {

@@ -115,7 +115,7 @@ impl Described for BristleField {
     }
 }
 
-/// A [`BristleField`] with every bristle's numbers at hand.
+/// A [`BristleField`] with the parameters of every bristle computed.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LaidField {
     bristles: MaxwellSlip,

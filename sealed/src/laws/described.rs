@@ -37,7 +37,7 @@ pub(crate) trait Described: Sized {
     const READ: Read<Self>;
     /// Where it is drawn as a hidden effect; empty where it is not.
     const DRAWS: &'static [Draw];
-    /// Keys of the numbers that a nominal model may have wrong.
+    /// Keys of the parameters that a nominal model may have wrong.
     const NUMBER_KEYS: &'static [&'static str] = &[];
 
     /// Its equations, ready to step.

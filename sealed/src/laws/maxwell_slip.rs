@@ -1,4 +1,4 @@
-//! Parallel spring-sliders, each with its own numbers.
+//! Parallel spring-sliders, each with its own parameters.
 
 use super::described::{Checked, Described, Facts, Read};
 use super::draw::{Draw, Here};

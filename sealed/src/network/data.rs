@@ -140,7 +140,7 @@ pub struct Axis {
     pub name: String,
     /// The body that a grip attaches to.
     pub user: usize,
-    /// Whether the hand is in the device's own numbers, so that no grip attaches.
+    /// Whether the hand is in the device's own parameters, so that no grip attaches.
     pub holds_user: bool,
     /// Index of the input that moves the hand that holds it, once one does.
     pub hand: Option<usize>,
