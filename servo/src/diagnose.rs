@@ -113,7 +113,7 @@ pub fn diagnose(problem: &Problem, without: &[String]) -> Result<Found, ServoErr
     Ok(Found { verdict, model, answers, notes: problem.notes.clone() })
 }
 
-/// Numbers of a fit as a file has them: seven digits.
+/// Parameters of a fit as a file has them: seven digits.
 fn rounded(candidate: &Candidate) -> Numbers {
     let mut numbers = candidate.fit.numbers;
     for n in &candidate.fit.free {

@@ -30,7 +30,7 @@ const LEFT_OUT: usize = 1;
 /// Stretches that a record is cut into, for comparisons.
 pub const BLOCKS: usize = 4;
 
-/// Numbers that fit.
+/// Fitted parameters.
 #[derive(Debug, Clone)]
 pub struct Fit {
     /// Which are free.
@@ -134,7 +134,7 @@ impl<'a> Problem<'a> {
         Fit { free: free.to_vec(), numbers, cost }
     }
 
-    /// Numbers of fits without each fold: one step from the fit to all with the derivatives there, halved until it is none for the worse.
+    /// Parameters of fits without each fold: one step from the fit to all with the derivatives there, halved until it is none for the worse.
     pub fn leave_out(&self, fit: &Fit) -> Vec<Numbers> {
         let residuals = self.residuals(&fit.numbers, None);
         let parts = self.parts(&fit.free, &fit.numbers, &residuals, None);

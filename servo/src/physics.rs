@@ -9,7 +9,7 @@ pub struct Physics {
     pub name: &'static str,
     /// In words.
     pub words: &'static str,
-    /// The numbers that it frees, its size first.
+    /// The parameters that it frees, its size first.
     pub numbers: &'static [Number],
     /// Another effect that it needs.
     pub needs: &'static [&'static str],

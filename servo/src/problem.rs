@@ -1,4 +1,4 @@
-//! A set of commands and positions with the model that they are held against.
+//! A set of commands and positions with the model that they are compared with.
 
 use crate::error::ServoError;
 use crate::gravity;

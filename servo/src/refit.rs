@@ -33,11 +33,11 @@ pub struct Refitted {
 pub struct Fitted {
     /// Each joint that the model has a servo of and that moves.
     pub joints: Vec<Refitted>,
-    /// The model with their numbers.
+    /// The model with their parameters.
     pub model: Model,
 }
 
-/// Fits the numbers that a model states, all but those at which nothing happens.
+/// Fits the parameters that a model states, all but those at values without effect.
 ///
 /// # Errors
 /// Where a command is none, or no joint of the model was recorded.

@@ -205,7 +205,7 @@ impl Searcher<'_> {
         best
     }
 
-    /// The structure and the numbers of another joint, where they predict this one better; what is particular to a joint stays its own.
+    /// The structure and the parameters of another joint, where they predict this one better; what is particular to a joint stays its own.
     fn adopted(&mut self, best: &Candidate, other: &Candidate) -> Candidate {
         let mut added = best.added.clone();
         added.extend(other.added.iter().filter(|name| !best.added.contains(name)));
@@ -429,7 +429,7 @@ pub(crate) fn candidate_of(problem: &Problem, added: Vec<&'static str>, free: &[
     Candidate { added, fit, folds, unseen }
 }
 
-/// The numbers that a first look at a move fits: its own, and those that most often give way to it.
+/// The parameters that a first evaluation of a move fits: its own, and those that most often change with it.
 fn screened(change: &Move) -> Vec<Number> {
     let own = change.adds.iter().flat_map(|p| p.numbers.iter().copied());
     let all: BTreeSet<Number> = own.chain([Number::Damping, Number::Offset, Number::Inertia]).collect();
@@ -441,7 +441,7 @@ pub fn total(candidate: &Candidate) -> f64 {
     candidate.unseen.iter().flatten().sum::<f64>() / (candidate.unseen.len() * BLOCKS).max(1) as f64
 }
 
-/// The numbers that a structure frees.
+/// The parameters that a structure frees.
 pub fn free_of(added: &[&str]) -> Vec<Number> {
     let all: BTreeSet<Number> =
         BASE.iter().copied().chain(added.iter().filter_map(|n| named(n)).flat_map(|p| p.numbers.iter().copied())).collect();
