@@ -11,7 +11,7 @@ use backdrive_nodes::graph::{DeviceFiles, Graph, NodeKind, Settings};
 /// What a topic carries.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Signal {
-    /// x_u, what the hand wants.
+    /// x_u, the hand's intended motion.
     Intent,
     /// x_m and F_f: the master's measured position, and the force applied to it.
     Master,
@@ -273,7 +273,7 @@ impl Collector {
     /// Which rows lack a fresh sample of a signal of the loop.
     fn gaps(&self, columns: &Columns) -> Gaps {
         let heard = |signal: Signal| self.topics.iter().any(|(_, s)| *s == signal);
-        // What an operator that pushes by a force wants is no position.
+        // The intent of an operator that pushes by a force is no position.
         let silent = |column: &Vec<f64>| !column.is_empty() && column.iter().all(|x| x.is_nan());
         let intent = (heard(Signal::Intent) && !silent(&columns.intent)).then_some(&columns.intent);
         let command = (!columns.command.is_empty()).then_some(&columns.command);

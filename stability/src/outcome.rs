@@ -15,7 +15,7 @@ pub enum Unit {
     /// rad: the axis turns.
     #[serde(rename = "rad")]
     Radian,
-    /// m or rad: whoever recorded it does not say.
+    /// m or rad: the recording does not state which.
     #[serde(rename = "m or rad")]
     Unknown,
 }

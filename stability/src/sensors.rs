@@ -1,6 +1,6 @@
 //! Signals that say nothing: dead, at their rail, clipped, or not moving with the sensor that measures the same.
 //!
-//! Nothing here knows a model, so it serves for any recording, and for columns that were not requested. What it goes by:
+//! Nothing here knows a model, so it serves for any recording, and for columns that were not requested. Its criteria:
 //!
 //! | fault | rule | reason |
 //! |---|---|---|

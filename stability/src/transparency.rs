@@ -27,7 +27,7 @@ pub struct Transparency {
     pub position_contact_rms: Option<f64>,
     /// RMS of F_f - d - lambda F_s in contact, N.
     pub force_contact_rms: Option<f64>,
-    /// RMS of lambda F_s in contact, N: what the former is to be held against.
+    /// RMS of lambda F_s in contact, N: the reference of the former.
     pub reflected_rms: Option<f64>,
     /// rms(x_mf) / rms(x_mu) in contact: what the reflected force does to the master over what the hand does, by the master's model.
     pub induced_ratio: Option<f64>,
@@ -65,7 +65,7 @@ pub struct Impedance {
 pub struct Cancellation {
     /// Time of the first contact, s.
     pub contact_s: f64,
-    /// Time from there that was looked at, s.
+    /// Time from there that was evaluated, s.
     pub window_s: f64,
     /// 1 - rms(x_mf - x^_mf) / rms(x_mf): 1 is perfect, 0 as good as none, below 0 worse.
     pub quality: f64,

@@ -21,11 +21,11 @@ pub struct Against {
     pub contradictions: Vec<String>,
     /// Devices beside their models, where the rows in contact do not decide.
     pub parts: Vec<PartCheck>,
-    /// What was recorded and not looked at, and why.
+    /// What was recorded and not examined, and why.
     pub notes: Vec<String>,
 }
 
-/// Steps that are looked at at once: memory for every sample of them is needed.
+/// Steps that are examined at once: memory for every sample of them is needed.
 const WINDOW: u64 = 40_000;
 
 /// Outputs that follow from inputs, by kind of node: port, quantity, whether each value is one that was given.
@@ -87,7 +87,7 @@ pub fn against(reader: &Reader, graph: &Graph) -> Result<Against, BagError> {
     Ok(found)
 }
 
-/// The outputs of a node that are looked at.
+/// The outputs of a node that are examined.
 fn told(graph: &Graph, index: usize) -> Vec<Told> {
     let Some(node) = graph.nodes.get(index).filter(|node| is_ours(node)) else { return Vec::new() };
     let computed = COMPUTED.iter().filter(|told| told.0 == node.kind).map(|(_, port, quantity, exact)| (*port, *quantity, *exact, None));
@@ -128,10 +128,10 @@ fn look_at(reader: &Reader, graph: &Graph, nodes: &[usize], recorded_gains: bool
     Ok(found)
 }
 
-/// An output that is looked at: port, quantity, whether each value is one that was given, and the part where it is a device.
+/// An output that is examined: port, quantity, whether each value is one that was given, and the part where it is a device.
 type Told = (&'static str, Quantity, bool, Option<&'static str>);
 
-/// A node that is looked at in a window.
+/// A node that is examined in a window.
 struct Look<'a> {
     graph: &'a Graph,
     index: usize,

@@ -1,4 +1,4 @@
-//! Which law it is: all of them fitted, held against time that they have not seen.
+//! Which law it is: all of them fitted, and compared on held-out time.
 
 use super::fit::{Fit, Ready, mean_square};
 use super::law::Term;
@@ -118,7 +118,7 @@ fn attempt(side: &Side, ready: &Ready, rough: Fit) -> Option<Tried> {
     total.is_finite().then_some(Tried { fit, unseen, total, stands_out })
 }
 
-/// Whether a law predicts worse than another: by block, in pairs, surely and by what is worth a word; or by far in all.
+/// Whether a law predicts worse than another: by block, in pairs, surely and by a relevant amount; or by far in all.
 fn worse(law: &Tried, best: &Tried, exact: f64) -> bool {
     if law.total <= exact {
         return false;

@@ -22,7 +22,7 @@ pub(super) struct Shape {
     pub(super) force_delay_s: f64,
 }
 
-/// The numbers of a shape, as a fit moves them.
+/// The parameters of a shape, as a fit moves them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Number {
     Filter,
@@ -49,7 +49,7 @@ pub(super) struct Fit {
     pub(super) loss: f64,
 }
 
-/// What a side's terms look at, in the band; all but friction may be filtered before they are shaped.
+/// The inputs of a side's terms, in the band; all but friction may be filtered before they are shaped.
 pub(super) struct Ready<'a> {
     side: &'a Side,
     pub(super) force: Vec<f64>,
@@ -265,7 +265,7 @@ impl<'a> Ready<'a> {
         }
     }
 
-    /// The numbers of a fit with their intervals.
+    /// The parameters of a fit with their intervals.
     pub(super) fn told(&self, fit: &Fit) -> Told {
         let moved: Vec<Number> = numbers(&fit.terms).into_iter().filter(|n| !self.at_an_end(fit.shape, *n)).collect();
         let columns = self.columns(&fit.terms, fit.shape);
@@ -323,7 +323,7 @@ impl<'a> Ready<'a> {
     }
 }
 
-/// The numbers of a fit with their intervals.
+/// The parameters of a fit with their intervals.
 pub(super) struct Told {
     pub(super) gains: Vec<Gain>,
     pub(super) offset: Estimate,
@@ -332,7 +332,7 @@ pub(super) struct Told {
     pub(super) force_delay_s: Option<Estimate>,
 }
 
-/// Which numbers of the shape a law depends on.
+/// Which parameters of the shape a law depends on.
 fn numbers(terms: &[Term]) -> Vec<Number> {
     let mut numbers = Vec::new();
     if terms.iter().any(|t| t.is_speed()) {

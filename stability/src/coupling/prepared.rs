@@ -8,7 +8,7 @@ use std::ops::Range;
 
 /// Blocks of time over which residuals count as independent, and by which held-out time is drawn.
 pub(super) const BLOCKS: usize = 20;
-/// More rows than this are not looked at: the piece with the most force is.
+/// More rows than this are not used: the piece with the most force is.
 const MOST_ROWS: usize = 60_000;
 /// A shorter recording holds no motion to fit, s.
 const LEAST_S: f64 = 1.0;
@@ -96,7 +96,7 @@ impl Side {
         Ok(Side { period_s, force, own, other, own_force, other_force, blocks, kept, limit, band_hz, resolution, low_pass })
     }
 
-    /// Whether what a term looks at was recorded.
+    /// Whether the input of a term was recorded.
     pub(super) fn has(&self, term: Term) -> bool {
         match term {
             Term::OwnForce => self.own_force.as_ref().is_some_and(|f| spread(f) > 0.0),
@@ -117,7 +117,7 @@ impl Side {
     }
 }
 
-/// The rows that are looked at: all, or of a long recording the piece with the most force.
+/// The rows that are used: all, or of a long recording the piece with the most force.
 fn most_force(force: &[f64]) -> Range<usize> {
     if force.len() <= MOST_ROWS {
         return 0..force.len();
@@ -164,7 +164,7 @@ fn band(force: &[f64], own: &[f64], other: &[f64], forces: [Option<&[f64]>; 2], 
     let Some(spectra) = welch(&columns, std::slice::from_ref(&whole), segment, period_s, half) else { return half };
     let best = |line: usize| (1..columns.len()).map(|c| spectra.coherence(line, 0, c)).fold(0.0, f64::max);
     let all: Vec<f64> = (0..spectra.hz.len()).map(best).collect();
-    // A single line may lie in a notch: a tenth of the frequency to either side is looked at together.
+    // A single line may lie in a notch: a tenth of the frequency to either side is evaluated together.
     let smooth = |line: usize| {
         let wide = (line / 10).max(1);
         let piece = all.get(line.saturating_sub(wide)..(line + wide + 1).min(all.len())).unwrap_or_default();

@@ -1,4 +1,4 @@
-//! What is looked at, and what is found.
+//! What is searched, and what is found.
 
 use super::law::{Law, Term};
 use crate::session::Session;
@@ -108,11 +108,11 @@ pub struct SideLaw {
     pub gains: Vec<Gain>,
     /// Added, N or N m.
     pub offset: Estimate,
-    /// Time constant of the filter of speeds, s; `None` where the law looks at no speed.
+    /// Time constant of the filter of speeds, s; `None` where the law uses no speed.
     pub filter_s: Option<Estimate>,
-    /// Delay of the motion that it looks at, s; `None` where it looks at no motion.
+    /// Delay of the motion in the law, s; `None` where it uses no motion.
     pub delay_s: Option<Estimate>,
-    /// Delay of the measured force that it looks at, s; `None` where it looks at none.
+    /// Delay of the measured force in the law, s; `None` where it uses none.
     pub force_delay_s: Option<Estimate>,
     /// Largest force, N or N m; `None` where no clamp acted.
     pub limit: Option<f64>,
@@ -139,9 +139,9 @@ pub enum Kind {
     ForceReflection,
     /// Both motors act on positions and on measured forces.
     FourChannel,
-    /// One of the motors looks at nothing of the other side.
+    /// One of the motors uses nothing of the other side.
     OneWay,
-    /// Neither looks at the other side.
+    /// Neither uses the other side.
     Uncoupled,
     /// Another combination.
     Other,

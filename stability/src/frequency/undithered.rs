@@ -1,7 +1,7 @@
 //! The loop without a dither: only the operator shook it.
 //!
-//! `x_m = G_u x_u + G_f F_f`, and in contact `F_f` follows `x_m`. Where the intent is all that acts, intent and force are fully coherent, and what
-//! comes out for `G_f` is `1/(lambda H_se)` or nothing. Free motion breaks that: there the force is 0 and `G_u` is identified alone. So both are
+//! `x_m = G_u x_u + G_f F_f`, and in contact `F_f` follows `x_m`. Where the intent is all that acts, intent and force are fully coherent, and the
+//! estimate of `G_f` is `1/(lambda H_se)` or nothing. Free motion breaks that: there the force is 0 and `G_u` is identified alone. So both are
 //! needed, broad-band, and the intent must be recorded.
 
 use super::AxisEstimate;

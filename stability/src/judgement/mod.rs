@@ -1,4 +1,4 @@
-//! One judgement of a run, for live runs, replays, predictions, bags and other people's recordings alike: [`judge`]. What it goes by:
+//! One judgement of a run, for live runs, replays, predictions, bags and other people's recordings alike: [`judge`]. Its criteria:
 //!
 //! | fact | threshold |
 //! |---|---|

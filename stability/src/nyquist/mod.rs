@@ -6,7 +6,7 @@
 //! Desoer and Y.-T. Wang, IEEE Trans. Automatic Control 25 (1980) 187-196). Our sign: a force comes back with its sign, so +1 stands where textbooks have
 //! -1.
 //!
-//! Where an axis is looked at alone, the others open, its loop is the element on the diagonal. **Even if each of these is stable, all of them closed may
+//! Where an axis is analysed alone, the others open, its loop is the element on the diagonal. **Even if each of these is stable, all of them closed may
 //! not be**: the path from one axis to another and back is in none of them. `tests` has a loop whose axes are stable to eight times the gain at which
 //! they are not together.
 //!
@@ -74,7 +74,7 @@ impl CoupledLoops {
         !self.loci.is_empty() && self.loci.iter().flatten().all(|[re, im]| re.hypot(*im) < NOTHING)
     }
 
-    /// Whether the axes looked at one by one would allow gains at which all together are not stable.
+    /// Whether the axes analysed one by one would allow gains at which all together are not stable.
     pub fn alone_misleads(&self) -> bool {
         self.together.critical_gain.is_some_and(|gain| self.lowest_alone() > MISLEADING * gain)
     }

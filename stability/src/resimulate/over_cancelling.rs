@@ -13,7 +13,7 @@ use backdrive_nodes::graph::{DeviceFiles, NodeKind, Settings};
 use backdrive_plant::linear::{LinearError, LinearModel, Operating};
 use std::sync::atomic::AtomicBool;
 
-/// Amplitude at which "large" is looked at, as a share of the travel: hysteresis and presliding show their soft side.
+/// Amplitude at which "large" is evaluated, as a share of the travel: hysteresis and presliding show their soft side.
 const LARGE_SHARE: f64 = 0.01;
 /// The same where a device has no travel, m or rad.
 const LARGE: f64 = 1e-3;

@@ -27,9 +27,9 @@ const STILL_S: f64 = 0.45;
 const BLEND_S: f64 = 0.02;
 /// Corrections at most; they stop earlier where the error falls no more.
 const PASSES: usize = 20;
-/// The model's response to the hand is looked at with this amplitude across what is not linear, as a share of the range of x_m.
+/// The model's response to the hand is evaluated with this amplitude across what is not linear, as a share of the range of x_m.
 const LOOK_SHARE: f64 = 0.05;
-/// Amplitude at which the grip's compliance is looked at, m or rad.
+/// Amplitude at which the grip's compliance is evaluated, m or rad.
 const LOOK_AT: f64 = 1e-3;
 /// A record that lacks more of x_m or F_f than this share cannot be followed.
 const MOST_MISSING: f64 = 0.1;

@@ -14,7 +14,7 @@ use backdrive_nodes::sequence::Sequence;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Steps between looks at whether to end early.
+/// Steps between checks whether to end early.
 const CHUNK: u64 = 256;
 
 /// Makes the cores of a node that is a user's own program, new for each run; the number scales the grip's forces. `None`: the node of the graph is

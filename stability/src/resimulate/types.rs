@@ -60,7 +60,7 @@ pub enum ResimulateError {
     /// The nodes cannot be joined.
     #[error(transparent)]
     Sequence(#[from] SequenceError),
-    /// The master cannot be looked at as a linear system.
+    /// The master cannot be treated as a linear system.
     #[error("{what}: {error}")]
     Linear {
         /// Which device.

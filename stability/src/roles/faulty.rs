@@ -1,4 +1,4 @@
-//! Which signals of a recording are looked at for faults, and what they are called.
+//! Which signals of a recording are checked for faults, and what they are called.
 
 use super::file::{Located, Roles, key_of};
 use super::table::Named;

@@ -21,7 +21,7 @@ pub struct Roles {
     pub rate_hz: Option<f64>,
     /// Column with the times of a table, s.
     pub time: String,
-    /// Further sensors by name, to be looked at for faults.
+    /// Further sensors by name, to be checked for faults.
     pub(super) sensors: Vec<Sensor>,
     /// The roles file, for messages.
     pub(super) file: String,

@@ -95,7 +95,7 @@ mod tests {
         assert_eq!(axis.command, axis.master);
         let told: Vec<&str> = session.sensors.iter().map(|s| s.signal.as_str()).collect();
         assert_eq!(told, ["second (gauge)"], "a column of words keeps the others from being read: {told:?}");
-        // Without it every column is looked at.
+        // Without it every column is read.
         let text = std::fs::read_to_string(&path).unwrap().replace(",words", "").replace(",on\n", "\n");
         std::fs::write(&path, text).unwrap();
         let session = Session::from_roles(&path, &roles).unwrap();

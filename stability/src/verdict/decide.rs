@@ -1,4 +1,4 @@
-//! Which method leads, and what the headline is before it is held against everything else that is known.
+//! Which method leads, and the headline before it is compared with everything else that is known.
 
 use super::question::{Question, Swapped};
 use super::recorded::recorded_outcome;
