@@ -11,7 +11,7 @@ use nalgebra::{DMatrix, DVector};
 
 /// Bar on the error in the record with the pulses, mm.
 const BAR: f64 = 3.5;
-/// Numbers that the refit may move, where a model has them.
+/// Parameters that the refit may move, where a model has them.
 const NUMBERS: [&str; 11] = [
     "bodies.carriage",
     "elements.viscous.damping",

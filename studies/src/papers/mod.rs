@@ -33,7 +33,7 @@ pub(super) struct Step {
     pub paper: &'static str,
     /// Names of effects that are this one, or that this one is a case of.
     pub accept: &'static [&'static str],
-    /// The place, and others at which it is the same device for whoever drives and measures this one.
+    /// The place, and others at which it is the same device for its driver and its measurements.
     pub places: &'static [[&'static str; 2]],
 }
 

@@ -17,7 +17,7 @@ pub(super) struct Environment {
 
 /// Places that are tried, from the lowest to the highest position of the slave.
 const PLACES: usize = 200;
-/// Every so manieth row is looked at.
+/// One in this number of rows is used.
 const EVERY: usize = 10;
 
 impl Environment {

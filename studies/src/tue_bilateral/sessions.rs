@@ -144,7 +144,7 @@ fn half_width(values: &[f64]) -> Option<f64> {
     (values.len() > 1).then(|| t * deviation / n.sqrt())
 }
 
-/// The laws of master and slave of a record, as the other records of the same gains have them: means of their numbers.
+/// The laws of master and slave of a record, as the other records of the same gains have them: means of their parameters.
 pub(super) fn laws_without(judged: &[Judged], name: &str) -> Option<[Law; 2]> {
     let group = name.get(..1)?;
     let others: Vec<&Coupling> = judged.iter().filter(|j| j.name.starts_with(group) && j.name != name).map(|j| &j.coupling).collect();
