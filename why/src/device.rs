@@ -131,7 +131,7 @@ pub fn diagnose_master(graph: &Graph, recorded: &Recorded, patience: Duration, s
         real_sensors: *real_sensors,
         grip_changes: Vec::new(),
     };
-    // First with the numbers as the graph has them: one effect that explains everything beside them is the simplest answer. Then with other numbers.
+    // First with the graph's parameters: one effect that explains everything beside them is the simplest answer. Then with other parameters.
     let fixed = Problem { stated: Vec::new(), ..problem.clone() };
     let mut best: Option<Explained> = None;
     for problem in [&fixed, &problem] {

@@ -16,7 +16,7 @@ use std::time::Duration;
 pub struct Differences {
     /// Where something differs.
     pub found: Vec<Difference>,
-    /// What could not be looked at, and why.
+    /// What could not be examined, and why.
     pub notes: Vec<String>,
 }
 
@@ -106,7 +106,7 @@ fn late(compared: &Compared) -> bool {
 /// A port of [`TOLD`].
 type Port = (NodeKind, &'static str, Quantity, &'static str, bool);
 
-/// Compares the outputs of one node. Where a way to it turns out to be late the node is looked at again with it so, so that one delay is not
+/// Compares the outputs of one node. Where a way to it turns out to be late the node is examined again with this delay, so that one delay is not
 /// taken for several things.
 fn of_node(
     graph: &Graph,

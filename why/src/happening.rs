@@ -15,7 +15,7 @@ const LOWEST_HZ: f64 = 8.0;
 /// What rings on for more periods than this before it has fallen to a third is ringing.
 const RINGS: f64 = 3.0;
 
-/// After a touch it is looked at for so long, s.
+/// Time after a touch that is evaluated, s.
 const AFTER_TOUCH_S: f64 = 0.5;
 
 /// Ringing below this is not felt, m or rad.
